@@ -17,7 +17,7 @@ import pytest
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import live_api
 
-from buildarena_api.http import limits
+from buildarena_api.http import limits, overload
 from buildarena_api.http.admission import (
     PLACE,
     BodyBuffers,
@@ -231,6 +231,23 @@ async def test_open_requests_count_by_address_until_a_key_is_known() -> None:
         await doors.hold(MAX_IN_FLIGHT + 3)
         doors.leave.set()
     assert not doors.places[0].counts
+
+
+@in_a_loop
+async def test_refusals_at_the_door_are_held_back_as_far_as_there_is_room(monkeypatch) -> None:
+    doors, waits = Doors({}), []
+
+    async def note(seconds: float) -> None:
+        waits.append(seconds)
+
+    monkeypatch.setattr(overload, "MAX_IN_FLIGHT", 0)
+    monkeypatch.setattr(overload.asyncio, "sleep", note)
+    assert await doors.ask(invented()) == 429
+    low, high = overload.HELD_S
+    assert low <= waits[0] <= high
+    monkeypatch.setattr(overload, "MAX_HELD", 0)
+    assert await doors.ask(invented()) == 429
+    assert len(waits) == 1
 
 
 def test_a_place_is_counted_once() -> None:

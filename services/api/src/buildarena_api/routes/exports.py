@@ -10,7 +10,7 @@ from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ExportingDep, RegistryDep
 from buildarena_api.http.concurrency import limited
@@ -85,9 +85,6 @@ class Result(BaseModel):
         description="It waits for its verification, or was refuted: it counts nowhere"
     )
     rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
-
-
-RESULTS = TypeAdapter(list[Result])
 
 
 @router.get(

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
@@ -213,7 +213,11 @@ def agreement_table(context: ContextDep, selection: SelectionDep) -> AgreementTa
     return AgreementTable(track=selection.track, rows=agreement_rows(found))
 
 
-@router.get("/leaderboard/changes", responses=problem_responses(404, 422, 503))
+@router.get(
+    "/leaderboard/changes",
+    response_model=ChangePage,
+    responses=problem_responses(404, 422, 503),
+)
 @weighs(lambda query: rows(query, default=DEFAULT_LIMIT))
 def changes(
     context: ContextDep,
@@ -222,18 +226,19 @@ def changes(
     before: Annotated[int | None, Query(ge=0, description="Only older ones")] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = DEFAULT_LIMIT,
     unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
-) -> ChangePage:
+) -> Response:
     """What entered a track's board, left it or was scored again, and why; newest first."""
-    if selection.track is None:
-        return ChangePage(track=None, changes=[], next_before=None)
-    found = context.store.results.boards.changes(
-        selection.track, before=before, limit=limit, scored_only=not unscored
-    )
-    return ChangePage(
-        track=selection.track,
-        changes=[ChangeView.model_validate(change) for change in found],
-        next_before=found[-1].id if len(found) == limit else None,
-    )
+    page = ChangePage(track=None, changes=[], next_before=None)
+    if selection.track is not None:
+        found = context.store.results.boards.changes(
+            selection.track, before=before, limit=limit, scored_only=not unscored
+        )
+        page = ChangePage(
+            track=selection.track,
+            changes=[ChangeView.model_validate(change) for change in found],
+            next_before=found[-1].id if len(found) == limit else None,
+        )
+    return Response(page.model_dump_json(), media_type="application/json")
 
 
 @router.get("/leaderboard/manifest", responses=problem_responses(404, 422, 503))
