@@ -23,8 +23,9 @@ from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
 POOL_SIZE = 10
-SWITCH_S = 0.0005
-"""How long a thread may keep the interpreter: exports must not delay the event loop."""
+SWITCH_S = 0.0001
+"""How long a thread may keep the interpreter: a light question asks for it some twenty times, and
+waits so long each time while a heavy one is being answered."""
 COLLECTING = (5_000, 10, 30)
 """How often the garbage collector runs: seldom over what a question of 10,000 jobs has made so far,
 as that takes 0.1 s in which nobody is answered."""

@@ -73,7 +73,7 @@ from buildarena_pipeline.submission.submission import Submissions
 WATCHERS = 3
 """Threads and connections for key checks and event streams."""
 EXPORTERS = 4
-"""Threads and connections for exports and archives: as many as may go on at once."""
+"""Threads and connections for exports and archives: as many as may go on at once, two of each."""
 ORDINARY = (
     verifications,
     sessions,

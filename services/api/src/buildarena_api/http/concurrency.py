@@ -155,7 +155,6 @@ class ConcurrencyLimits:
     files: ConcurrencyLimit
     streams: ConcurrencyLimit
     archives: ConcurrencyLimit
-    exports: ConcurrencyLimit
     trajectories: ConcurrencyLimit
     runner_waits: ConcurrencyLimit
     runner_outcomes: ConcurrencyLimit
@@ -175,7 +174,6 @@ def usual_limits() -> ConcurrencyLimits:
         files=ConcurrencyLimit("checks", per_caller=1, total=2, wait_s=30.0, in_turns=True),
         streams=ConcurrencyLimit("event streams", per_caller=32, total=512, retry_s=5),
         archives=ConcurrencyLimit("archive transfers", per_caller=1, total=2, retry_s=5),
-        exports=ConcurrencyLimit("exports", per_caller=1, total=2, wait_s=30.0, in_turns=True),
         # One may have 64 MB in memory until it is sent.
         trajectories=ConcurrencyLimit("trajectories", per_caller=4, total=12, wait_s=30.0),
         runner_waits=ConcurrencyLimit("waits for a trial", per_caller=64, total=1000),

@@ -18,7 +18,7 @@ from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import EndedJob, compare_models, counted_trials
 from buildarena_store import Store
 
-router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"], dependencies=[limited("exports")])
+router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"], dependencies=[limited()])
 
 
 class SweepSide(BaseModel):
@@ -78,7 +78,7 @@ class SweepComparison(UnderPolicy):
     response_model=SweepComparison,
     responses=problem_responses(404, 422, 503),
 )
-@weighs(HEAVIEST, lane="exports")
+@weighs(HEAVIEST)
 async def compare_sweeps(
     sweep_id: str,
     other_id: str,

@@ -28,7 +28,7 @@ from buildarena_benchmark.leaderboard import (
 )
 from buildarena_store import Store
 
-router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("exports")])
+router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited()])
 
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",
@@ -95,7 +95,7 @@ class Result(BaseModel):
         **problem_responses(404, 422, 503),
     },
 )
-@weighs(HEAVIEST, lane="exports")
+@weighs(HEAVIEST)
 async def export(
     exporting: ExportingDep,
     boards: BoardsDep,
@@ -136,7 +136,7 @@ async def export(
     response_model=list[Result],
     responses=problem_responses(404, 503),
 )
-@weighs(HEAVIEST, lane="exports")
+@weighs(HEAVIEST)
 async def sweep_results(sweep_id: str, exporting: ExportingDep) -> Response:
     """All ended jobs of a sweep with their rounds: what a report is made of."""
     body = await exporting.run(_results, exporting.context.store, sweep_id)
