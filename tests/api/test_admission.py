@@ -17,7 +17,7 @@ import pytest
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import live_api
 
-from buildarena_api.http import limits
+from buildarena_api.http import limits, overload
 from buildarena_api.http.admission import (
     PLACE,
     BodyBuffers,
@@ -29,7 +29,9 @@ from buildarena_api.http.admission import (
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.limits import BodyLimitMiddleware
 from buildarena_api.http.overload import MAX_IN_FLIGHT, OverloadMiddleware
+from buildarena_api.http.weights import Weights
 from buildarena_pipeline.runtime.context import open_context
+from buildarena_store.accounts.keys import secret_hash
 
 MIB = 1024 * 1024
 STRANGERS = 200
@@ -187,7 +189,7 @@ class Doors:
 
     def __init__(self, known: dict[str, str]) -> None:
         self.leave, self.came, self.places = asyncio.Event(), asyncio.Event(), []
-        self.middleware = OverloadMiddleware(self.app, known=known.get)
+        self.middleware = OverloadMiddleware(self.app, known=known.get, weights=Weights([]))
 
     async def app(self, scope, _receive, _send):
         self.places.append(scope[PLACE])
@@ -231,6 +233,23 @@ async def test_open_requests_count_by_address_until_a_key_is_known() -> None:
     assert not doors.places[0].counts
 
 
+@in_a_loop
+async def test_refusals_at_the_door_are_held_back_as_far_as_there_is_room(monkeypatch) -> None:
+    doors, waits = Doors({}), []
+
+    async def note(seconds: float) -> None:
+        waits.append(seconds)
+
+    monkeypatch.setattr(overload, "MAX_IN_FLIGHT", 0)
+    monkeypatch.setattr(overload.asyncio, "sleep", note)
+    assert await doors.ask(invented()) == 429
+    low, high = overload.HELD_S
+    assert low <= waits[0] <= high
+    monkeypatch.setattr(overload, "MAX_HELD", 0)
+    assert await doors.ask(invented()) == 429
+    assert len(waits) == 1
+
+
 def test_a_place_is_counted_once() -> None:
     counts: Counter[str] = Counter()
     place = Place("a", counts)
@@ -246,12 +265,13 @@ class Pool:
 
     def __init__(self) -> None:
         self.asked: list[int] = []
+        self.good: dict[str, object] = {}
         keys = SimpleNamespace(check_hashes=self.check)
         self.context = SimpleNamespace(store=SimpleNamespace(keys=keys))
 
     def check(self, digests):
         self.asked.append(len(digests))
-        return {}
+        return {digest: self.good[digest] for digest in digests if digest in self.good}
 
     async def run(self, work, *arguments):
         await asyncio.sleep(0.01)
@@ -268,6 +288,25 @@ async def test_invented_keys_cost_few_questions_and_malformed_ones_none() -> Non
     assert len(pool.asked) <= 3
     assert await checks.check("no secret of ours") is None
     assert sum(pool.asked) == 500
+
+
+@in_a_loop
+async def test_invented_keys_are_looked_up_now_and_then_and_good_ones_at_once(monkeypatch) -> None:
+    pool, secret = Pool(), invented()
+    pool.good[secret_hash(secret)] = SimpleNamespace(key=SimpleNamespace(id="key_1"), refusal=None)
+    checks = KeyChecks(pool)
+    assert (await checks.check(secret)).key.id == "key_1"
+    monkeypatch.setattr(checks._of_unknown, "_pause_s", 60.0)
+    assert await checks.check(invented()) is None
+    waiting = [asyncio.create_task(checks.check(invented())) for _ in range(50)]
+    for _ in range(3):
+        # Whoever is known waits for none of them.
+        checks.forget()
+        assert (await checks.check(secret)).key.id == "key_1"
+    assert not any(task.done() for task in waiting)
+    assert sum(pool.asked) <= 6
+    for task in waiting:
+        task.cancel()
 
 
 def test_a_heartbeat_says_little(url, context) -> None:

@@ -6,8 +6,8 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from fastapi import Depends, FastAPI
+from fastapi.routing import APIRoute
 from fastapi_offline import FastAPIOffline
-from starlette.routing import Route
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from buildarena_api.dashboard.files import read_pages
@@ -34,6 +34,7 @@ from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
+from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
@@ -71,8 +72,8 @@ from buildarena_pipeline.submission.submission import Submissions
 
 WATCHERS = 3
 """Threads and connections for key checks and event streams."""
-EXPORTERS = 6
-"""Threads and connections for exports and archives: as many as may go on at once."""
+EXPORTERS = 4
+"""Threads and connections for exports and archives: as many as may go on at once, two of each."""
 ORDINARY = (
     verifications,
     sessions,
@@ -177,13 +178,23 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 def _add_routes(app: FastAPI) -> None:
     app.include_router(health.router)
     for route in (*LIMITED_THEMSELVES, *ORDINARY):
-        own = [] if route in LIMITED_THEMSELVES else [limited("ordinary")]
+        own = [] if route in LIMITED_THEMSELVES else [limited()]
         app.include_router(
             route.router,
             dependencies=[Depends(caller_of), *own],
             responses=problem_responses(401, 403, 429),
         )
     app.include_router(runner.router, responses=problem_responses(401, 403, 429))
+
+
+def all_routes() -> list[APIRoute]:
+    """Every route of the application."""
+    return [
+        found
+        for part in (health, runner, *ORDINARY, *LIMITED_THEMSELVES)
+        for found in part.router.routes
+        if isinstance(found, APIRoute)
+    ]
 
 
 def _add_middleware(app: FastAPI) -> None:
@@ -200,18 +211,14 @@ def _add_middleware(app: FastAPI) -> None:
         admit=admission(app),
         buffers=app.state.body_buffers,
     )
-    routes = [
-        (found.path, found.methods or ())
-        for part in (health, runner, *ORDINARY, *LIMITED_THEMSELVES)
-        for found in part.router.routes
-        if isinstance(found, Route)
-    ]
-    app.add_middleware(MethodMiddleware, routes=routes)
+    routes = all_routes()
+    methods = [(found.path, found.methods or ()) for found in routes]
+    app.add_middleware(MethodMiddleware, routes=methods)
     app.add_middleware(FormerNamesMiddleware)
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)
-    app.add_middleware(OverloadMiddleware, known=known_key(app))
+    app.add_middleware(OverloadMiddleware, known=known_key(app), weights=Weights(routes))
     if settings.base_path:
         app.add_middleware(BasePathMiddleware, base=settings.base_path)
     if settings.trusted_proxies:

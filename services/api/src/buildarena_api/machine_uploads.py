@@ -1,11 +1,19 @@
-"""Reads machines that strangers hand over as files: bounded before anything is built."""
+"""Reads machines that strangers hand over as files: bounded before anything is built.
+
+They are read in a process apart: two thousand blocks in one file take seconds, in which the API
+answers others.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from typing import Any, Final
 
 from fastapi import Request
 
+from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_api.http.problems import ProblemError
 from buildarena_benchmark import ValidationIssue
 from buildarena_besiege import ImportedMachine, MachineFileError, read_machine_file
@@ -15,6 +23,10 @@ from buildarena_simulation.constants import MAX_PARTS
 
 MAX_BYTES: Final = 2 << 20
 """Largest file; a machine of a hundred blocks has 60 kB with its log."""
+SPARE_BYTES: Final = 512 << 20
+"""Memory for one file: one of 2,000 blocks takes some 100 MB while it is read."""
+LONGEST_S: Final = 20.0
+"""Time for one file: 2,000 blocks take 2 s on a core of their own."""
 _BLANKS: Final = b" \t\r\n\x00\xef\xbb\xbf\xfe\xff"
 _GLB: Final = b"glTF"
 
@@ -32,26 +44,80 @@ async def uploaded(request: Request) -> bytes:
     return body
 
 
-def read_upload(data: bytes) -> ImportedMachine:
-    """The machine of a file, told apart by content.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Upload:
+    """What a file holds.
 
-    Args:
-        data: A machine document (JSON) or a machine file of the game (.bsg).
-
-    Raises:
-        ProblemError: It is neither, or is not sound.
+    Attributes:
+        content: The machine, and what it does not hold of the file.
+        fault: Why the machine's document would not be read back; None for one that can be tried.
     """
+
+    content: ImportedMachine
+    fault: str | None
+
+
+class UploadChecker:
+    """Reads machines' files, one at a time."""
+
+    def __init__(self) -> None:
+        self._checker = Checker(
+            "machine files", _reading, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S
+        )
+
+    def read(self, data: bytes) -> Upload:
+        """The machine of a file, told apart by content.
+
+        Args:
+            data: A machine document (JSON) or a machine file of the game (.bsg).
+
+        Raises:
+            ProblemError: It is neither, is not sound, or can't be read within the bounds.
+        """
+        try:
+            answer: Upload | str = self._checker.ask(data)
+        except CheckFailedError as error:
+            raise refused(f"the file is too much: {error}") from error
+        if isinstance(answer, str):
+            raise refused(answer)
+        return answer
+
+    def close(self) -> None:
+        """Ends the process."""
+        self._checker.close()
+
+
+@cache
+def shared_checker() -> UploadChecker:
+    """This process' checker; its own process begins with the first file and ends with this one."""
+    return UploadChecker()
+
+
+def _reading() -> Callable[[Any], Upload | str]:
+    return read_upload
+
+
+def read_upload(data: bytes) -> Upload | str:
+    """The machine of a file, or why it holds none."""
     try:
-        if data.lstrip(_BLANKS).startswith(b"<"):
-            return read_machine_file(data)
-        machine = Machine.from_document(_document(data))
-    except (DocumentError, MachineFileError) as error:
-        raise refused(str(error)) from error
+        content = _content(data)
+        return Upload(content=content, fault=_not_storable(content.machine))
+    except (_RefusedError, DocumentError, MachineFileError) as error:
+        return str(error)
+
+
+class _RefusedError(Exception):
+    """A file holds no machine; the message is for its sender."""
+
+
+def _content(data: bytes) -> ImportedMachine:
+    if data.lstrip(_BLANKS).startswith(b"<"):
+        return read_machine_file(data)
+    machine = Machine.from_document(_document(data))
     return ImportedMachine(machine=machine, name="", not_understood=())
 
 
-def not_storable(machine: Machine) -> str | None:
-    """Why a machine's document would not be read back; None for one that can be tried."""
+def _not_storable(machine: Machine) -> str | None:
     try:
         Machine.from_document(machine.to_document())
     except DocumentError as error:
@@ -66,20 +132,22 @@ def refused(message: str) -> ProblemError:
 
 def _document(data: bytes) -> object:
     if data.startswith(_GLB):
-        raise refused("a GLB file has shapes only: it can be looked at, not checked or tried")
+        raise _RefusedError("a GLB file has shapes only: it can be looked at, not checked or tried")
     try:
         content: object = read_json(data.decode("utf-8-sig"))
     except TooDeepError as error:
-        raise refused(f"the file has {error}") from error
+        raise _RefusedError(f"the file has {error}") from error
     except ValueError as error:
-        raise refused(
+        raise _RefusedError(
             f"neither a machine document (JSON) nor a machine file of the game (.bsg): {error}"
         ) from error
     if not isinstance(content, dict) or "blocks" not in content:
-        raise refused("not a machine document: a JSON object with blocks, joints and connectors")
+        raise _RefusedError(
+            "not a machine document: a JSON object with blocks, joints and connectors"
+        )
     count = _parts(content)
     if count > MAX_PARTS:
-        raise refused(f"the document has {count:,} entries: at most {MAX_PARTS:,} are read")
+        raise _RefusedError(f"the document has {count:,} entries: at most {MAX_PARTS:,} are read")
     return content
 
 

@@ -23,6 +23,7 @@ from buildarena_api.http.admission import PLACE, Admit, Place, address_of
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.http.weights import weight_of
 from buildarena_pipeline.runtime.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
@@ -156,7 +157,7 @@ async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None
         raise
     request.state.caller = caller
     _move(request.scope, caller)
-    await _count(limits, who_asks(request))
+    await _count(limits, who_asks(request), weight=weight_of(request.scope).units)
     return caller
 
 
@@ -215,13 +216,14 @@ async def admin_only(caller: CallerDep) -> None:
     caller.require("admin")
 
 
-async def _count(limits: RateLimits, who: str) -> None:
-    wait_s = await limits.hit(who)
-    if wait_s is not None:
+async def _count(limits: RateLimits, who: str, *, weight: int = 1) -> None:
+    refused = await limits.hit(who, weight=weight)
+    if refused is not None:
         raise ProblemError(
             429,
-            f"more than {limits.spelled} requests: wait {wait_s} s",
-            headers={"Retry-After": str(wait_s)},
+            f"more than {limits.spelled} requests: this one weighs {weight}, {refused.left} are "
+            f"left; wait {refused.wait_s} s",
+            headers={"Retry-After": str(refused.wait_s)},
         )
 
 

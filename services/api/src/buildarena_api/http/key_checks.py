@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import OrderedDict
+from collections.abc import Awaitable, Callable
 from typing import Final, TypeVar
 
 from buildarena_api.http.own_pool import OwnPool
@@ -15,6 +16,10 @@ CACHED_S: Final = 0.5
 KNOWN_S: Final = 60.0
 """How long a key that was good counts as its holder's, for what is counted before it is checked."""
 MAX_CACHED: Final = 10_000
+PAUSE_S: Final = 0.1
+"""Between two questions for secrets that nobody is known to have: whoever invents keys, however
+many and however fast, costs the database ten questions in a second; a new key waits so long at
+most, once."""
 
 T = TypeVar("T")
 
@@ -22,9 +27,9 @@ T = TypeVar("T")
 class KeyChecks:
     """Checks secrets without taking the threads and connections of ordinary requests.
 
-    One question is asked of the database at a time, for all secrets that came meanwhile: whoever
-    sends invented keys, however many, costs the others one connection. What does not have the form
-    of a secret costs none.
+    One question at a time is asked of the database for all secrets that came meanwhile: one for
+    those that were good lately, and, ten times in a second at most, one for those that nobody is
+    known to have. What does not have the form of a secret is not asked for.
 
     Args:
         pool: What it asks with.
@@ -34,8 +39,8 @@ class KeyChecks:
         self._pool = pool
         self._checked: OrderedDict[str, tuple[float, KeyCheck | None]] = OrderedDict()
         self._good: OrderedDict[str, tuple[float, str]] = OrderedDict()
-        self._waiting: dict[str, asyncio.Future[KeyCheck | None]] = {}
-        self._asking: asyncio.Task[None] | None = None
+        self._of_known = _Questions(self._ask, pause_s=0.0)
+        self._of_unknown = _Questions(self._ask, pause_s=PAUSE_S)
 
     async def check(self, secret: str) -> KeyCheck | None:
         """The key that has this secret, and whether it is still good; None when nobody has it."""
@@ -45,13 +50,8 @@ class KeyChecks:
         checked = self._checked.get(digest)
         if checked is not None and loop.time() - checked[0] < CACHED_S:
             return checked[1]
-        waiting = self._waiting.get(digest)
-        if waiting is None:
-            waiting = self._waiting[digest] = loop.create_future()
-        if self._asking is None or self._asking.done():
-            self._asking = asyncio.create_task(self._ask_all())
-        # One that leaves must not end the question of the others.
-        return await asyncio.shield(waiting)
+        questions = self._of_unknown if self.known(secret) is None else self._of_known
+        return await questions.answer(digest)
 
     def known(self, secret: str) -> str | None:
         """Whose secret it is, if it was good within the last minute; nothing is asked."""
@@ -64,20 +64,12 @@ class KeyChecks:
         """Asks the database again for every key: one was changed."""
         self._checked.clear()
 
-    async def _ask_all(self) -> None:
-        while self._waiting:
-            asked, self._waiting = self._waiting, {}
-            asked_at = asyncio.get_running_loop().time()
-            check = self._pool.context.store.keys.check_hashes
-            try:
-                checks = await self._pool.run(check, list(asked))
-            except Exception as error:  # noqa: BLE001 - whoever asked gets it
-                _answer(asked, error)
-                continue
-            for digest, waiting in asked.items():
-                self._note(digest, asked_at, checks.get(digest))
-                if not waiting.done():
-                    waiting.set_result(checks.get(digest))
+    async def _ask(self, digests: list[str]) -> dict[str, KeyCheck]:
+        asked_at = asyncio.get_running_loop().time()
+        checks = await self._pool.run(self._pool.context.store.keys.check_hashes, digests)
+        for digest in digests:
+            self._note(digest, asked_at, checks.get(digest))
+        return checks
 
     def _note(self, digest: str, asked_at: float, check: KeyCheck | None) -> None:
         _put(self._checked, digest, (asked_at, check))
@@ -85,6 +77,46 @@ class KeyChecks:
             _put(self._good, digest, (asked_at, check.key.id))
         else:
             self._good.pop(digest, None)
+
+
+class _Questions:
+    """Asks one question at a time, for all that came while the one before was answered.
+
+    Args:
+        ask: Asks for many.
+        pause_s: How long after an answer the next question is asked at the earliest.
+    """
+
+    def __init__(
+        self, ask: Callable[[list[str]], Awaitable[dict[str, KeyCheck]]], *, pause_s: float
+    ) -> None:
+        self._ask = ask
+        self._pause_s = pause_s
+        self._waiting: dict[str, asyncio.Future[KeyCheck | None]] = {}
+        self._asking: asyncio.Task[None] | None = None
+
+    async def answer(self, digest: str) -> KeyCheck | None:
+        """What is known of one."""
+        waiting = self._waiting.get(digest)
+        if waiting is None:
+            waiting = self._waiting[digest] = asyncio.get_running_loop().create_future()
+        if self._asking is None or self._asking.done():
+            self._asking = asyncio.create_task(self._ask_all())
+        # One that leaves must not end the question of the others.
+        return await asyncio.shield(waiting)
+
+    async def _ask_all(self) -> None:
+        while self._waiting:
+            asked, self._waiting = self._waiting, {}
+            try:
+                checks = await self._ask(list(asked))
+            except Exception as error:  # noqa: BLE001 - whoever asked gets it
+                _answer(asked, error)
+            else:
+                for digest, waiting in asked.items():
+                    if not waiting.done():
+                        waiting.set_result(checks.get(digest))
+            await asyncio.sleep(self._pause_s)
 
 
 def _put(cache: OrderedDict[str, T], digest: str, value: T) -> None:

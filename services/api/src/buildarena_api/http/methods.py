@@ -32,7 +32,9 @@ class MethodMiddleware:
             methods.setdefault(template, set()).update(more)
         # The fewer parameters, the closer a template describes a path.
         ordered = sorted(methods, key=lambda template: len(PARAMETER.findall(template)))
-        self._methods = [(_pattern(template), sorted(methods[template])) for template in ordered]
+        self._methods = [
+            (path_pattern(template), sorted(methods[template])) for template in ordered
+        ]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it for its method."""
@@ -57,6 +59,7 @@ class MethodMiddleware:
         return []
 
 
-def _pattern(template: str) -> re.Pattern[str]:
+def path_pattern(template: str) -> re.Pattern[str]:
+    """What the paths of a route match."""
     fixed = [re.escape(part) for part in PARAMETER.split(template)]
     return re.compile("[^/]+".join(fixed))

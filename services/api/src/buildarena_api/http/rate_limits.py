@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import structlog
-from limits import parse
+from limits import WindowStats, parse
 from limits.aio.storage import RedisStorage
 from limits.aio.strategies import SlidingWindowCounterRateLimiter as SharedLimiter
 from limits.storage import MemoryStorage
@@ -22,6 +23,20 @@ from buildarena_pipeline.breakers import AsyncCircuitBreaker
 TIMEOUT_S = 0.3
 """How long a request waits for its count; the store is not asked again until it answers."""
 GROUP = "buildarena"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused:
+    """A request was one too many.
+
+    Attributes:
+        wait_s: Seconds after which it may come again.
+        left: What the caller may still send now, in requests of weight 1.
+    """
+
+    wait_s: int
+    left: int
+
 
 log = structlog.get_logger(__name__)
 
@@ -50,18 +65,20 @@ class RateLimits:
         self._breaker = AsyncCircuitBreaker(self._storage.check)
         self.spelled = rate.replace("/", " per ")
 
-    async def hit(self, who: str) -> int | None:
+    async def hit(self, who: str, *, weight: int = 1) -> Refused | None:
         """Counts a request.
 
         Args:
             who: The caller.
+            weight: As how many it counts; at most as all that one may send in the time.
 
         Returns:
-            None when it may pass, otherwise after how many seconds the next one may.
+            None when it may pass, otherwise what is left.
         """
+        cost = min(weight, self._item.amount)
         if not self._breaker.is_open:
             try:
-                if await self._shared.hit(self._item, GROUP, who):
+                if await self._shared.hit(self._item, GROUP, who, cost=cost):
                     return None
                 stats = await self._shared.get_window_stats(self._item, GROUP, who)
             # What uvloop says of a connection that ended while nobody looked is a RuntimeError.
@@ -70,16 +87,24 @@ class RateLimits:
                     log.warning("rate_limits_unreachable", error=str(error))
                 self._breaker.failed()
             else:
-                return _seconds_until(stats.reset_time)
-        if self._own.hit(self._item, GROUP, who):
+                return self._refused(cost, stats)
+        if self._own.hit(self._item, GROUP, who, cost=cost):
             return None
-        return _seconds_until(self._own.get_window_stats(self._item, GROUP, who).reset_time)
+        return self._refused(cost, self._own.get_window_stats(self._item, GROUP, who))
+
+    def _refused(self, cost: int, stats: WindowStats) -> Refused:
+        """Why a request was refused.
+
+        The library says when the next unit comes free. What is further needed comes free as the
+        window goes on, as evenly as nobody knows better.
+        """
+        missing = max(0, cost - stats.remaining - 1)
+        wait_s = (
+            stats.reset_time - time.time() + missing * self._item.get_expiry() / self._item.amount
+        )
+        return Refused(wait_s=max(1, math.ceil(wait_s)), left=stats.remaining)
 
     async def close(self) -> None:
         """Closes the connections."""
         await self._breaker.close()
         await self._pool.aclose()
-
-
-def _seconds_until(moment: float) -> int:
-    return max(1, math.ceil(moment - time.time()))

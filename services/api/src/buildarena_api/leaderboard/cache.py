@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
-from cachetools import LRUCache
-
 from buildarena_api.http.etags import Answer
+from buildarena_api.http.fair_cache import FairCache
 from buildarena_api.leaderboard.cells import Cells, Shown
 from buildarena_benchmark import Task
 from buildarena_benchmark.leaderboard import Board, BoardQuery, EndedJob, Tally
@@ -29,12 +28,14 @@ class Question:
         query: Which tasks, models and times.
         sweeps: Ids of sweeps, if only jobs of these count.
         members: How many jobs these sweeps have: answers from before one had more are not true.
+        asked_by: Whose share of the cached answers it takes; the answer is the same for all.
     """
 
     track: str
     query: BoardQuery
     sweeps: frozenset[str] | None = None
     members: int = 0
+    asked_by: str = field(default="", compare=False)
 
     @property
     def is_partial(self) -> bool:
@@ -71,7 +72,7 @@ class BoardCache:
         self._tasks: Mapping[str, Task] = {}
         self._lock = threading.Lock()
         self._cells = Cells(boards.cells)
-        self._answers: LRUCache[tuple[Question, str], tuple[int, Answer]] = LRUCache(
+        self._answers: FairCache[tuple[Question, str], tuple[int, Answer]] = FairCache(
             MAX_CACHED_ANSWERS
         )
 
@@ -89,6 +90,11 @@ class BoardCache:
         return [
             track for track in found if self._boards.any_of(TrialFilter(track=track, sweeps=sweeps))
         ]
+
+    def known_models(self, names: Iterable[str]) -> frozenset[str]:
+        """Those of some models that have an ended job, as of the last question."""
+        with self._lock:
+            return frozenset(names) & self._cells.models()
 
     def tasks(self) -> Mapping[str, Task]:
         """Every task by name in its newest version, as of the last question."""
@@ -156,7 +162,7 @@ class BoardCache:
 
     def _keep(self, key: tuple[Question, str], generation: int, body: bytes) -> Answer:
         answer = Answer.of(body)
-        self._answers[key] = (generation, answer)
+        self._answers.put(key, (generation, answer), who=key[0].asked_by)
         return answer
 
     def _shown(self, question: Question) -> Shown:

@@ -97,6 +97,10 @@ class Cells:
         """Tracks with ended jobs."""
         return sorted(track for track, heads in self._heads.items() if heads)
 
+    def models(self) -> set[str]:
+        """Models with ended jobs, of all tracks."""
+        return {head.model for heads in self._heads.values() for head in heads.values()}
+
     def generation(self, track: str) -> int:
         """A number that is another one after each change of the track."""
         return self._generations.get(track, 0)

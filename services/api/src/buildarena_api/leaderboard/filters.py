@@ -2,21 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Final
 
 from fastapi import Depends, Query, Request
 
 from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.access import who_asks
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.weights import HEAVIEST
 from buildarena_api.leaderboard.cache import BoardCache, Question
 from buildarena_benchmark import ValidationIssue, builtin_tasks, paper_tasks
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import BoardQuery
 
+PARTIAL: Final = ("sweep", "since", "until")
+"""Filters by which only some jobs of a cell count: boards are made of jobs then."""
+NARROWED: Final = ("task", "level", "category", "model")
 MAX_SWEEPS = 50
 """Sweeps that one board is made of at most."""
+
+
+def weight_of_board(query: Mapping[str, str]) -> int:
+    """What a question for a board weighs: one that others ask too is in memory."""
+    if any(name in query for name in PARTIAL):
+        return HEAVIEST
+    return 5 if any(name in query for name in NARROWED) else 2
 
 
 async def _boards(request: Request) -> BoardCache:
@@ -47,6 +60,7 @@ class Selection:
 def select_board(
     boards: BoardsDep,
     context: ContextDep,
+    request: Request,
     *,
     track: Annotated[str | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
@@ -108,14 +122,21 @@ def select_board(
         )
     query = BoardQuery(
         tasks=chosen,
-        models=frozenset(model) if model else None,
+        # Invented names are not told from each other: their empty boards are one.
+        models=boards.known_models(model) if model else None,
         since=since,
         until=until,
         policy=policy,
         overall=_ranked_over(task, category),
     )
     track = track or (tracks[0] if tracks else None)
-    question = Question(track=track or "", query=query, sweeps=sweeps, members=members)
+    question = Question(
+        track=track or "",
+        query=query,
+        sweeps=sweeps,
+        members=members,
+        asked_by=who_asks(request),
+    )
     return Selection(track=track, tracks=tracks, query=query, question=question)
 
 

@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ExportingDep
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_api.routes.leaderboard import TaskDuelView
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import EndedJob, compare_models, counted_trials
 from buildarena_store import Store
 
-router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"], dependencies=[limited("exports")])
+router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"], dependencies=[limited()])
 
 
 class SweepSide(BaseModel):
@@ -72,7 +73,12 @@ class SweepComparison(UnderPolicy):
     left_out: list[LeftOut]
 
 
-@router.get("/{sweep_id}/compare/{other_id}", responses=problem_responses(404, 422, 503))
+@router.get(
+    "/{sweep_id}/compare/{other_id}",
+    response_model=SweepComparison,
+    responses=problem_responses(404, 422, 503),
+)
+@weighs(HEAVIEST)
 async def compare_sweeps(
     sweep_id: str,
     other_id: str,
@@ -81,12 +87,13 @@ async def compare_sweeps(
     policy: Annotated[
         ScoringPolicy, Query(description="The scoring policy: how flags are read")
     ] = ScoringPolicy.OURS,
-) -> SweepComparison:
+) -> Response:
     """Compares two sweeps: what differs between their tracks or settings is what is measured."""
-    return await exporting.run(_compared, exporting.context.store, (sweep_id, other_id), policy)
+    body = await exporting.run(_compared, exporting.context.store, (sweep_id, other_id), policy)
+    return Response(body, media_type="application/json")
 
 
-def _compared(store: Store, ids: tuple[str, str], policy: ScoringPolicy) -> SweepComparison:
+def _compared(store: Store, ids: tuple[str, str], policy: ScoringPolicy) -> bytes:
     sides, trials = zip(*(_side(store, id_) for id_ in ids), strict=True)
     same, left_out = _same_tasks(*trials)
     models = [list(dict.fromkeys(trial.model for trial in side)) for side in same]
@@ -106,13 +113,14 @@ def _compared(store: Store, ids: tuple[str, str], policy: ScoringPolicy) -> Swee
         )
         for first, second in named
     ]
-    return SweepComparison(
+    comparison = SweepComparison(
         first=sides[0],
         second=sides[1],
         policy=policy,
         pairs=[pair for pair in pairs if pair is not None],
         left_out=left_out,
     )
+    return comparison.model_dump_json().encode()
 
 
 def _side(store: Store, sweep_id: str) -> tuple[SweepSide, list[EndedJob]]:

@@ -10,11 +10,12 @@ from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ExportingDep, RegistryDep
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
 from buildarena_api.leaderboard.views import Board, PublishedView, Row, board_view
 from buildarena_benchmark import paper_tasks
@@ -27,7 +28,7 @@ from buildarena_benchmark.leaderboard import (
 )
 from buildarena_store import Store
 
-router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("exports")])
+router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited()])
 
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",
@@ -86,9 +87,6 @@ class Result(BaseModel):
     rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
 
 
-RESULTS = TypeAdapter(list[Result])
-
-
 @router.get(
     "/leaderboard/export",
     response_class=Response,
@@ -97,6 +95,7 @@ RESULTS = TypeAdapter(list[Result])
         **problem_responses(404, 422, 503),
     },
 )
+@weighs(HEAVIEST)
 async def export(
     exporting: ExportingDep,
     boards: BoardsDep,
@@ -137,6 +136,7 @@ async def export(
     response_model=list[Result],
     responses=problem_responses(404, 503),
 )
+@weighs(HEAVIEST)
 async def sweep_results(sweep_id: str, exporting: ExportingDep) -> Response:
     """All ended jobs of a sweep with their rounds: what a report is made of."""
     body = await exporting.run(_results, exporting.context.store, sweep_id)
@@ -155,7 +155,8 @@ def _results(store: Store, sweep_id: str) -> bytes:
         )
         for trial, rounds in store.results.boards.of_sweep(sweep_id)
     ]
-    return RESULTS.dump_json(found)
+    # One by one: no call keeps the interpreter for long.
+    return b"[" + b",".join(result.model_dump_json().encode() for result in found) + b"]"
 
 
 def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:

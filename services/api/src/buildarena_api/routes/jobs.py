@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from datetime import datetime
 from hashlib import sha256
-from typing import Annotated, Literal
+from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Response
 
@@ -13,6 +13,7 @@ from buildarena_api.dependencies import ContextDep, IdPrefix, RegistryDep, Submi
 from buildarena_api.http import cursors
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.weights import HEAVIEST, rows, weighs
 from buildarena_api.leaderboard.filters import require_zones, unknown
 from buildarena_api.routes.transcripts import as_markdown
 from buildarena_api.schemas import (
@@ -37,6 +38,17 @@ from buildarena_store.jobs.pages import JobFilter, Order, Sort, sort_value
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
+DEFAULT_LIMIT: Final = 100
+
+SEARCHED: Final = {"text": 10, "flag": 10, "indicator_min": 2, "indicator_max": 2}
+"""What filters weigh for which jobs are searched, beyond their rows."""
+
+
+def _weight_of_list(query: Mapping[str, str]) -> int:
+    searching = sum(units for name, units in SEARCHED.items() if name in query)
+    return min(HEAVIEST, rows(query, default=DEFAULT_LIMIT) + searching)
+
+
 ARTIFACT_TYPES = {
     "machine": "application/json",
     "transcript": "application/json",
@@ -53,7 +65,8 @@ def submit_job(
     return JobView.of(job)
 
 
-@router.get("", responses=problem_responses(404, 422, 503))
+@router.get("", response_model=JobPage, responses=problem_responses(404, 422, 503))
+@weighs(_weight_of_list)
 def list_jobs(
     context: ContextDep,
     registry: RegistryDep,
@@ -95,8 +108,8 @@ def list_jobs(
         Literal["asc", "desc"], Query(description="desc: the newest, or greatest, first")
     ] = "desc",
     cursor: Annotated[str | None, Query(max_length=1000)] = None,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
-) -> JobPage:
+    limit: Annotated[int, Query(ge=1, le=1000)] = DEFAULT_LIMIT,
+) -> Response:
     """Lists jobs, newest first by default.
 
     A value that no job can have is refused with the choices. A cursor is good for the order that
@@ -138,10 +151,12 @@ def list_jobs(
             {"task": task, "model": model, "track": track, "reason": reason, "flag": flag},
         )
     more = len(found) == limit
-    return JobPage(
+    page = JobPage(
         jobs=[JobView.of(job) for job in found],
         next_cursor=_cursor(in_order, found[-1]) if more else None,
     )
+    # Made here: the event loop serves others meanwhile.
+    return Response(page.model_dump_json(), media_type="application/json")
 
 
 def _cursor(order: Order, job: Job) -> str:
@@ -155,6 +170,7 @@ def _require_known(
     known = {
         "task": lambda: list(context.tasks.newest()),
         "model": lambda: list(registry.models),
+        "flag": lambda: list(known_flags()),
     }
     for name, value in given.items():
         if value is None:
@@ -163,7 +179,7 @@ def _require_known(
         if value in choices:
             continue
         if name == "flag":
-            used = context.store.jobs.used_flags([*known_flags(), value])
+            used = context.store.jobs.used_flags([value])
         else:
             used = context.store.jobs.distinct(name)
         if value in used or not (choices or used):

@@ -5,18 +5,19 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.weights import HEAVIEST, rows, weighs
 from buildarena_api.leaderboard.agreement import AgreementTable, agreement_rows
 from buildarena_api.leaderboard.cache import Question
-from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown
+from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown, weight_of_board
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
@@ -27,6 +28,14 @@ from buildarena_store import CellId
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
 MAX_DISTINCT = 20
 """Values of a manifest that are spelled out; of a name with more, seeds say, only their number."""
+
+
+DEFAULT_LIMIT: Final = 100
+
+
+def _weight_of_manifest(query: Mapping[str, str]) -> int:
+    """Manifests are counted task by task and model by model."""
+    return weight_of_board(query) if {"task", "model"} <= query.keys() else HEAVIEST
 
 
 class TestView(BaseModel):
@@ -102,6 +111,7 @@ class VerifyAccepted(BaseModel):
 
 
 @router.get("/leaderboard", response_model=Board, responses=problem_responses(404, 422, 503))
+@weighs(weight_of_board)
 def leaderboard(
     boards: BoardsDep,
     selection: SelectionDep,
@@ -135,6 +145,7 @@ def leaderboard(
 @router.get(
     "/leaderboard/figures", response_model=Figures, responses=problem_responses(404, 422, 503)
 )
+@weighs(weight_of_board)
 def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any:
     """What the figures of a board are drawn from; reports are drawn from the same."""
     track, policy = selection.track, selection.query.policy
@@ -152,6 +163,7 @@ def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any
 
 
 @router.get("/leaderboard/compare", responses=problem_responses(404, 422, 503))
+@weighs(lambda query: max(10, weight_of_board(query)))
 def compare(
     boards: BoardsDep,
     selection: SelectionDep,
@@ -192,6 +204,7 @@ def _usual(every: Mapping[CellId, tuple[str, int]], field: str, name: str) -> li
 
 
 @router.get("/leaderboard/agreement", responses=problem_responses(404, 422, 503))
+@weighs(weight_of_board)
 def agreement_table(context: ContextDep, selection: SelectionDep) -> AgreementTable:
     """How far our engines say the same as the game, task by task, of the machines it tried."""
     if selection.track is None:
@@ -200,29 +213,36 @@ def agreement_table(context: ContextDep, selection: SelectionDep) -> AgreementTa
     return AgreementTable(track=selection.track, rows=agreement_rows(found))
 
 
-@router.get("/leaderboard/changes", responses=problem_responses(404, 422, 503))
+@router.get(
+    "/leaderboard/changes",
+    response_model=ChangePage,
+    responses=problem_responses(404, 422, 503),
+)
+@weighs(lambda query: rows(query, default=DEFAULT_LIMIT))
 def changes(
     context: ContextDep,
     selection: SelectionDep,
     *,
     before: Annotated[int | None, Query(ge=0, description="Only older ones")] = None,
-    limit: Annotated[int, Query(ge=1, le=1000)] = 100,
+    limit: Annotated[int, Query(ge=1, le=1000)] = DEFAULT_LIMIT,
     unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
-) -> ChangePage:
+) -> Response:
     """What entered a track's board, left it or was scored again, and why; newest first."""
-    if selection.track is None:
-        return ChangePage(track=None, changes=[], next_before=None)
-    found = context.store.results.boards.changes(
-        selection.track, before=before, limit=limit, scored_only=not unscored
-    )
-    return ChangePage(
-        track=selection.track,
-        changes=[ChangeView.model_validate(change) for change in found],
-        next_before=found[-1].id if len(found) == limit else None,
-    )
+    page = ChangePage(track=None, changes=[], next_before=None)
+    if selection.track is not None:
+        found = context.store.results.boards.changes(
+            selection.track, before=before, limit=limit, scored_only=not unscored
+        )
+        page = ChangePage(
+            track=selection.track,
+            changes=[ChangeView.model_validate(change) for change in found],
+            next_before=found[-1].id if len(found) == limit else None,
+        )
+    return Response(page.model_dump_json(), media_type="application/json")
 
 
 @router.get("/leaderboard/manifest", responses=problem_responses(404, 422, 503))
+@weighs(_weight_of_manifest)
 def manifest(
     context: ContextDep, boards: BoardsDep, selection: SelectionDep
 ) -> list[ManifestEntry]:

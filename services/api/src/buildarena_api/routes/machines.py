@@ -10,7 +10,14 @@ from pydantic import BaseModel, Field
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.machine_uploads import MAX_BYTES, not_storable, read_upload, refused, uploaded
+from buildarena_api.http.weights import HEAVIEST, weighs
+from buildarena_api.machine_uploads import (
+    MAX_BYTES,
+    UploadChecker,
+    refused,
+    shared_checker,
+    uploaded,
+)
 from buildarena_api.replays.views import PressView
 from buildarena_api.scenes import MachineScene, Vector, machine_scene
 from buildarena_api.schemas import JobView
@@ -37,6 +44,12 @@ FILE: Final[dict[str, Any]] = {
     }
 }
 
+
+async def _checker() -> UploadChecker:
+    return shared_checker()
+
+
+CheckerDep = Annotated[UploadChecker, Depends(_checker)]
 FileDep = Annotated[bytes, Depends(uploaded)]
 TaskName = Annotated[Name | None, Query(description="Also hold it against this task's rules")]
 
@@ -68,22 +81,25 @@ class MachineCheckView(BaseModel):
 
 @router.post(
     "/check",
+    response_model=MachineCheckView,
     responses=problem_responses(404, 413, 422, 503),
     openapi_extra=FILE,
 )
-def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> MachineCheckView:
+@weighs(HEAVIEST, lane="files")
+def check_machine(
+    data: FileDep, checker: CheckerDep, context: ContextDep, task: TaskName = None
+) -> Response:
     """Reads a machine from a file and says what it is and what is wrong with it.
 
     A file that holds no machine is refused, and named what makes it so.
     """
-    found = read_upload(data)
-    machine = found.machine
-    fault = not_storable(machine)
-    return MachineCheckView(
-        name=found.name,
-        faults=[] if fault is None else [fault],
-        broken_rule=None if task is None else _broken_rule(context, found.machine, task),
-        remarks=list(found.not_understood),
+    upload = checker.read(data)
+    content, machine = upload.content, upload.content.machine
+    view = MachineCheckView(
+        name=content.name,
+        faults=[] if upload.fault is None else [upload.fault],
+        broken_rule=None if task is None else _broken_rule(context, machine, task),
+        remarks=list(content.not_understood),
         detached=list(machine.detached),
         parts=machine.part_count,
         mass=machine.mass,
@@ -94,6 +110,7 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
         ],
         scene=machine_scene(machine),
     )
+    return Response(view.model_dump_json(), media_type="application/json")
 
 
 @router.post(
@@ -105,8 +122,11 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
     },
     openapi_extra=FILE,
 )
+@weighs(HEAVIEST, lane="files")
 def try_file(
     data: FileDep,
+    checker: CheckerDep,
+    *,
     wanted: Annotated[TrialQuery, Query()],
     context: ContextDep,
     caller: CallerDep,
@@ -117,13 +137,12 @@ def try_file(
     The same machine, task, simulator and seed give the same job; its score, trajectory and scene
     are those of any job.
     """
-    machine = read_upload(data).machine
-    fault = not_storable(machine)
-    if fault is not None:
-        raise refused(fault)
+    upload = checker.read(data)
+    if upload.fault is not None:
+        raise refused(upload.fault)
     job, fresh = request_trial(
         context,
-        machine,
+        upload.content.machine,
         task=wanted.task,
         simulator=wanted.simulator,
         seed=wanted.seed,

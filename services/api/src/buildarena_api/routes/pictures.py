@@ -13,6 +13,7 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.http.response_cache import ResponseCache
+from buildarena_api.http.weights import weighs
 from buildarena_geometry import DocumentError, Machine, module_set
 from buildarena_geometry.export import machine_glb, module_glb
 from buildarena_pipeline.runtime.context import Context
@@ -52,6 +53,7 @@ def module_model(name: str, request: Request) -> Response:
     response_class=Response,
     responses={200: {"content": {GLB: {}}}, **problem_responses(404, 503)},
 )
+@weighs(3)
 def machine_model(
     job_id: str, context: ContextDep, pictures: PicturesDep, request: Request
 ) -> Response:
@@ -68,6 +70,7 @@ def machine_model(
     response_class=Response,
     responses={200: {"content": {PNG: {}}}, **problem_responses(404, 503)},
 )
+@weighs(3)
 def thumbnail(
     job_id: str, context: ContextDep, pictures: PicturesDep, request: Request
 ) -> Response:

@@ -9,6 +9,7 @@ from fastapi import APIRouter, Depends, Request
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.weights import weighs
 from buildarena_api.replays.making import Replays
 from buildarena_api.replays.views import ReplayView
 
@@ -21,6 +22,7 @@ async def _replays(request: Request) -> Replays:
 
 
 @router.get("/{job_id}/replay", response_model=ReplayView, responses=problem_responses(404, 503))
+@weighs(5)
 def show_replay(
     job_id: str,
     context: ContextDep,

@@ -12,6 +12,7 @@ from buildarena_api.dependencies import ContextDep, IdPrefix, SubmissionsDep
 from buildarena_api.http import cursors
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.weights import rows, weighs
 from buildarena_api.schemas import (
     DONE,
     BudgetView,
@@ -32,6 +33,7 @@ from buildarena_store.states import CONSTRUCT_QUEUE
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 MAX_TROUBLES: Final = 50
 """Kinds of trouble that one answer has."""
+DEFAULT_LIMIT: Final = 20
 
 
 RequestKey = Annotated[
@@ -164,10 +166,11 @@ def _require_owner(context: Context, caller: Caller, sweep_id: str) -> None:
 
 
 @router.get("", responses=problem_responses(422, 503))
+@weighs(lambda query: rows(query, default=DEFAULT_LIMIT, each=20))
 def list_sweeps(
     context: ContextDep,
     cursor: Annotated[str | None, Query(max_length=500)] = None,
-    limit: Annotated[int, Query(ge=1, le=100)] = 20,
+    limit: Annotated[int, Query(ge=1, le=100)] = DEFAULT_LIMIT,
     id_prefix: IdPrefix = None,
 ) -> SweepPage:
     """Lists sweeps, newest first."""

@@ -14,6 +14,7 @@ from buildarena_api.http.etags import conditional
 from buildarena_api.http.negotiation import prefers
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.http.response_cache import ResponseCache
+from buildarena_api.http.weights import weighs
 from buildarena_api.scenes import SceneView, scene_view
 from buildarena_geometry import DocumentError, Machine
 from buildarena_pipeline.runtime.context import Context
@@ -73,6 +74,7 @@ def get_trajectory(
 
 
 @router.get("/{job_id}/scene", response_model=SceneView, responses=problem_responses(404, 422, 503))
+@weighs(3)
 def show_scene(
     job_id: str,
     context: ContextDep,

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable
 from functools import cache
 from typing import Any, Final
 
-import structlog
-
-from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
+from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.trial_checks import OutcomeRefusedError, checked_trajectory
 from buildarena_simulation import Scenario, Trajectory
@@ -19,15 +15,14 @@ SPARE_BYTES: Final = 1 << 30
 """Memory for one file: that of the most block-seconds takes some 200 MB while it is read."""
 LONGEST_S: Final = 30.0
 
-log = structlog.get_logger(__name__)
 
-
-class Checker:
+class TrajectoryChecker:
     """Reads and checks trajectories, one at a time."""
 
     def __init__(self) -> None:
-        self._process = WarmProcess("trajectories", _answering, spare_bytes=SPARE_BYTES)
-        self._lock = threading.Lock()
+        self._checker = Checker(
+            "trajectories", _answering, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S
+        )
 
     def checked(
         self, data: bytes, *, simulator: str, version: str, machine: Machine, scenario: Scenario
@@ -44,29 +39,20 @@ class Checker:
             "machine": machine.to_document(),
             "scenario": scenario.model_dump_json(),
         }
-        with self._lock:
-            until = time.monotonic() + LONGEST_S
-
-            def meanwhile() -> None:
-                if time.monotonic() > until:
-                    raise OutcomeRefusedError(f"it can't be read within {LONGEST_S:.0f} s")
-
-            try:
-                refusal, trajectory = self._process.ask(question, meanwhile=meanwhile)
-            except ProcessEndedError as error:
-                log.warning("trajectory_burst", code=error.code)
-                detail = "it can't be read within the memory it may take"
-                raise OutcomeRefusedError(detail) from error
+        try:
+            refusal, trajectory = self._checker.ask(question)
+        except CheckFailedError as error:
+            raise OutcomeRefusedError(str(error)) from error
         if trajectory is None:
             raise OutcomeRefusedError(refusal)
-        found: Trajectory = trajectory
-        return found
+        checked: Trajectory = trajectory
+        return checked
 
 
 @cache
-def shared_checker() -> Checker:
+def shared_checker() -> TrajectoryChecker:
     """This process' checker; its own process begins with the first file and ends with this one."""
-    return Checker()
+    return TrajectoryChecker()
 
 
 def _answering() -> Callable[[Any], tuple[str, Trajectory | None]]:
