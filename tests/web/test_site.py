@@ -22,12 +22,8 @@ SWEEP = {
     "seeds": [0, 1],
     "simulator": "mujoco",
 }
-OTHER = {
-    **SWEEP,
-    "name": "</script><img src=x onerror=alert(1)>another",
-    "tasks": ["support-1"],
-    "seeds": [1],
-}
+NAME = "</script><img src=x onerror=alert(1)>another"
+OTHER = {**SWEEP, "name": NAME, "tasks": ["support-1"], "seeds": [1]}
 PLACE = "some/where"
 
 

@@ -9,8 +9,8 @@ import pytest
 from support.servers.stacks import wait_until
 
 from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_worker.verification_report import Report
 from buildarena_worker.verification_runner import AT_ONCE, VerificationRunner
-from buildarena_worker.verify import Report
 
 
 class Slow:

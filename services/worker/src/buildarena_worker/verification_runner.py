@@ -11,7 +11,8 @@ from sqlalchemy.exc import OperationalError
 
 from buildarena_store import ArtifactStoreError, Verifications
 from buildarena_store.states import Verdict
-from buildarena_worker.verify import Report, Verifier, broken_off
+from buildarena_worker.verification_report import Report, broken_off
+from buildarena_worker.verify import Verifier
 
 AT_ONCE = 2
 """Verifications of one process at once, however many wait."""

@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
@@ -55,7 +54,6 @@ from buildarena_store import (
     Usage,
 )
 from buildarena_store.jobs.histories import Histories
-from buildarena_store.states import Verdict
 from buildarena_worker.game_trials import annotations_again, logged_trajectory
 from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.processors import other_processor, simulate_as
@@ -68,64 +66,9 @@ from buildarena_worker.session.results import (
     Suspended,
 )
 from buildarena_worker.session.session import Session
+from buildarena_worker.verification_report import Check, Report, broken_off, compare
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import run_session
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Check:
-    """One comparison: what is stored, and what came out now.
-
-    Attributes:
-        name: What is compared.
-        ok: Whether both are equal.
-        kept: What is stored.
-        found: What came out now.
-        able: Whether, when they differ, a figure is wrong; otherwise it can't be said here.
-        trial: Number of the rollout whose trajectory is wrong when they differ, if it is that.
-    """
-
-    name: str
-    ok: bool
-    kept: Any
-    found: Any
-    able: bool = True
-    trial: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Report:
-    """What a verification found out.
-
-    Attributes:
-        checks: Its comparisons.
-    """
-
-    checks: Sequence[Check]
-
-    @property
-    def verdict(self) -> Verdict:
-        """Whether all is equal, and if not, whether that refutes the job."""
-        differing = [check for check in self.checks if not check.ok]
-        if not differing:
-            return Verdict.VERIFIED
-        able = all(check.able for check in differing)
-        return Verdict.REFUTED if able else Verdict.INCONCLUSIVE
-
-    @property
-    def refuted_trials(self) -> list[int]:
-        """Numbers of the rollouts whose trajectories are not what they must be."""
-        if self.verdict != Verdict.REFUTED:
-            return []
-        return sorted({c.trial for c in self.checks if not c.ok and c.trial is not None})
-
-    def as_document(self) -> dict[str, Any]:
-        """``{"ok", "verdict", "checks": [{"name", "ok", "kept", "found"}]}``."""
-        verdict = self.verdict
-        names = ("name", "ok", "kept", "found")
-        checks = [{name: getattr(check, name) for name in names} for check in self.checks]
-        return {"ok": verdict == Verdict.VERIFIED, "verdict": verdict, "checks": checks}
-
 
 SCORED = ("success", "indicator", "metrics", "flags")
 COUNTED = ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
@@ -176,7 +119,7 @@ class Verifier:
                 named[f"trajectory-{record.number}"] = record.trajectory_hash
         states = {digest: self._state_of(digest) for digest in set(named.values())}
         return [
-            _compare(f"artifact {name}", digest, states[digest], able=False)
+            compare(f"artifact {name}", digest, states[digest], able=False)
             for name, digest in sorted(named.items())
         ]
 
@@ -191,7 +134,7 @@ class Verifier:
 
     def _checks(self, job: Job) -> list[Check]:
         if job.state != JobState.DONE or job.success is None:
-            return [_compare("scored", kept=True, found=False)]
+            return [compare("scored", kept=True, found=False)]
         if job.track_config["workflow"] in {EXTERNAL_WORKFLOW, FILE_WORKFLOW}:
             return self._external_checks(job)
         try:
@@ -202,17 +145,17 @@ class Verifier:
             case Finished():
                 reasons = []
             case Failed(reason=reason) | LimitReached(limit=reason):
-                reasons = [_compare("reason", job.reason, reason)]
+                reasons = [compare("reason", job.reason, reason)]
             case Suspended(number=number):
                 return [broken_off(f"waits for rollout {number}")]
             case _:
                 return [broken_off(getattr(result, "detail", str(result)))]
         records = self._store.rollouts.read(job.id)
         checks = [
-            _compare(
+            compare(
                 "transcript", self._artifact(job, "transcript"), _hash(session.transcript.to_json())
             ),
-            _compare("rollouts", len(records), len(host.simulated)),
+            compare("rollouts", len(records), len(host.simulated)),
             *_usage_checks(job, host.usage),
             *reasons,
         ]
@@ -226,13 +169,13 @@ class Verifier:
         if job.track_config["workflow"] == FILE_WORKFLOW:
             digest = str(job.model_config.get("model"))
             machine = Machine.from_document(json.loads(self._artifacts.get(digest)))
-            checks = [_compare("machine", self._artifact(job, "machine"), digest)]
+            checks = [compare("machine", self._artifact(job, "machine"), digest)]
             return checks + self._trial_checks(job, machine)
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = bench_of(task_of(job, self._tasks))
         repeated = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
-        checks = [_compare("calls", _feedback_of(calls), _feedback_of(repeated))]
+        checks = [compare("calls", _feedback_of(calls), _feedback_of(repeated))]
         chosen = bench.result()
         return checks + self._trial_checks(job, None if chosen is None else chosen[1])
 
@@ -243,7 +186,7 @@ class Verifier:
             if job.outcome != Outcome.LIMIT:
                 broken = broken_constraint(task_of(job, self._tasks), machine)
                 kept = None if records else job.reason
-                checks.append(_compare("reason", kept, None if broken is None else broken[0]))
+                checks.append(compare("reason", kept, None if broken is None else broken[0]))
             for record in records:
                 checks += self._rollout_checks(job, record, machine, None)
         return checks + self._score_checks(job, machine, records)
@@ -273,7 +216,7 @@ class Verifier:
         controls: Sequence[KeyPress] | None,
     ) -> list[Check]:
         name, built = f"rollout {record.number}", _hash(machine_bytes(machine))
-        checks = [_compare(f"{name}: machine", record.machine_hash, built)]
+        checks = [compare(f"{name}: machine", record.machine_hash, built)]
         # Another machine moves otherwise, whoever simulates it.
         trial = record.number if built == record.machine_hash else None
         task = task_of(job, self._tasks)
@@ -281,7 +224,7 @@ class Verifier:
             if record.engine == BESIEGE:
                 trajectory = self._played(job, record, machine, task)
                 checks += [
-                    _compare(f"{name}: what {engine} says", kept, _plain(found))
+                    compare(f"{name}: what {engine} says", kept, _plain(found))
                     for engine, kept, found in annotations_again(record, task, machine, controls)
                 ]
             else:
@@ -292,18 +235,18 @@ class Verifier:
         except (MachineNotSimulable, MachineNotPlayableError):
             repeated, digest = failed_score(task, machine), None
         except LogIncompleteError as error:
-            return [*checks, _compare(f"{name}: log", "", str(error), able=False)]
+            return [*checks, compare(f"{name}: log", "", str(error), able=False)]
         except UnknownEngineError as error:
-            return [*checks, _compare(f"{name}: engine", record.engine, str(error), able=False)]
+            return [*checks, compare(f"{name}: engine", record.engine, str(error), able=False)]
         else:
             repeated = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))
-        checks.append(_compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial))
+        checks.append(compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial))
         if digest is not None and record.engine != BESIEGE and not checks[-1].ok:
             checks += self._processor_checks(name, record, trajectory)
         for field in SCORED:
             kept = _plain(getattr(record, field))
-            checks.append(_compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
+            checks.append(compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
         return checks
 
     def _version_checks(self, name: str, record: RolloutRecord) -> list[Check]:
@@ -311,7 +254,7 @@ class Verifier:
         said = record.versions or {}
         here = {"simulation": SIMULATION_VERSION, "engine_version": engine_version(record.engine)}
         return [
-            _compare(f"{name}: {what.replace('_', ' ')}", said.get(what), version, able=False)
+            compare(f"{name}: {what.replace('_', ' ')}", said.get(what), version, able=False)
             for what, version in here.items()
         ]
 
@@ -334,7 +277,7 @@ class Verifier:
         reason = other_processor(record.versions or {}, kept, repeated)
         if reason is None:
             return []
-        return [_compare(f"{name}: processor", reason[0], dict(reason[1]), able=False)]
+        return [compare(f"{name}: processor", reason[0], dict(reason[1]), able=False)]
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
         """What the kept log of a trial in the game tells; the game itself plays nothing again.
@@ -359,7 +302,7 @@ class Verifier:
             else failed_score(task_of(job, self._tasks), machine)
         )
         return [
-            _compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
+            compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
         ]
 
     def _artifact(self, job: Job, name: str) -> str | None:
@@ -377,20 +320,9 @@ def _feedback_of(calls: Sequence[ExternalCall]) -> list[list[Any]]:
 
 
 def _usage_checks(job: Job, usage: Usage) -> list[Check]:
-    checks = [_compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in COUNTED]
-    checks.append(_compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
+    checks = [compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in COUNTED]
+    checks.append(compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
     return checks
-
-
-def broken_off(detail: str) -> Check:
-    """What a verification says that can't be done."""
-    return _compare("replay", "the journal", detail, able=False)
-
-
-def _compare(
-    name: str, kept: Any, found: Any, *, able: bool = True, trial: int | None = None
-) -> Check:
-    return Check(name=name, ok=kept == found, kept=kept, found=found, able=able, trial=trial)
 
 
 def _hash(data: bytes) -> str:

@@ -1,0 +1,76 @@
+"""What a verification says: comparisons, and the verdict that follows from them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from buildarena_store.states import Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Check:
+    """One comparison: what is stored, and what came out now.
+
+    Attributes:
+        name: What is compared.
+        ok: Whether both are equal.
+        kept: What is stored.
+        found: What came out now.
+        able: Whether, when they differ, a figure is wrong; otherwise it can't be said here.
+        trial: Number of the rollout whose trajectory is wrong when they differ, if it is that.
+    """
+
+    name: str
+    ok: bool
+    kept: Any
+    found: Any
+    able: bool = True
+    trial: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What a verification found out.
+
+    Attributes:
+        checks: Its comparisons.
+    """
+
+    checks: Sequence[Check]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether all is equal, and if not, whether that refutes the job."""
+        differing = [check for check in self.checks if not check.ok]
+        if not differing:
+            return Verdict.VERIFIED
+        able = all(check.able for check in differing)
+        return Verdict.REFUTED if able else Verdict.INCONCLUSIVE
+
+    @property
+    def refuted_trials(self) -> list[int]:
+        """Numbers of the rollouts whose trajectories are not what they must be."""
+        if self.verdict != Verdict.REFUTED:
+            return []
+        return sorted({c.trial for c in self.checks if not c.ok and c.trial is not None})
+
+    def as_document(self) -> dict[str, Any]:
+        """``{"ok", "verdict", "checks": [{"name", "ok", "kept", "found"}]}``."""
+        verdict = self.verdict
+        names = ("name", "ok", "kept", "found")
+        checks = [{name: getattr(check, name) for name in names} for check in self.checks]
+        return {"ok": verdict == Verdict.VERIFIED, "verdict": verdict, "checks": checks}
+
+
+def broken_off(detail: str) -> Check:
+    """What a verification says that can't be done."""
+    return compare("replay", "the journal", detail, able=False)
+
+
+def compare(
+    name: str, kept: Any, found: Any, *, able: bool = True, trial: int | None = None
+) -> Check:
+    """A comparison; the arguments are the fields of `Check`."""
+    return Check(name=name, ok=kept == found, kept=kept, found=found, able=able, trial=trial)
