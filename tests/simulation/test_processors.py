@@ -10,8 +10,15 @@ from support.machines.references import load_machine
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment.other_kernels import simulate_with
-from buildarena_geometry import kernels
-from buildarena_simulation import SimulationError, processor, simulate, write_trajectory
+from buildarena_geometry import Machine, kernels
+from buildarena_simulation import (
+    MachineNotSimulable,
+    SimulationError,
+    UnknownEngineError,
+    processor,
+    simulate,
+    write_trajectory,
+)
 
 OTHERS = kernels.runnable()[1:]
 several = pytest.mark.skipif(not OTHERS, reason="this processor has one kind of kernels")
@@ -51,8 +58,13 @@ def test_kernels_that_no_processor_has_are_an_error() -> None:
 
 @several
 def test_a_trial_that_fails_there_says_why() -> None:
-    with pytest.raises(SimulationError, match="no engine 'steam'"):
+    with pytest.raises(UnknownEngineError, match="no engine 'steam'"):
         simulate_with(OTHERS[0], load_machine("beam"), SCENARIO, "steam")
+    with pytest.raises(MachineNotSimulable) as here:
+        simulate(Machine(), SCENARIO, "mujoco")
+    with pytest.raises(MachineNotSimulable) as there:
+        simulate_with(OTHERS[0], Machine(), SCENARIO, "mujoco")
+    assert str(there.value) == str(here.value)
 
 
 def test_the_processor_is_said_by_what_rounds() -> None:

@@ -21,7 +21,7 @@ from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Database, tables
 from buildarena_store.rights import ROLES
 from buildarena_store.roles import OWNER, RoleError, make_roles
-from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_store.states import CONSTRUCT_QUEUE, Verdict, simulate_queue
 from buildarena_worker.wiring import verifier
 
 PROCESSES = ("api", "construct", "simulate")
@@ -103,7 +103,7 @@ def test_a_job_goes_through_processes_with_roles_of_their_own(contexts) -> None:
         key = client.post("/v1/keys", json={"name": "ada", "scopes": ["submit"]})
         assert key.status_code == 201, key.text
         assert client.post(f"/v1/jobs/{job.id}/verify").status_code in {200, 202}
-    assert verifier(contexts["construct"]).verify(job.id)["ok"]
+    assert verifier(contexts["construct"]).verify(job.id).verdict == Verdict.VERIFIED
     with contexts["reader"].store.database.transaction() as connection:
         for table in tables.metadata.tables:
             connection.execute(text(f"SELECT count(*) FROM {table}"))
@@ -139,7 +139,10 @@ def test_no_process_removes_what_results_rest_on(contexts, role, table) -> None:
 def test_workers_read_no_keys_and_raise_no_limit(contexts, role) -> None:
     for statement in (
         "SELECT secret_hash FROM api_keys",
-        "SELECT 1 FROM api_keys",
+        "SELECT previous_hash FROM api_keys",
+        "SELECT scopes FROM api_keys",
+        "UPDATE api_keys SET revoked_at = NULL",
+        "UPDATE api_keys SET secret_hash = 'x'",
         "SELECT 1 FROM names",
         "INSERT INTO api_keys (id) VALUES ('key_x')",
         "UPDATE budgets SET max_cost_usd = 1e6",

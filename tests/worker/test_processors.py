@@ -13,6 +13,8 @@ from buildarena_geometry import Machine, kernels
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_simulation import processor, write_trajectory
 from buildarena_store import tables
+from buildarena_store.states import Verdict
+from buildarena_worker import processors
 from buildarena_worker.wiring import verifier
 
 SPEC = JobSpec(task="support-1", model="builtin/expert", simulator="mujoco")
@@ -68,15 +70,38 @@ def test_a_manifest_names_the_processor(job) -> None:
 def test_a_result_of_other_kernels_is_verified_with_them(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)
     trajectory = elsewhere(context, job)
-    there = {**processor(), "blas": kernels.runnable()[1], "numpy": "X86_V3"}
+    name = kernels.runnable()[1]
+    level = processors._LEVELS.get(name, processors._LOWEST)
+    there = {**processor(), "blas": name, "numpy": level}
     as_of(context, job, {**record.versions, "processor": there}, trajectory)
     assert "rollout 0: trajectory" not in failed(context, job)
 
 
 @several
-@pytest.mark.parametrize("there", [None, {"blas": "NeoverseN1", "machine": "aarch64"}, "a cloud"])
-def test_what_differs_is_said_where_the_kernels_are_not_here(context, job, there) -> None:
+@pytest.mark.parametrize("there", [None, "a cloud"])
+def test_a_result_that_names_no_processor_is_tried_with_all_kernels(context, job, there) -> None:
     (record,) = context.store.rollouts.read(job.id)
+    trajectory = elsewhere(context, job)
+    as_of(context, job, {**record.versions, "processor": there}, trajectory)
+    assert "rollout 0: trajectory" not in failed(context, job)
+    as_of(context, job, {**record.versions, "processor": there}, b"changed")
+    assert set(failed(context, job)) == {"rollout 0: trajectory"}
+
+
+@several
+def test_a_runner_that_names_none_is_tried_once(context, job, monkeypatch) -> None:
+    (record,) = context.store.rollouts.read(job.id)
+    as_of(context, job, {**record.versions, "processor": None}, elsewhere(context, job))
+    with context.store.database.transaction() as connection:
+        connection.execute(tables.rollouts.update().values(runner="key_of_somebody"))
+    monkeypatch.setattr(processors, "simulate_with", None)
+    assert "rollout 0: trajectory" in failed(context, job)
+
+
+@several
+def test_what_differs_is_said_where_the_kernels_are_not_here(context, job) -> None:
+    (record,) = context.store.rollouts.read(job.id)
+    there = {"blas": "NeoverseN1", "machine": "aarch64"}
     trajectory = elsewhere(context, job)
     as_of(context, job, {**record.versions, "processor": there}, trajectory)
     checks = failed(context, job)
@@ -87,6 +112,18 @@ def test_what_differs_is_said_where_the_kernels_are_not_here(context, job, there
     assert found["blas"] == processor()["blas"]
     assert found["apart_from_s"] > 0.0
     assert found["farthest_apart"] > 0.0
+    assert verifier(context).verify(job.id).verdict == Verdict.INCONCLUSIVE
+
+
+@several
+def test_who_names_kernels_that_are_here_is_held_to_them(context, job) -> None:
+    (record,) = context.store.rollouts.read(job.id)
+    name = kernels.runnable()[1]
+    level = processors._LEVELS.get(name, processors._LOWEST)
+    there = {**processor(), "blas": name, "numpy": level}
+    as_of(context, job, {**record.versions, "processor": there}, b"changed")
+    assert "rollout 0: processor" not in failed(context, job)
+    assert verifier(context).verify(job.id).verdict == Verdict.REFUTED
 
 
 def test_changed_bytes_of_the_same_processor_have_no_such_excuse(context, job) -> None:

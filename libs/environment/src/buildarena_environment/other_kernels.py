@@ -17,15 +17,19 @@ from typing import Final
 from buildarena_environment.processes import PARENT, end_with_parent
 from buildarena_geometry import KeyPress, Machine, kernels
 from buildarena_simulation import (
+    MachineNotSimulable,
     Scenario,
     SimulationError,
     Trajectory,
     read_trajectory,
+    require_engine,
     simulate,
     write_trajectory,
 )
 
 LONGEST_S: Final = 600.0
+REFUSED: Final = 3
+"""The process' exit code where the engine can't take the machine."""
 
 
 def can_run(name: str) -> bool:
@@ -44,8 +48,11 @@ def simulate_with(
     """As `buildarena_simulation.simulate`, with the kernels that OpenBLAS calls by this name.
 
     Raises:
+        UnknownEngineError: No engine of this name is installed.
+        MachineNotSimulable: The engine can't take the machine.
         SimulationError: The processor lacks them, or the trial failed; never scored.
     """
+    require_engine(engine)
     if not can_run(name):
         raise SimulationError(f"this processor has no kernels {name}")
     question = {
@@ -66,6 +73,8 @@ def simulate_with(
     except subprocess.TimeoutExpired as error:
         raise SimulationError(f"the trial took longer than {LONGEST_S:g} s") from error
     except subprocess.CalledProcessError as error:
+        if error.returncode == REFUSED:
+            raise MachineNotSimulable(error.stdout.decode("utf-8")) from error
         told = error.stderr.decode("utf-8", "replace").strip().splitlines()
         raise SimulationError(f"with kernels {name}: {told[-1] if told else error}") from error
     return read_trajectory(done.stdout)
@@ -76,12 +85,16 @@ def main() -> None:
     end_with_parent()
     question = json.load(sys.stdin)
     controls = question["controls"]
-    trajectory = simulate(
-        Machine.from_document(question["machine"]),
-        Scenario.model_validate_json(question["scenario"]),
-        question["engine"],
-        controls=None if controls is None else tuple(KeyPress(**press) for press in controls),
-    )
+    try:
+        trajectory = simulate(
+            Machine.from_document(question["machine"]),
+            Scenario.model_validate_json(question["scenario"]),
+            question["engine"],
+            controls=None if controls is None else tuple(KeyPress(**press) for press in controls),
+        )
+    except MachineNotSimulable as error:
+        sys.stdout.write(str(error))
+        sys.exit(REFUSED)
     sys.stdout.buffer.write(write_trajectory(trajectory))
 
 

@@ -32,6 +32,7 @@ _EVERY = (
     "reservations",
     "verifications",
 )
+_SUSPENSION = ("suspended_at", "suspended_for")
 _LOST = ("lost_cost_usd", "lost_requests")
 _SPENT = ("spent_cost_usd", "spent_requests", "spent_tokens")
 
@@ -46,6 +47,7 @@ class Role:
         adds: Tables that it adds rows to.
         changes: Tables whose rows it changes: all columns, or those that are named.
         removes: Tables that it removes rows from.
+        sees: Of tables that it does not read, columns that it does.
     """
 
     meaning: str
@@ -53,6 +55,7 @@ class Role:
     adds: tuple[str, ...] = ()
     changes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     removes: tuple[str, ...] = ()
+    sees: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 _WHOLE: tuple[str, ...] = ()
@@ -80,7 +83,7 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
                 *("artifacts", "attempts", "events", "job_artifacts", "rollouts"),
                 *_SESSIONS,
                 *_FIGURES,
-                "reservations",
+                *("reservations", "verifications"),
             ),
             changes={
                 **_WORKED,
@@ -89,13 +92,16 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
                 # A sweep whose budget is used up is stopped by the worker that finds it so.
                 "sweeps": ("state",),
                 "verifications": _WHOLE,
+                # A verification that refutes a runner's trial suspends its key.
+                "api_keys": _SUSPENSION,
             },
             removes=_REAPS,
+            sees={"api_keys": ("id", *_SUSPENSION)},
         ),
         "simulate": Role(
             meaning="Simulation workers: trials and their scores.",
             reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS, "journal"}),
-            adds=("artifacts", "attempts", "events", "job_artifacts", *_FIGURES),
+            adds=("artifacts", "attempts", "events", "job_artifacts", "verifications", *_FIGURES),
             changes={**_WORKED, "budgets": _LOST, "verifications": _WHOLE},
             removes=_REAPS,
         ),
@@ -137,6 +143,9 @@ def grant_rights(connection: Connection) -> list[str]:
         ):
             for table in tables:
                 run_with(connection, f"GRANT {right} ON {{}} TO {{}}", sql.Identifier(table), group)
+        for table, columns in rights.sees.items():
+            right = f"SELECT ({', '.join(columns)})"
+            run_with(connection, f"GRANT {right} ON {{}} TO {{}}", sql.Identifier(table), group)
         for table, columns in rights.changes.items():
             right = f"UPDATE ({', '.join(columns)})" if columns else "UPDATE"
             run_with(connection, f"GRANT {right} ON {{}} TO {{}}", sql.Identifier(table), group)

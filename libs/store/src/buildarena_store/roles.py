@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, Final
 
 from psycopg import sql
 from sqlalchemy import Connection, make_url, text
+from sqlalchemy.exc import IntegrityError, ProgrammingError
 
 from buildarena_store.database import MIGRATION_LOCK, Database
 from buildarena_store.errors import StoreError
@@ -15,6 +17,8 @@ from buildarena_store.rights import run_with as _run
 
 OWNER: Final = "owner"
 """The role that migrates and grants: it owns the tables, and no process is it."""
+_PLAIN: Final = "NOSUPERUSER NOCREATEDB NOCREATEROLE NOREPLICATION NOBYPASSRLS"
+_EXISTS: Final = text("SELECT 1 FROM pg_roles WHERE rolname = :name")
 
 
 class RoleError(StoreError):
@@ -73,7 +77,7 @@ def _account(role: str, url: str) -> tuple[str, str]:
 
 def _make(connection: Connection, name: str, login: str) -> None:
     wanted = {"name": name}
-    if connection.execute(text("SELECT 1 FROM pg_roles WHERE rolname = :name"), wanted).first():
+    if connection.execute(_EXISTS, wanted).first():
         plain = text(
             "SELECT NOT (rolsuper OR rolcreaterole OR rolcreatedb OR rolreplication "
             "OR rolbypassrls) FROM pg_roles WHERE rolname = :name"
@@ -81,11 +85,12 @@ def _make(connection: Connection, name: str, login: str) -> None:
         if not connection.execute(plain, wanted).scalar():
             raise RoleError(f"{name} is a superuser or may do more than a process should")
         return
-    _run(
-        connection,
-        f"CREATE ROLE {{}} {login} NOSUPERUSER NOCREATEDB NOCREATEROLE NOREPLICATION NOBYPASSRLS",
-        sql.Identifier(name),
-    )
+    # Roles are the server's: somebody who makes them for another database may be first.
+    with suppress(IntegrityError, ProgrammingError), connection.begin_nested():
+        _run(connection, f"CREATE ROLE {{}} {login} {_PLAIN}", sql.Identifier(name))
+        return
+    if not connection.execute(_EXISTS, wanted).first():
+        raise RoleError(f"{name} can't be made by this account")
 
 
 def _set_password(connection: Connection, name: str, password: str) -> None:

@@ -6,83 +6,103 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 # isort: split
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from buildarena_benchmark import Task
-from buildarena_environment.other_kernels import can_run, simulate_with
+from buildarena_environment.other_kernels import simulate_with
 from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry.kernels import runnable
 from buildarena_simulation import Trajectory, processor, simulate
+from buildarena_store import RolloutRecord
 
 PROCESSOR: Final = "processor"
 """The key of a rollout's versions that says what simulated it, see `buildarena_simulation`."""
-KERNELS: Final = ("blas", "numpy", "machine")
-"""What must be equal for equal bytes; another libm rarely matters."""
+_LEVELS: Final = {"SkylakeX": "X86_V4", "Haswell": "X86_V3"}
+_LOWEST: Final = "X86_V2"
 
 
-def simulate_as(
-    versions: Mapping[str, Any],
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Repeated:
+    """A trial that was simulated again.
+
+    Attributes:
+        trajectory: What came of it.
+        processor: What simulated it here, as manifests say it.
+    """
+
+    trajectory: Trajectory
+    processor: Mapping[str, str]
+
+
+def repetitions(
+    record: RolloutRecord,
     machine: Machine,
     task: Task,
-    engine: str,
     *,
     controls: Sequence[KeyPress] | None,
-) -> Trajectory:
+) -> Iterator[Repeated]:
     """A trial with the kernels that it was simulated with, where this processor has them.
 
+    Our own workers' results of before they named their kernels are tried with all, this process's
+    first. A runner's are not: whoever lies would have every lie simulated with all.
+
     Args:
-        versions: The rollout's; before they named the processor, this process's kernels count.
+        record: The rollout.
         machine: The machine.
         task: The task.
-        engine: Name of the engine.
         controls: Key presses of this run; None for the machine's own.
 
     Raises:
         BuildarenaSimulationError: As `buildarena_simulation.simulate`.
     """
+    own, engine = processor(), record.engine
+    others = [name for name in runnable() if name != own["blas"]]
+    then = named_processor(record.versions or {})
+    tried = others if then is None and record.runner is None else []
+    if then is not None and then.get("blas") in others:
+        tried = [str(then["blas"])]
+    else:
+        trajectory = simulate(
+            machine,
+            task.scenario,
+            engine,
+            controls=None if controls is None else tuple(controls),
+        )
+        yield Repeated(trajectory=trajectory, processor=own)
+    for name in tried:
+        trajectory = simulate_with(name, machine, task.scenario, engine, controls=controls)
+        here = {**own, "blas": name, "numpy": _LEVELS.get(name, _LOWEST)}
+        yield Repeated(trajectory=trajectory, processor=here)
+
+
+def named_processor(versions: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The processor in a rollout's versions, if they name one; a runner may send anything."""
     named = versions.get(PROCESSOR)
-    kept: Mapping[str, Any] = named if isinstance(named, Mapping) else {}
-    own = processor()
-    if any(kept.get(name, own[name]) != own[name] for name in KERNELS) and can_run(
-        str(kept.get("blas"))
-    ):
-        return simulate_with(str(kept["blas"]), machine, task.scenario, engine, controls=controls)
-    return simulate(machine, task.scenario, engine, controls=controls)
+    return named if isinstance(named, Mapping) else None
 
 
-def other_processor(
-    versions: Mapping[str, Any], kept: Trajectory | None, repeated: Trajectory
-) -> tuple[Any, Mapping[str, Any]] | None:
-    """Why a trajectory may differ though nothing is wrong, if another processor made it.
+def difference(kept: Trajectory | None, repeated: Repeated) -> dict[str, Any]:
+    """The processor here, and from when, and how far in units, blocks are apart.
 
     Args:
-        versions: The rollout's.
         kept: The stored trajectory; None where it can't be read.
-        repeated: The trajectory that came out now.
-
-    Returns:
-        The processor that made the stored one, and this one with how far the two are apart; None
-        if they are of one kind.
+        repeated: What came out now.
     """
-    then = versions.get(PROCESSOR)
-    own = dict(processor())
-    if then == own:
-        return None
-    return then, {**own, **({} if kept is None else _apart(kept, repeated))}
-
-
-def _apart(kept: Trajectory, repeated: Trajectory) -> dict[str, Any]:
-    """From when, and how far, in units, blocks are apart."""
-    if kept.positions.shape != repeated.positions.shape:
-        return {"apart": "the recordings have other sizes"}
+    told: dict[str, Any] = dict(repeated.processor)
+    now = repeated.trajectory
+    if kept is None or kept.positions.shape != now.positions.shape:
+        return told
     distance = np.linalg.norm(
-        kept.positions.astype(np.float64) - repeated.positions.astype(np.float64), axis=2
+        kept.positions.astype(np.float64) - now.positions.astype(np.float64), axis=2
     ).max(axis=1, initial=0.0)
     moved = np.flatnonzero(distance > 0.0)
     return {
+        **told,
         "apart_from_s": float(kept.time_s[moved[0]]) if len(moved) else None,
         "farthest_apart": round(float(distance.max(initial=0.0)), 4),
-        "breaks": [len(kept.breaks), len(repeated.breaks)],
+        "breaks": [len(kept.breaks), len(now.breaks)],
     }

@@ -56,7 +56,7 @@ from buildarena_store import (
 from buildarena_store.jobs.histories import Histories
 from buildarena_worker.game_trials import annotations_again, logged_trajectory
 from buildarena_worker.jobs import loop_of, pack_of
-from buildarena_worker.processors import other_processor, simulate_as
+from buildarena_worker.processors import Repeated, difference, named_processor, repetitions
 from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.results import (
     Failed,
@@ -220,6 +220,7 @@ class Verifier:
         # Another machine moves otherwise, whoever simulates it.
         trial = record.number if built == record.machine_hash else None
         task = task_of(job, self._tasks)
+        simulated: Repeated | None = None
         try:
             if record.engine == BESIEGE:
                 trajectory = self._played(job, record, machine, task)
@@ -229,9 +230,8 @@ class Verifier:
                 ]
             else:
                 checks += self._version_checks(name, record)
-                trajectory = simulate_as(
-                    record.versions or {}, machine, task, record.engine, controls=controls
-                )
+                simulated = self._repeated(record, machine, task, controls)
+                trajectory = simulated.trajectory
         except (MachineNotSimulable, MachineNotPlayableError):
             repeated, digest = failed_score(task, machine), None
         except LogIncompleteError as error:
@@ -242,8 +242,8 @@ class Verifier:
             repeated = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))
         checks.append(compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial))
-        if digest is not None and record.engine != BESIEGE and not checks[-1].ok:
-            checks += self._processor_checks(name, record, trajectory)
+        if simulated is not None and not checks[-1].ok:
+            checks += self._processor_checks(name, record, simulated)
         for field in SCORED:
             kept = _plain(getattr(record, field))
             checks.append(compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
@@ -266,18 +266,36 @@ class Verifier:
                 return write_trajectory(trajectory, schema=schema)
         return write_trajectory(trajectory)
 
+    def _repeated(
+        self,
+        record: RolloutRecord,
+        machine: Machine,
+        task: Task,
+        controls: Sequence[KeyPress] | None,
+    ) -> Repeated:
+        """The trial again: the first repetition of equal bytes, or the first."""
+        first = None
+        for each in repetitions(record, machine, task, controls=controls):
+            first = first or each
+            written = self._written_as(record.trajectory_hash, each.trajectory)
+            if _hash(written) == record.trajectory_hash:
+                return each
+        assert first is not None  # noqa: S101 - there is one at least
+        return first
+
     def _processor_checks(
-        self, name: str, record: RolloutRecord, repeated: Trajectory
+        self, name: str, record: RolloutRecord, repeated: Repeated
     ) -> list[Check]:
-        """Whether another kind of processor may be why the bytes differ, and how far they do."""
+        """Whether another processor may be why bytes differ, so that nothing can be said here."""
+        then = named_processor(record.versions or {})
+        if then is None or then == repeated.processor:
+            return []
         kept = None
         with suppress(ArtifactStoreError, TrajectoryFormatError, ValueError):
             if record.trajectory_hash is not None:
                 kept = read_trajectory(self._artifacts.get(record.trajectory_hash))
-        reason = other_processor(record.versions or {}, kept, repeated)
-        if reason is None:
-            return []
-        return [compare(f"{name}: processor", reason[0], dict(reason[1]), able=False)]
+        told = difference(kept, repeated)
+        return [compare(f"{name}: processor", _plain(then), told, able=False)]
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
         """What the kept log of a trial in the game tells; the game itself plays nothing again.
