@@ -288,14 +288,15 @@ class Verifier:
     ) -> list[Check]:
         """Whether another processor may be why bytes differ, so that nothing can be said here."""
         then = named_processor(record.versions or {})
-        if then is None or then == repeated.processor:
+        # A runner that names no processor gains nothing by it.
+        if then == repeated.processor or (then is None and record.runner is not None):
             return []
         kept = None
         with suppress(ArtifactStoreError, TrajectoryFormatError, ValueError):
             if record.trajectory_hash is not None:
                 kept = read_trajectory(self._artifacts.get(record.trajectory_hash))
         told = difference(kept, repeated)
-        return [compare(f"{name}: processor", _plain(then), told, able=False)]
+        return [compare(f"{name}: processor", then and dict(then), told, able=False)]
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
         """What the kept log of a trial in the game tells; the game itself plays nothing again.
