@@ -8,6 +8,7 @@ from scenarios.chaos.faults import WORKERS, Strike
 from sqlalchemy import text
 
 from buildarena_store import Database
+from buildarena_store.jobs.verifications import ABANDONED_AFTER
 
 WRONG = {
     "jobs that have not ended": "SELECT id FROM jobs WHERE state <> 'done'",
@@ -18,8 +19,13 @@ WRONG = {
         "SELECT job_id FROM events WHERE kind = 'done' GROUP BY job_id HAVING count(*) > 1"
     ),
     "jobs that entered the leaderboard more than once, or changed there": (
-        "SELECT job_id FROM board_changes GROUP BY job_id "
-        "HAVING count(*) > 1 OR min(kind) <> 'entered'"
+        # What a runner brought enters once it was verified.
+        "SELECT job_id FROM board_changes b JOIN jobs ON jobs.id = b.job_id GROUP BY job_id "
+        "HAVING count(*) FILTER (WHERE kind = 'entered') <> 1 "
+        "OR bool_or(kind <> 'entered' AND NOT (kind = 'unscored' AND by_runner))"
+    ),
+    "jobs by runners that were not verified": (
+        "SELECT id FROM jobs WHERE by_runner AND audit IS DISTINCT FROM 'verified'"
     ),
     "journal entries written without a hold": (
         "SELECT j.job_id FROM journal j LEFT JOIN attempts a USING (job_id, token) "
@@ -43,6 +49,17 @@ WRONG = {
     ),
     "reservations left over": "SELECT job_id FROM reservations",
 }
+
+
+def audited(database: Database) -> bool:
+    """Whether no verification is open; those of killed workers are others' from now on."""
+    with database.transaction() as connection:
+        connection.execute(
+            text("UPDATE verifications SET claimed_at = claimed_at - interval '1 second' * :later"),
+            {"later": ABANDONED_AFTER.total_seconds() / 20},
+        )
+        query = text("SELECT count(*) FROM verifications WHERE state <> 'done'")
+        return connection.execute(query).scalar_one() == 0
 
 
 def wrongs(database: Database) -> dict[str, list[str]]:

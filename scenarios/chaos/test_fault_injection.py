@@ -16,7 +16,7 @@ from pathlib import Path
 
 import httpx
 import pytest
-from scenarios.chaos.accounts import pick_ups, wrongs
+from scenarios.chaos.accounts import audited, pick_ups, wrongs
 from scenarios.chaos.faults import VICTIMS, Fire
 from sqlalchemy.exc import OperationalError
 from support.long_tests import LONG
@@ -162,6 +162,7 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
             fire.stop()
             seconds = time.monotonic() - started
         wait_until(lambda: reachable(database), 60, "the last strike is over")
+        wait_until(lambda: audited(database), 300, "all is verified that must be")
         assert wrongs(database) == {}
         picked_up = pick_ups(database, fire.strikes)
         with database.transaction() as connection:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+from scenarios.chaos.accounts import audited
 from scenarios.hosts.books import PAID_MODEL, differences, figures, paid_twice, tracebacks, wrongs
 from scenarios.hosts.cuts import Cuts
 from scenarios.hosts.listening import Listener
@@ -103,6 +104,7 @@ def examined(
     """What was found; `wrong` is empty when all is well."""
     with inside("database"):
         found = figures(service.database, service.logs)
+        wait_until(lambda: audited(service.database), 600, "all is verified that must be")
         wrong: dict[str, Any] = dict(wrongs(service.database))
         extra, most = paid_twice(service.database, service.standin)
         compared, different = differences(service.database, TASK, ENGINE)

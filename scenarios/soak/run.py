@@ -20,7 +20,7 @@ from pathlib import Path
 
 import httpx
 import psutil
-from scenarios.chaos.accounts import wrongs
+from scenarios.chaos.accounts import audited, wrongs
 from scenarios.chaos.faults import Fire
 from scenarios.soak.memory import MEBI, Watch, growth
 from support.servers.stacks import running_stack, wait_until
@@ -195,6 +195,7 @@ def main() -> int:
 
 
 def _figures(database: Database, watch: Watch, fire: Fire, reader: Reader) -> dict[str, object]:
+    wait_until(lambda: audited(database), 600, "all is verified that must be")
     wrong = wrongs(database)
     with database.transaction() as connection:
         for name, query in BOOKS.items():

@@ -15,6 +15,7 @@ from buildarena_benchmark.leaderboard import published_rows
 from buildarena_cli.commands.report import variant
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_store.states import Verdict
 from buildarena_store.tables import jobs, rollouts
 
 TASKS = ["transport-1", "support-1", "support-2", "lift-1", "lift-2"]
@@ -217,7 +218,8 @@ def test_an_audit_tells_every_difference(url, context) -> None:
                 number += 1
                 check = {"name": "score: indicator", "ok": number % 2 == 0, "kept": 1, "found": 2}
                 report = {"ok": check["ok"], "checks": [check]}
-                context.store.verifications.finish(claimed.id, report)
+                verdict = Verdict.VERIFIED if check["ok"] else Verdict.REFUTED
+                context.store.verifications.finish(claimed.id, report, verdict=verdict)
             time.sleep(0.05)
 
     worker = threading.Thread(target=verify)

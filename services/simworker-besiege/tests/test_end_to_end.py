@@ -110,7 +110,7 @@ def _check(context: Context, job: Job) -> None:
     assert {*kept, f"trajectory-{number}"} <= set(files)
     read = read_machine_file(context.artifacts.get(files[f"machine-{number}.bsg"])).machine
     assert read.part_count == machine.part_count
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     assert any(check["name"].endswith("what mujoco says") for check in report["checks"])
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
     _spoil_log(context, job, f"log-{number}.txt", files[f"log-{number}.txt"])
@@ -132,7 +132,7 @@ def _spoil_log(context: Context, job: Job, name: str, digest: str) -> None:
     made = {name: context.artifacts.put("".join(lines).encode(), "text/plain")}
     with context.store.database.transaction() as connection:
         context.store.results.attach(job.id, made, connection=connection)
-    report = verifier(context).verify(job.id)
+    report = verifier(context).verify(job.id).as_document()
     failed = [check["name"] for check in report["checks"] if not check["ok"]]
     assert failed, "a changed log passed"
 

@@ -45,7 +45,7 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "model": Entry("models", "app", "Look at models."),
     "machine": Entry("machine", "app", "Simulate and draw machines on this computer."),
     "besiege": Entry("besiege", "app", "Play machines in the game Besiege."),
-    "key": Entry("keys", "app", "Make, list, rotate and revoke API keys."),
+    "key": Entry("keys", "app", "Make, list, rotate, revoke and reinstate API keys."),
     "mcp": Entry("mcp", "mcp", "Let agents that speak the Model Context Protocol build."),
     "worker": Entry("worker", "app", "Run workers by themselves."),
     "backup": Entry("backups", "backup", "Back up the database and its artifacts."),
