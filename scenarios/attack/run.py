@@ -28,6 +28,7 @@ FULL: Mapping[str, float] = {
     "flood_s": 10,
     "bomb_mib": 2048,
     "lies": 100,
+    "heartbeats": 100,
     "kills": 10,
     "strangers": 200,
     "broker_s": 60,

@@ -77,13 +77,14 @@ def forged_trials(arena: Arena) -> Tried:
 def noisy_runner(arena: Arena) -> Tried:
     """Heartbeats of megabytes, and more names than a key may have."""
     runner = _runner(arena)
-    found = Tried("100 heartbeats of 2 MB, as many of 60 kB, 400 names")
+    count = int(arena.sizes["heartbeats"])
+    found = Tried(f"{count} heartbeats of 2 MB, as many of 60 kB, {4 * count} names")
     before = _health(arena)
     answers: Counter[int] = Counter()
     large_taken = 0
     large = json.dumps({**_beat("noisy"), "versions": {"engine": "x" * 2_000_000}}).encode()
     wordy = {**_beat("noisy"), "versions": {"engine": "x" * 60_000}}
-    for number in range(100):
+    for number in range(count):
         answer = _ask(runner, content=large)
         answers[answer] += 1
         large_taken += answer == 200

@@ -20,6 +20,7 @@ SMALL = {
     "flood_s": 1.0,
     "bomb_mib": 64,
     "lies": 3,
+    "heartbeats": 8,
     "kills": 2,
     "strangers": 60,
     "broker_s": 3,
