@@ -71,8 +71,8 @@ def _settle() -> None:
     """Takes what the process always has out of the garbage collector's sight.
 
     Looking through it all takes 0.2 s, in which nobody is answered, and happens whenever a question
-    makes many objects. What the first board and the first
-    comparison would load is loaded before, so that it is part of it.
+    makes many objects. What the first board and the first comparison would load is loaded before,
+    so that it is part of it.
     """
     published_overall()
     import_module("scipy.stats")

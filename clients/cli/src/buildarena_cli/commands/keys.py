@@ -110,12 +110,7 @@ def rotate_key(
 @app.command("revoke")
 def revoke_key(key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """Revoke a key at once; its jobs continue."""
-    client = Client(url)
-    key = client.post(at("keys", whole_id(client, "key", key_id), "revoke"), {})
-    if as_json:
-        print_json(key)
-    else:
-        say(f"{key['id']} ({key['name']}) is revoked")
+    _change(url, key_id, "revoke", "is revoked", as_json=as_json)
 
 
 @app.command("reinstate")
@@ -123,12 +118,7 @@ def reinstate_key(
     key_id: KeyId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
 ) -> None:
     """Let a runner key work again that was suspended because a trial of its was refuted."""
-    client = Client(url)
-    key = client.post(at("keys", whole_id(client, "key", key_id), "reinstate"), {})
-    if as_json:
-        print_json(key)
-    else:
-        say(f"{key['id']} ({key['name']}) may lease trials")
+    _change(url, key_id, "reinstate", "may lease trials", as_json=as_json)
 
 
 @app.command("budget")
@@ -149,6 +139,15 @@ def set_budget(
         print_json(key)
     else:
         say(f"{key['id']} ({key['name']}): {spent(key['budget'])}")
+
+
+def _change(url: str, key_id: str, verb: str, outcome: str, *, as_json: bool) -> None:
+    client = Client(url)
+    key = client.post(at("keys", whole_id(client, "key", key_id), verb), {})
+    if as_json:
+        print_json(key)
+    else:
+        say(f"{key['id']} ({key['name']}) {outcome}")
 
 
 def _hours(text: str) -> float:

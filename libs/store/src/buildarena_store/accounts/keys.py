@@ -8,6 +8,7 @@ import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from typing import Any
 
 from sqlalchemy import any_, func, insert, or_, select, update
 
@@ -220,17 +221,7 @@ class ApiKeys:
         Raises:
             UnknownIdError: There is no such key.
         """
-        statement = (
-            update(api_keys)
-            .where(api_keys.c.id == key_id)
-            .values(revoked_at=func.coalesce(api_keys.c.revoked_at, events.now))
-            .returning(*_COLUMNS)
-        )
-        with self._database.transaction() as connection:
-            row = connection.execute(statement).first()
-        if row is None:
-            raise UnknownIdError("key", key_id)
-        return value_of(ApiKey, row)
+        return self._change(key_id, revoked_at=func.coalesce(api_keys.c.revoked_at, events.now))
 
     def reinstate(self, key_id: str) -> ApiKey:
         """Lets a suspended key work again; what its runners bring is verified as before.
@@ -238,11 +229,11 @@ class ApiKeys:
         Raises:
             UnknownIdError: There is no such key.
         """
+        return self._change(key_id, suspended_at=None, suspended_for=None)
+
+    def _change(self, key_id: str, **values: Any) -> ApiKey:
         statement = (
-            update(api_keys)
-            .where(api_keys.c.id == key_id)
-            .values(suspended_at=None, suspended_for=None)
-            .returning(*_COLUMNS)
+            update(api_keys).where(api_keys.c.id == key_id).values(**values).returning(*_COLUMNS)
         )
         with self._database.transaction() as connection:
             row = connection.execute(statement).first()
