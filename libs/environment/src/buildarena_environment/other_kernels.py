@@ -32,11 +32,6 @@ REFUSED: Final = 3
 """The process' exit code where the engine can't take the machine."""
 
 
-def can_run(name: str) -> bool:
-    """Whether this processor has the kernels of this name."""
-    return name in kernels.runnable()
-
-
 def simulate_with(
     name: str,
     machine: Machine,
@@ -53,7 +48,7 @@ def simulate_with(
         SimulationError: The processor lacks them, or the trial failed; never scored.
     """
     require_engine(engine)
-    if not can_run(name):
+    if name not in kernels.runnable():
         raise SimulationError(f"this processor has no kernels {name}")
     question = {
         "machine": machine.to_document(),

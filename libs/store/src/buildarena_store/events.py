@@ -52,6 +52,11 @@ def record_sweep(connection: Connection, sweep_id: str, kind: str, data: Mapping
     connection.execute(insert(events).values(sweep_id=sweep_id, kind=kind, data=dict(data)))
 
 
+def say_why(why: str, connection: Connection) -> None:
+    """What the log of boards gives as the reason of this transaction's changes from now on."""
+    connection.execute(select(func.set_config("buildarena.why", why, True)))
+
+
 class Events:
     """Reads events after a given one."""
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pydantic import BaseModel
-from sqlalchemy import Column, Connection, Table, func, select, text
+from sqlalchemy import Column, Connection, Table, func, select
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.exc import OperationalError, StatementError
 
@@ -109,10 +109,7 @@ def read_archive(
         archive.keep_artifacts(store)
         try:
             with database.transaction() as connection:
-                connection.execute(
-                    text("SELECT set_config('buildarena.why', :why, true)"),
-                    {"why": f"imported from {archive.origin}"},
-                )
+                events.say_why(f"imported from {archive.origin}", connection)
                 return archive.take_in(connection)
         except StatementError as error:
             if isinstance(error, OperationalError):

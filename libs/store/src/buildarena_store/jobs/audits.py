@@ -111,7 +111,7 @@ def note_verdict(
         refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
         connection: The transaction that ends the verification.
     """
-    _say_why(f"{verdict} by {verification_id}", connection)
+    events.say_why(f"{verdict} by {verification_id}", connection)
     if verdict == Verdict.INCONCLUSIVE:
         _audit_all(_runners(job_id, true(), connection), connection)
         return
@@ -139,7 +139,7 @@ def note_verdict(
     if refuted:
         events.record_jobs(connection, [job_id], REFUTED.name, {"verification": verification_id})
         keys = _runners(job_id, rollouts.c.number.in_(refuted_trials), connection)
-        _say_why(f"its runner was refuted by {verification_id}", connection)
+        events.say_why(f"its runner was refuted by {verification_id}", connection)
         connection.execute(
             update(api_keys)
             .where(api_keys.c.id == any_(bound_texts(keys)), api_keys.c.suspended_at.is_(None))
@@ -230,8 +230,3 @@ def _audit_all(keys: Sequence[str], connection: Connection) -> None:
         .returning(jobs.c.id)
     )
     require_audits(list(waiting.scalars()), connection=connection)
-
-
-def _say_why(why: str, connection: Connection) -> None:
-    """What the log of boards gives as the reason of this transaction's changes from now on."""
-    connection.execute(select(func.set_config("buildarena.why", why, True)))
