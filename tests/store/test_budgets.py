@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from decimal import Decimal
 
@@ -137,6 +138,45 @@ def test_a_reply_that_was_lost_in_a_kill_is_a_figure_of_its_own(context, sweep) 
     assert (budget.spent_requests, budget.spent_cost_usd) == (0, 0)
     # Of a job without a request under way nobody can tell: its figure is at most.
     assert context.store.sweeps.progress(name).lost_requests == 2
+
+
+@pytest.mark.parametrize("end", ["hand_back", "cancel", "loss"])
+def test_who_lost_the_job_reserves_nothing(context, sweep, end) -> None:
+    name = sweep(0, max_requests=9)
+    lease = claim(context)
+    if end == "hand_back":
+        context.store.leases.hand_back(lease)
+    elif end == "cancel":
+        cancel(context, lease.job.id)
+    else:
+        lose(context, jobs=1)
+        assert claim(context).token > lease.token
+    with pytest.raises(StaleLeaseError):
+        context.store.budgets.reserve(lease, NEED)
+    assert reserved(context, name) == 0
+
+
+def test_a_lease_that_ends_meanwhile_leaves_no_reservation(context, sweep) -> None:
+    """A worker that was taken for dead reserves at the moment in which its job is taken away."""
+    name = sweep(*range(12), max_requests=99)
+    leases = [claim(context) for _ in range(12)]
+
+    def reserve(lease: Lease) -> None:
+        with suppress(StaleLeaseError):
+            context.store.budgets.reserve(lease, NEED)
+
+    with ThreadPoolExecutor(8) as pool:
+        done = [pool.submit(reserve, lease) for lease in leases]
+        done += [pool.submit(cancel, context, lease.job.id) for lease in leases]
+        for one in done:
+            one.result()
+    assert reserved(context, name) == 0
+
+
+def reserved(context, budget: str) -> int:
+    with context.store.database.transaction() as connection:
+        query = text("SELECT count(*) FROM reservations WHERE budget_id = :budget")
+        return connection.execute(query, {"budget": budget}).scalar_one()
 
 
 @pytest.mark.parametrize("end", ["hand_back", "cancel"])

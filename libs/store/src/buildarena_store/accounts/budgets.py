@@ -18,8 +18,10 @@ from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store.account_tables import MAX_USD, budgets, reservations
 from buildarena_store.database import Database
+from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.journal import Usage
 from buildarena_store.jobs.leases import Lease
+from buildarena_store.states import JobState
 from buildarena_store.tables import jobs, journal, sweep_jobs
 
 
@@ -132,8 +134,21 @@ class Budgets:
 
         Returns:
             None when it is reserved, otherwise what is lacking.
+
+        Raises:
+            StaleLeaseError: The lease is over: nobody would give back what it reserved.
         """
         job_id = lease.job.id
+        # Before the budgets, as in every write under a lease; who ends the lease waits for it.
+        held = (
+            select(jobs.c.id)
+            .where(
+                jobs.c.id == job_id,
+                jobs.c.lease_token == lease.token,
+                jobs.c.state == JobState.RUNNING,
+            )
+            .with_for_update(read=True)
+        )
         # Locked in the order of their ids, so that two jobs never wait for each other.
         locked = (
             select(budgets)
@@ -143,6 +158,8 @@ class Budgets:
             .with_for_update(of=budgets)
         )
         with self._database.transaction() as connection:
+            if connection.execute(held).first() is None:
+                raise StaleLeaseError(job_id, lease.token)
             found = [_budget(row) for row in connection.execute(locked)]
             for budget in found:
                 shortage = _shortage(budget, _reserved(budget.id, job_id, connection), need)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from decimal import Decimal
 
 from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_store import Budgets, Need, Usage
+from buildarena_store import Budgets, Need, Shortage, StaleLeaseError, Usage
 from buildarena_worker.session.messages import Request
 from buildarena_worker.session.results import BudgetExhausted, SessionEnded, Superseded
 
@@ -39,12 +39,12 @@ class BudgetGuard:
         """Reserves what a request may cost; waits while open requests may give back enough.
 
         Raises:
-            SessionEnded: No budget is left for it, or the lease ended while it waited.
+            SessionEnded: No budget is left for it, or the lease is over.
         """
         if not self._active.budgeted:
             return
         need = self._need(request)
-        while (shortage := self._budgets.reserve(self._active.lease, need)) is not None:
+        while (shortage := self._reserved(need)) is not None:
             if not shortage.temporary:
                 raise SessionEnded(BudgetExhausted(shortage=shortage))
             if self._active.lost:
@@ -59,6 +59,12 @@ class BudgetGuard:
     def charge_lost(self, usage: Usage) -> None:
         """Counts a reply that was paid for but came after the lease had ended."""
         self._budgets.charge_lost(self._active.lease, usage)
+
+    def _reserved(self, need: Need) -> Shortage | None:
+        try:
+            return self._budgets.reserve(self._active.lease, need)
+        except StaleLeaseError as stale:
+            raise SessionEnded(Superseded()) from stale
 
     def _need(self, request: Request) -> Need:
         given = request.model_config["decoding"].get("max_tokens")
