@@ -188,7 +188,8 @@ def measure_lists(client: httpx.Client) -> dict[str, Any]:
 
 def measure_workers(database: Database, times: int) -> dict[str, Any]:
     """What workers and the reaper ask for."""
-    leases = open_store(database, lease_s=15, max_faults=8).leases
+    store = open_store(database, lease_s=15, max_faults=8)
+    leases, waiting = store.leases, store.waiting
     last: list[str | None] = [None]
 
     def claim() -> None:
@@ -198,8 +199,8 @@ def measure_workers(database: Database, times: int) -> dict[str, Any]:
     return {
         "claim_ms": spread(timed(claim, times)),
         "recover_ms": spread(timed(leases.recover, 10)),
-        "waiting_queues_ms": spread(timed(leases.waiting_queues, 10)),
-        "to_notify_ms": spread(timed(lambda: leases.to_notify("construct", 100), 10)),
+        "waiting_queues_ms": spread(timed(waiting.queues, 10)),
+        "to_notify_ms": spread(timed(lambda: waiting.to_notify("construct", 100), 10)),
     }
 
 

@@ -100,7 +100,7 @@ def test_a_fault_waits_before_the_next_attempt(context, add) -> None:
     lease = claim(context)
     assert context.store.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
     assert context.store.leases.claim("construct", owner="w") is None
-    assert context.store.leases.to_notify("construct", 10) == []
+    assert context.store.waiting.to_notify("construct", 10) == []
 
 
 def test_handing_back_is_no_fault(context, add) -> None:
@@ -112,8 +112,8 @@ def test_handing_back_is_no_fault(context, add) -> None:
 
 def test_workers_are_notified_of_waiting_jobs_once(context, add) -> None:
     ids = add(1, 2, 3)
-    assert set(context.store.leases.to_notify("construct", 10)) == set(ids)
-    assert context.store.leases.to_notify("construct", 10) == []
+    assert set(context.store.waiting.to_notify("construct", 10)) == set(ids)
+    assert context.store.waiting.to_notify("construct", 10) == []
 
 
 def test_a_cancelled_job_frees_its_worker(context, add) -> None:

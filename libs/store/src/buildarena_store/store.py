@@ -17,6 +17,7 @@ from buildarena_store.jobs.rollouts import Rollouts
 from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import Turns
 from buildarena_store.jobs.verifications import Verifications
+from buildarena_store.jobs.waiting import WaitingJobs
 from buildarena_store.metrics import Metrics
 from buildarena_store.sweeps.lifecycle import SweepLifecycle
 from buildarena_store.sweeps.sweeps import Sweeps
@@ -31,6 +32,7 @@ class Store:
     database: Database
     jobs: Jobs
     leases: Leases
+    waiting: WaitingJobs
     runner_leases: RunnerLeases
     journal: Journal
     rollouts: Rollouts
@@ -61,6 +63,7 @@ def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
         database=database,
         jobs=Jobs(database),
         leases=leases,
+        waiting=WaitingJobs(database),
         runner_leases=RunnerLeases(database, leases),
         journal=Journal(database),
         rollouts=Rollouts(database),

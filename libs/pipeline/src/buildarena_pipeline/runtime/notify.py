@@ -31,7 +31,7 @@ def notify_waiting(context: Context, queue: str, *, most: int = MAX_WAITING) -> 
     waiting = context.queues.waiting(queue)
     if waiting is None or waiting >= most:
         return waiting
-    job_ids = context.store.leases.to_notify(queue, most - waiting)
+    job_ids = context.store.waiting.to_notify(queue, most - waiting)
     if job_ids:
         context.queues.announce(queue, job_ids)
     return waiting

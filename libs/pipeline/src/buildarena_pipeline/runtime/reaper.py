@@ -61,7 +61,7 @@ class Reaper:
             recovered = self._context.store.leases.recover()
             if recovered:
                 log.info("recovered", jobs=recovered)
-            for queue in self._context.store.leases.waiting_queues():
+            for queue in self._context.store.waiting.queues():
                 self._notify(queue)
             self._context.store.external_calls.abandon_idle()
             checks = self._context.store.verifications.to_notify(MAX_WAITING)

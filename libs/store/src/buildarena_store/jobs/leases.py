@@ -30,7 +30,7 @@ from buildarena_store import events
 from buildarena_store.account_tables import budgets
 from buildarena_store.database import Database
 from buildarena_store.jobs.attempts import Ending, end_attempts, move_on
-from buildarena_store.jobs.claiming import CLAIM, WAITING_QUEUES
+from buildarena_store.jobs.claiming import CLAIM
 from buildarena_store.jobs.job import Job
 from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, RUNNER, require_fewer_leases
 from buildarena_store.rows import value_of
@@ -39,8 +39,6 @@ from buildarena_store.tables import jobs
 
 LONGEST_DELAY_S = 300.0
 """A job waits no longer than this between two attempts."""
-NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
-"""Workers are notified again of a queued job whose message may have been lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -344,48 +342,6 @@ class Leases:
                 endings, AttemptResult.LOST, "no heartbeat was received", connection=connection
             )
         return [row.id for row in rows if row.state == JobState.QUEUED]
-
-    def waiting_queues(self) -> list[str]:
-        """Names of the queues that jobs wait in."""
-        with self._database.statement() as connection:
-            return list(connection.execute(WAITING_QUEUES).scalars())
-
-    def to_notify(self, queue: str, limit: int) -> list[str]:
-        """Waiting jobs that no message names, oldest first; they are marked as notified.
-
-        Recovered ones come before all others.
-        """
-        found: list[str] = []
-        with self._database.transaction() as connection:
-            # Each kind has an index in its order; in one query neither would serve.
-            for kind in (jobs.c.faults > 0, jobs.c.faults == 0):
-                found += self._notified(queue, kind, limit - len(found), connection)
-        return found
-
-    def _notified(
-        self, queue: str, kind: ColumnElement[bool], limit: int, connection: Connection
-    ) -> list[str]:
-        unnotified = (
-            select(jobs.c.id)
-            .where(
-                jobs.c.state == JobState.QUEUED,
-                jobs.c.queue == queue,
-                kind,
-                jobs.c.available_at <= events.now,
-                jobs.c.notified_at.is_(None)
-                | (jobs.c.notified_at < events.now - NOTIFY_AGAIN_AFTER),
-            )
-            .order_by(jobs.c.created_at, jobs.c.id)
-            .limit(limit)
-            .with_for_update(skip_locked=True)
-        )
-        rows = connection.execute(
-            update(jobs)
-            .where(jobs.c.id.in_(unnotified.scalar_subquery()))
-            .values(notified_at=events.now)
-            .returning(jobs.c.id)
-        )
-        return [row.id for row in rows]
 
 
 _BUDGETED = (
