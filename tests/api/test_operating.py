@@ -85,6 +85,10 @@ def test_an_estimate_stores_nothing(api, sweep) -> None:
     # gpt-4o at 2.5 and 10 dollars per million tokens, support-1's means of the paper.
     assert paid["cost_usd"] == pytest.approx(4 * (629911.1 * 2.5 + 27311.1 * 10) / 1e6, rel=1e-3)
     assert api.get("/v1/sweeps").json()["sweeps"] == []
+    # Two models on one task are one claim.
+    power = estimate["power"]
+    assert (power["trials"], power["trials_for_ten_points"]) == (4, 388)
+    assert power["on_a_task"] == power["overall"] is None
 
 
 def test_an_oversized_body_is_refused(api) -> None:

@@ -7,6 +7,7 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 from support.clients.commands import printed, run, run_cli
+from support.clients.terminals import on_terminal
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "docs" / "sweep.schema.json"
@@ -85,6 +86,16 @@ def test_what_the_service_does_not_know_is_reported_with_its_line(url, file) -> 
         assert model.startswith(f"{file}:7: models[1]: there is no model 'gpt-6'; choose from ")
         assert "openai/gpt-5" in model
         assert simulator.startswith(f"{file}:11: simulator: there is no simulator 'unity'; choose")
+
+
+def test_a_dry_run_says_what_the_sweep_could_show(url, file) -> None:
+    words = ["sweep", "run", str(file), "--dry-run", "--url", url, "--samples"]
+    code, told = on_terminal(120, *words, "64", NO_COLOR="1")
+    assert code == 0, told
+    assert "64 trials of each model on each task" in told
+    assert "trials of each model on each task show 10 points over all tasks" in told
+    _, few = on_terminal(120, *words, "3", NO_COLOR="1")
+    assert "not at all" in few
 
 
 def test_flags_take_the_place_of_the_files_fields(url, file) -> None:

@@ -17,7 +17,7 @@ loads = arrays(float, st.integers(0, 40), elements=st.sampled_from([0.0, 3.0, 20
 
 
 @pytest.mark.parametrize(
-    ("trials", "rate"), [(8, 0.9), (8, 1.0), (16, 0.6), (32, 0.3), (64, 0.1), (256, 0.03)]
+    ("trials", "rate"), [(16, 0.9), (12, 1.0), (24, 0.6), (48, 0.3), (128, 0.1), (512, 0.03)]
 )
 @pytest.mark.parametrize("name", LOADS)
 def test_intervals_of_means_hold_as_often_as_they_say(name, trials, rate) -> None:
@@ -29,21 +29,21 @@ def test_intervals_of_means_hold_as_often_as_they_say(name, trials, rate) -> Non
 
 @pytest.mark.parametrize("failures", [0.0, 8.0])
 def test_few_successes_are_covered_or_too_few(failures) -> None:
-    """At 3 % and 64 trials resampling covers 79 %: it knows only the successes it saw."""
+    """Where few trials succeed, resampling covers too few: it knows only the successes it saw."""
     lognormal = LOADS["lognormal, sigma 0.8"]
-    found = coverage(lognormal, 64, 0.03, samples=6000, seed=22, failures=failures)
+    found = coverage(lognormal, 128, 0.04, samples=6000, seed=22, failures=failures)
     assert 0.02 < found.shown < 0.08
     assert found.covered >= 0.93
 
 
 def test_a_rate_that_is_never_missed_for_want_of_failures() -> None:
-    """Eight successes of eight do not say that every trial succeeds."""
-    low, high = mean_interval(np.full(8, 300.0))
+    """Twelve successes of twelve do not say that every trial succeeds."""
+    low, high = mean_interval(np.full(12, 300.0))
     assert low < 0.9 * 300 < high == 300
 
 
 @pytest.mark.parametrize("successes", range(MIN_SUCCESSES))
-@pytest.mark.parametrize("trials", [8, 64])
+@pytest.mark.parametrize("trials", [10, 64])
 def test_too_few_successes_give_no_interval(successes, trials) -> None:
     values = np.zeros(trials)
     values[:successes] = 300.0

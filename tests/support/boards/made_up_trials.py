@@ -54,6 +54,15 @@ def _split(share: float, most: float) -> Draw:
     return draw
 
 
+def _designs(share: float, ratio: float) -> Loads:
+    """Loads of two designs: this share of the successes is of one that carries so much more."""
+
+    def draw(rng: np.random.Generator, n: int) -> Floats:
+        return np.where(rng.random(n) < share, ratio, 1.0) * 100 * np.exp(rng.normal(0, 0.15, n))
+
+    return Loads(draw, 100 * (1 - share + share * ratio) * float(np.exp(0.15**2 / 2)))
+
+
 LOADS: Mapping[str, Loads] = {
     "lognormal, sigma 0.3": lognormal(0.3),
     "lognormal, sigma 0.8": lognormal(0.8),
@@ -63,6 +72,9 @@ LOADS: Mapping[str, Loads] = {
     "uniform": Loads(lambda rng, n: rng.uniform(10, 200, n), 105.0),
     "exponential": Loads(lambda rng, n: rng.exponential(300, n), 300.0),
     "half at 1500": Loads(_split(0.5, 500), 0.5 * LIMIT + 0.5 * 275),
+    "two designs, 3 to 1, a quarter": _designs(0.25, 3),
+    "two designs, 3 to 1, half": _designs(0.5, 3),
+    "two designs, 10 to 1, half": _designs(0.5, 10),
 }
 """Loads for which intervals promise to hold."""
 RARE = Loads(_split(0.1, 200), 0.1 * LIMIT + 0.9 * 125)

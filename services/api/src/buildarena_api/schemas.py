@@ -254,12 +254,27 @@ class ModelEstimate(_Answer):
     cost_usd: float | None = Field(description="null when no price is known")
 
 
+class BoardPower(_Answer):
+    """What a sweep's board could show, where the weaker model succeeds in half of its trials."""
+
+    trials: int = Field(description="Trials of each model on each task")
+    on_a_task: float | None = Field(
+        description="The smallest rise of the success rate, 0 to 1, that four of five such boards "
+        "claim on one task; null when they claim none"
+    )
+    overall: float | None = Field(description="The same rise on every task, over all of them")
+    trials_for_ten_points: int = Field(
+        description="Trials of each model on each task that show a rise of 0.1 over all tasks"
+    )
+
+
 class SweepEstimate(_Answer):
     """What a sweep would consist of, from the mean figures that the paper reports per task."""
 
     jobs: int
     models: list[ModelEstimate]
     cost_usd: float = Field(description="Sum over the models with a known price")
+    power: BoardPower
 
 
 class SweepPage(_Answer):

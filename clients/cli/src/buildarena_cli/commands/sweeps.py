@@ -30,7 +30,7 @@ from buildarena_cli.terminal.output import columns, minute_of, number, print_jso
 from buildarena_cli.terminal.progress import exit_code, watch_sweep
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import SweepEstimate, SweepView
+    from buildarena_client.schemas import BoardPower, SweepEstimate, SweepView
 
 app = new_group("Submit and watch sweeps.")
 
@@ -54,7 +54,8 @@ def run_sweep(
     dry_run: Annotated[
         bool,
         typer.Option(
-            "--dry-run", help="Show the jobs and about what they would cost; submit nothing."
+            "--dry-run",
+            help="Show the jobs, about what they cost and what they could show; submit nothing.",
         ),
     ] = False,
     detach: Annotated[bool, typer.Option("--detach", help="Submit without waiting.")] = False,
@@ -298,8 +299,25 @@ def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
             for model in estimate["models"]
         ],
         title=f"{estimate['jobs']:,} jobs, about ${estimate['cost_usd']:,.2f}",
-        notes=["From the mean figures that the paper reports; models without a known price: -"],
+        notes=[
+            "From the mean figures that the paper reports; models without a known price: -",
+            *_power(estimate["power"]),
+        ],
     )
+
+
+def _power(power: BoardPower) -> list[str]:
+    """What the sweep's board could show, in words."""
+    needed = power["trials_for_ten_points"]
+    return [
+        f"{power['trials']} trials of each model on each task: tell a success rate from 50 %",
+        f"  on a task {_by(power['on_a_task'])}, over all tasks {_by(power['overall'])}",
+        f"{needed:,} trials of each model on each task show 10 points over all tasks",
+    ]
+
+
+def _by(rise: float | None) -> str:
+    return "not at all" if rise is None else f"if it is {100 * rise:.0f} points more"
 
 
 def _show_limit(sweep: SweepView) -> None:

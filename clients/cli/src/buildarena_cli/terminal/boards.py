@@ -103,7 +103,7 @@ def task_table(task: Mapping[str, Any]) -> None:
         notes=[
             "* baseline; # is shared by statistically tied models",
             "95 % is the exact interval of the success rate, and the one of the mean indicator",
-            "too few: no interval of the mean indicator holds with fewer than 5 successes",
+            "too few: with so few successes no interval of the mean indicator holds",
             *_remarks(task["rows"]),
             *_imports(task["rows"]),
         ],

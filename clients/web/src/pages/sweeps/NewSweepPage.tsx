@@ -150,6 +150,11 @@ function Faults({ faults }: { faults: readonly Fault[] }) {
   );
 }
 
+/** How much more a success rate must be for a board to claim that it is. */
+function riseWords(rise: number | null): string {
+  return rise === null ? "not at all" : `if it is ${Math.round(100 * rise)} points more`;
+}
+
 function Estimate({ found, waiting }: { found: Schema<"SweepEstimate"> | undefined; waiting: boolean }) {
   return (
     <Section title="Estimate">
@@ -159,6 +164,11 @@ function Estimate({ found, waiting }: { found: Schema<"SweepEstimate"> | undefin
         <>
           <Text size="lg" fw={650} className="figures">
             {count(found.jobs)} jobs, {dollars(found.cost_usd)}
+          </Text>
+          <Text size="sm">
+            {count(found.power.trials)} trials of each model on each task tell a success rate from 50 %{" "}
+            {riseWords(found.power.on_a_task)} on a task, {riseWords(found.power.overall)} over all;{" "}
+            {count(found.power.trials_for_ten_points)} would show 10 points over all.
           </Text>
           <Table.ScrollContainer
             minWidth={300}

@@ -14,7 +14,12 @@ from buildarena_benchmark.statistics.comparisons import (
 from buildarena_benchmark.statistics.economy import TokenBin, cost_per_success, token_bins
 from buildarena_benchmark.statistics.means import MIN_SUCCESSES, mean_interval
 from buildarena_benchmark.statistics.permutation import PairTests, pair_tests
-from buildarena_benchmark.statistics.power import detectable_difference, trials_needed
+from buildarena_benchmark.statistics.power import (
+    BoardPower,
+    board_power,
+    detectable_difference,
+    trials_needed,
+)
 from buildarena_benchmark.statistics.proportions import (
     difference_interval,
     exact_interval,
@@ -33,12 +38,14 @@ from buildarena_benchmark.statistics.ranking import (
 __all__ = [
     "MIN_SUCCESSES",
     "Agreement",
+    "BoardPower",
     "PairTests",
     "PairedTest",
     "Ranking",
     "TokenBin",
     "adjusted",
     "agreement",
+    "board_power",
     "combined",
     "cost_per_success",
     "detectable_difference",

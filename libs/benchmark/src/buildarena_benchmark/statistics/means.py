@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.statistics.proportions import LEVEL, exact_interval
 
-MIN_SUCCESSES: Final = 5
-"""With fewer successes nothing is known of their spread, and no interval is given."""
+MIN_SUCCESSES: Final = 10
+"""With fewer successes too little is known of their spread, and no interval is given: those of two
+designs, one of which is three times as good, may all be of the same."""
 
 Floats = NDArray[np.float64]
 Interval = tuple[float, float]
@@ -79,8 +80,9 @@ def _of_successes(gained: Floats, trials: int, level: float) -> Interval:
 def _half_widths(gained: Floats, level: float) -> Interval:
     """How far the mean of successes may lie below and above, as logarithms of ratios.
 
-    The wider of two: Student's, which asks for no distribution and is too narrow for few skewed
-    values, and that of a lognormal mean, which knows of the tail that few values do not show.
+    The widest of three: Student's, which asks for no distribution and is too narrow for few skewed
+    values; that of a lognormal mean, which knows of the tail that few values do not show; and
+    upwards Student's with one more of the best, which a better design may have been short of.
     """
     from scipy.special import chdtri, stdtrit
 
@@ -91,10 +93,18 @@ def _half_widths(gained: Floats, level: float) -> Interval:
     plain = student * float(gained.std(ddof=1)) / float(gained.mean())
     half = float(np.log(gained).var(ddof=1)) / 2
     middle = student * math.sqrt(2 * half)
+    more = np.append(gained, gained[-1])
+    short = float(more.mean()) + student * math.sqrt(len(gained) / len(more)) * float(
+        more.std(ddof=1)
+    )
     least, most = (free / float(chdtri(free, tail)) for tail in ((1 - level) / 2, (1 + level) / 2))
     return (
         max(plain, math.hypot(middle, half * (1 - least))),
-        max(plain, math.hypot(middle, half * (most - 1))),
+        max(
+            plain,
+            math.hypot(middle, half * (most - 1)),
+            math.log(short / float(gained.mean())),
+        ),
     )
 
 

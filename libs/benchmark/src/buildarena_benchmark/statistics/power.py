@@ -3,11 +3,54 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Final
 
 ERROR: Final = 0.05
 POWER: Final = 0.8
+EVEN: Final = 0.5
+TEN_POINTS: Final = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardPower:
+    """What the claims of a board can show, where the weaker model succeeds in half of its trials.
+
+    Attributes:
+        trials: Trials of each model on each task.
+        on_a_task: The smallest rise of the success rate that four of five boards claim on one task.
+        overall: The smallest such rise on every task that they claim over all tasks together.
+        trials_for_ten_points: Trials of each model on each task that show a rise of 0.1 overall.
+    """
+
+    trials: int
+    on_a_task: float | None
+    overall: float | None
+    trials_for_ten_points: int
+
+
+def board_power(*, models: int, tasks: int, trials: int) -> BoardPower:
+    """The power of a board whose pairs of models are all compared, on each task and overall.
+
+    Args:
+        models: Models on the board; a single one is compared with another that is as often tried.
+        tasks: Tasks.
+        trials: Trials of each model on each task.
+
+    Source:
+        Bonferroni's bound, which is the first step of Holm's procedure; the tasks' evidence adds up
+        as if their trials were one task's.
+    """
+    claims = math.comb(max(models, 2), 2) * (tasks + 1 if tasks > 1 else 1)
+    error = ERROR / claims
+    needed = trials_needed(EVEN, EVEN + TEN_POINTS, error=error) or 0
+    return BoardPower(
+        trials=trials,
+        on_a_task=detectable_difference(EVEN, trials, error=error),
+        overall=detectable_difference(EVEN, trials * tasks, error=error),
+        trials_for_ten_points=math.ceil(needed / tasks),
+    )
 
 
 def trials_needed(

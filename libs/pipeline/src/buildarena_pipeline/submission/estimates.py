@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import cache
 from importlib import resources
 
+from buildarena_benchmark.statistics import BoardPower, board_power
 from buildarena_pipeline.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_store import NewJob
@@ -37,11 +39,12 @@ class ModelEstimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SweepEstimate:
-    """What a sweep would use."""
+    """What a sweep would use, and what its figures could show."""
 
     jobs: int
     models: Sequence[ModelEstimate]
     cost_usd: float
+    power: BoardPower
 
 
 def estimate(jobs: Sequence[NewJob], registry: ModelRegistry) -> SweepEstimate:
@@ -55,7 +58,13 @@ def estimate(jobs: Sequence[NewJob], registry: ModelRegistry) -> SweepEstimate:
         by_model.setdefault(job.model, []).append(job)
     models = [_model(name, found, registry) for name, found in by_model.items()]
     total = sum(model.cost_usd or 0.0 for model in models)
-    return SweepEstimate(jobs=len(jobs), models=models, cost_usd=round(total, 2))
+    cells = Counter((job.model, job.key.task) for job in jobs)
+    power = board_power(
+        models=len(by_model),
+        tasks=len({task for _, task in cells}),
+        trials=min(cells.values()),
+    )
+    return SweepEstimate(jobs=len(jobs), models=models, cost_usd=round(total, 2), power=power)
 
 
 def _model(name: str, jobs: Sequence[NewJob], registry: ModelRegistry) -> ModelEstimate:
