@@ -19,7 +19,7 @@ WEB_OUT := services/api/src/buildarena_api/pages
 WEB_STAMP := $(WEB_OUT)/.built
 WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 
-.PHONY: help install demo up test test-durations test-long check lock clean openapi
+.PHONY: help install demo up test test-slow test-durations test-long check lock clean openapi
 
 help: ## Lists the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -54,30 +54,34 @@ test: $(STAMP)
 	@$(BIN)/ruff check --quiet $(PACKAGE_CODE)
 	@$(BIN)/mypy --no-error-summary $(firstword $(PACKAGE_CODE))
 	@set -o pipefail; $(BIN)/lint-imports | tail -n 3
-	@$(RUN_TESTS) $(lastword $(PACKAGE_CODE))
+	@$(RUN_TESTS) -m "not slow" $(lastword $(PACKAGE_CODE))
 else
-test: check check-integrations check-web-if-it-can-be ## Lints, types, import rules and all tests; PACKAGE=libs/geometry: those of one package
-	@echo "== 6/7 tests, $(WORKERS) at once (left out: make test-long, chaos, peer and bench-*)"
-	@$(RUN_TESTS)
-	@echo "== 7/7 adapters, each in its own environment"
-	@$(MAKE) --no-print-directory test-integrations
+test: check check-web-if-it-can-be ## Lints, types, import rules and tests; PACKAGE=libs/geometry: those of one package
+	@echo "== 6/6 tests, $(WORKERS) at once (left out: make test-slow, test-long, chaos, peer and bench-*)"
+	@$(RUN_TESTS) -m "not slow"
 endif
 
-test-durations: $(STAMP) ## All tests, and which 30 took longest
-	@$(RUN_TESTS) --durations 30 --durations-min 1
+test-slow: check-integrations web-if-it-can-be ## Whole services, browsers, attacks and adapters; CI runs it after make test
+	@echo "== slow tests, $(WORKERS) at once"
+	@$(RUN_TESTS) -m slow
+	@echo "== adapters, each in its own environment"
+	@$(MAKE) --no-print-directory test-integrations
+
+test-durations: $(STAMP) ## The tests of make test, and which 30 took longest
+	@$(RUN_TESTS) -m "not slow" --durations 30 --durations-min 1
 
 test-long: $(WEB_STAMP) ## Further variants and larger sizes of what make test tries
 	@BUILDARENA_TEST_LONG=1 $(RUN_TESTS) -m "long or sized"
 	@BUILDARENA_TEST_LONG=1 $(MAKE) --no-print-directory test-integrations
 
 check: $(STAMP) ## Lints, types and import rules alone
-	@echo "== 1/7 format"
+	@echo "== 1/6 format"
 	@$(BIN)/ruff format --check --quiet $(CODE)
-	@echo "== 2/7 lint"
+	@echo "== 2/6 lint"
 	@$(BIN)/ruff check --quiet $(CODE)
-	@echo "== 3/7 types"
+	@echo "== 3/6 types"
 	@$(BIN)/mypy --no-error-summary $(addsuffix /src,$(PACKAGES))
-	@echo "== 4/7 import rules"
+	@echo "== 4/6 import rules"
 	@set -o pipefail; $(BIN)/lint-imports | tail -n 3
 
 clean: ## Removes the environment, caches and local data

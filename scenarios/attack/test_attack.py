@@ -25,6 +25,8 @@ SMALL = {
     "strangers": 60,
     "broker_s": 3,
 }
+QUICK = {"tenants", "truncated bodies", "harmful runner", "strangers", "look-alikes", "boards"}
+"""What takes seconds; the others are left to `make test-slow`."""
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +43,13 @@ def place() -> Iterator[Arena]:
 @pytest.mark.xdist_group("attack")
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize(
-    "name", [long(name) if name.startswith("killed") else name for name in SCENARIOS]
+    "name",
+    [
+        long(name)
+        if name.startswith("killed")
+        else pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+        for name in SCENARIOS
+    ],
 )
 def test_nothing_goes_wrong(place, name) -> None:
     place.bystander.take()

@@ -127,6 +127,7 @@ def started_runner(stack: Stack, words: list[str]) -> subprocess.Popen[bytes]:
 
 
 @pytest.mark.timeout(3600)
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["database", "api"])
 def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
     rng = random.Random(SEED)

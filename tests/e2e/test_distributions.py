@@ -85,6 +85,7 @@ def test_every_distribution_has_one_version_and_asks_for_its_siblings_of_the_sam
             assert said in ([], [version]), module
 
 
+@pytest.mark.slow
 def test_the_meta_distribution_installs_all_but_adapters(installed) -> None:
     listed = _uv("pip", "list", "--format", "json", "--python", str(installed / "python"))
     ours = {p["name"] for p in json.loads(listed.stdout) if p["name"].startswith("buildarena")}
@@ -125,6 +126,7 @@ def test_a_new_version_goes_everywhere(tmp_path) -> None:
     assert (refused.returncode, "'next' is no version" in refused.stderr) == (2, True)
 
 
+@pytest.mark.slow
 def test_wheels_and_sdists_say_what_they_are(dist) -> None:
     wheels, sdists = sorted(dist.glob("*.whl")), sorted(dist.glob("*.tar.gz"))
     assert len(wheels) == len(sdists) == len(PROJECTS)
@@ -145,6 +147,7 @@ def test_wheels_and_sdists_say_what_they_are(dist) -> None:
         assert {"LICENSE", "README.md", "pyproject.toml", "PKG-INFO"} <= set(inside)
 
 
+@pytest.mark.slow
 def test_the_clients_types_are_written_when_it_is_built(dist) -> None:
     schemas = "buildarena_client/schemas.py"
     (wheel,) = dist.glob("buildarena_client-*.whl")
@@ -161,6 +164,7 @@ def test_each_licence_is_the_repositorys() -> None:
     assert [p for p in PROJECTS if (p.parent / "LICENSE").read_text() != licence] == []
 
 
+@pytest.mark.slow
 @needs_pages
 def test_a_notebook_draws_from_an_empty_environment(installed, tmp_path) -> None:
     code = (
@@ -176,6 +180,7 @@ def test_a_notebook_draws_from_an_empty_environment(installed, tmp_path) -> None
     assert len(shown.stdout) > 100_000
 
 
+@pytest.mark.slow
 @needs_pages
 def test_demo_report_and_pages_run_from_an_empty_environment(installed, tmp_path) -> None:
     data = tmp_path / "data"

@@ -18,6 +18,7 @@ from buildarena_pipeline.runtime.context import open_context
 from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.slow
 ADAPTER = ROOT / "integrations/inspect"
 PYTHON = ROOT / ".venv-integrations/inspect/bin/python"
 README_LINE = re.compile(r"^python -m buildarena_inspect import .*$", re.MULTILINE)

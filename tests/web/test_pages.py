@@ -21,6 +21,7 @@ ADMIN = "operator-secret-that-is-long-enough"
 pytestmark = needs_pages
 
 
+@pytest.mark.slow
 @pytest.mark.sized
 @pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
 def test_pages_work_in_a_browser(tmp_path, files) -> None:
@@ -34,6 +35,7 @@ def test_pages_work_in_a_browser(tmp_path, files) -> None:
         in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report))
 
 
+@pytest.mark.slow
 def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
         in_browser(stack.url, ["e2e/build", "e2e/strangers"])

@@ -66,6 +66,7 @@ def test_a_manifest_names_the_processor(job) -> None:
     assert job.manifest["simulator"]["processor"] == dict(processor())
 
 
+@pytest.mark.slow
 @several
 def test_a_result_of_other_kernels_is_verified_with_them(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)
@@ -90,6 +91,7 @@ def test_a_result_that_names_no_processor_is_tried_with_all_kernels(context, job
     assert verifier(context).verify(job.id).verdict == Verdict.INCONCLUSIVE
 
 
+@pytest.mark.slow
 @several
 def test_a_runner_that_names_none_is_tried_once(context, job, monkeypatch) -> None:
     (record,) = context.store.rollouts.read(job.id)
@@ -100,6 +102,7 @@ def test_a_runner_that_names_none_is_tried_once(context, job, monkeypatch) -> No
     assert "rollout 0: trajectory" in failed(context, job)
 
 
+@pytest.mark.slow
 @several
 def test_what_differs_is_said_where_the_kernels_are_not_here(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)
@@ -117,6 +120,7 @@ def test_what_differs_is_said_where_the_kernels_are_not_here(context, job) -> No
     assert verifier(context).verify(job.id).verdict == Verdict.INCONCLUSIVE
 
 
+@pytest.mark.slow
 @several
 def test_who_names_kernels_that_are_here_is_held_to_them(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)

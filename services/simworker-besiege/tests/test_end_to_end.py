@@ -61,6 +61,7 @@ def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Cont
     service.close()
 
 
+@pytest.mark.slow
 @pytest.mark.sized
 def test_each_category_is_played_scored_verified_and_compared(playing, rig) -> None:
     submissions = Submissions(playing, load_registry())

@@ -85,6 +85,7 @@ def test_root_in_a_container_needs_no_further_privilege() -> None:
     assert printed.splitlines() == ["42", "True", "", "cluster password"]
 
 
+@pytest.mark.slow
 def test_two_clones_start_side_by_side() -> None:
     second = Case(folder="clone/second")
     both = Case(
@@ -159,6 +160,7 @@ def _refusal(case: Case) -> str:
     return run_elsewhere(case, ["-c", program, "{data}"])
 
 
+@pytest.mark.slow
 def test_the_suite_itself_runs_in_a_private_clone() -> None:
     case = Case(noexec=("/tmp",), folder="Übungen für später", unset=("HOME",))
     few = f"{case.clone}/tests/store/test_schema.py"
@@ -167,6 +169,7 @@ def test_the_suite_itself_runs_in_a_private_clone() -> None:
     assert "passed" in printed
 
 
+@pytest.mark.slow
 def test_the_whole_service_runs_from_a_read_only_checkout_without_pybullet() -> None:
     case = Case(folder="Übungen für später", read_only=True, noexec=("/tmp",), unset=("HOME",))
     port = str(free_port())
