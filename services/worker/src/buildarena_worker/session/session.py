@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Task, broken_constraint
-from buildarena_geometry import Machine, ToolDefinition
+from buildarena_environment.briefing import catalogue_told
+from buildarena_geometry import Catalogue, Machine, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_worker.session.host import SessionHost
@@ -31,6 +32,7 @@ class Session:
         pack: The sentences to use.
         host: Where answers come from.
         on_turn: Takes every turn, those of stored replies included.
+        data_sheets: Whether roles are told the numbers of modules and world.
 
     Attributes:
         additions: What follows the task's statement: an example, results of rounds.
@@ -47,8 +49,10 @@ class Session:
         pack: PromptPack,
         host: SessionHost,
         on_turn: OnTurn | None = None,
+        data_sheets: bool = True,
     ) -> None:
         self.task = task
+        self.data_sheets = data_sheets
         self.seed = seed
         self.pack = pack
         self.host = host
@@ -65,14 +69,18 @@ class Session:
         statement = self.pack.statements.get(self.task.name, self.task.statement)
         return "\n\n".join([statement.strip(), *self.additions])
 
+    @property
+    def catalogue(self) -> Catalogue:
+        """The task's modules, with their data sheets where roles are told them."""
+        return catalogue_told(self.task.constraints, data_sheets=self.data_sheets)
+
     def new_machine(self, available: Mapping[str, Machine] | None = None) -> Machine:
         """An empty machine of the task's modules, which is what is being built from now on.
 
         Args:
             available: Finished machines by name; with some, the new one is their assembly.
         """
-        catalogue = self.task.constraints.catalogue
-        self.machine = Machine(catalogue=catalogue, available=available)
+        self.machine = Machine(catalogue=self.catalogue, available=available)
         return self.machine
 
     def ask(

@@ -13,13 +13,12 @@ from buildarena_geometry import (
     GROUPS,
     LOOKUP,
     ToolDefinition,
-    catalogue_of,
     modules_named,
     tool_definitions,
 )
 from buildarena_geometry.feedback.modules import lookup_text
 from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
-from buildarena_geometry.feedback.modules import modules_text as catalogue_text
+from buildarena_worker.session.session import Session
 
 QUERIES = ("get_machine_summary", "get_block_details")
 BUILD = (
@@ -77,24 +76,13 @@ def lookups(task: Task) -> list[ToolDefinition]:
     return tools_named(LOOKUPS) if task.constraints.on_demand else []
 
 
-def modules_text(chosen: str | Sequence[str] | None = None) -> str:
-    """The module list for people and models, generated from the catalogue.
-
-    Args:
-        chosen: Only these modules, or those of a set, and the starting block; the basic set by
-            default.
-    """
-    allowed = chosen if chosen is None or isinstance(chosen, str) else tuple(chosen)
-    return catalogue_text(catalogue_of(allowed), modules_named(allowed))
-
-
-def modules_of(task: Task) -> str:
-    """What models read about the modules of a task: all of them, or how to look them up."""
-    return modules_told(task.constraints)
+def modules_of(session: Session) -> str:
+    """What models read about the modules of a session's task: all, or how to look them up."""
+    return modules_told(session.task.constraints, data_sheets=session.data_sheets)
 
 
 def parts_of(task: Task) -> str:
-    """The same in short: sizes, masses and actions, without descriptions."""
+    """The same in short: sizes, masses and actions, without descriptions and data."""
     limits = task.constraints
     if limits.on_demand:
         return lookup_text(limits.catalogue)

@@ -46,7 +46,7 @@ def plan_phase(session: Session) -> Plan:
         "plan",
         task=task.name,
         statement=session.statement,
-        modules=modules_of(task),
+        modules=modules_of(session),
     )
     dialogue = Dialogue(session, phase="plan", opening=opening)
     planner = _looking_up(session, Role(name="planner", system=pack.roles["planner"]))
@@ -92,7 +92,7 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         "draft",
         task=task.name,
         statement=session.statement,
-        modules=modules_of(task),
+        modules=modules_of(session),
         plan=plan.text,
         name=part.name,
         sub_structure=part.text,
@@ -215,7 +215,7 @@ def solo_phase(session: Session) -> Machine:
         "build_solo",
         task=task.name,
         statement=session.statement,
-        modules=modules_of(task),
+        modules=modules_of(session),
     )
     dialogue = Dialogue(session, phase="build", opening=opening)
     role = Role(
@@ -248,7 +248,7 @@ def _looking_up(session: Session, role: Role) -> Role:
     tools = lookups(session.task)
     if not tools:
         return role
-    offered = Machine(catalogue=session.task.constraints.catalogue)
+    offered = Machine(catalogue=session.catalogue)
     return replace(role, tools=[*role.tools, *tools], act=offered.act)
 
 
