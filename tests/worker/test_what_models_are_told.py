@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import re
 from collections import Counter
@@ -45,7 +46,15 @@ FACTS: dict[tuple[str, str], tuple[str, ...]] = {
     ("refine", "guidance"): (FRAME, "twist_block", "shift_block", "flip_spin"),
     ("assemble", "guidance"): (FRAME, "Brace", "Winch", "add_machine", "several times"),
     ("assemble", "builder"): (FRAME, "Brace", "several times"),
-    ("control", "controller"): ("UpArrow", "spinning_forward", "## Plan", "no key"),
+    ("control", "controller"): (
+        "UpArrow",
+        "spinning_forward",
+        "## Plan",
+        "no key",
+        "100 rpm",
+        "a torque up to 20",
+        "Gravity is",
+    ),
 }
 """What a role must be able to read, by phase and role."""
 
@@ -200,6 +209,53 @@ def test_the_controller_keeps_its_past(play, rollout) -> None:
             assert all(action in lines[0] for action in block.module.actions)
     for fact in FACTS["control", "controller"]:
         assert fact in first[0].text + opening
+
+
+@pytest.mark.parametrize("keep", ["KEEP", "`KEEP`.", "**KEEP**\n"])
+@pytest.mark.parametrize("succeeds_at", [0, 1])
+def test_a_trial_that_succeeded_may_be_kept(play, rollout, keep, succeeds_at) -> None:
+    model = Recording()
+    model.complete = _keeping(model.complete, keep)
+    records = [
+        rollout(number, success=number == succeeds_at, indicator=5.0 + number)
+        for number in range(succeeds_at + 1)
+    ]
+    played = play(task="transport-1", client=model, rollouts=records)
+    assert played.end is not None, played.failure
+    assert played.end.best.number == succeeds_at
+    asked = [r for r in model.requests if _role(r) == "controller"]
+    assert len(asked) == succeeds_at + 2
+    last = asked[-1].messages[-1].text
+    assert "KEEP" in last
+    assert "It succeeded." in last
+    for earlier in asked[1:-1]:
+        text = earlier.messages[-1].text
+        assert "KEEP" not in text
+        assert "Criterion: " in text
+        assert "min distance 10" in text
+
+
+def _keeping(complete, keep):
+    """A controller that keeps what succeeded, in these words."""
+
+    def answer(request, options=None):
+        completion = complete(request, options)
+        keeps = _role(request) == "controller" and "KEEP" in request.messages[-1].text
+        return dataclasses.replace(completion, text=keep) if keeps else completion
+
+    return answer
+
+
+def test_before_a_success_nothing_is_kept(play) -> None:
+    model = Recording()
+    complete = model.complete
+    model.complete = lambda request, options=None: (
+        dataclasses.replace(complete(request, options), text="KEEP")
+        if _role(request) == "controller"
+        else complete(request, options)
+    )
+    played = play(task="transport-1", client=model)
+    assert played.failure.reason == "control_invalid"
 
 
 def test_the_page_of_what_models_see_is_as_sessions_are_now() -> None:

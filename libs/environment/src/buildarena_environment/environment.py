@@ -319,7 +319,7 @@ class Environment:
         self._trials = (*self._trials, trial)
         self._done = trial.counts or len(self._trials) >= self.rounds
         self._reward = self._worth()
-        report = trial.detail or score_text(self.task, trial.score)
+        report = trial.detail or score_text(self.task, trial.score, trial.trajectory)
         return Submission(trial=trial, reward=self._reward, report=report, done=self._done)
 
     def finish(self) -> Submission:

@@ -29,7 +29,12 @@ def world_text(catalogue: Catalogue, names: Collection[str]) -> str:
         names: Those that may be used, beside the starting block.
     """
     modules = [catalogue.start, *(catalogue[name] for name in names)]
-    return " ".join([*_units(catalogue.start), *_strengths(modules), *_sharing(modules)])
+    return " ".join([units_text(catalogue), *_strengths(modules), *_sharing(modules)])
+
+
+def units_text(catalogue: Catalogue) -> str:
+    """What the numbers of modules mean: gravity, units of forces, friction, drag, places."""
+    return " ".join(_units(catalogue.start))
 
 
 def _units(start: Module) -> Iterator[str]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from buildarena_benchmark import Task, broken_constraint
+from buildarena_benchmark import Score, Task, broken_constraint
 from buildarena_environment.briefing import catalogue_told
+from buildarena_environment.trials import score_text
 from buildarena_geometry import Catalogue, Machine, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
+from buildarena_store import RolloutRecord
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Completion, Message, Request
 from buildarena_worker.session.results import ConstructionFailedError
@@ -106,6 +108,16 @@ class Session:
                 "context_overflow", f"the {role}'s conversation outgrew the model's context"
             )
         return completion
+
+    def told(self, record: RolloutRecord) -> str:
+        """A rollout's result in words, made from its score and its trajectory."""
+        measured = Score(
+            success=bool(record.success),
+            indicator=record.indicator or 0.0,
+            metrics=record.metrics or {},
+            flags=tuple(record.flags or ()),
+        )
+        return score_text(self.task, measured, self.host.trajectory(record))
 
     def record(
         self,
