@@ -85,7 +85,7 @@ def test_figures_are_the_modules_own():
     wheel = WORKSHOP["Powered Wheel"]
     slower = replace(wheel, motor=replace(wheel.motor, speed_rpm=77.0, torque=13.5))
     assert "77 rpm (8.06 rad/s" in data_sheet(slower, None)
-    assert "brakes with up to 13.5" in data_sheet(slower, None)
+    assert "torque and brake up to 13.5" in data_sheet(slower, None)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if WORKSHOP[name].gear])

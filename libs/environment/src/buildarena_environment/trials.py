@@ -169,10 +169,14 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
 
 
 def _criterion(task: Task) -> str:
-    """What the task's scorer asks for, as its file says it."""
-    asked = {k: v for k, v in task.scoring.model_dump(mode="json").items() if k != "name"}
-    named = (f"{name.replace('_', ' ')} {value}" for name, value in asked.items() if value)
-    return ", ".join(named) or f"{task.scorer}, as the task says"
+    """The thresholds that the task's file gives its scorer."""
+    asked = task.scoring.model_dump(mode="json").items()
+    thresholds = [
+        f"{name.replace('_', ' ')} {value:g}"
+        for name, value in asked
+        if isinstance(value, int | float) and not isinstance(value, bool) and value
+    ]
+    return ", ".join(thresholds) or "as the task says"
 
 
 def _happened(trajectory: Trajectory | None) -> Iterator[str]:
@@ -196,7 +200,7 @@ def _tilt_deg(trajectory: Trajectory) -> NDArray[np.float64]:
     turned = rotations(trajectory.quaternions[:, 0])
     # Its own axis that looked up: a turn about the vertical is no lean.
     up = turned[0].T @ np.array([0.0, 0.0, 1.0])
-    return np.degrees(np.arccos(np.clip((turned @ up)[:, 2], -1.0, 1.0)))
+    return np.asarray(np.degrees(np.arccos(np.clip((turned @ up)[:, 2], -1.0, 1.0))))
 
 
 def _rendered(value: object) -> str:

@@ -61,9 +61,8 @@ def _motion(module: Module) -> Iterator[str]:
 def _motor(motor: Motor) -> str:
     torque = plain(motor.torque)
     return (
-        f"turns at {plain(motor.speed_rpm)} rpm ({number(motor.speed)} rad/s, reached within about "
-        f"{number(3.0 / motor.lag_per_s)} s) with a torque up to {torque}, and brakes with up to "
-        f"{torque}"
+        f"turns at {plain(motor.speed_rpm)} rpm ({number(motor.speed)} rad/s, after about "
+        f"{number(3.0 / motor.lag_per_s)} s), torque and brake up to {torque}"
     )
 
 

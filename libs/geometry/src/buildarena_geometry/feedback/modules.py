@@ -67,7 +67,7 @@ def category_text(catalogue: Catalogue, category: str) -> str:
     Raises:
         KeyError: there is no such category.
     """
-    return "\n".join(_short_line(module) for module in modules_of_category(catalogue)[category])
+    return "\n".join(module_in_short(module) for module in modules_of_category(catalogue)[category])
 
 
 def module_text(module: Module, catalogue: Catalogue) -> str:
@@ -96,7 +96,8 @@ def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
     return categories
 
 
-def _short_line(module: Module) -> str:
+def module_in_short(module: Module) -> str:
+    """A module in a short line: its mass and what it is."""
     first = module.brief or module.description.partition(". ")[0]
     first = first.rstrip(".")
     return f"- {module.name} (mass {plain(module.mass)}): {first}."

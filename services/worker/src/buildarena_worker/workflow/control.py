@@ -103,12 +103,13 @@ def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
 
 def driven_modules(session: Session, machine: Machine) -> str:
     """All that is told about the modules of a machine that move by keys or by themselves."""
-    driven = {
-        part.module.name: part.module
-        for part in (*machine.blocks.values(), *machine.connectors.values())
-        if part.module.actions or (part.module.joint is not None and part.module.joint.drive)
-    }
-    lines = [f"- {module_text(module, session.catalogue)}" for module in driven.values()]
+    used = {part.module.name: part.module for part in machine.state.parts}
+    driven = [
+        module
+        for module in used.values()
+        if module.actions or (module.joint is not None and module.joint.drive)
+    ]
+    lines = [f"- {module_text(module, session.catalogue)}" for module in driven]
     if session.data_sheets and lines:
         lines.append(f"\n{units_text(session.catalogue)}")
     return "\n".join(lines) or "(none)"

@@ -9,6 +9,7 @@ from typing import Any, Final
 from buildarena_benchmark import Task
 from buildarena_environment.briefing import modules_told
 from buildarena_environment.tools import LOOKUPS
+from buildarena_environment.world import units_text
 from buildarena_geometry import (
     GROUPS,
     LOOKUP,
@@ -16,7 +17,7 @@ from buildarena_geometry import (
     modules_named,
     tool_definitions,
 )
-from buildarena_geometry.feedback.modules import lookup_text
+from buildarena_geometry.feedback.modules import lookup_text, module_in_short, modules_text
 from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
 from buildarena_worker.session.session import Session
 
@@ -58,13 +59,17 @@ _TOLD: Final = frozenset({"init_rotation", "rotation", "machine_id", "machine_in
 """Arguments whose descriptions say more than their names and the tools' own words."""
 
 
+_REFUSALS_TELL: Final = frozenset({"minItems", "maxItems", "maxLength"})
+"""Bounds that a refusal names, and that every request would repeat."""
+
+
 def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
     """A schema without what names, prompts and refusals say as well."""
     properties = {
         name: {
             key: value
             for key, value in told.items()
-            if key != "maxLength" and (key != "description" or name in _TOLD)
+            if key not in _REFUSALS_TELL and (key != "description" or name in _TOLD)
         }
         for name, told in schema["properties"].items()
     }
@@ -81,12 +86,41 @@ def modules_of(session: Session) -> str:
     return modules_told(session.task.constraints, data_sheets=session.data_sheets)
 
 
-def parts_of(task: Task) -> str:
+def planned_modules(session: Session, plan: str) -> str:
+    """What models read about the modules that a plan names, and in short about other connectors.
+
+    Args:
+        session: The session.
+        plan: What was planned; if it names no module, they are told all.
+    """
+    task, catalogue = session.task, session.catalogue
+    if task.constraints.on_demand:
+        return modules_of(session)
+    named = _named_in(plan, task)
+    others = [module_in_short(catalogue[name]) for name in connectors_of(task) if name not in named]
+    units = [f"\n{units_text(catalogue)}"] if session.data_sheets else []
+    return "\n".join([modules_text(catalogue, named), *others, *units])
+
+
+def parts_of(task: Task, plan: str) -> str:
     """The same in short: sizes, masses and actions, without descriptions and data."""
     limits = task.constraints
     if limits.on_demand:
         return lookup_text(limits.catalogue)
-    return catalogue_in_short(limits.catalogue, modules_named(limits.modules))
+    named = (*_named_in(plan, task), *connectors_of(task))
+    return catalogue_in_short(limits.catalogue, named)
+
+
+def _named_in(plan: str, task: Task) -> Sequence[str]:
+    """The task's modules that a plan names, in any case; all if it names none."""
+    offered, written = modules_named(task.constraints.modules), plan.casefold()
+    named = set()
+    # A long name may hold a short one, which is not meant by it.
+    for name in sorted(offered, key=len, reverse=True):
+        if name.casefold() in written:
+            named.add(name)
+            written = written.replace(name.casefold(), "\0")
+    return [name for name in offered if name in named] or offered
 
 
 def connectors_of(task: Task) -> list[str]:
