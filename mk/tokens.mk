@@ -7,3 +7,8 @@ bench-tokens: $(STAMP) ## Measures where a session's input tokens go; JSON in .b
 
 what-a-model-sees: $(STAMP) ## Writes docs/what-a-model-sees.md again, after an intended change
 	@$(TEST_PYTHON) -m support.documents.what_a_model_sees
+
+.PHONY: kept-sessions
+
+kept-sessions: $(STAMP) ## Writes tests/data/sessions again, after an intended change of what models read
+	@$(TEST_PYTHON) -m support.documents.kept_sessions

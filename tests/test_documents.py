@@ -61,6 +61,12 @@ def test_files_exist(document) -> None:
     assert not [name for name in named if not list(ROOT.glob(name))]
 
 
+def test_files_of_packages_exist(document) -> None:
+    """Files that are named from their package on, such as `buildarena_environment/briefing.md`."""
+    named = re.findall(r"`(buildarena_\w+/[\w./-]+\.\w+)`", document.read_text())
+    assert not [name for name in named if not any((s / name).is_file() for s in SOURCES)]
+
+
 def test_modules_exist(document) -> None:
     named = re.findall(r"`(buildarena_[a-z]+(?:[./]\w+)*)", document.read_text())
     dotted = {name.removesuffix(".py").replace("/", ".") for name in named}

@@ -85,7 +85,7 @@ def _machine(trial: ProcessorTrial) -> Machine:
         if trial.task in random_machines.TASKS:
             return random_machines.random_machine(trial.task, int(name))
         return random_workshop.random_workshop_machine(trial.task, int(name))
-    bench = bench_of(builtin_tasks()[trial.task])
+    bench = bench_of(builtin_tasks()[trial.task], data_sheets=False)
     for call in json.loads(DATA.read_text(encoding="utf-8"))[trial.task]["calls"]:
         bench.call(call["machine"], call["tool"], call["arguments"])
     chosen = bench.result()

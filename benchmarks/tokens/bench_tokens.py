@@ -22,11 +22,24 @@ from buildarena_worker.builtin import CHARACTERS_PER_TOKEN
 from buildarena_worker.session.messages import Request
 
 PARTS = ("schemas", "system", "opening", "own words", "others", "tool answers")
-BASELINE = {"support-1": (30, 46279), "transport-1": (36, 56810), "lift-3": (67, 98181)}
-"""Requests and input tokens of the expert's sessions before, schemas included."""
+BASELINE = {
+    "flight-1": (41, 65141),
+    "flight-2": (52, 78524),
+    "mechanisms-1": (130, 372455),
+    "mechanisms-2": (50, 81911),
+    "mechanisms-3": (162, 512726),
+    "mechanisms-4": (70, 122992),
+    "support-1": (32, 36083),
+    "transport-1": (38, 44096),
+    "lift-3": (73, 89336),
+}
+"""Requests and input tokens of the expert's sessions when a builder got one step at a time and each
+role the whole list of modules, without data; schemas included."""
+WORKSHOP = ("flight", "mechanisms")
 PUBLISHED = {"support-1": (67, 630_000)}
 """Mean requests and input tokens of the paper's models."""
-BAR = 2 / 3
+BAR = 0.5
+"""Of tasks of the workshop, whose modules are many."""
 LOOKED_UP_TASK = "transport-1"
 LOOKED_UP_IN = ("builder", "guidance-builder", "five-role")
 LOOKED_UP_BAR = {"builder": 0.5}
@@ -87,8 +100,8 @@ def main() -> int:
     """Runs the benchmark.
 
     Returns:
-        The exit code: 1 if support-1 takes more than two thirds of what it took, or looking modules
-        up more than half of what telling them takes.
+        The exit code: 1 if a task of the workshop takes more than half of what it took, or looking
+        modules up more than half of what telling them takes.
     """
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path, help="where the figures go")
@@ -108,7 +121,7 @@ def main() -> int:
         return 1
     return (
         0
-        if all(_ratio(task, figures[task]) <= BAR for task in figures if task == "support-1")
+        if all(_ratio(task, figures[task]) <= BAR for task in figures if task.startswith(WORKSHOP))
         else 1
     )
 

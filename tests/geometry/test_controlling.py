@@ -64,6 +64,50 @@ def test_only_actions_a_block_has_can_be_bound(car, block, action, cause):
     assert bind(car, block, action, "UpArrow").cause is cause
 
 
+def test_an_answer_has_the_new_line_and_the_count_and_no_other_line(car):
+    bind(car, "2", "spinning_forward", "UpArrow")
+    first = press(car, 0, "UpArrow", 1).text.splitlines()
+    assert first == ["Added. The sequence has 1 entry.", "0: at 0 s hold UpArrow for 1 s"]
+    for count in range(2, 6):
+        answer = press(car, count, "UpArrow", 0.5).text.splitlines()
+        assert answer == [
+            f"Added. The sequence has {count} entries.",
+            f"{count - 1}: at {count} s hold UpArrow for 0.5 s",
+        ]
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 100])
+def test_a_call_takes_several_presses(car, count):
+    bind(car, "2", "spinning_forward", "UpArrow")
+    more = [{"time": 2.0 * k, "key": "UpArrow", "hold_for": 1} for k in range(1, count + 1)]
+    one = {"time": 0, "key": "UpArrow", "hold_for": 1}
+    outcome = car.act("add_control_sequence", {**one, "more": more})
+    assert outcome.ok
+    assert [p.time_s for p in car.control_sequence] == [2.0 * k for k in range(count + 1)]
+    assert len(outcome.text.splitlines()) == count + 2
+
+
+@pytest.mark.parametrize(
+    ("bad", "cause"),
+    [
+        ({"time": -1, "key": "UpArrow", "hold_for": 1}, Cause.OUT_OF_RANGE),
+        ({"time": 1, "key": "UpArrow", "hold_for": 0}, Cause.OUT_OF_RANGE),
+        ({"time": 1, "key": "DownArrow", "hold_for": 1}, Cause.BAD_KEY),
+        ({"time": 1, "key": "UpArrow"}, Cause.MALFORMED_ARGUMENTS),
+        ({"time": "1", "key": "UpArrow", "hold_for": 1}, Cause.MALFORMED_ARGUMENTS),
+        ({"time": 1, "key": 5, "hold_for": 1}, Cause.MALFORMED_ARGUMENTS),
+        ([1, "UpArrow", 1], Cause.MALFORMED_ARGUMENTS),
+        (None, Cause.MALFORMED_ARGUMENTS),
+    ],
+)
+def test_one_bad_press_refuses_the_whole_call(car, bad, cause):
+    bind(car, "2", "spinning_forward", "UpArrow")
+    one = {"time": 0, "key": "UpArrow", "hold_for": 1}
+    outcome = car.act("add_control_sequence", {**one, "more": [{**one, "time": 2}, bad]})
+    assert outcome.cause is cause
+    assert car.control_sequence == ()
+
+
 def test_a_sequence_takes_keys_that_do_something_in_the_order_of_entry(car):
     assert press(car, 0, "UpArrow", 1).reason == RefusalClass.BAD_KEY
     bind(car, "2", "spinning_forward", "UpArrow")

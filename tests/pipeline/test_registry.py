@@ -83,7 +83,7 @@ def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path)
     varied = make_track(
         five_role, "pybullet", packs.load("default"), version="2", one_shot=True, closed_loop=loop
     )
-    assert varied.id.startswith("five-role+one-shot+5-rounds-analyst/pybullet-")
+    assert varied.id.startswith("five-role+one-shot+data-sheets+5-rounds-analyst/pybullet-")
 
 
 def test_a_pack_that_lacks_a_file_is_refused(tmp_path: Path) -> None:

@@ -88,6 +88,7 @@ class Player:
         pack: PromptPack | None = None,
         workflows: dict[str, str] = MappingProxyType({}),  # type: ignore[assignment]
         trajectories: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
+        data_sheets: bool = True,
     ) -> Played:
         config = model_config(self.registry, model, Decoding())
         if client is None and not offline:
@@ -117,6 +118,7 @@ class Player:
             model_config=config,
             pack=pack or PromptPacks().load("default"),
             host=host,
+            data_sheets=data_sheets,
         )
         try:
             with gate.acquired():

@@ -3,11 +3,12 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from support.providers.scripted import Scripted, call
+from support.providers.scripted import Recording, Scripted, call
 
 from buildarena_store import StaleLeaseError, Usage
 from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import Diverged, Failed, LimitReached, Superseded
+from buildarena_worker.workflow.phases import MOST_STEPS, steps_in
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
@@ -192,13 +193,79 @@ def test_roles_see_the_thread_from_their_own_side(play) -> None:
     )
     play(client=model)
     builder, guidance = model.requests[6].messages, model.requests[5].messages
-    assert [m.role for m in builder] == ["system", "user", "assistant", "tool", "user"]
-    assert builder[-1] == Message(role="user", text="[guidance] Go on.")
+    # The builder reads what it is told now, and nothing of what it did before.
+    assert [m.role for m in builder] == ["system", "user"]
+    assert builder[-1].text.endswith("\n\n[guidance] Go on.")
+    assert "Started" not in builder[-1].text
     assert [m.role for m in guidance] == ["system", "user"]
     assert "[builder] Started. 1 Starting Block" in guidance[-1].text
     # Guidance works from the drawing; the builder does what guidance says.
     assert "final" in guidance[-1].text
     assert all("final" not in m.text for m in builder)
+
+
+STEPS = "1. Start.\n2. A block on its east.\n3. One more."
+
+
+def spoken(play, guidance: str, *builder: Completion) -> list[str]:
+    """The roles that speak after guidance has said this for the first time."""
+    model = Scripted(
+        PLAN,
+        Completion(text="drawing"),
+        Completion(text="TERMINATE"),
+        Completion(text="final"),
+        Completion(text="My tools."),
+        Completion(text=guidance),
+        *builder,
+    )
+    turns = play(client=model).session.transcript.turns
+    return [turn.role for turn in turns if turn.stage == "build"][2:]
+
+
+@pytest.mark.parametrize(
+    ("guidance", "builder", "turns"),
+    [
+        (STEPS, [START, BLOCK], 3),
+        ("First\n  1) start,\n  2) a block.", [START, BLOCK], 2),
+        ("Start, then 2. a block.", [START, BLOCK], 1),
+        ("Start.", [START, BLOCK], 1),
+        # What is refused, and what is no call, is read by guidance at once.
+        (STEPS, [START, START, BLOCK], 2),
+        (STEPS, [Completion(text="How?"), START], 1),
+    ],
+)
+def test_numbered_steps_are_carried_out_one_after_the_other(play, guidance, builder, turns) -> None:
+    further = call("attach_block_to", base_block="2", face="E", new_block="Small Wooden Block")
+    roles = spoken(play, guidance, *builder, further)
+    assert roles[: turns + 1] == ["builder"] * turns + ["guidance"]
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, MOST_STEPS, MOST_STEPS + 5])
+def test_steps_are_counted_up_to_a_bound(count) -> None:
+    text = "\n".join(f"{n}. attach" for n in range(7, 7 + count))
+    assert steps_in(f"Now:\n{text}") == max(1, min(count, MOST_STEPS))
+
+
+def test_a_builders_view_grows_through_its_steps_and_begins_anew(play) -> None:
+    model = Recording()
+    played = play(client=model)
+    views = [
+        request.messages
+        for turn, request in zip(played.session.transcript.turns, model.requests, strict=True)
+        if (turn.stage, turn.role) == ("build", "builder")
+    ]
+    anew = [
+        place
+        for place, (before, after) in enumerate(itertools.pairwise(views))
+        if list(after[: len(before)]) != list(before)
+    ]
+    assert anew
+    for before, after in itertools.pairwise(views):
+        # What is always there is a prefix that providers cache.
+        assert before[0] == after[0]
+        openings = {view[1].text.partition("[guidance]")[0].strip() for view in (before, after)}
+        assert len(openings) == 1
+    assert max(len(view) for view in views) <= 2 + 2 * MOST_STEPS
 
 
 @pytest.mark.parametrize(

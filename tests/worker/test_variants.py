@@ -38,7 +38,9 @@ def test_a_failed_round_is_followed_by_one_that_is_reported_the_result(play, rol
     assert played.suspended is not None
     assert (played.suspended.number, played.suspended.final) == (1, False)
     assert "12.50" not in text_of(model.requests[0])
-    assert "It did not succeed. Load: 12.50 mass units." in text_of(model.requests[3])
+    told = text_of(model.requests[3])
+    assert "It did not succeed. Criterion: fall height 4, " in told
+    assert "Load: 12.50 mass units." in told
 
 
 def test_a_loop_ends_with_the_first_success(play, rollout) -> None:

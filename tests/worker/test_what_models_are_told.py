@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import re
 from collections import Counter
@@ -14,6 +15,7 @@ from support.providers.scripted import Recording
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import load_catalogue, tool_definitions
 from buildarena_worker.session.messages import Request
+from buildarena_worker.workflow.machine_tools import parts_of
 from buildarena_worker.workflow.rounds import Loop
 
 TASKS = ("support-1", "support-3", "transport-1", "transport-2", "lift-2", "lift-3")
@@ -45,7 +47,15 @@ FACTS: dict[tuple[str, str], tuple[str, ...]] = {
     ("refine", "guidance"): (FRAME, "twist_block", "shift_block", "flip_spin"),
     ("assemble", "guidance"): (FRAME, "Brace", "Winch", "add_machine", "several times"),
     ("assemble", "builder"): (FRAME, "Brace", "several times"),
-    ("control", "controller"): ("UpArrow", "spinning_forward", "## Plan", "no key"),
+    ("control", "controller"): (
+        "UpArrow",
+        "spinning_forward",
+        "## Plan",
+        "no key",
+        "100 rpm",
+        "torque and brake up to 20",
+        "Gravity is",
+    ),
 }
 """What a role must be able to read, by phase and role."""
 
@@ -141,15 +151,54 @@ def test_each_role_is_told_what_its_work_needs(play, played_requests) -> None:
     assert set(FACTS) - seen <= {("control", "controller"), ("refine", "guidance")}
 
 
-def test_whoever_designs_or_guides_knows_every_module(play, played_requests) -> None:
-    for task, where, request in all_requests(play, played_requests):
-        if where[1] in {"planner", "drafter", "reviewer", "engineer"} or where == (
-            "build",
-            "guidance",
-        ):
-            text = "\n".join(_told(request))
-            for module in MODULES:
-                assert re.search(rf"{module.name}.*mass {module.mass:g}", text), (task, where)
+def test_who_plans_or_works_without_a_plan_knows_every_module(play, played_requests) -> None:
+    for task, workflow in itertools.product(TASKS, WORKFLOWS):
+        for stage, role, request in played_requests(play, task, workflow):
+            without_plan = workflow == "guidance-builder" and (stage, role) == ("build", "guidance")
+            if role in {"planner", "engineer"} or without_plan:
+                text = "\n".join(_told(request))
+                for module in MODULES:
+                    assert re.search(rf"{module.name}.*mass {module.mass:g}", text), (task, role)
+
+
+@pytest.mark.parametrize("task", ["mechanisms-1", "mechanisms-3", "flight-1", "support-1"])
+def test_who_works_from_a_plan_knows_the_modules_that_it_names(play, task) -> None:
+    model = Recording()
+    played = play(task=task, client=model)
+    catalogue = builtin_tasks()[task].constraints.catalogue
+    (plan,) = (turn.text for turn in played.session.transcript.turns if turn.role == "planner")
+    for turn, request in zip(played.session.transcript.turns, model.requests, strict=True):
+        text = "\n".join(_told(request))
+        described = {name for name, module in catalogue.items() if module.description in text}
+        if turn.role in {"drafter", "reviewer"}:
+            named = {name for name in catalogue if name in plan.replace("Sqr Balloon", "")}
+            assert named <= described
+            # The list as a whole is told once in a session.
+            assert len(described) < len(catalogue) or len(catalogue) <= len(named) + 1
+            for name, module in catalogue.items():
+                assert module.kind != "connector" or name in text
+        elif turn.role in {"builder", "guidance"}:
+            assert not described
+
+
+@pytest.mark.parametrize(
+    ("plan", "named"),
+    [
+        ("four POWERED WHEELS on small wooden blocks", {"Powered Wheel", "Small Wooden Block"}),
+        ("a Steering Hinge", {"Steering Hinge"}),
+        ("a Steering Hinge and a hinge", {"Steering Hinge", "Hinge"}),
+        ("cog medium powered, log", {"Cog Medium Powered", "Log"}),
+    ],
+)
+def test_a_plans_modules_are_found_by_their_names(plan, named) -> None:
+    given = builtin_tasks()["mechanisms-2"]
+    text = parts_of(given, plan)
+    connectors = set(given.constraints.catalogue.connectors)
+    listed = set(re.findall(r"^- ([^:]+):", text, re.MULTILINE))
+    assert listed == named | connectors | {"Starting Block"}
+    assert len(parts_of(given, "something that rolls").splitlines()) == len(
+        given.constraints.catalogue
+    )
 
 
 def test_no_sentence_is_told_twice(play, played_requests) -> None:
@@ -200,6 +249,53 @@ def test_the_controller_keeps_its_past(play, rollout) -> None:
             assert all(action in lines[0] for action in block.module.actions)
     for fact in FACTS["control", "controller"]:
         assert fact in first[0].text + opening
+
+
+@pytest.mark.parametrize("keep", ["KEEP", "`KEEP`.", "**KEEP**\n"])
+@pytest.mark.parametrize("succeeds_at", [0, 1])
+def test_a_trial_that_succeeded_may_be_kept(play, rollout, keep, succeeds_at) -> None:
+    model = Recording()
+    model.complete = _keeping(model.complete, keep)
+    records = [
+        rollout(number, success=number == succeeds_at, indicator=5.0 + number)
+        for number in range(succeeds_at + 1)
+    ]
+    played = play(task="transport-1", client=model, rollouts=records)
+    assert played.end is not None, played.failure
+    assert played.end.best.number == succeeds_at
+    asked = [r for r in model.requests if _role(r) == "controller"]
+    assert len(asked) == succeeds_at + 2
+    last = asked[-1].messages[-1].text
+    assert "KEEP" in last
+    assert "It succeeded." in last
+    for earlier in asked[1:-1]:
+        text = earlier.messages[-1].text
+        assert "KEEP" not in text
+        assert "Criterion: " in text
+        assert "min distance 10" in text
+
+
+def _keeping(complete, keep):
+    """A controller that keeps what succeeded, in these words."""
+
+    def answer(request, options=None):
+        completion = complete(request, options)
+        keeps = _role(request) == "controller" and "KEEP" in request.messages[-1].text
+        return dataclasses.replace(completion, text=keep) if keeps else completion
+
+    return answer
+
+
+def test_before_a_success_nothing_is_kept(play) -> None:
+    model = Recording()
+    complete = model.complete
+    model.complete = lambda request, options=None: (
+        dataclasses.replace(complete(request, options), text="KEEP")
+        if _role(request) == "controller"
+        else complete(request, options)
+    )
+    played = play(task="transport-1", client=model)
+    assert played.failure.reason == "control_invalid"
 
 
 def test_the_page_of_what_models_see_is_as_sessions_are_now() -> None:

@@ -16,7 +16,8 @@ from typing import Final
 from buildarena_benchmark import Task
 from buildarena_benchmark.tasks.document import Constraints
 from buildarena_environment.tools import ASSEMBLY, MAIN
-from buildarena_geometry import modules_named
+from buildarena_environment.world import world_text
+from buildarena_geometry import Catalogue, module_set, modules_named
 from buildarena_geometry.feedback.modules import lookup_text, modules_text
 from buildarena_geometry.feedback.words import counted
 
@@ -44,7 +45,14 @@ _CHECKS: Final = {
 _ON_DEMAND: Final = "Only the modules that can be looked up."
 
 
-def briefing(task: Task, *, trials: str, guidelines: str, values: Mapping[str, str]) -> str:
+def briefing(
+    task: Task,
+    *,
+    trials: str,
+    guidelines: str,
+    values: Mapping[str, str],
+    data_sheets: bool = True,
+) -> str:
     """All that a builder must know to play a task, but for its tools.
 
     Args:
@@ -52,6 +60,7 @@ def briefing(task: Task, *, trials: str, guidelines: str, values: Mapping[str, s
         trials: How often it may submit, in a sentence or two.
         guidelines: What holds for its calls and for the end, as paragraphs; a template.
         values: What stands in for the names in `guidelines`, beside those of every task.
+        data_sheets: Whether it is told the numbers of modules and world.
 
     Returns:
         Markdown: how it plays, the statement, the frame, the rules, the modules.
@@ -64,30 +73,48 @@ def briefing(task: Task, *, trials: str, guidelines: str, values: Mapping[str, s
         main=MAIN,
         assembly=ASSEMBLY,
         checks=_checks(task),
-        modules=modules_told(task.constraints),
+        modules=modules_told(task.constraints, data_sheets=data_sheets),
         **values,
     )
 
 
-def modules_told(constraints: Constraints) -> str:
-    """What a builder reads about its modules: all of them, or how to look them up."""
-    if constraints.on_demand:
-        return lookup_text(constraints.catalogue)
-    return modules_text(constraints.catalogue, modules_named(constraints.modules))
+def modules_told(constraints: Constraints, *, data_sheets: bool) -> str:
+    """What a builder reads about its modules: all of them, or how to look them up.
+
+    Args:
+        constraints: The task's.
+        data_sheets: Whether modules have their data with them, and the world's follow.
+    """
+    catalogue = catalogue_told(constraints, data_sheets=data_sheets)
+    names = modules_named(constraints.modules)
+    told = lookup_text(catalogue) if constraints.on_demand else modules_text(catalogue, names)
+    return f"{told}\n\n**World.** {world_text(catalogue, names)}" if data_sheets else told
+
+
+def catalogue_told(constraints: Constraints, *, data_sheets: bool) -> Catalogue:
+    """The modules of a task as its builders may look them up: with or without their data."""
+    catalogue = constraints.catalogue
+    return catalogue.with_data_sheets() if data_sheets else catalogue
 
 
 @cache
-def briefing_digest(trials: str, guidelines: str, *, on_demand: bool = False) -> str:
+def briefing_digest(
+    trials: str, guidelines: str, *, on_demand: bool = False, data_sheets: bool = True
+) -> str:
     """Hash of the words around a statement: results of different ones don't compare.
 
     Args:
         trials: How often it may submit.
         guidelines: What holds for its calls and for the end.
         on_demand: Whether modules are looked up: who does that does not compare with who is told.
+        data_sheets: Whether it is told the numbers of modules and world.
     """
     words = [_text(trials, guidelines), *_CONTROL.values(), *_CHECKS.values()]
     if on_demand:
         words.append(_ON_DEMAND)
+    if data_sheets:
+        told = module_set("workshop").with_data_sheets()
+        words += [modules_text(told), world_text(told, modules_named("workshop"))]
     return sha256("\0".join(words).encode()).hexdigest()
 
 

@@ -8,7 +8,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_benchmark import Task
-from buildarena_environment.briefing import briefing
+from buildarena_environment.briefing import briefing, catalogue_told
 from buildarena_environment.choices import checked_simulator, chosen_task, reference_of
 from buildarena_environment.errors import (
     EpisodeOverError,
@@ -135,6 +135,8 @@ class Environment:
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
         reference: The indicator that is worth 1; the task's reference where there is one.
         tries: What tries machines, such as a `TrialPool`'s `try_machine`; by default this process.
+        data_sheets: Whether the builder is told the numbers of modules and world, or finds them
+            out by trials.
 
     Raises:
         UnknownChoiceError: Task, simulator or a reward does not exist.
@@ -152,6 +154,7 @@ class Environment:
         rewards: Mapping[str, float] | None = None,
         reference: float | None = None,
         tries: Tries = try_machine,
+        data_sheets: bool = True,
     ) -> None:
         if rounds < 1:
             raise ValueError(f"rounds is {rounds}: a builder submits at least once")
@@ -162,10 +165,13 @@ class Environment:
         self.limits = limits or Limits()
         self.weights = checked_weights(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(self.task, reference, needed="indicator" in self.weights)
+        self.data_sheets = data_sheets
         self._tries = tries
         self._shaped = bool(self.weights.keys() - TERMINAL)
         limits_of = self.task.constraints
-        self._bench = Workbench(limits_of.catalogue, on_demand=limits_of.on_demand)
+        self._bench = Workbench(
+            catalogue_told(limits_of, data_sheets=data_sheets), on_demand=limits_of.on_demand
+        )
         self._steps = self._changes = self._refused = 0
         self._trials: tuple[Trial, ...] = ()
         self._done = False
@@ -197,6 +203,7 @@ class Environment:
                 "rounds": str(self.rounds),
                 "after": LAST if self.rounds == 1 else AGAIN,
             },
+            data_sheets=self.data_sheets,
         )
         tools = tools_of_models(on_demand=self.task.constraints.on_demand)
         return Observation(task=self.task.name, briefing=text, tools=tools)
@@ -312,7 +319,7 @@ class Environment:
         self._trials = (*self._trials, trial)
         self._done = trial.counts or len(self._trials) >= self.rounds
         self._reward = self._worth()
-        report = trial.detail or score_text(self.task, trial.score)
+        report = trial.detail or score_text(self.task, trial.score, trial.trajectory)
         return Submission(trial=trial, reward=self._reward, report=report, done=self._done)
 
     def finish(self) -> Submission:

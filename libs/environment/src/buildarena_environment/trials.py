@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol, Self
+from typing import Any, Final, Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
-from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.flags import is_disqualified, meaning
+from buildarena_benchmark.scorers.measures.series import rotations
 from buildarena_benchmark.scores import decision
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory, simulate
 
 NOT_SIMULABLE = "not_simulable"
+TOPPLED_DEG: Final = 60.0
+"""A starting block that leans by more has toppled, degrees. Ours."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,11 +143,18 @@ def best_trial(trials: Sequence[Trial]) -> Trial:
     return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
 
 
-def score_text(task: Task, score: Score) -> str:
-    """A trial's score in words, for models."""
+def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -> str:
+    """A trial's score in words, for models: what was asked, what was measured, what happened.
+
+    Args:
+        task: The task.
+        score: The score.
+        trajectory: What the simulator recorded, where that is at hand.
+    """
     indicator = task.indicator
+    succeeded = score.success and not is_disqualified(score.flags)
     parts = [
-        "It succeeded." if score.success else "It did not succeed.",
+        "It succeeded." if succeeded else f"It did not succeed. Criterion: {_criterion(task)}.",
         f"{indicator.name.capitalize()}: {score.indicator:.2f} {indicator.unit}.".strip(),
     ]
     known = [
@@ -150,8 +163,44 @@ def score_text(task: Task, score: Score) -> str:
     if known:
         parts.append("Measured: " + ", ".join(known) + ".")
     if score.flags:
-        parts.append("Flags: " + ", ".join(score.flags) + ".")
-    return " ".join(parts)
+        flags = (f"{flag} ({meaning(flag)})" if meaning(flag) else flag for flag in score.flags)
+        parts.append("Flags: " + ", ".join(flags) + ".")
+    return " ".join([*parts, *_happened(trajectory)])
+
+
+def _criterion(task: Task) -> str:
+    """The thresholds that the task's file gives its scorer."""
+    asked = task.scoring.model_dump(mode="json").items()
+    thresholds = [
+        f"{name.replace('_', ' ')} {value:g}"
+        for name, value in asked
+        if isinstance(value, int | float) and not isinstance(value, bool) and value
+    ]
+    return ", ".join(thresholds) or "as the task says"
+
+
+def _happened(trajectory: Trajectory | None) -> Iterator[str]:
+    """Sentences on the first thing that broke, and on a machine that toppled."""
+    if trajectory is None:
+        return
+    if trajectory.breaks:
+        first, count = trajectory.breaks[0], len(trajectory.breaks)
+        yield f"First to break: {first.joint} ({first.kind}) at {first.time_s:.2f} s, of {count}."
+    tilt = _tilt_deg(trajectory)
+    toppled = np.flatnonzero(tilt > TOPPLED_DEG)
+    if len(toppled):
+        yield (
+            f"It toppled: from {trajectory.time_s[toppled[0]]:.2f} s on the starting block leaned "
+            f"by more than {TOPPLED_DEG:g}°, at the end by {tilt[-1]:.0f}°."
+        )
+
+
+def _tilt_deg(trajectory: Trajectory) -> NDArray[np.float64]:
+    """(T,) by how much the starting block's upright leans against how it stood, degrees."""
+    turned = rotations(trajectory.quaternions[:, 0])
+    # Its own axis that looked up: a turn about the vertical is no lean.
+    up = turned[0].T @ np.array([0.0, 0.0, 1.0])
+    return np.asarray(np.degrees(np.arccos(np.clip((turned @ up)[:, 2], -1.0, 1.0))))
 
 
 def _rendered(value: object) -> str:

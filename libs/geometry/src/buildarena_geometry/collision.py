@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -12,12 +13,27 @@ from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
 from buildarena_geometry.poses import Pose
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from buildarena_geometry.blocks import Block
 
 TOUCHING = 1e-6  # units; solids that reach into each other less than this touch, which is allowed
 _ALL_CONTACTS = 1_000_000  # FCL's broadphase stops at so many contacts: more than any machine has
+
+
+@dataclass(frozen=True, slots=True)
+class Overlap:
+    """Two blocks that reach into each other.
+
+    Attributes:
+        block: id of the one that was asked about.
+        other: id of the one that is there.
+        depth: how far they reach into each other where they do so most, units.
+    """
+
+    block: str
+    other: str
+    depth: float
 
 
 class CollisionWorld:
@@ -37,8 +53,8 @@ class CollisionWorld:
         self._objects: dict[str, list[tuple[fcl.CollisionObject, fcl.CollisionGeometry]]] = {}
         self._owners: dict[int, str] = {}
 
-    def overlaps(self, blocks: Iterable[Block]) -> list[tuple[str, str]]:
-        """Pairs of ids of blocks that would overlap if these blocks were where they say they are.
+    def overlaps(self, blocks: Iterable[Block]) -> list[Overlap]:
+        """The pairs of blocks that would overlap if these blocks were where they say they are.
 
         Blocks given here are tested against the world's others and not against each other: they are
         one block, or move together as one rigid body.
@@ -47,21 +63,25 @@ class CollisionWorld:
             blocks: new blocks, or blocks of the world in new places.
 
         Returns:
-            The pairs (given block, block of the world), each once, in the order of the given blocks
-            and then in that in which the world's were placed.
+            Each pair once, in the order of the given blocks and then in that in which the world's
+            were placed.
         """
         candidates = list(blocks)
         moving = {block.id for block in candidates}
-        pairs: list[tuple[str, str]] = []
+        overlaps: list[Overlap] = []
         for block in candidates:
-            touched = {
-                other
-                for solid in block.module.colliders
-                for other in self._touched_by(solid, block.world_from_block)
-            } - moving
-            if touched:
-                pairs.extend((block.id, other) for other in self._objects if other in touched)
-        return pairs
+            depths: dict[str, float] = {}
+            for solid in block.module.colliders:
+                for other, depth in self._touched_by(solid, block.world_from_block):
+                    if other not in moving:
+                        depths[other] = max(depth, depths.get(other, 0.0))
+            if depths:
+                overlaps.extend(
+                    Overlap(block.id, other, depths[other])
+                    for other in self._objects
+                    if other in depths
+                )
+        return overlaps
 
     def place(self, blocks: Iterable[Block]) -> None:
         """Takes blocks in, or moves those it has to where they are now."""
@@ -103,32 +123,32 @@ class CollisionWorld:
             made.append((placed, geometry))
         self._objects[block.id] = made
 
-    def _touched_by(self, solid: Solid, world_from_block: Pose) -> set[str]:
+    def _touched_by(self, solid: Solid, world_from_block: Pose) -> Iterator[tuple[str, float]]:
         request = fcl.CollisionRequest(num_max_contacts=_ALL_CONTACTS, enable_contact=True)
         collisions = fcl.CollisionData(request, fcl.CollisionResult())
         probe = fcl.CollisionObject(_probe(solid), _transform(solid, world_from_block))
         self._tree.collide(probe, collisions, fcl.defaultCollisionCallback)
-        touched = set()
         for contact in collisions.result.contacts:
             if contact.penetration_depth >= TOUCHING:
                 # One side is the probe, which no block owns.
-                touched.add(self._owners.get(id(contact.o1)) or self._owners[id(contact.o2)])
-        return touched
+                owner = self._owners.get(id(contact.o1)) or self._owners[id(contact.o2)]
+                yield owner, contact.penetration_depth
 
 
-def unwanted(
-    pairs: Iterable[tuple[str, str]], blocks: Mapping[str, Block]
-) -> list[tuple[str, str]]:
+def unwanted(overlaps: Iterable[Overlap], blocks: Mapping[str, Block]) -> list[Overlap]:
     """Those of some overlaps that no module has by design.
 
     Args:
-        pairs: ids of blocks that overlap.
+        overlaps: pairs of blocks that overlap.
         blocks: all blocks by id, with those of the pairs where they overlap.
     """
     return [
-        (first, second)
-        for first, second in pairs
-        if not (_reaches_into(blocks[first], second) or _reaches_into(blocks[second], first))
+        overlap
+        for overlap in overlaps
+        if not (
+            _reaches_into(blocks[overlap.block], overlap.other)
+            or _reaches_into(blocks[overlap.other], overlap.block)
+        )
     ]
 
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
 from buildarena_geometry.changes import Change, attempted
-from buildarena_geometry.collision import CollisionWorld, unwanted
+from buildarena_geometry.collision import CollisionWorld, Overlap, unwanted
 from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
-from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.feedback.mobility import consequences
+from buildarena_geometry.feedback.words import listing, number
 from buildarena_geometry.json_values import json_value
 from buildarena_geometry.measures import bounds, center_of_mass
 from buildarena_geometry.modules.catalogue import load_catalogue
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from buildarena_geometry.modules.module import Catalogue
     from buildarena_geometry.state import SubStructure
 
+_DIGITS = 1e-6  # hundredths that a depth may be above a round figure and not be rounded up
 _OFFERED = tuple(tool.name for tool in tool_definitions())  # what every builder has
 
 
@@ -275,14 +278,14 @@ class Machine:
         world = self._collision_world()
         placed = [change.after.blocks[block] for block in change.placed]
         _require_reach(placed)
-        pairs = unwanted(world.overlaps(placed), change.after.blocks)
-        if pairs:
-            raise _overlap(change, pairs)
+        overlaps = unwanted(world.overlaps(placed), change.after.blocks)
+        if overlaps:
+            raise _overlap(change, overlaps)
         world.remove(change.removed)
         world.place(placed)
-        self._state = change.after
+        before, self._state = self._state, change.after
         changed = (*change.placed, *change.touched, *change.removed)
-        return Accepted(changed=changed, render=change.render)
+        return Accepted(changed=changed, render=lambda: _rendered(before, change))
 
     def _collision_world(self) -> CollisionWorld:
         if self._world is None:
@@ -322,16 +325,33 @@ def _require_reach(blocks: Sequence[Block]) -> None:
             )
 
 
-def _overlap(change: Change, pairs: list[tuple[str, str]]) -> RefusalError:
-    others = list(dict.fromkeys(other for _, other in pairs))
+def _rendered(before: MachineState, change: Change) -> str:
+    """An answer, and what the action did to joints and gear wheels elsewhere."""
+    told = change.placed if len(change.placed) == 1 else ()
+    parts = {*before.connectors, *change.after.connectors}
+    moved = change.placed or change.removed or parts.intersection(change.touched)
+    further = consequences(before, change.after, told) if moved else ()
+    return " ".join([change.render(), *further])
+
+
+def _overlap(change: Change, overlaps: list[Overlap]) -> RefusalError:
+    pairs = [(overlap.block, overlap.other) for overlap in overlaps]
     if len(change.placed) == 1:
-        text = f"{change.attempt} would overlap {_blocks(change.after, others)}."
+        named = listing(
+            f"{_block(change.after, overlap.other)} by {_depth(overlap)}" for overlap in overlaps
+        )
+        text = f"{change.attempt} would overlap {named}."
     else:
-        named = "; ".join(f"{mine} and {other}" for mine, other in pairs)
+        named = "; ".join(f"{o.block} and {o.other} by {_depth(o)}" for o in overlaps)
         text = f"{change.attempt} would make blocks overlap: {named}."
     tried = attempted(change.after.blocks[block_id] for block_id in change.placed)
     return RefusalError(Cause.OVERLAP, text, tuple(pairs), tried)
 
 
-def _blocks(state: MachineState, ids: list[str]) -> str:
-    return listing(f"block {block_id} ({state.blocks[block_id].module.name})" for block_id in ids)
+def _block(state: MachineState, block_id: str) -> str:
+    return f"block {block_id} ({state.blocks[block_id].module.name})"
+
+
+def _depth(overlap: Overlap) -> str:
+    """The depth with two digits, rounded up: as far apart they do not overlap."""
+    return number(math.ceil(overlap.depth * 100.0 - _DIGITS) / 100.0)

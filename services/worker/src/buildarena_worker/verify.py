@@ -25,7 +25,7 @@ from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.agents.workbench import bench_of
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, FILE_WORKFLOW
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, FILE_WORKFLOW, has_data_sheets
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
@@ -173,7 +173,7 @@ class Verifier:
             return checks + self._trial_checks(job, machine)
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
-        bench = bench_of(task_of(job, self._tasks))
+        bench = bench_of(task_of(job, self._tasks), data_sheets=has_data_sheets(job.track_config))
         repeated = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
         checks = [compare("calls", _feedback_of(calls), _feedback_of(repeated))]
         chosen = bench.result()
@@ -204,6 +204,7 @@ class Verifier:
             model_config=job.model_config,
             pack=pack_of(job, self._packs),
             host=host,
+            data_sheets=has_data_sheets(job.track_config),
         )
         workflow = self._workflows.find(str(job.track_config["workflow"]))
         return session, host, run_session(session, workflow, loop_of(job))

@@ -23,6 +23,7 @@ ENDINGS = (".html", ".md", ".pdf")
 PLAIN: Final[Mapping[str, Any]] = {
     "workflow": "five-role",
     "prompts": "default",
+    "data_sheets": True,
     "one_shot": False,
     "closed_loop": None,
 }
@@ -117,6 +118,8 @@ def variant(spec: Mapping[str, Any]) -> str:
         for name in ("workflow", "simulator", "prompts")
         if settings[name] != main[name]
     ]
+    if not settings["data_sheets"]:
+        parts.append("no data sheets")
     if settings["one_shot"]:
         parts.append("one-shot")
     if loop:

@@ -17,7 +17,7 @@ from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import action_rows, parts_hash, replayed_hash
 from buildarena_cli.errors import CommandError
 from buildarena_pipeline.agents.briefing import briefing, briefing_digest
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, has_data_sheets
 from buildarena_store import clean
 
 BASELINE: Final = "builtin/"
@@ -130,17 +130,18 @@ def _first_words(task: Mapping[str, Any] | None, track: Mapping[str, Any]) -> st
     if task is None:
         return None
     as_read = track.get("workflow") == EXTERNAL_WORKFLOW
-    on_demand = bool(track.get("looked_up"))
-    if as_read and track.get("prompts_digest") == briefing_digest(on_demand=on_demand):
-        return _briefing(compact(task["document"])) or str(task["statement"])
+    data_sheets = has_data_sheets(track)
+    digest = briefing_digest(on_demand=bool(track.get("looked_up")), data_sheets=data_sheets)
+    if as_read and track.get("prompts_digest") == digest:
+        return _briefing(compact(task["document"]), data_sheets) or str(task["statement"])
     return str(task["statement"])
 
 
 @lru_cache(maxsize=64)
-def _briefing(document: str) -> str | None:
+def _briefing(document: str, data_sheets: bool) -> str | None:
     """The briefing of a task's document; None when it is of a version that is not read here."""
     try:
-        return briefing(parse_task(document, origin="task"))
+        return briefing(parse_task(document, origin="task"), data_sheets=data_sheets)
     except TaskError:
         return None
 

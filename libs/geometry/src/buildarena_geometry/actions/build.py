@@ -35,7 +35,7 @@ def start(
     Args:
         init_shift: Position of the block's centre [east, north, up]; [0, 0, 0] if left out.
         init_rotation: [yaw, pitch, roll] in degrees: yaw turns north to east, pitch north down,
-            roll up to east; [0, 0, 0] if left out.
+            roll up to east.
         note: What this machine is, in your words.
     """
     if state.is_assembly:

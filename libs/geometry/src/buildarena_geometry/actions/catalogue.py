@@ -45,7 +45,9 @@ def describe_module(state: MachineState, module: Name) -> Change:
     }
     return Change(
         after=state,
-        render=lambda: "\n\n".join(words.module_text(described) for described in modules.values()),
+        render=lambda: "\n\n".join(
+            words.module_text(described, state.catalogue) for described in modules.values()
+        ),
     )
 
 

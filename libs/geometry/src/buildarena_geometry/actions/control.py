@@ -14,6 +14,7 @@ from buildarena_geometry.modules.parameters import (
     Key,
     Name,
     Number,
+    Presses,
     RefusalError,
     shown,
 )
@@ -45,16 +46,36 @@ def add_control_key(state: MachineState, block_id: BlockId, action: Name, new_ke
     return _bind(state, block_id, action, new_key, keep=True)
 
 
-def add_control_sequence(state: MachineState, time: Number, key: Key, hold_for: Number) -> Change:
-    """Adds a key press to the control sequence; presses may overlap.
+def add_control_sequence(
+    state: MachineState, *, time: Number, key: Key, hold_for: Number, more: Presses = ()
+) -> Change:
+    """Adds one or several key presses to the control sequence; presses may overlap.
 
     Args:
         time: When the key goes down, in seconds from the start, at least 0.
         key: A key that some block is bound to.
         hold_for: How long it stays down, in seconds, more than 0.
+        more: Further presses of the same form; all are added, or none if one is refused.
     """
     require_started(state)
     bound = state.keys_in_use()
+    presses = tuple(_press(bound, *press) for press in ((time, key, hold_for), *more))
+    after = replace(state, control_sequence=(*state.control_sequence, *presses))
+    return Change(after=after, render=lambda: words.added_presses(after, len(presses)))
+
+
+def _press(bound: tuple[str, ...], time: float, key: str, hold_for: float) -> KeyPress:
+    """A key press that can be played.
+
+    Args:
+        bound: the keys that some action has.
+        time: seconds.
+        key: its name.
+        hold_for: seconds.
+
+    Raises:
+        RefusalError: no action has the key, or a number is out of range.
+    """
     if key not in bound:
         problem = "no action has this key" if key in KEYS else "there is no such key"
         raise RefusalError(
@@ -66,9 +87,7 @@ def add_control_sequence(state: MachineState, time: Number, key: Key, hold_for: 
             f"time must be at least 0 and hold_for more than 0, "
             f"not {shown(time)} and {shown(hold_for)}.",
         )
-    press = KeyPress(time_s=time, key=key, hold_for_s=hold_for)
-    after = replace(state, control_sequence=(*state.control_sequence, press))
-    return Change(after=after, render=lambda: f"Added.\n{words.control_sequence(after)}")
+    return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
 
 
 def remove_control_sequence(state: MachineState, index: Index) -> Change:

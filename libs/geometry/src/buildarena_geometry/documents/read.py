@@ -264,9 +264,10 @@ def _check_whole(state: MachineState) -> None:
 def _check_apart(state: MachineState) -> None:
     world = CollisionWorld()
     for block in state.blocks.values():
-        pairs = unwanted(world.overlaps([block]), state.blocks)
-        if pairs:
-            raise MisfitError(f".blocks: blocks {pairs[0][1]} and {pairs[0][0]} overlap")
+        overlaps = unwanted(world.overlaps([block]), state.blocks)
+        if overlaps:
+            found = overlaps[0]
+            raise MisfitError(f".blocks: blocks {found.other} and {found.block} overlap")
         world.place([block])
 
 

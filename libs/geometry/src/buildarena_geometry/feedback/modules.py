@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from buildarena_geometry.feedback.data_sheets import data_sheet
 from buildarena_geometry.feedback.words import counted, plain, point
 
 if TYPE_CHECKING:
@@ -15,13 +16,17 @@ OTHER = "other"  # the category of modules that name none
 
 
 def modules_text(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
-    """The modules for people and models, a line each: size, mass and what they are.
+    """The modules for people and models: size, mass and what they are.
+
+    Each has a line, and another with its data where the catalogue tells data sheets.
 
     Args:
         catalogue: the modules.
         names: only these, and the starting block; all that can be built by default.
     """
-    return "\n".join(_module_line(module) for module in _chosen(catalogue, names))
+    return "\n".join(
+        f"- {_module_lines(module, catalogue)}" for module in _chosen(catalogue, names)
+    )
 
 
 def modules_in_short(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
@@ -62,13 +67,18 @@ def category_text(catalogue: Catalogue, category: str) -> str:
     Raises:
         KeyError: there is no such category.
     """
-    return "\n".join(_short_line(module) for module in modules_of_category(catalogue)[category])
+    return "\n".join(module_in_short(module) for module in modules_of_category(catalogue)[category])
 
 
-def module_text(module: Module) -> str:
-    """All that builders read about a module."""
-    line = _module_line(module).removeprefix("- ")
-    if not module.faces:
+def module_text(module: Module, catalogue: Catalogue) -> str:
+    """All that builders read about a module.
+
+    Args:
+        module: the module.
+        catalogue: those that may be used, with or without their data sheets.
+    """
+    line = _module_lines(module, catalogue)
+    if not module.faces or catalogue.data_sheets:
         return line
     # World-sized blocks have faces that their letters do not place.
     places = [f"{face.label} {point(face.center)}" for face in module.faces]
@@ -86,7 +96,8 @@ def modules_of_category(catalogue: Catalogue) -> dict[str, list[Module]]:
     return categories
 
 
-def _short_line(module: Module) -> str:
+def module_in_short(module: Module) -> str:
+    """A module in a short line: its mass and what it is."""
     first = module.brief or module.description.partition(". ")[0]
     first = first.rstrip(".")
     return f"- {module.name} (mass {plain(module.mass)}): {first}."
@@ -103,10 +114,14 @@ def _size(module: Module) -> str:
     return "connector" if module.size is None else " x ".join(map(plain, module.size))
 
 
-def _module_line(module: Module) -> str:
+def _module_lines(module: Module, catalogue: Catalogue) -> str:
     facts = [_size(module), f"mass {plain(module.mass)}"]
-    if module.faces:
+    data = ""
+    if catalogue.data_sheets:
+        sheet = data_sheet(module, catalogue.start.physics)
+        data = f"\n  Data: {sheet}." if sheet else ""
+    elif module.faces:
         facts.append(f"faces {' '.join(face.label for face in module.faces)}")
     if module.actions:
         facts.append(f"actions {', '.join(module.actions)}")
-    return f"- {module.name} ({'; '.join(facts)}): {module.description}"
+    return f"{module.name} ({'; '.join(facts)}): {module.description}{data}"

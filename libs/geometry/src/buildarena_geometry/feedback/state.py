@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from buildarena_geometry.blocks import JOINT_REACH
+from buildarena_geometry.feedback import mobility as joints_in_words
 from buildarena_geometry.feedback.motion import motions
 from buildarena_geometry.feedback.words import (
     caption,
@@ -16,6 +18,7 @@ from buildarena_geometry.feedback.words import (
     rolling,
 )
 from buildarena_geometry.flames import heating
+from buildarena_geometry.mobility import Mobility, mobility
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -24,7 +27,14 @@ if TYPE_CHECKING:
     from buildarena_geometry.rotations import Vector
     from buildarena_geometry.state import MachineState
 
-    Heating = Mapping[str, tuple[str, ...]]  # by cannon, the blocks whose flames touch it
+
+@dataclass(frozen=True, slots=True)
+class _Relations:
+    """What a block's line says of others: which flames heat it, what it meshes with or locks it."""
+
+    heat: Mapping[str, tuple[str, ...]]  # by cannon, the blocks whose flames touch it
+    moving: Mobility
+
 
 LONGEST_NOTE = 80  # characters of a note that are shown
 FLUSH_OFFSET = 1e-6  # units; a joint whose sides are nearer sits flush
@@ -48,22 +58,22 @@ def block_line(state: MachineState, block: Block) -> str:
 
 def block_lines(state: MachineState, blocks: Iterable[Block]) -> list[str]:
     """Blocks of the state, a line each."""
-    heat = heating(state)
-    return [_place_line(state, block, heat) + _note(block.note) for block in blocks]
+    relations = _relations(state)
+    return [_place_line(state, block, relations) + _note(block.note) for block in blocks]
 
 
 def block_lines_with_faces(state: MachineState, blocks: Iterable[Block]) -> list[str]:
     """Blocks of the state, a line each, with the letters and sides of their faces."""
-    heat = heating(state)
+    relations = _relations(state)
     return [
-        _place_line(state, block, heat) + _letters(state, block) + _note(block.note)
+        _place_line(state, block, relations) + _letters(state, block) + _note(block.note)
         for block in blocks
     ]
 
 
 def place_line(state: MachineState, block: Block) -> str:
     """A block in one line: what it sits on, where it is and what it does there."""
-    return _place_line(state, block, heating(state))
+    return _place_line(state, block, _relations(state))
 
 
 def connector_line(link: Connector) -> str:
@@ -153,12 +163,14 @@ def detached(state: MachineState, joints: Iterable[Joint]) -> list[str]:
 
 def control_sequence(state: MachineState) -> str:
     """The control sequence, one entry a line, with the numbers `remove_control_sequence` takes."""
-    if not state.control_sequence:
-        return "The control sequence is empty."
-    return "\n".join(
-        f"{index}: at {plain(press.time_s)} s hold {press.key} for {plain(press.hold_for_s)} s"
-        for index, press in enumerate(state.control_sequence)
-    )
+    return "\n".join(_press_lines(state)) or "The control sequence is empty."
+
+
+def added_presses(state: MachineState, count: int) -> str:
+    """The last so many entries of the control sequence, and how many it has."""
+    entries = "entry" if len(state.control_sequence) == 1 else "entries"
+    lines = "\n".join(_press_lines(state)[-count:])
+    return f"Added. The sequence has {len(state.control_sequence)} {entries}.\n{lines}"
 
 
 def control_config(state: MachineState) -> str:
@@ -222,12 +234,24 @@ def cooled(before: MachineState, after: MachineState) -> list[str]:
     return rendered
 
 
-def _place_line(state: MachineState, block: Block, heat: Heating) -> str:
+def _press_lines(state: MachineState) -> list[str]:
+    return [
+        f"{index}: at {plain(press.time_s)} s hold {press.key} for {plain(press.hold_for_s)} s"
+        for index, press in enumerate(state.control_sequence)
+    ]
+
+
+def _relations(state: MachineState) -> _Relations:
+    return _Relations(heating(state), mobility(state))
+
+
+def _place_line(state: MachineState, block: Block, relations: _Relations) -> str:
     facts = [f"{block.id} {block.module.name}"]
     facts.extend(_seat(block, state.joint(block)))
     facts.append(f"at {point(block.center_xyz)}")
     facts.extend(_use(block))
-    facts.extend(_heat(block, heat))
+    facts.extend(_heat(block, relations.heat))
+    facts.extend(joints_in_words.facts(relations.moving, block.id))
     return ", ".join(facts)
 
 
@@ -270,7 +294,7 @@ def _use(block: Block) -> list[str]:
     return [f"points {caption(towards)}", *marks]
 
 
-def _heat(block: Block, heat: Heating) -> list[str]:
+def _heat(block: Block, heat: Mapping[str, tuple[str, ...]]) -> list[str]:
     facts = []
     if block.id in heat:
         torches = heat[block.id]

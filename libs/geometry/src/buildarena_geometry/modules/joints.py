@@ -19,6 +19,11 @@ DriveKind = Literal["speed", "position"]
 DefaultMode = Literal["hold", "free", "return", "forward"]
 Sense = Literal["clockwise", "counterclockwise"]
 UP: Vector = (0.0, 0.0, 1.0)
+MESH_SLACK = 0.1
+"""Cogs mesh if the distance of their axes misses the sum of their pitch radii by no more, units.
+Chosen: a fifth of the shift that a builder is allowed."""
+MESH_COSINE = 0.996
+"""Cosine of the greatest angle between the axes of cogs that mesh. Chosen: five degrees."""
 
 _DRIVEN = ("axle", "hinge", "slider")
 _LIMITED = ("hinge", "slider", "constant_velocity")

@@ -288,11 +288,16 @@ class Module(ModuleFields, frozen=True, kw_only=True):
 
 
 class Catalogue(Mapping[str, Module]):
-    """The modules a machine may be made of, by name, in the order of their files."""
+    """The modules a machine may be made of, by name, in the order of their files.
 
-    __slots__ = ("_modules", "_names", "start")
+    Attributes:
+        start: the starting block.
+        data_sheets: whether builders read each module's numbers, not its description alone.
+    """
 
-    def __init__(self, modules: tuple[Module, ...]) -> None:
+    __slots__ = ("_modules", "_names", "_with_data_sheets", "data_sheets", "start")
+
+    def __init__(self, modules: tuple[Module, ...], *, data_sheets: bool = False) -> None:
         """Takes modules with distinct names, exactly one of them a starting block.
 
         Raises:
@@ -304,6 +309,16 @@ class Catalogue(Mapping[str, Module]):
         if len(self._modules) != len(modules) or len(starts) != 1:
             raise ValueError("a catalogue holds distinct names and exactly one starting block")
         self.start = starts[0]
+        self.data_sheets = data_sheets
+        self._with_data_sheets: Catalogue | None = None
+
+    def with_data_sheets(self) -> Catalogue:
+        """The same modules, told with their numbers; always the same object."""
+        if self.data_sheets:
+            return self
+        if self._with_data_sheets is None:
+            self._with_data_sheets = Catalogue(tuple(self._modules.values()), data_sheets=True)
+        return self._with_data_sheets
 
     def __getitem__(self, name: str) -> Module:
         return self._modules[name]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeGuard
 
@@ -21,6 +21,7 @@ LARGEST_NUMBER = (
     1e6  # units, degrees or seconds; far beyond any machine, well within a float's digits
 )
 LONGEST_TEXT = 500  # characters of a note or a name
+MOST_PRESSES = 100  # key presses beside the first that one call adds
 _LONGEST_QUOTE = 40  # characters of what a message quotes
 JsonSchema = dict[str, Any]
 
@@ -122,6 +123,40 @@ def _read_vector(name: str, value: object) -> Vector:
     return (x, y, z)
 
 
+_PRESS_ARGUMENTS = ("time", "key", "hold_for")
+
+
+def _read_presses(name: str, value: object) -> tuple[tuple[float, str, float], ...]:
+    if not isinstance(value, list | tuple) or len(value) > MOST_PRESSES:
+        raise _malformed(name, f"a list of at most {MOST_PRESSES} presses", value)
+    return tuple(_read_press(f"{name}[{index}]", press) for index, press in enumerate(value))
+
+
+def _read_press(name: str, value: object) -> tuple[float, str, float]:
+    if not isinstance(value, Mapping) or set(value) != set(_PRESS_ARGUMENTS):
+        raise _malformed(name, f"an object with {', '.join(_PRESS_ARGUMENTS)}", value)
+    time, key, hold_for = (value[argument] for argument in _PRESS_ARGUMENTS)
+    return (
+        _read_number(f"{name}.time", time),
+        _read_text(f"{name}.key", key),
+        _read_number(f"{name}.hold_for", hold_for),
+    )
+
+
+_PRESSES_SCHEMA: JsonSchema = {
+    "type": "array",
+    "items": {
+        "type": "object",
+        "properties": {
+            "time": {"type": "number"},
+            "key": {"type": "string", "enum": list(KEYS)},
+            "hold_for": {"type": "number"},
+        },
+        "required": list(_PRESS_ARGUMENTS),
+        "additionalProperties": False,
+    },
+    "maxItems": MOST_PRESSES,
+}
 _VECTOR_SCHEMA: JsonSchema = {
     "type": "array",
     "items": {"type": "number"},
@@ -136,4 +171,5 @@ Key = Annotated[str, Parameter({"type": "string", "enum": list(KEYS)}, _read_tex
 Note = Annotated[str, Parameter({"type": "string", "maxLength": LONGEST_TEXT}, _read_note)]
 Number = Annotated[float, Parameter({"type": "number"}, _read_number)]
 Index = Annotated[int, Parameter({"type": "integer"}, _read_index)]
+Presses = Annotated[tuple[tuple[float, str, float], ...], Parameter(_PRESSES_SCHEMA, _read_presses)]
 Triple = Annotated[Vector, Parameter(_VECTOR_SCHEMA, _read_vector)]

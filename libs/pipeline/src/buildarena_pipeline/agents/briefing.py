@@ -44,11 +44,12 @@ LIMITS: Final = SessionLimits(
 )
 
 
-def briefing(task: Task) -> str:
+def briefing(task: Task, *, data_sheets: bool = True) -> str:
     """All that an agent must know to play a task, but for its tools.
 
     Args:
         task: The task.
+        data_sheets: Whether it is told the numbers of modules and world.
 
     Returns:
         Markdown: how it plays, the statement, the frame, the rules, the limits, the modules.
@@ -63,16 +64,20 @@ def briefing(task: Task) -> str:
             "call_bytes": f"{LIMITS.call_bytes:,}",
             "idle_hours": str(LIMITS.idle_s // 3600),
         },
+        data_sheets=data_sheets,
     )
 
 
-def briefing_digest(*, on_demand: bool = False) -> str:
+def briefing_digest(*, on_demand: bool = False, data_sheets: bool = True) -> str:
     """Hash of the words around a statement: results of different ones don't compare.
 
     Args:
         on_demand: Whether the task's modules are looked up instead of told.
+        data_sheets: Whether it is told the numbers of modules and world.
     """
-    return words_around.briefing_digest(TRIALS, _guidelines(), on_demand=on_demand)
+    return words_around.briefing_digest(
+        TRIALS, _guidelines(), on_demand=on_demand, data_sheets=data_sheets
+    )
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Literal
@@ -20,7 +20,7 @@ from buildarena_pipeline.agents.briefing import (
 )
 from buildarena_pipeline.agents.submission import chosen_task, submit_machine
 from buildarena_pipeline.agents.workbench import Workbench, check_arguments, rebuild
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track, has_data_sheets
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import simulation_version
@@ -107,6 +107,7 @@ class ExternalSessions:
         kind: PlayerKind = "agent",
         owner: str | None = None,
         force: bool = False,
+        data_sheets: bool = True,
     ) -> OpenedSession:
         """Opens a session for one task, which belongs to the key that opened it.
 
@@ -120,6 +121,7 @@ class ExternalSessions:
             kind: Who plays; no name is of both kinds.
             owner: Id of the API key; None for the operator.
             force: Play under another key's name, as an admin may.
+            data_sheets: Whether it is told the numbers of modules and world.
 
         Raises:
             SubmissionError: Something is unknown, or the agent's session of this seed is over or
@@ -134,7 +136,11 @@ class ExternalSessions:
         version = simulation_version(self._context, simulator)
         on_demand = chosen.constraints.on_demand
         track = external_track(
-            simulator, version, briefing_digest(on_demand=on_demand), on_demand=on_demand
+            simulator,
+            version,
+            briefing_digest(on_demand=on_demand, data_sheets=data_sheets),
+            on_demand=on_demand,
+            data_sheets=data_sheets,
         )
         model = f"{kind}/{agent}"
         config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}
@@ -168,7 +174,7 @@ class ExternalSessions:
         return OpenedSession(
             job=self._context.store.jobs.get(key.job_id),
             task=chosen,
-            briefing=briefing(chosen),
+            briefing=briefing(chosen, data_sheets=data_sheets),
             reopened=reopened,
         )
 
@@ -216,7 +222,7 @@ class ExternalSessions:
         with self._lock:
             bench = self._benches.pop((job_id, len(calls)), None)
         if bench is None:
-            bench = rebuild(calls, self._task(job))
+            bench = self._rebuilt(calls, job)
         # A call in between works on a workbench of its own, so this one stays as it is.
         machines = {name: machine.copy() for name, machine in bench.machines.items()}
         state = SessionState(
@@ -240,7 +246,7 @@ class ExternalSessions:
         with context.store.database.transaction() as connection:
             lease = self._open_lease(job_id, connection)
             calls = context.store.external_calls.read(job_id, connection=connection)
-            bench = rebuild(calls, self._task(lease.job))
+            bench = self._rebuilt(calls, lease.job)
             machine = bench.submitted()
             transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
             queue = submit_machine(context, lease, machine, transcript, connection=connection)
@@ -266,7 +272,11 @@ class ExternalSessions:
         if bench is not None:
             return bench
         calls = self._context.store.external_calls.read(job.id, connection=connection)
-        return rebuild(calls, self._task(job))
+        return self._rebuilt(calls, job)
+
+    def _rebuilt(self, calls: Sequence[ExternalCall], job: Job) -> Workbench:
+        data_sheets = has_data_sheets(job.track_config)
+        return rebuild(calls, self._task(job), data_sheets=data_sheets)
 
     def _task(self, job: Job) -> Task | None:
         return self._context.tasks.exact(job.task, job.task_version)

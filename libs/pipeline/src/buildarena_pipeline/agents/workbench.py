@@ -8,6 +8,7 @@ from typing import Any
 
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_environment import workbench as building
+from buildarena_environment.briefing import catalogue_told
 from buildarena_geometry import Catalogue, Refused
 from buildarena_geometry.json_values import levels
 from buildarena_pipeline.errors import SubmissionError
@@ -67,16 +68,24 @@ def _refused(message: str) -> SubmissionError:
     return SubmissionError([ValidationIssue(path="arguments", message=message)])
 
 
-def bench_of(task: Task | None) -> Workbench:
-    """An empty workbench with what a task offers; None for one whose task is no longer known."""
+def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
+    """An empty workbench with what a task offers.
+
+    Args:
+        task: The task; None where that is no longer known.
+        data_sheets: Whether modules that are looked up are told with their numbers.
+    """
     if task is None:
         return Workbench()
-    return Workbench(task.constraints.catalogue, on_demand=task.constraints.on_demand)
+    return Workbench(
+        catalogue_told(task.constraints, data_sheets=data_sheets),
+        on_demand=task.constraints.on_demand,
+    )
 
 
-def rebuild(calls: Sequence[ExternalCall], task: Task | None) -> Workbench:
-    """The workbench after these calls in a session of a task."""
-    bench = bench_of(task)
+def rebuild(calls: Sequence[ExternalCall], task: Task | None, *, data_sheets: bool) -> Workbench:
+    """The workbench after these calls in a session of a task; arguments as for `bench_of`."""
+    bench = bench_of(task, data_sheets=data_sheets)
     for call in calls:
         bench.call(call.machine, call.tool, call.arguments)
     return bench

@@ -45,6 +45,7 @@ MESSAGES = (
     "guide_assemble",
     "control",
     "control_again",
+    "control_success",
     "no_plan",
     "program_again",
     "go_on",

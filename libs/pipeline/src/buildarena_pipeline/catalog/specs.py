@@ -81,6 +81,13 @@ class Variant(BaseModel):
     workflow: Name = DEFAULT_WORKFLOW
     simulator: Name = DEFAULT_ENGINE
     prompts: Name = "default"
+    data_sheets: Annotated[
+        bool,
+        Field(
+            description="Tell every number that decides: each module's data, and the world's; "
+            "without, they are found out by trials"
+        ),
+    ] = True
     one_shot: Annotated[bool, Field(description="Show an example construction")] = False
     closed_loop: ClosedLoop | None = None
     decoding: Decoding = Decoding()

@@ -33,6 +33,7 @@ class Track:
         rounds: Rounds of the closed loop; 1 without one.
         analyst: Whether an analyst advises between rounds.
         on_demand: Whether roles look modules up instead of being told them.
+        data_sheets: Whether roles are told the numbers of modules and world.
     """
 
     workflow: str
@@ -46,6 +47,7 @@ class Track:
     rounds: int = 1
     analyst: bool = False
     on_demand: bool = False
+    data_sheets: bool = False
 
     @property
     def id(self) -> str:
@@ -57,6 +59,8 @@ class Track:
             workflow += "+one-shot"
         if self.on_demand:
             workflow += "+looked-up"
+        if self.data_sheets:
+            workflow += "+data-sheets"
         if self.rounds > 1:
             workflow += f"+{self.rounds}-rounds" + ("-analyst" if self.analyst else "")
         return (
@@ -67,12 +71,28 @@ class Track:
     def as_config(self) -> Mapping[str, Any]:
         """The parts as a JSON object."""
         parts = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        # Rows have the older word; tracks from before modules could be looked up say nothing of it.
-        return {**parts, "looked_up": True} if parts.pop("on_demand") else parts
+        # Rows have the older word; tracks from before modules could be looked up say nothing of it,
+        # nor do those from before data sheets, which had none.
+        further = {"data_sheets": parts.pop("data_sheets"), "looked_up": parts.pop("on_demand")}
+        return {**parts, **{name: True for name, holds in further.items() if holds}}
+
+
+def has_data_sheets(config: Mapping[str, Any]) -> bool:
+    """Whether a track tells the numbers of modules and world; older ones say nothing of it.
+
+    Args:
+        config: What `Track.as_config` gave.
+    """
+    return bool(config.get("data_sheets"))
 
 
 def external_track(
-    simulator: str, version: str, briefing_digest: str, *, on_demand: bool = False
+    simulator: str,
+    version: str,
+    briefing_digest: str,
+    *,
+    on_demand: bool = False,
+    data_sheets: bool = True,
 ) -> Track:
     """The track of external agents, which bring their own prompts.
 
@@ -81,6 +101,7 @@ def external_track(
         version: Its version, see `simulation_version`.
         briefing_digest: Hash of what they read around a task's statement.
         on_demand: Whether they look modules up instead of being told them.
+        data_sheets: Whether they are told the numbers of modules and world.
     """
     return Track(
         workflow=EXTERNAL_WORKFLOW,
@@ -90,6 +111,7 @@ def external_track(
         prompts_digest=briefing_digest,
         feedback_version=FEEDBACK_VERSION,
         on_demand=on_demand,
+        data_sheets=data_sheets,
     )
 
 
@@ -119,6 +141,7 @@ def make_track(
     one_shot: bool = False,
     closed_loop: ClosedLoop | None = None,
     on_demand: bool = False,
+    data_sheets: bool = True,
 ) -> Track:
     """The track of a submission, with the prompts and feedback that are installed now.
 
@@ -130,6 +153,7 @@ def make_track(
         one_shot: Whether an example construction is shown.
         closed_loop: The closed loop, if there is one.
         on_demand: Whether the task's modules are looked up instead of told.
+        data_sheets: Whether the numbers of modules and world are told.
     """
     return Track(
         workflow=workflow.name,
@@ -143,4 +167,5 @@ def make_track(
         rounds=1 if closed_loop is None else closed_loop.rounds,
         analyst=closed_loop is not None and closed_loop.analyst,
         on_demand=on_demand,
+        data_sheets=data_sheets,
     )

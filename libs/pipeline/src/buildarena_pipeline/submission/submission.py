@@ -207,6 +207,7 @@ class Submissions:
             one_shot=variant.one_shot,
             closed_loop=variant.closed_loop,
             on_demand=on_demand,
+            data_sheets=variant.data_sheets,
         )
 
     def _require_known(

@@ -2,18 +2,11 @@
 
 from collections.abc import Sequence
 from itertools import combinations
-from typing import Final
 
 import numpy as np
 
+from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK
 from buildarena_simulation.structure.model import Joints, Mesh, Part
-
-_MESH_SLACK: Final = 0.1
-"""Cogs engage if the distance of their axes misses the sum of their pitch radii by no more, units.
-Chosen: a fifth of the shift that a builder is allowed."""
-
-_PARALLEL: Final = 0.996
-"""Cosine of the greatest angle between the axes of cogs that engage. Chosen: five degrees."""
 
 
 def joints_of(parts: Sequence[Part]) -> Joints:
@@ -49,8 +42,8 @@ def _meshes(parts: Sequence[Part]) -> tuple[Mesh, ...]:
         along = float(apart @ first.axis)
         distance = float(np.linalg.norm(apart - along * first.axis))
         thickness = first.shapes[0].half_extents[2] + second.shapes[0].half_extents[2]
-        touch = abs(distance - first_gear.pitch_radius - second_gear.pitch_radius) <= _MESH_SLACK
-        if touch and abs(alike) >= _PARALLEL and abs(along) < thickness - _MESH_SLACK:
+        touch = abs(distance - first_gear.pitch_radius - second_gear.pitch_radius) <= MESH_SLACK
+        if touch and abs(alike) >= MESH_COSINE and abs(along) < thickness - MESH_SLACK:
             # On parallel axes cogs turn against each other, on opposite ones the same way.
             ratio = -float(np.sign(alike)) * first_gear.pitch_radius / second_gear.pitch_radius
             meshes.append(Mesh(first=i, second=j, ratio=ratio))

@@ -49,6 +49,11 @@ class OpenSession(BaseModel):
             "`human/NAME`. No name is of both kinds"
         ),
     ] = "agent"
+    data_sheets: bool = Field(
+        default=True,
+        description="Tell each module's data and the world's; sessions with and without are "
+        "ranked apart",
+    )
 
 
 class ToolView(BaseModel):
@@ -76,7 +81,7 @@ class SessionOpened(BaseModel):
     id: str = Field(description="Also the id of the job that will hold the score")
     briefing: str = Field(
         description="All that an agent must know, as Markdown: how it plays, the statement, the "
-        "frame, the rules and the modules with sizes, masses, face letters and actions"
+        "frame, the rules, the modules with their data, and the world"
     )
     statement: str = Field(description="What to build; part of the briefing")
     tools: list[ToolView]
@@ -137,7 +142,8 @@ def open_session(
 ) -> SessionOpened:
     """Opens a session in which an agent of yours, or you yourself, build for one task.
 
-    The same name, kind, task, seed and simulator give the same session for as long as it is open.
+    The same name, kind, task, seed, simulator and data sheets give the same session for as long as
+    it is open.
     """
     opened = sessions.open(
         task=body.task,
@@ -147,6 +153,7 @@ def open_session(
         kind=body.kind,
         owner=caller.key_id,
         force=caller.is_admin,
+        data_sheets=body.data_sheets,
     )
     response.headers["Location"] = f"/v1/jobs/{opened.job.id}"
     if opened.reopened:

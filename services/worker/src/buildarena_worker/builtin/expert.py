@@ -18,6 +18,8 @@ from buildarena_worker.session.messages import Completion, Request, ToolCall
 
 DONE = "TERMINATE"
 DESCRIBE = "describe_module"
+STEPS = 10
+"""Steps that it tells a builder at a time."""
 DESIGNERS = ("planner", "drafter", "guidance", "engineer")
 """The roles that must know modules; guidance only where it has no drawing."""
 
@@ -58,19 +60,27 @@ def _look_up(design: Design, situation: Situation, request: Request) -> Completi
     parts = design.parts.values()
     everything = [action for part in parts for action in part.actions]
     script = everything if situation.role == "planner" else _script(design, situation)
-    used = dict.fromkeys(
-        str(value)
-        for _, arguments in script
-        for argument, value in arguments.items()
-        if argument in ("new_block", "connector")
-    )
+    used = _modules(script)
     call = ToolCall(id="look_1", name=DESCRIBE, arguments={"module": ", ".join(used)})
     return Completion(text="", calls=(call,)) if used else None
+
+
+def _modules(script: Sequence[Action]) -> list[str]:
+    """The modules that actions name, each once."""
+    return list(
+        dict.fromkeys(
+            str(value)
+            for _, arguments in script
+            for argument, value in arguments.items()
+            if argument in ("new_block", "connector")
+        )
+    )
 
 
 def _plan(design: Design) -> str:
     parts = "".join(
         f"<sub_structure><name>{name}</name><description>{part.description}</description>"
+        f"<components>{', '.join(_modules(part.actions))}</components>"
         f"<assembly>{len(part.actions)} actions</assembly></sub_structure>\n"
         for name, part in design.parts.items()
     )
@@ -115,7 +125,8 @@ def _guide(design: Design, situation: Situation) -> Completion:
     done = situation.builder_turns - 1
     if situation.refining or done >= len(script):
         return Completion(text=DONE)
-    return Completion(text=_rendered(script[done]))
+    steps = enumerate(script[done : done + STEPS], start=done + 1)
+    return Completion(text="\n".join(f"{number}. {_rendered(action)}" for number, action in steps))
 
 
 def _act(script: Sequence[Action], done: int) -> Completion:

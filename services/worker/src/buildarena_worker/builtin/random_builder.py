@@ -63,7 +63,7 @@ def _guide(situation: Situation, request: Request) -> Completion:
     most = 2 if situation.refining else _length(request, situation)
     if situation.builder_turns >= most:
         return Completion(text="TERMINATE")
-    return Completion(text="Do something.")
+    return Completion(text=f"{situation.builder_turns + 1}. Do something.")
 
 
 def _act(situation: Situation, request: Request, rng: random.Random) -> Completion:

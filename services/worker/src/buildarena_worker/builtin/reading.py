@@ -13,6 +13,7 @@ _TASK = re.compile(r"^# Task: (\S+)", re.MULTILINE)
 _PART = re.compile(r"^## (?:Sub-structure|Refinement of): (.+)$", re.MULTILINE)
 _ASSEMBLY = re.compile(r"^## Assembly$", re.MULTILINE)
 _REFINEMENT = re.compile(r"^## Refinement of: ", re.MULTILINE)
+_STEP = re.compile(r"^\[guidance\] (\d+)\. ", re.MULTILINE)
 _BUILDER = re.compile(r"^\[builder\] ", re.MULTILINE)
 
 
@@ -26,7 +27,7 @@ class Situation:
         part: Sub-structure it is about, if any.
         assembling: Whether the sub-structures are being put together.
         refining: Whether a built machine is being corrected.
-        own_turns: Replies that this role gave before.
+        own_turns: Replies that this role gave before, as far as it knows.
         own_actions: Tools that this role called before, those that look modules up left out.
         own_lookups: How often it looked modules up.
         has_drawing: Whether it works from a drawing.
@@ -55,6 +56,9 @@ def read_situation(request: Request) -> Situation:
     own = [m for m in request.messages if m.role == "assistant"]
     calls = [call.name for message in own for call in message.calls]
     lookups = sum(name in LOOKUPS for name in calls)
+    # A builder reads the steps of now; their numbers tell how many came before.
+    steps = [int(number) for text in received for number in _STEP.findall(text)]
+    before = steps[-1] - 1 if steps and _first(_ROLE, system) == "builder" else 0
     part = _PART.search(opening)
     return Situation(
         role=_first(_ROLE, system),
@@ -62,8 +66,8 @@ def read_situation(request: Request) -> Situation:
         part=part.group(1).strip() if part else None,
         assembling=_ASSEMBLY.search(opening) is not None,
         refining=_REFINEMENT.search(opening) is not None,
-        own_turns=len(own),
-        own_actions=len(calls) - lookups,
+        own_turns=len(own) + (before + 1 if steps else 0),
+        own_actions=len(calls) - lookups + before,
         own_lookups=lookups,
         has_drawing="Drawing of " in opening,
         builder_turns=sum(len(_BUILDER.findall(text)) for text in received),

@@ -48,6 +48,8 @@ class Role:
         tools: Tools it may use.
         act: Carries out its tool calls.
         brief: What it reads first, in place of the dialogue's opening.
+        forgets: Whether it reads no more than the opening and what came since it was last told
+            something: it only carries out, and somebody else keeps the whole in mind.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Role:
     tools: Sequence[ToolDefinition] = ()
     act: Act | None = None
     brief: str = ""
+    forgets: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +79,8 @@ class Dialogue:
     """A thread that roles add to.
 
     What was said is never taken back: a role's view only grows, so that providers can cache it, and
-    its replies always alternate with what it reads, as strict chat templates demand.
+    its replies always alternate with what it reads, as strict chat templates demand. The view of a
+    role that forgets begins anew with each thing that it is told, and grows until the next.
 
     Args:
         session: The session it is part of.
@@ -97,6 +101,12 @@ class Dialogue:
     def remark(self, role: Role, text: str) -> None:
         """Says something to one role; it stays in what that role reads."""
         self._thread.append(_Remark(to=role.name, text=text))
+
+    @property
+    def acted(self) -> bool:
+        """Whether the last thing in the thread is an action that was carried out."""
+        last = self._thread[-1] if self._thread else None
+        return isinstance(last, _Utterance) and any(action.ok for action in last.actions)
 
     def turn(self, role: Role) -> Completion:
         """Lets a role speak and carries out the tool it calls.
@@ -122,7 +132,7 @@ class Dialogue:
     def _view(self, role: Role) -> list[Message]:
         messages = [Message(role="system", text=role.system)]
         received = [role.brief or self._opening]
-        for said in self._thread:
+        for said in self._thread[self._beginning(role) :]:
             if isinstance(said, _Remark):
                 received += [said.text] if said.to == role.name else []
             elif said.role == role.name:
@@ -133,6 +143,17 @@ class Dialogue:
                 received.append(_rendered(said))
         self._hear(messages, received)
         return messages
+
+    def _beginning(self, role: Role) -> int:
+        """From where on in the thread a role reads."""
+        if not role.forgets:
+            return 0
+        told = (
+            place
+            for place, said in enumerate(self._thread)
+            if isinstance(said, _Utterance) and said.role != role.name
+        )
+        return max(told, default=0)
 
     def _hear(self, messages: list[Message], received: Sequence[str]) -> None:
         """Adds what was received; a role that spoke last and received nothing is told to go on."""

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from buildarena_benchmark import Task, broken_constraint
-from buildarena_geometry import Machine, ToolDefinition
+from buildarena_benchmark import Score, Task, broken_constraint
+from buildarena_environment.briefing import catalogue_told
+from buildarena_environment.trials import score_text
+from buildarena_geometry import Catalogue, Machine, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
+from buildarena_store import RolloutRecord
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Completion, Message, Request
 from buildarena_worker.session.results import ConstructionFailedError
@@ -31,6 +34,7 @@ class Session:
         pack: The sentences to use.
         host: Where answers come from.
         on_turn: Takes every turn, those of stored replies included.
+        data_sheets: Whether roles are told the numbers of modules and world.
 
     Attributes:
         additions: What follows the task's statement: an example, results of rounds.
@@ -47,8 +51,10 @@ class Session:
         pack: PromptPack,
         host: SessionHost,
         on_turn: OnTurn | None = None,
+        data_sheets: bool = True,
     ) -> None:
         self.task = task
+        self.data_sheets = data_sheets
         self.seed = seed
         self.pack = pack
         self.host = host
@@ -65,14 +71,18 @@ class Session:
         statement = self.pack.statements.get(self.task.name, self.task.statement)
         return "\n\n".join([statement.strip(), *self.additions])
 
+    @property
+    def catalogue(self) -> Catalogue:
+        """The task's modules, with their data sheets where roles are told them."""
+        return catalogue_told(self.task.constraints, data_sheets=self.data_sheets)
+
     def new_machine(self, available: Mapping[str, Machine] | None = None) -> Machine:
         """An empty machine of the task's modules, which is what is being built from now on.
 
         Args:
             available: Finished machines by name; with some, the new one is their assembly.
         """
-        catalogue = self.task.constraints.catalogue
-        self.machine = Machine(catalogue=catalogue, available=available)
+        self.machine = Machine(catalogue=self.catalogue, available=available)
         return self.machine
 
     def ask(
@@ -98,6 +108,16 @@ class Session:
                 "context_overflow", f"the {role}'s conversation outgrew the model's context"
             )
         return completion
+
+    def told(self, record: RolloutRecord) -> str:
+        """A rollout's result in words, made from its score and its trajectory."""
+        measured = Score(
+            success=bool(record.success),
+            indicator=record.indicator or 0.0,
+            metrics=record.metrics or {},
+            flags=tuple(record.flags or ()),
+        )
+        return score_text(self.task, measured, self.host.trajectory(record))
 
     def record(
         self,

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from buildarena_benchmark.flags import is_disqualified
+from buildarena_environment.world import units_text
 from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry.feedback.modules import module_text
 from buildarena_geometry.json_texts import read_json
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
@@ -19,6 +23,8 @@ ATTEMPTS = 3
 """Attempts of a transport session; the best counts. Source: the paper's task details."""
 PROGRAM_TURNS = 5
 """Answers the controller may need for one attempt; an unreadable one costs a turn, not a trial."""
+_KEEP = re.compile(r"\A[\s*_`'\"]*KEEP[\s*_`'\".!]*\Z")
+"""An answer that keeps the best trial instead of trying again."""
 STILL = 0.02
 """Closer than this to where it ends, it has stopped, units."""
 
@@ -56,35 +62,63 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         plan=session.plan or pack.say("no_plan"),
         machine=_unpowered(machine),
         powered=_powered(machine),
+        modules=driven_modules(session, machine),
     )
     dialogue = Dialogue(session, phase="control", opening=opening)
     controller = Role(name="controller", system=pack.roles["controller"])
     records: list[RolloutRecord] = []
     for attempt in range(1, ATTEMPTS + 1):
         try:
-            program = _program(dialogue, controller, machine, session)
+            program = _program(dialogue, controller, machine, session, keeps=_succeeded(records))
         except _ProgramError as error:
             if not records:
                 raise ConstructionFailedError("control_invalid", str(error)) from error
+            break
+        if program is None:
             break
         session.machine = program.machine
         last = attempt == ATTEMPTS
         record = session.host.simulate(program.machine, program.presses, final=final and last)
         records.append(record)
         if not last:
-            result = pack.say(
-                "control_again",
-                trial=str(attempt),
-                trials=str(ATTEMPTS),
-                trajectory=rendered_trace(record.trace or ()),
-                result=_result(session, record),
-            )
-            dialogue.remark(controller, result)
+            dialogue.remark(controller, _outcome(session, record, attempt))
     return best_rollout(records)
 
 
-def _program(dialogue: Dialogue, controller: Role, machine: Machine, session: Session) -> _Program:
-    """The controller's next program that can be used.
+def _succeeded(records: Sequence[RolloutRecord]) -> bool:
+    return any(record.success and not is_disqualified(record.flags or ()) for record in records)
+
+
+def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
+    """What the controller reads after a trial: how it went, and whether to improve or to keep."""
+    frame = "control_success" if _succeeded([record]) else "control_again"
+    return session.pack.say(
+        frame,
+        trial=str(attempt),
+        trials=str(ATTEMPTS),
+        trajectory=rendered_trace(record.trace or ()),
+        result=session.told(record),
+    )
+
+
+def driven_modules(session: Session, machine: Machine) -> str:
+    """All that is told about the modules of a machine that move by keys or by themselves."""
+    used = {part.module.name: part.module for part in machine.state.parts}
+    driven = [
+        module
+        for module in used.values()
+        if module.actions or (module.joint is not None and module.joint.drive)
+    ]
+    lines = [f"- {module_text(module, session.catalogue)}" for module in driven]
+    if session.data_sheets and lines:
+        lines.append(f"\n{units_text(session.catalogue)}")
+    return "\n".join(lines) or "(none)"
+
+
+def _program(
+    dialogue: Dialogue, controller: Role, machine: Machine, session: Session, *, keeps: bool
+) -> _Program | None:
+    """The controller's next program that can be used; None where it keeps what succeeded.
 
     Raises:
         _ProgramError: None within the turns; what is wrong with the last one.
@@ -92,19 +126,14 @@ def _program(dialogue: Dialogue, controller: Role, machine: Machine, session: Se
     error = _ProgramError("nothing was said")
     for _ in range(PROGRAM_TURNS):
         text = dialogue.turn(controller).text
+        if keeps and _KEEP.search(text) is not None:
+            return None
         try:
             return _read_program(machine, text)
         except _ProgramError as unusable:
             error = unusable
             dialogue.remark(controller, session.pack.say("program_again", error=str(error)))
     raise error
-
-
-def _result(session: Session, record: RolloutRecord) -> str:
-    indicator = session.task.indicator
-    verdict = "success" if record.success else "no success"
-    flags = f"; {', '.join(record.flags)}" if record.flags else ""
-    return f"{verdict}, {indicator.name} {record.indicator or 0.0:.2f} {indicator.unit}{flags}"
 
 
 def _unpowered(machine: Machine) -> str:

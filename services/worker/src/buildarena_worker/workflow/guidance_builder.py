@@ -19,7 +19,7 @@ class GuidanceBuilder:
         """Builds the machine of the session's task as one structure."""
         brief = session.pack.say("no_drawing", statement=session.statement)
         part = SubStructure(name="machine", text=brief)
-        modules = modules_of(session.task)
+        modules = modules_of(session)
         machine = build_phase(session, part, brief, modules=modules)
         require_started(machine)
         return refine_phase(session, machine, part, brief)

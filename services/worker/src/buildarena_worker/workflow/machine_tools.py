@@ -9,17 +9,17 @@ from typing import Any, Final
 from buildarena_benchmark import Task
 from buildarena_environment.briefing import modules_told
 from buildarena_environment.tools import LOOKUPS
+from buildarena_environment.world import units_text
 from buildarena_geometry import (
     GROUPS,
     LOOKUP,
     ToolDefinition,
-    catalogue_of,
     modules_named,
     tool_definitions,
 )
-from buildarena_geometry.feedback.modules import lookup_text
+from buildarena_geometry.feedback.modules import lookup_text, module_in_short, modules_text
 from buildarena_geometry.feedback.modules import modules_in_short as catalogue_in_short
-from buildarena_geometry.feedback.modules import modules_text as catalogue_text
+from buildarena_worker.session.session import Session
 
 QUERIES = ("get_machine_summary", "get_block_details")
 BUILD = (
@@ -59,13 +59,17 @@ _TOLD: Final = frozenset({"init_rotation", "rotation", "machine_id", "machine_in
 """Arguments whose descriptions say more than their names and the tools' own words."""
 
 
+_REFUSALS_TELL: Final = frozenset({"minItems", "maxItems", "maxLength"})
+"""Bounds that a refusal names, and that every request would repeat."""
+
+
 def _in_short(schema: Mapping[str, Any]) -> dict[str, Any]:
     """A schema without what names, prompts and refusals say as well."""
     properties = {
         name: {
             key: value
             for key, value in told.items()
-            if key != "maxLength" and (key != "description" or name in _TOLD)
+            if key not in _REFUSALS_TELL and (key != "description" or name in _TOLD)
         }
         for name, told in schema["properties"].items()
     }
@@ -77,28 +81,46 @@ def lookups(task: Task) -> list[ToolDefinition]:
     return tools_named(LOOKUPS) if task.constraints.on_demand else []
 
 
-def modules_text(chosen: str | Sequence[str] | None = None) -> str:
-    """The module list for people and models, generated from the catalogue.
+def modules_of(session: Session) -> str:
+    """What models read about the modules of a session's task: all, or how to look them up."""
+    return modules_told(session.task.constraints, data_sheets=session.data_sheets)
+
+
+def planned_modules(session: Session, plan: str) -> str:
+    """What models read about the modules that a plan names, and in short about other connectors.
 
     Args:
-        chosen: Only these modules, or those of a set, and the starting block; the basic set by
-            default.
+        session: The session.
+        plan: What was planned; if it names no module, they are told all.
     """
-    allowed = chosen if chosen is None or isinstance(chosen, str) else tuple(chosen)
-    return catalogue_text(catalogue_of(allowed), modules_named(allowed))
+    task, catalogue = session.task, session.catalogue
+    if task.constraints.on_demand:
+        return modules_of(session)
+    named = _named_in(plan, task)
+    others = [module_in_short(catalogue[name]) for name in connectors_of(task) if name not in named]
+    units = [f"\n{units_text(catalogue)}"] if session.data_sheets else []
+    return "\n".join([modules_text(catalogue, named), *others, *units])
 
 
-def modules_of(task: Task) -> str:
-    """What models read about the modules of a task: all of them, or how to look them up."""
-    return modules_told(task.constraints)
-
-
-def parts_of(task: Task) -> str:
-    """The same in short: sizes, masses and actions, without descriptions."""
+def parts_of(task: Task, plan: str) -> str:
+    """The same in short: sizes, masses and actions, without descriptions and data."""
     limits = task.constraints
     if limits.on_demand:
         return lookup_text(limits.catalogue)
-    return catalogue_in_short(limits.catalogue, modules_named(limits.modules))
+    named = (*_named_in(plan, task), *connectors_of(task))
+    return catalogue_in_short(limits.catalogue, named)
+
+
+def _named_in(plan: str, task: Task) -> Sequence[str]:
+    """The task's modules that a plan names, in any case; all if it names none."""
+    offered, written = modules_named(task.constraints.modules), plan.casefold()
+    named = set()
+    # A long name may hold a short one, which is not meant by it.
+    for name in sorted(offered, key=len, reverse=True):
+        if name.casefold() in written:
+            named.add(name)
+            written = written.replace(name.casefold(), "\0")
+    return [name for name in offered if name in named] or offered
 
 
 def connectors_of(task: Task) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -19,6 +20,7 @@ from buildarena_worker.workflow.machine_tools import (
     lookups,
     modules_of,
     parts_of,
+    planned_modules,
     tools_named,
     tools_text,
 )
@@ -31,6 +33,9 @@ BUILD_TURNS = 300
 """Replies a phase may take. Source: the paper's workflow appendix."""
 MAX_LOOKUPS = 20
 """Modules a role may look up before it speaks."""
+MOST_STEPS = 10
+"""Steps that guidance may give at a time."""
+_STEP = re.compile(r"^\s*\d+[.)]\s+\S", re.MULTILINE)
 SHOWN = 200
 """Characters of a reply that a failure quotes."""
 
@@ -46,7 +51,7 @@ def plan_phase(session: Session) -> Plan:
         "plan",
         task=task.name,
         statement=session.statement,
-        modules=modules_of(task),
+        modules=modules_of(session),
     )
     dialogue = Dialogue(session, phase="plan", opening=opening)
     planner = _looking_up(session, Role(name="planner", system=pack.roles["planner"]))
@@ -92,7 +97,7 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         "draft",
         task=task.name,
         statement=session.statement,
-        modules=modules_of(task),
+        modules=planned_modules(session, f"{plan.text}\n{part.text}"),
         plan=plan.text,
         name=part.name,
         sub_structure=part.text,
@@ -135,7 +140,7 @@ def build_phase(
         task=task.name,
         name=part.name,
         blueprint=blueprint,
-        modules=modules or parts_of(task),
+        modules=modules or parts_of(task, f"{part.text}\n{blueprint}"),
         tools=tools_text(BUILD),
     )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
@@ -165,7 +170,7 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
         name=part.name,
         blueprint=blueprint,
         summary=summary,
-        modules=parts_of(task),
+        modules=parts_of(task, f"{part.text}\n{blueprint}"),
         tools=tools_text(REFINE),
     )
     dialogue = Dialogue(session, phase="refine", opening=opening, sub_structure=part.name)
@@ -215,7 +220,7 @@ def solo_phase(session: Session) -> Machine:
         "build_solo",
         task=task.name,
         statement=session.statement,
-        modules=modules_of(task),
+        modules=modules_of(session),
     )
     dialogue = Dialogue(session, phase="build", opening=opening)
     role = Role(
@@ -234,6 +239,7 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
         system=session.pack.roles["builder"],
         tools=tools_named(names),
         act=machine.act,
+        forgets=True,
     )
 
 
@@ -248,7 +254,7 @@ def _looking_up(session: Session, role: Role) -> Role:
     tools = lookups(session.task)
     if not tools:
         return role
-    offered = Machine(catalogue=session.task.constraints.catalogue)
+    offered = Machine(catalogue=session.catalogue)
     return replace(role, tools=[*role.tools, *tools], act=offered.act)
 
 
@@ -264,9 +270,26 @@ def _speak(dialogue: Dialogue, role: Role) -> Completion:
 
 
 def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: str) -> None:
-    for turn in range(BUILD_TURNS):
-        role = roles[turn % len(roles)]
+    """Lets roles speak in turn until one ends it.
+
+    Who is given numbered steps takes a turn for each; when one is refused, or no call is made, the
+    other reads at once.
+    """
+    place, steps = 0, 0
+    for _ in range(BUILD_TURNS):
+        role = roles[place]
         reply = _speak(dialogue, role)
-        if role is ends and terminates(reply):
-            return
+        if role is ends:
+            if terminates(reply):
+                return
+            steps = steps_in(reply.text)
+        else:
+            steps = steps - 1 if dialogue.acted else 0
+        if role is ends or steps <= 0:
+            place = (place + 1) % len(roles)
     raise ConstructionFailedError("turn_limit", f"{what} took more than {BUILD_TURNS} turns")
+
+
+def steps_in(text: str) -> int:
+    """How many steps a role is given: the lines with a number before them, or one."""
+    return max(1, min(len(_STEP.findall(text)), MOST_STEPS))

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
-from buildarena_benchmark import Score
-from buildarena_environment.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
@@ -100,19 +98,8 @@ def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
 
 def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
     """Adds a failed round's result, and the analyst's advice, to what the next round reads."""
-    result = describe(session, played.record)
+    result = session.told(played.record)
     session.additions.append(session.pack.say("round_result", round=str(number), result=result))
     if loop.analyst:
         advice = analyse(session, played.machine, played.record, number=number, result=result)
         session.additions.append(session.pack.say("advice", round=str(number), advice=advice))
-
-
-def describe(session: Session, record: RolloutRecord) -> str:
-    """A rollout's result in words, generated from its score."""
-    measured = Score(
-        success=bool(record.success),
-        indicator=record.indicator or 0.0,
-        metrics=record.metrics or {},
-        flags=tuple(record.flags or ()),
-    )
-    return score_text(session.task, measured)

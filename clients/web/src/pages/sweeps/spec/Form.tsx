@@ -99,6 +99,14 @@ export function Form({ text, value, onText, faults, known }: Filling) {
       ))}
       {number(["budget", "max_cost_usd"], "Budget, dollars", "Nothing new starts when it is used up")}
       <Switch
+        label="Tell models the data of modules and world"
+        checked={value.data_sheets !== false}
+        mt="md"
+        onChange={(event) => {
+          set(["data_sheets"], event.currentTarget.checked ? undefined : false);
+        }}
+      />
+      <Switch
         label="Show models an example construction"
         checked={value.one_shot === true}
         mt="md"
