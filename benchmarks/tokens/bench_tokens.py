@@ -3,7 +3,7 @@
 The expert plays each task in the default workflow. Its requests are cut into what they consist
 of: tool schemas, system messages, openings, own words, others' words and tool answers. Tokens are
 characters / 4, as built-in models count them; ratios do not depend on that. The baseline is what
-the same sessions took before prompts and answers were reworked.
+the same sessions took before guidance gave lists of steps.
 """
 
 import argparse

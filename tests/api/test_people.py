@@ -27,7 +27,7 @@ def test_a_person_stands_on_the_external_track_under_an_own_name(api, session) -
     act(api, session, "start", {})
     job = api.post(f"/v1/sessions/{session}/submit").json()
     assert job["model"] == "human/ada"
-    assert job["track"].startswith("external/mujoco-")
+    assert job["track"].startswith("external+data-sheets/mujoco-")
 
 
 @pytest.mark.parametrize("kinds", [("human", "agent"), ("agent", "human")])

@@ -37,7 +37,7 @@ def test_an_agent_builds_and_submits(api, context, session) -> None:
     assert (job["state"], job["stage"]) == ("queued", "simulate")
     assert (job["actions"], job["refused_actions"]) == (3, 1)
     assert job["refusals"] == {"face_occupied": 1}
-    assert job["track"].startswith("external/mujoco-")
+    assert job["track"].startswith("external+data-sheets/mujoco-")
     assert api.get(f"/v1/jobs/{session}/machine").status_code == 200
     assert len(api.get(f"/v1/jobs/{session}/transcript").json()["turns"]) == 3
     assert context.queues.settle()

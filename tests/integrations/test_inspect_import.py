@@ -69,9 +69,10 @@ def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, c
         ]
         jobs = jobs_of(client)
         assert len(jobs) == 4
-        assert {job["track"].split("-")[0] for job in jobs.values()} == {
-            f"external/{DEFAULT_ENGINE}"
-        }
+        assert all(
+            job["track"].startswith(f"external+data-sheets/{DEFAULT_ENGINE}-")
+            for job in jobs.values()
+        )
         assert [jobs[name]["outcome"] for name in ("support-1", "support-3")] == ["success"] * 2
         for name in ("lift-2", "support-2"):
             assert jobs[name]["outcome"] == "construction_failed"

@@ -8,7 +8,7 @@ from support.providers.scripted import Recording, Scripted, call
 from buildarena_store import StaleLeaseError, Usage
 from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import Diverged, Failed, LimitReached, Superseded
-from buildarena_worker.workflow.phases import MOST_STEPS, steps_in
+from buildarena_worker.workflow.phases import MAX_STEPS, steps_in
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
@@ -240,10 +240,10 @@ def test_numbered_steps_are_carried_out_one_after_the_other(play, guidance, buil
     assert roles[: turns + 1] == ["builder"] * turns + ["guidance"]
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, MOST_STEPS, MOST_STEPS + 5])
+@pytest.mark.parametrize("count", [0, 1, 2, MAX_STEPS, MAX_STEPS + 5])
 def test_steps_are_counted_up_to_a_bound(count) -> None:
     text = "\n".join(f"{n}. attach" for n in range(7, 7 + count))
-    assert steps_in(f"Now:\n{text}") == max(1, min(count, MOST_STEPS))
+    assert steps_in(f"Now:\n{text}") == max(1, min(count, MAX_STEPS))
 
 
 def test_a_builders_view_grows_through_its_steps_and_begins_anew(play) -> None:
@@ -265,7 +265,7 @@ def test_a_builders_view_grows_through_its_steps_and_begins_anew(play) -> None:
         assert before[0] == after[0]
         openings = {view[1].text.partition("[guidance]")[0].strip() for view in (before, after)}
         assert len(openings) == 1
-    assert max(len(view) for view in views) <= 2 + 2 * MOST_STEPS
+    assert max(len(view) for view in views) <= 2 + 2 * MAX_STEPS
 
 
 @pytest.mark.parametrize(

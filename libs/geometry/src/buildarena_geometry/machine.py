@@ -327,10 +327,10 @@ def _require_reach(blocks: Sequence[Block]) -> None:
 
 def _rendered(before: MachineState, change: Change) -> str:
     """An answer, and what the action did to joints and gear wheels elsewhere."""
-    told = change.placed if len(change.placed) == 1 else ()
+    shown_by_itself = change.placed if len(change.placed) == 1 else ()
     parts = {*before.connectors, *change.after.connectors}
     moved = change.placed or change.removed or parts.intersection(change.touched)
-    further = consequences(before, change.after, told) if moved else ()
+    further = consequences(before, change.after, shown_by_itself) if moved else ()
     return " ".join([change.render(), *further])
 
 

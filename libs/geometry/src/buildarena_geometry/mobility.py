@@ -76,11 +76,11 @@ def mobility(state: MachineState) -> Mobility:
         for edge in joints:
             if edge.second not in locks and label[edge.first] == label[edge.second]:
                 locks[edge.second] = _holding(rigid, edge)
-        found = {**_closed_loops(state, label, free), **_held_teeth(label, free, meshes)}
-        if not found:
+        newly_locked = {**_closed_loops(state, label, free), **_held_teeth(label, free, meshes)}
+        if not newly_locked:
             return Mobility(meshes=_driving(label, free, meshes), locks=locks)
-        locks.update(found)
-        rigid += [_Edge(e.first, e.second, e.second) for e in free if e.second in found]
+        locks.update(newly_locked)
+        rigid += [_Edge(e.first, e.second, e.second) for e in free if e.second in newly_locked]
 
 
 def _moves(block: Block) -> bool:

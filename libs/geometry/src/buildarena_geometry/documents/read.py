@@ -266,8 +266,8 @@ def _check_apart(state: MachineState) -> None:
     for block in state.blocks.values():
         overlaps = unwanted(world.overlaps([block]), state.blocks)
         if overlaps:
-            found = overlaps[0]
-            raise MisfitError(f".blocks: blocks {found.other} and {found.block} overlap")
+            pair = overlaps[0]
+            raise MisfitError(f".blocks: blocks {pair.other} and {pair.block} overlap")
         world.place([block])
 
 

@@ -23,24 +23,24 @@ def facts(moving: Mobility, block_id: str) -> Iterator[str]:
 
 
 def consequences(
-    before: MachineState, after: MachineState, told: tuple[str, ...] = ()
+    before: MachineState, after: MachineState, shown: tuple[str, ...] = ()
 ) -> Iterator[str]:
     """Sentences on the joints that an action locked or freed and the cogs that it put together.
 
     Args:
         before: the state before the action.
         after: the state after it.
-        told: ids of blocks whose own lines tell of themselves.
+        shown: ids of blocks whose own lines tell of themselves.
     """
     was, now = mobility(before), mobility(after)
     for block in now.locks:
-        if block not in was.locks and block not in told:
+        if block not in was.locks and block not in shown:
             yield f"{_named(after, block)} is {_locked(now, block)}."
     for block in was.locks:
         if block not in now.locks and block in after.blocks:
             yield f"{_named(after, block)} can move again."
     for cog, others in _new(was.meshes, now.meshes):
-        apart = [other for other in others if other not in told and cog not in told]
+        apart = [other for other in others if other not in shown and cog not in shown]
         if apart:
             yield f"{_named(after, cog)} meshes with {listing(apart)}."
     for cog, others in _new(now.meshes, was.meshes):

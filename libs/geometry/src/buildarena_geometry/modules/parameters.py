@@ -21,7 +21,7 @@ LARGEST_NUMBER = (
     1e6  # units, degrees or seconds; far beyond any machine, well within a float's digits
 )
 LONGEST_TEXT = 500  # characters of a note or a name
-MOST_PRESSES = 100  # key presses beside the first that one call adds
+MAX_PRESSES = 100  # key presses beside the first that one call adds
 _LONGEST_QUOTE = 40  # characters of what a message quotes
 JsonSchema = dict[str, Any]
 
@@ -127,8 +127,8 @@ _PRESS_ARGUMENTS = ("time", "key", "hold_for")
 
 
 def _read_presses(name: str, value: object) -> tuple[tuple[float, str, float], ...]:
-    if not isinstance(value, list | tuple) or len(value) > MOST_PRESSES:
-        raise _malformed(name, f"a list of at most {MOST_PRESSES} presses", value)
+    if not isinstance(value, list | tuple) or len(value) > MAX_PRESSES:
+        raise _malformed(name, f"a list of at most {MAX_PRESSES} presses", value)
     return tuple(_read_press(f"{name}[{index}]", press) for index, press in enumerate(value))
 
 
@@ -155,7 +155,7 @@ _PRESSES_SCHEMA: JsonSchema = {
         "required": list(_PRESS_ARGUMENTS),
         "additionalProperties": False,
     },
-    "maxItems": MOST_PRESSES,
+    "maxItems": MAX_PRESSES,
 }
 _VECTOR_SCHEMA: JsonSchema = {
     "type": "array",

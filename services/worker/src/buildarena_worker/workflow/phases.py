@@ -33,7 +33,7 @@ BUILD_TURNS = 300
 """Replies a phase may take. Source: the paper's workflow appendix."""
 MAX_LOOKUPS = 20
 """Modules a role may look up before it speaks."""
-MOST_STEPS = 10
+MAX_STEPS = 10
 """Steps that guidance may give at a time."""
 _STEP = re.compile(r"^\s*\d+[.)]\s+\S", re.MULTILINE)
 SHOWN = 200
@@ -292,4 +292,4 @@ def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: s
 
 def steps_in(text: str) -> int:
     """How many steps a role is given: the lines with a number before them, or one."""
-    return max(1, min(len(_STEP.findall(text)), MOST_STEPS))
+    return max(1, min(len(_STEP.findall(text)), MAX_STEPS))
