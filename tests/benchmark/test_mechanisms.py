@@ -213,6 +213,37 @@ def test_a_machine_without_wheels_passes_no_gate(tasks, engine_machine) -> None:
     assert score(tasks["mechanisms-2"], engine_machine, trial).indicator == 0.0
 
 
+def test_a_gate_that_half_a_car_passed_does_not_count(tasks, car) -> None:
+    """The starting block may be beside a gate; wheels and mass may not."""
+    trial = drive(car, [*GATES, (4.0, 55.0)])
+    wheels = [trial.block_ids.index(block) for block in wheels_of(car)]
+    heavy = [trial.block_ids.index("2"), trial.block_ids.index("3"), *wheels]
+
+    def shifted(columns: list[int]) -> Score:
+        positions = trial.positions.copy()
+        positions[:, columns, 0] -= 3.0
+        return score(tasks["mechanisms-2"], car, replace(trial, positions=positions))
+
+    assert shifted([0]).metrics["gates"] == 5, "the starting block alone"
+    assert shifted(wheels).metrics["gates"] == 0, "the wheels alone"
+    assert shifted(heavy).metrics["gates"] == 0, "all but the starting block"
+    others = [k for k in range(len(trial.block_ids)) if k not in wheels]
+    loaded = shifted(others)
+    share = 3.0 * sum(car.blocks[trial.block_ids[k]].module.mass for k in others) / float(car.mass)
+    assert (loaded.metrics["gates"] == 5) == (share <= 1.5)
+
+
+def test_a_gate_is_passed_when_the_last_of_the_car_has_passed_it(tasks, car) -> None:
+    trial = drive(car, [*GATES, (4.0, 55.0)])
+    wheels = [trial.block_ids.index(block) for block in wheels_of(car)]
+    positions = trial.positions.copy()
+    positions[:, wheels, 1] -= 1.0
+    whole = slalom(tasks, car, [*GATES, (4.0, 55.0)])
+    behind = score(tasks["mechanisms-2"], car, replace(trial, positions=positions))
+    late_s = behind.metrics["last_gate_s"] - whole.metrics["last_gate_s"]
+    assert late_s == pytest.approx(1.0 / (4.0 * 0.78), abs=0.1)
+
+
 # Winch
 
 POWERED, MEDIUM, LARGE = "Cog Medium Powered", "Cog Medium Unpowered", "Cog Large Unpowered"

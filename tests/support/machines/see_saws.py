@@ -35,25 +35,19 @@ def see_saw(pivot: str = "Swivel", *, show: str = "apart") -> KeyedDraft:
     draft.attach(arm[-1], SOUTH, "Log")
     draft.connect(beam, arm[-1], UP)
     draft.connect(beam, arm[3], EAST)
-    _guys(draft, near, back, post[7], ahead, behind)
     for k in (7, 5, 3):
         draft.connect(near[k], far[k], EAST, WEST)
     for first, second, way, other in (
         (middle, foot, UP, EAST),
         (ahead, near[5], WEST, UP),
+        (ahead, near[5], NORTH, UP),
+        (behind, back[3], SOUTH, UP),
+        (post[7], ahead, NORTH, UP),
+        (post[7], behind, SOUTH, UP),
     ):
         draft.connect(first, second, way, other)
     _gears(draft, post, beam, show)
     return draft
-
-
-def _guys(
-    draft: KeyedDraft, near: list[str], back: list[str], top: str, ahead: str, behind: str
-) -> None:
-    draft.connect(ahead, near[5], NORTH, UP)
-    draft.connect(behind, back[3], SOUTH, UP)
-    draft.connect(top, ahead, NORTH, UP)
-    draft.connect(top, behind, SOUTH, UP)
 
 
 def _gears(draft: KeyedDraft, post: list[str], beam: str, show: str) -> None:

@@ -143,8 +143,9 @@ def judge(
 def _gearing(
     machine: "Machine", trajectory: "Trajectory", height: "Series"
 ) -> tuple[float, float | None]:
-    """When the first key of a motor is pressed, seconds, and how far a gear wheel turns from then
-    until the cargo is highest, degrees; never, and None, without one.
+    """When the first key of a motor is pressed, seconds, and the turning from then on, degrees.
+
+    It is that of a gear wheel, until the cargo is highest; without one, never and None.
     """
     presses = motor_presses(machine, presses_of(machine, trajectory))
     first_s = min((press.time_s for found in presses.values() for press in found), default=np.inf)

@@ -71,6 +71,27 @@ def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> floa
     return math.fsum([*blocks, *halves])
 
 
+def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
+    """Where the mass of some of the tracked blocks has its centre, (T, 3), world frame, units.
+
+    A block's mass lies at its centre, and half of each connector's there as well.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        members: (T, N) which of the tracked blocks.
+    """
+    index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
+    for link in machine.connectors.values():
+        for end in (link.start[0], link.end[0]):
+            if end in index:
+                masses[index[end]] += link.module.mass / 2
+    weights = masses * members
+    center = np.einsum("tn,tnk->tk", weights, trajectory.positions.astype(np.float64))
+    return np.asarray(center / np.maximum(weights.sum(axis=1), 1e-9)[:, None])
+
+
 def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
     """`mass_of` at each sample, (T,), for members (T, N)."""
     masses = np.empty(len(members))
