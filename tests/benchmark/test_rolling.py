@@ -1,5 +1,6 @@
 """Transport: only what wheels drove counts. Trajectories made by hand."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ def _driven(
     borne: object = 1.0,
     cargo: Path | None = None,
     cargo_borne: object = 50.0,
+    keys: str | None = None,
 ) -> Trajectory:
     """A machine that moves by (east, north), its wheels turned by angles; positive ones north."""
 
@@ -36,7 +38,7 @@ def _driven(
         cargo_mass=None if cargo is None else lambda t: np.full_like(t, 50.0),
         settings={"effective_key_presses": 1},
     )
-    trial = rolled(machine, trial, turned)
+    trial = rolled(machine, trial, turned, keys=keys)
     carried = cargo_borne if cargo else 0.0
     return with_bearing(trial, wheels=borne, wheel_ids=wheels_of(machine), cargo=carried)
 
@@ -80,6 +82,32 @@ def test_what_wheels_did_not_drive_does_not_count(tasks, car, motion) -> None:
     assert not result.success
     assert result.indicator < 8.0
     assert result.flags == ("not_driven",)
+
+
+@pytest.mark.parametrize(
+    ("keys", "most"),
+    [
+        ([], 1.0),  # braked, and rolled by a push
+        ([["UpArrow", 0.0, 5.0]], 5.5 * 1.05 + 0.5),  # let go, and pushed on
+        ([["DownArrow", 0.0, 30.0]], 1.0),  # told to go back
+        ([["UpArrow", 0.0, 30.0], ["DownArrow", 0.0, 30.0]], 1.0),  # brakes
+        ([["Alpha1", 0.0, 30.0]], 1.0),  # a key of something else
+    ],
+)
+def test_what_no_key_told_the_wheels_does_not_count(tasks, car, keys, most) -> None:
+    trial = _driven(car, **ROLLING, keys=json.dumps(keys))
+    result = score(tasks["transport-1"], car, trial)
+    assert result.indicator <= most
+    assert (result.success, result.flags) == (False, ("not_driven",))
+
+
+@pytest.mark.parametrize(("speed", "counts"), [(10.4, 10.4), (11.5, 11.5), (20.0, 11.0), (40, 11)])
+def test_wheels_drive_no_faster_than_their_motors_turn(tasks, car, speed, counts) -> None:
+    trial = _driven(car, moved=_north(speed), turned=_turn(speed))
+    indicator = score(tasks["transport-1"], car, trial).indicator
+    most = 10.472 * 1.05 * 30.0 * 1.05 + 1.5
+    assert indicator == pytest.approx(min(counts * 30.0, most), rel=0.06)
+    assert indicator <= most
 
 
 def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(tasks, car) -> None:
