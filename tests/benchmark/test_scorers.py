@@ -8,6 +8,7 @@ import pytest
 from tests.benchmark.conftest import make_trajectory, wheels_of
 
 from buildarena_benchmark import failed_score, score
+from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
 
@@ -222,3 +223,53 @@ def test_a_machine_never_finished_scores_nothing_but_tells_its_parts(tasks, car)
     for task in tasks.values():
         assert (failed_score(task).success, failed_score(task).indicator) == (False, 0.0)
         assert failed_score(task, car).metrics["parts"] == car.part_count
+
+
+def _hops(first_s: float, height: float, low: float) -> Path:
+    """Up to a height and down to another, then up for good, by 10 units/s."""
+    top_s, down_s = first_s + height / 10, first_s + (2 * height - low) / 10
+    times = [0, first_s, top_s, down_s, 40]
+    heights = [0, 0, height, low, low + 10 * (40 - down_s)]
+    return lambda t: np.interp(t, times, heights)
+
+
+def _on_the_ground(machine: Machine, trial: Trajectory) -> Trajectory:
+    """The trajectory from where the machine, its blocks upright, stands on the ground."""
+    low = extents(machine, trial, axis=2)[0][0].min()
+    return replace(trial, positions=trial.positions - np.array([0, 0, low], dtype=np.float32))
+
+
+@pytest.mark.parametrize(
+    ("height", "low", "counts"),
+    [
+        (20.0, 0.0, 20.0),  # it lands and takes off again
+        (3.0, 0.0, 3.0),
+        (1.6, 0.0, 1.6),
+        (0.8, 0.0, None),  # it hops on its pad before it takes off
+        (20.0, 1.0, None),  # it passes over the ground
+    ],
+)
+def test_a_flight_ends_when_a_rocket_touches_the_ground(
+    tasks, engine_machine, height, low, counts
+) -> None:
+    flight = _climb(engine_machine, _hops(2.0, height, low), heated=[True, True])
+    flight = _on_the_ground(engine_machine, flight)
+    result = score(tasks["lift-2"], engine_machine, flight)
+    assert result.success == (counts is None)
+    if counts is not None:
+        top = float(flight.positions[0, :, 2].max())
+        assert result.indicator == pytest.approx(counts + top, abs=0.4)
+        assert result.metrics["landed_s"] == pytest.approx(2.0 + 2 * height / 10, abs=0.09)
+
+
+@pytest.mark.parametrize("bounce_s", [6.0, 6.011, 6.027])
+def test_a_bounce_between_two_samples_is_a_touch(tasks, engine_machine, bounce_s) -> None:
+    def height(t: np.ndarray) -> np.ndarray:
+        falling = 100.0 - np.abs(t - bounce_s / 2) * 200.0 / bounce_s
+        return np.where(t < bounce_s, falling, 100.0 * (t - bounce_s))
+
+    flight = _on_the_ground(engine_machine, _climb(engine_machine, height, heated=[True, True]))
+    result = score(tasks["lift-2"], engine_machine, flight)
+    assert not result.success
+    assert result.indicator < 103.0
+    assert result.metrics["landed_s"] == pytest.approx(bounce_s, abs=0.05)

@@ -27,18 +27,35 @@ def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
         machine: Gives starting block and ropes.
         trajectory: Gives pieces and breaks.
     """
-    pieces = trajectory.pieces
-    if pieces is None:
+    groups = groups_of(machine, trajectory)
+    if groups is None:
         return np.ones(trajectory.positions.shape[:2], dtype=bool)
     start = starting_block(machine, trajectory)
+    return np.asarray(groups == groups[:, start, None])
+
+
+def groups_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.int16] | None:
+    """Which tracked blocks joints, axles, braces and ropes still join, (T, N); None if not known.
+
+    Blocks of one number are joined.
+
+    Args:
+        machine: Gives ropes.
+        trajectory: Gives pieces and breaks.
+    """
+    pieces = trajectory.pieces
+    if pieces is None:
+        return None
     ropes = _ropes(machine, trajectory)
     rope_ends = np.searchsorted(trajectory.time_s, [end for _, _, end in ropes])
-    joined = np.zeros(pieces.shape, dtype=bool)
+    groups = pieces.copy()
     for first, last in spans_of(pieces, rope_ends.tolist()):
         row, time_s = pieces[first], trajectory.time_s[first]
         ties = [(row[a], row[b]) for a, b, end in ropes if time_s < end]
-        joined[first:last] = np.isin(row, _reached(row[start], ties))
-    return joined
+        for piece in np.unique(row):
+            reached = _reached(piece, ties)
+            groups[first:last, np.isin(row, reached)] = min(reached)
+    return groups
 
 
 def spans_of(pieces: NDArray[np.int16], further: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
