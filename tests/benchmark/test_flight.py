@@ -185,8 +185,8 @@ def test_the_flight_ends_at_the_first_touch(tasks, car) -> None:
     touched = np.zeros(751)
     touched[100] = 30.0  # touches at 4 s, and flies on
     result = score(tasks["flight-2"], car, with_bearing(trial, ground=touched))
-    assert not result.success
-    assert result.indicator == pytest.approx(60 / 40, rel=0.01)
+    assert (result.success, result.indicator) == (False, 0.0)
+    assert result.metrics["range"] == pytest.approx(60, rel=0.01)
 
 
 def test_what_came_off_does_not_soften_the_landing(tasks, car) -> None:

@@ -11,6 +11,7 @@ from buildarena_benchmark import failed_score, score
 from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
+from buildarena_simulation.constants import GRAVITY
 
 Path = Callable[[np.ndarray], np.ndarray]
 
@@ -121,10 +122,11 @@ def test_wheels_that_drift_apart_are_not_intact(tasks, car) -> None:
 
 def _carried(machine: Machine, fall_at: float | None, *, start: float = 10.0) -> Trajectory:
     def height(t: np.ndarray) -> np.ndarray:
-        settled = np.maximum(start - 20 * t, 6.75)
+        settled = np.maximum(start - GRAVITY / 2 * t**2, 6.75)
         if fall_at is None:
             return settled
-        return np.where(t < fall_at, settled, np.maximum(settled - 20 * (t - fall_at), 0.8))
+        fallen = GRAVITY / 2 * np.maximum(t - fall_at, 0.0) ** 2
+        return np.maximum(settled - fallen, 0.8)
 
     return make_trajectory(machine, 17.0, cargo=_upwards(height), cargo_mass=_ramp)
 
@@ -132,7 +134,7 @@ def _carried(machine: Machine, fall_at: float | None, *, start: float = 10.0) ->
 def test_the_load_is_the_cargos_mass_when_it_sinks(tasks, car) -> None:
     result = score(tasks["support-1"], car, _carried(car, 8.0))
     assert result.success
-    below = 8.0 + 2.75 / 20  # from 6.75 to 4 at 20 units/s
+    below = 8.0 + np.sqrt(2 * 2.75 / GRAVITY)  # from 6.75 to 4
     sample = np.ceil(below * 25) / 25
     assert result.indicator == pytest.approx(float(_ramp(np.array([sample]))[0]), abs=4.1)
     assert result.metrics["fall_time_s"] == pytest.approx(sample, abs=0.05)

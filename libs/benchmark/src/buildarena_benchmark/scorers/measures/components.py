@@ -98,15 +98,20 @@ def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> ND
         trajectory: The trial.
         members: (T, N) which of the tracked blocks.
     """
+    weights = masses_of_blocks(machine, trajectory) * members
+    center = np.einsum("tn,tnk->tk", weights, trajectory.positions.astype(np.float64))
+    return np.asarray(center / np.maximum(weights.sum(axis=1), 1e-9)[:, None])
+
+
+def masses_of_blocks(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.float64]:
+    """Mass of each tracked block, (N,), with half of each connector that ends on it, mass units."""
     index = {block: i for i, block in enumerate(trajectory.block_ids)}
     masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
     for link in machine.connectors.values():
         for end in (link.start[0], link.end[0]):
             if end in index:
                 masses[index[end]] += link.module.mass / 2
-    weights = masses * members
-    center = np.einsum("tn,tnk->tk", weights, trajectory.positions.astype(np.float64))
-    return np.asarray(center / np.maximum(weights.sum(axis=1), 1e-9)[:, None])
+    return masses
 
 
 def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
