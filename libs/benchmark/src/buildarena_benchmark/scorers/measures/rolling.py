@@ -35,9 +35,9 @@ Floats = NDArray[np.float64]
 
 
 def driven_distances(
-    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
 ) -> Floats | None:
-    """How far wheels explain that a path leads away from its start, with what is allowed, (T,).
+    """How far wheels explain that a path leads away from where it was, with what is allowed, (T,).
 
     A powered wheel that bears on ground or terrain, joined to the starting block, drives the
     machine as far as it rolls while its motor is told to turn that way: by the horizontal motion of
@@ -53,6 +53,7 @@ def driven_distances(
         trajectory: Gives their motion, and what bears them.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of what is transported.
+        since: The sample from which on wheels drive, and whose place is meant.
 
     Returns:
         None where the trajectory has no forces on the wheels, or not how they move.
@@ -79,15 +80,17 @@ def driven_distances(
         moves.append(np.where(touches[:, None], moved, 0.0))
         shares.append(np.where(touches, share, 0.0))
     driven = np.max(shares, axis=0)[None, :, None] * np.array(moves)
-    away = path[:, :2] - path[0, :2]
+    away = path[:, :2] - path[since, :2]
     direction = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
     carried = np.zeros((len(columns), *away.shape))
-    carried[:, 1:] = np.cumsum(driven, axis=1)
+    carried[:, since + 1 :] = np.cumsum(driven[:, since:], axis=1)
     explained = (carried * direction).sum(axis=2).max(axis=0).clip(0.0)
     return np.asarray(explained * (1.0 + ERROR) + SLACK)
 
 
-def moved_upright(trajectory: "Trajectory", joined: Mask, path: Floats) -> Floats:
+def moved_upright(
+    trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
+) -> Floats:
     """How far a subject can have got with every joined block had the machine only turned, (T,).
 
     A machine that moves and turns on the ground takes no block farther than another by more than
@@ -97,10 +100,11 @@ def moved_upright(trajectory: "Trajectory", joined: Mask, path: Floats) -> Float
         trajectory: The trial.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of the subject.
+        since: The sample from whose place on it got so far.
     """
     positions = trajectory.positions[:, :, :2].astype(np.float64)
-    apart = np.linalg.norm(positions[0] - path[0, :2], axis=1)
-    moved = np.linalg.norm(positions - positions[0], axis=2)
+    apart = np.linalg.norm(positions[since] - path[since, :2], axis=1)
+    moved = np.linalg.norm(positions - positions[since], axis=2)
     reach = np.where(joined, moved + 2.0 * apart, np.inf)
     return np.asarray(reach.min(axis=1, initial=np.inf) + SLACK)
 
