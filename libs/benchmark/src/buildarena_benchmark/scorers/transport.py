@@ -140,17 +140,17 @@ def judge(
             return np.asarray((gone <= explained) & (True if borne is None else borne))
 
         target = np.array(scoring.target)
-        found = there_and_back(path, target, scoring.reach, counts)
+        done = there_and_back(path, target, scoring.reach, counts)
         anyhow = there_and_back(
             path, target, scoring.reach, lambda _: np.ones(len(path), dtype=bool)
         )
         route = {
             "driven_distance": rounded(indicator),
-            "there_s": _time_of(trajectory, found.there),
-            "back_s": _time_of(trajectory, found.back),
+            "there_s": _time_of(trajectory, done.there),
+            "back_s": _time_of(trajectory, done.back),
         }
-        indicator = found.way
-        reached = found.back is not None and enough
+        indicator = done.way
+        reached = done.back is not None and enough
         moved_enough = anyhow.back is not None and enough
     flags = {
         NO_WHEELS: moved_enough and not wheels,

@@ -148,7 +148,7 @@ def _gearing(
     It is that of a gear wheel, until the cargo is highest; without one, never and None.
     """
     presses = motor_presses(machine, presses_of(machine, trajectory))
-    first_s = min((press.time_s for found in presses.values() for press in found), default=np.inf)
+    first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
     first, last = int(np.searchsorted(trajectory.time_s, first_s)), int(height.argmax())
     if first >= last:
         return first_s, None

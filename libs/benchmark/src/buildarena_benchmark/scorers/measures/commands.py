@@ -37,7 +37,7 @@ def motor_presses(
         block.id: [press for press in presses if press.key in _motor_keys(block)]
         for block in machine.blocks.values()
     }
-    return {block: found for block, found in reached.items() if found}
+    return {block: pressed for block, pressed in reached.items() if pressed}
 
 
 def held(

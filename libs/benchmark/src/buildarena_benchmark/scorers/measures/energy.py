@@ -46,17 +46,19 @@ def gains_energy(
     positions = trajectory.positions[:samples].astype(np.float64)
     whole = float(masses.sum())
     energy = _energies(time_s, positions) @ masses
-    given = whole * release_speed(scenario) ** 2 / 2 + GRAVITY * float(positions[0, :, 2] @ masses)
+    released = whole * release_speed(scenario) ** 2 / 2 + GRAVITY * float(
+        positions[0, :, 2] @ masses
+    )
     brought = np.zeros(samples - 1)
     if trajectory.cargo_position is not None and trajectory.cargo_mass is not None:
         cargo = trajectory.cargo_mass[:samples]
         path = trajectory.cargo_position[:samples].astype(np.float64)
         each = _energies(time_s, path[:, None])[:, 0]
         energy = energy + cargo[1:] * each
-        given += GRAVITY * float(path[0, 2]) * float(cargo[0])
+        released += GRAVITY * float(path[0, 2]) * float(cargo[0])
         brought = np.cumsum(np.diff(cargo) * each)
         whole += float(cargo[0])
-    most = (given + brought) * (1.0 + SHARE) + RISE * GRAVITY * whole
+    most = (released + brought) * (1.0 + SHARE) + RISE * GRAVITY * whole
     beyond = energy > most
     runs = np.convolve(beyond.astype(int), np.ones(LASTING, dtype=int))
     return bool((runs >= LASTING).any())

@@ -95,16 +95,16 @@ def _driven_wheels(structure: "Structure", driven: set[int]) -> Iterator[tuple[i
     }
     reached, grown = {i for i in driven if i in axles}, True
     while grown:
-        found = {
+        turning = {
             other
             for mesh in structure.joints.meshes
             for cog, other in ((mesh.first, mesh.second), (mesh.second, mesh.first))
             if cog in reached and other in axles
         }
         bodies = {clusters[i] for i in reached}
-        found |= {i for i in axles if clusters[i] in bodies}
-        grown = not found <= reached
-        reached |= found
+        turning |= {i for i in axles if clusters[i] in bodies}
+        grown = not turning <= reached
+        reached |= turning
     in_mesh = {i for mesh in structure.joints.meshes for i in (mesh.first, mesh.second)}
     for i in sorted(reached & in_mesh - driven):
         gear = structure.parts[i].module.gear

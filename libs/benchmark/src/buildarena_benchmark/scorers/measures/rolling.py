@@ -75,8 +75,8 @@ def driven_distances(
         wheel = machine.blocks[bearing.wheel_ids[column]]
         row = index[wheel.id]
         touches = (_lasting(bearing.wheels[:, column] > 0.0) & joined[:, row])[1:]
-        told = _told(wheel, presses, trajectory)
-        moved, share = _rolling(trajectory, row, touches, told, radius_of(wheel))
+        limits = _commanded(wheel, presses, trajectory)
+        moved, share = _rolling(trajectory, row, touches, limits, radius_of(wheel))
         moves.append(np.where(touches[:, None], moved, 0.0))
         shares.append(np.where(touches, share, 0.0))
     driven = np.max(shares, axis=0)[None, :, None] * np.array(moves)
@@ -116,7 +116,7 @@ def radius_of(wheel: "Block") -> float:
     return float(max(radii or boxes, default=0.0))
 
 
-def _told(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory") -> Floats:
+def _commanded(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory") -> Floats:
     """The least and greatest speed its motor may be told to have between samples, (2, T - 1).
 
     Rad/s about the wheel's outward axis, with a margin; 0 both where no key is held, or keys for
@@ -132,7 +132,7 @@ def _told(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory
 
 
 def _rolling(
-    trajectory: "Trajectory", row: int, touches: Mask, told: Floats, radius: float
+    trajectory: "Trajectory", row: int, touches: Mask, limits: Floats, radius: float
 ) -> tuple[Floats, Floats]:
     """A wheel's horizontal steps, (T - 1, 2) units, and which share of each it rolled, (T - 1,)."""
     steps_s = np.diff(trajectory.time_s)
@@ -141,7 +141,7 @@ def _rolling(
     ahead = np.column_stack([axle[:, 1], -axle[:, 0]])
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
     along = (moved * ahead).sum(axis=1)
-    rolled = np.where(touches, np.clip(turn, *(told * steps_s)) * radius, 0.0)
+    rolled = np.where(touches, np.clip(turn, *(limits * steps_s)) * radius, 0.0)
     credit = np.zeros(len(along))
     speed = 0.0
     for k, step_s in enumerate(steps_s):

@@ -137,7 +137,9 @@ def collapsed_sample(
             members = groups[first] == group
             rows = slice(first, last)
             spans[rows] |= south[rows][:, members].any(axis=1) & north[rows][:, members].any(axis=1)
-    lost = np.flatnonzero(~spans[spans.argmax() :]) if spans.any() else []
+    if not spans.any():
+        return None
+    lost = np.flatnonzero(~spans[spans.argmax() :])
     return int(spans.argmax() + lost[0]) if len(lost) else None
 
 

@@ -17,6 +17,7 @@ from buildarena_worker.builtin.designs.drafting import (
     SOUTH_WEST,
     UP,
     WEST,
+    Direction,
     Draft,
 )
 
@@ -66,11 +67,13 @@ def _vehicle(
     """
     draft = Draft()
     middle = draft.start("under the deck" if diagonal else "middle of the spine")
-    spine, (ahead, behind, east, west) = middle, (NORTH, SOUTH, EAST, WEST)
+    spine = middle
+    ways: tuple[Direction, ...] = (NORTH, SOUTH, EAST, WEST)
     if diagonal:
         spine = draft.attach(middle, DOWN)
         draft.do("twist_block", block_id=spine, angle=45)
-        ahead, behind, east, west = (NORTH_EAST, SOUTH_WEST, SOUTH_EAST, NORTH_WEST)
+        ways = (NORTH_EAST, SOUTH_WEST, SOUTH_EAST, NORTH_WEST)
+    ahead, behind, east, west = ways
     front = draft.row(spine, ahead, length // 2)[-1]
     back = draft.row(spine, behind, length // 2)[-1]
     right: list[str] = []
