@@ -115,7 +115,7 @@ def test_only_its_simulators_jobs_are_leased(context, url) -> None:
     assert caller.ask("POST", "/leases", json=unknown).status_code == 403
     own = {**caller.about(), "simulators": {"pybullet": "3"}}
     assert caller.ask("POST", "/leases", json=own).status_code == 204
-    both = {**caller.about(), "simulators": {"pybullet": "3", "mujoco": "3"}}
+    both = {**caller.about(), "simulators": {"pybullet": "4", "mujoco": "4"}}
     assert caller.ask("POST", "/leases", json=both).status_code == 403
 
 
@@ -128,7 +128,7 @@ def test_jobs_of_other_versions_are_not_leased(context, url) -> None:
         for version in ("2", "4.0", "44", "5"):
             other = {**caller.about(), "simulators": {"mujoco": version}}
             assert caller.ask("POST", "/leases", json=other).status_code == 204
-    assert caller.lease()["version"] == "3"
+    assert caller.lease()["version"] == "4"
 
 
 def test_a_key_for_ones_own_jobs_leases_no_others(context, url) -> None:
