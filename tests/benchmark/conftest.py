@@ -1,5 +1,6 @@
 """Trajectories made by hand: what a scorer sees, whichever simulator wrote it."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -55,15 +56,35 @@ def wheels_of(machine: Machine) -> list[str]:
     return [block.id for block in machine.blocks.values() if block.module.spins]
 
 
-def rolled(machine: Machine, trial: Trajectory, turned: Path) -> Trajectory:
-    """The trajectory with its wheels turned by angles (T,); positive ones roll north."""
+def keys_held(time_s: np.ndarray, **held: np.ndarray) -> str:
+    """Presses of keys as settings keep them, each held at samples (T,)."""
+    presses = []
+    for key, samples in held.items():
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], samples, [False]]).astype(int)))
+        presses += [
+            [key, float(time_s[begin]), float(end - begin) / 25]
+            for begin, end in zip(edges[::2], edges[1::2], strict=True)
+        ]
+    return json.dumps(presses)
+
+
+def rolled(
+    machine: Machine, trial: Trajectory, turned: Path, *, keys: str | None = None
+) -> Trajectory:
+    """The trajectory with its wheels turned by angles (T,); positive ones roll north.
+
+    Unless keys are given, those for forward and backward are held while the wheels turn so.
+    """
+    speed = np.diff(turned(trial.time_s), append=turned(trial.time_s)[-1])
+    keys = keys or keys_held(trial.time_s, UpArrow=speed > 0.0, DownArrow=speed < 0.0)
     half = -turned(trial.time_s) / 2
     w, x = np.cos(half), np.sin(half)
     rows = np.sqrt(0.5) * np.column_stack([w, x, w, x])  # block z axis towards east
     quaternions = trial.quaternions.copy()
     for wheel in wheels_of(machine):
         quaternions[:, trial.block_ids.index(wheel)] = rows
-    return replace(trial, quaternions=quaternions.astype(np.float32))
+    settings = {**trial.settings, "presses": keys}
+    return replace(trial, quaternions=quaternions.astype(np.float32), settings=settings)
 
 
 def with_bearing(
@@ -119,8 +140,9 @@ def car() -> Machine:
     ]
     machine = built(("1", "E", BLOCK), ("1", "F", BLOCK), *corner_parts)
     for wheel in wheels_of(machine):
-        key = {"block_id": wheel, "action": "spinning_forward", "new_key": "UpArrow"}
-        assert machine.act("add_control_key", key).ok
+        for way, name in (("forward", "UpArrow"), ("backward", "DownArrow")):
+            key = {"block_id": wheel, "action": f"spinning_{way}", "new_key": name}
+            assert machine.act("add_control_key", key).ok
     machine.act("add_control_sequence", {"time": 1.0, "key": "UpArrow", "hold_for": 5.0})
     return machine
 

@@ -1,15 +1,18 @@
 """Mechanisms: what counts, and what does not. Trajectories made by hand."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.machines.drafts import KeyedDraft
 from tests.benchmark.conftest import make_trajectory, rolled, wheels_of, with_bearing, with_pieces
 
 from buildarena_benchmark import Score, Task, score
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory
+from buildarena_simulation import Event, Trajectory
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 
 Path = Callable[[np.ndarray], np.ndarray]
 
@@ -210,7 +213,75 @@ def test_a_machine_without_wheels_passes_no_gate(tasks, engine_machine) -> None:
     assert score(tasks["mechanisms-2"], engine_machine, trial).indicator == 0.0
 
 
+def test_a_gate_that_half_a_car_passed_does_not_count(tasks, car) -> None:
+    """The starting block may be beside a gate; wheels and mass may not."""
+    trial = drive(car, [*GATES, (4.0, 55.0)])
+    wheels = [trial.block_ids.index(block) for block in wheels_of(car)]
+    heavy = [trial.block_ids.index("2"), trial.block_ids.index("3"), *wheels]
+
+    def shifted(columns: list[int]) -> Score:
+        positions = trial.positions.copy()
+        positions[:, columns, 0] -= 3.0
+        return score(tasks["mechanisms-2"], car, replace(trial, positions=positions))
+
+    assert shifted([0]).metrics["gates"] == 5, "the starting block alone"
+    assert shifted(wheels).metrics["gates"] == 0, "the wheels alone"
+    assert shifted(heavy).metrics["gates"] == 0, "all but the starting block"
+    others = [k for k in range(len(trial.block_ids)) if k not in wheels]
+    loaded = shifted(others)
+    share = 3.0 * sum(car.blocks[trial.block_ids[k]].module.mass for k in others) / float(car.mass)
+    assert (loaded.metrics["gates"] == 5) == (share <= 1.5)
+
+
+def test_a_gate_is_passed_when_the_last_of_the_car_has_passed_it(tasks, car) -> None:
+    trial = drive(car, [*GATES, (4.0, 55.0)])
+    wheels = [trial.block_ids.index(block) for block in wheels_of(car)]
+    positions = trial.positions.copy()
+    positions[:, wheels, 1] -= 1.0
+    whole = slalom(tasks, car, [*GATES, (4.0, 55.0)])
+    behind = score(tasks["mechanisms-2"], car, replace(trial, positions=positions))
+    late_s = behind.metrics["last_gate_s"] - whole.metrics["last_gate_s"]
+    assert late_s == pytest.approx(1.0 / (4.0 * 0.78), abs=0.1)
+
+
 # Winch
+
+POWERED, MEDIUM, LARGE = "Cog Medium Powered", "Cog Medium Unpowered", "Cog Large Unpowered"
+
+
+def gear_train(*cogs: str, apart: int = 3, pivot: str = LARGE) -> Draft:
+    """A bar whose first block bears an arm on a pivot; a driven cog on its last.
+
+    The arm's end is the last block, and what holds the cargo.
+
+    Args:
+        cogs: Between pivot and driven cog, each with how far its axis is from the bar's start.
+        apart: How far the driven cog's axis is.
+        pivot: What the arm turns on.
+    """
+    draft = KeyedDraft(modules="workshop")
+    start = draft.start()
+    bar = [start, *draft.row(start, EAST, max(apart, 7))]
+    for place, cog in enumerate(cogs):
+        draft.attach(bar[3 + 2 * place], NORTH, cog)
+    motor = draft.attach(bar[apart], NORTH, POWERED)
+    arm = draft.attach(draft.attach(start, NORTH, pivot), NORTH)
+    draft.row(arm, WEST, 3)
+    draft.bind(motor, "spinning_forward", "UpArrow")
+    draft.press("UpArrow", 1.0, 20.0)
+    return draft
+
+
+def turned_deg(machine: Machine, trial: Trajectory, module: str, degrees: np.ndarray) -> Trajectory:
+    """The trajectory with all blocks of a module turned by angles (T,) about the north."""
+    half = np.radians(degrees) / 2
+    still = np.zeros_like(half)
+    turns = np.column_stack([np.cos(half), still, np.sin(half), still])
+    quaternions = trial.quaternions.copy()
+    for block in machine.blocks.values():
+        if block.module.name == module:
+            quaternions[:, trial.block_ids.index(block.id)] = turns
+    return replace(trial, quaternions=quaternions)
 
 
 def lift(
@@ -219,42 +290,52 @@ def lift(
     rise: Path = lambda t: 6.0 * ramp(t, 2.0, 15.0),
     borne: object = 20.0,
     ground: object = None,
+    turn: Path = lambda t: 60.0 * ramp(t, 2.0, 15.0),
 ) -> Trajectory:
     def cargo(t: np.ndarray) -> np.ndarray:
         return np.column_stack([np.zeros_like(t), np.full_like(t, 6.0), 0.5 + rise(t) * (t > 0)])
 
     trial = make_trajectory(machine, 30.0, cargo=cargo, cargo_mass=lambda t: np.full_like(t, 20.0))
     weight = float(machine.mass) + np.asarray(borne) if ground is None else ground
-    return with_bearing(trial, cargo=borne, ground=weight)
+    trial = turned_deg(machine, trial, LARGE, turn(trial.time_s))
+    held = Event(time_s=0.0, what="grabbed", joint=list(machine.blocks)[-1], held="cargo")
+    return with_bearing(replace(trial, events=(held,)), cargo=borne, ground=weight)
+
+
+@pytest.fixture(scope="module")
+def train() -> Machine:
+    return gear_train().machine
 
 
 def winch(tasks: dict[str, Task], machine: Machine, **how: object) -> Score:
     return score(tasks["mechanisms-3"], machine, lift(machine, **how))  # type: ignore[arg-type]
 
 
-def test_a_cargo_that_is_lifted_and_held(tasks, car) -> None:
-    result = winch(tasks, car)
+def test_a_cargo_that_is_lifted_and_held(tasks, train) -> None:
+    result = winch(tasks, train)
     assert result.success
     assert result.indicator == pytest.approx(120.0)
-    assert not winch(tasks, car, rise=lambda t: 4.9 * ramp(t, 2.0, 15.0)).success
-    assert winch(tasks, car, rise=lambda t: 4.9 * ramp(t, 2.0, 15.0)).indicator == pytest.approx(98)
+    assert not winch(tasks, train, rise=lambda t: 4.9 * ramp(t, 2.0, 15.0)).success
+    lower = winch(tasks, train, rise=lambda t: 4.9 * ramp(t, 2.0, 15.0))
+    assert lower.indicator == pytest.approx(98)
 
 
 @pytest.mark.parametrize(
     ("rise", "held"),
     [
         (lambda t: 9.0 * ramp(t, 19.0, 19.5) * (t < 24.8), 0.0),  # held for too short a time
-        (lambda t: 9.0 - 0.2 * np.maximum(t - 20.0, 0.0), 0.0),  # sinks all the time
-        (lambda t: 9.0 - 0.1 * np.maximum(t - 20.0, 0.0), 8.5),  # sinks slowly enough
+        (lambda t: (9.0 - 0.2 * np.maximum(t - 20.0, 0.0)) * (t > 1), 0.0),  # sinks all the time
+        (lambda t: (9.0 - 0.1 * np.maximum(t - 20.0, 0.0)) * (t > 1), 8.5),  # slowly enough
         (lambda t: 6.0 * ramp(t, 2.0, 8.0) - 6.0 * ramp(t, 14.0, 19.0), 0.0),  # let down before
-        (lambda t: 6.0 + 0.5 * np.sin(9 * t), 0.0),  # swings
-        (lambda t: 6.0 + 0.25 * np.sin(9 * t), 5.75),
+        (lambda t: (6.0 + 0.5 * np.sin(9 * t)) * (t > 1), 0.0),  # swings
+        (lambda t: (6.0 + 0.25 * np.sin(9 * t)) * (t > 1), 5.75),
         (lambda t: 9.0 * np.sin(np.pi * ramp(t, 20.0, 30.0)), 8.9),  # thrown high and slow
     ],
 )
-def test_what_is_held(tasks, car, rise, held) -> None:
-    found = winch(tasks, car, rise=rise).metrics["held_height"]
-    assert found == pytest.approx(held, abs=0.11 if held != 8.9 else 9.0)
+def test_what_is_held(tasks, train, rise, held) -> None:
+    found = winch(tasks, train, rise=rise, turn=lambda t: 60.0 * (t > 1.0))
+    held_height = found.metrics["held_height"]
+    assert held_height == pytest.approx(held, abs=0.11 if held != 8.9 else 9.0)
 
 
 @pytest.mark.parametrize(
@@ -263,17 +344,72 @@ def test_what_is_held(tasks, car, rise, held) -> None:
         ({"borne": 0.0}, "not_carried"),  # thrown, or lies on a terrain
         ({"borne": 14.0}, "not_carried"),
         ({"ground": 0.0}, "not_standing"),  # balloons or fans hold it
-        ({"ground": 17.0}, "not_standing"),
+        ({"ground": 10.0}, "not_standing"),
+        ({"turn": lambda t: 19.0 * ramp(t, 2.0, 15.0)}, "not_geared"),
+        ({"turn": lambda t: 60.0 * ramp(t, 0.0, 0.9)}, "not_geared"),  # before the key
+        ({"turn": lambda t: 60.0 * ramp(t, 15.5, 19.0)}, "not_geared"),  # once it is up
+        ({"rise": lambda t: 0.31 * ramp(t, 0, 0.5) + 6.0 * ramp(t, 2, 15)}, "not_geared"),
     ],
 )
-def test_who_holds_it(tasks, car, how, flag) -> None:
-    result = winch(tasks, car, **how)
+def test_who_holds_it(tasks, train, how, flag) -> None:
+    result = winch(tasks, train, **how)
     assert (result.success, result.indicator, result.flags) == (False, 0.0, (flag,))
 
 
-def test_a_machine_that_came_apart_holds_nothing(tasks, car) -> None:
-    trial = with_pieces(lift(car), list(car.blocks)[-2:], since_s=12.0)
-    result = score(tasks["mechanisms-3"], car, trial)
+@pytest.mark.parametrize(
+    ("draft", "counts"),
+    [
+        (gear_train(MEDIUM, apart=5), True),  # by another cog
+        (gear_train(MEDIUM, MEDIUM, apart=7), True),
+        (gear_train(apart=4), False),  # in no mesh
+        (gear_train(MEDIUM, apart=6), False),
+        (gear_train(pivot=MEDIUM, apart=2), False),  # no large one
+        (gear_train(pivot="Swivel"), False),
+    ],
+)
+def test_what_the_gears_must_be(tasks, draft, counts) -> None:
+    assert winch(tasks, draft.machine).success == counts
+
+
+def test_a_gear_beside_what_holds_the_cargo_raises_nothing(tasks) -> None:
+    draft = gear_train()
+    base = draft.attach("8", UP)
+    assert winch(tasks, draft.machine).flags == ("not_geared",), "the base holds the cargo"
+    draft.connect(base, "13", UP, connector="Winch")
+    assert winch(tasks, draft.machine).flags == ("not_geared",), "a rope goes round the axle"
+
+
+def test_a_shaft_may_have_two_bearings(tasks) -> None:
+    draft = gear_train()
+    arm = next(b.id for b in draft.machine.blocks.values() if b.center[1] > 1.5)
+    post = draft.row(draft.row("1", SOUTH, 1)[-1], DOWN, 3)[-1]
+    beyond = draft.row(draft.row(post, NORTH, 6)[-1], UP, 3)[-1]
+    swivel = draft.attach(beyond, SOUTH, "Swivel")
+    end = draft.attach(swivel, SOUTH)
+    draft.connect(end, arm, UP)
+    draft.row(arm, UP, 1)
+    assert winch(tasks, draft.machine).success
+
+
+def test_without_a_key_nothing_is_raised(tasks, train) -> None:
+    machine = train.copy()
+    assert machine.act("remove_control_sequence", {"index": 0}).ok
+    assert winch(tasks, machine).flags == ("not_geared", "unstable"), "the energy is from nowhere"
+
+
+def test_the_keys_that_were_played_decide(tasks, train) -> None:
+    trial = lift(train)
+    for presses, flags in (
+        ([["UpArrow", 1.0, 5.0]], ()),
+        ([["Alpha1", 1.0, 5.0]], ("not_geared", "unstable")),
+    ):
+        played = replace(trial, settings={"presses": json.dumps(presses)})
+        assert score(tasks["mechanisms-3"], train, played).flags == flags
+
+
+def test_a_machine_that_came_apart_holds_nothing(tasks, train) -> None:
+    trial = with_pieces(lift(train), list(train.blocks)[1:3], since_s=12.0)
+    result = score(tasks["mechanisms-3"], train, trial)
     assert (result.success, result.flags) == (False, ("came_apart",))
 
 
@@ -364,9 +500,10 @@ def test_without_forces_nothing_can_be_judged(tasks, car, name) -> None:
     trials = {
         "mechanisms-1": ride(car),
         "mechanisms-2": drive(car, GATES),
-        "mechanisms-3": lift(car),
+        "mechanisms-3": lift(gear_train().machine),
         "mechanisms-4": carry(car),
     }
-    result = score(tasks[name], car, replace(trials[name], bearing=None))
+    machine = gear_train().machine if name == "mechanisms-3" else car
+    result = score(tasks[name], machine, replace(trials[name], bearing=None))
     assert (result.success, result.indicator) == (False, 0.0)
     assert result.flags == ("forces_not_measured",)

@@ -1,5 +1,6 @@
 """Transport: only what wheels drove counts. Trajectories made by hand."""
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ def _driven(
     borne: object = 1.0,
     cargo: Path | None = None,
     cargo_borne: object = 50.0,
+    keys: str | None = None,
 ) -> Trajectory:
     """A machine that moves by (east, north), its wheels turned by angles; positive ones north."""
 
@@ -36,7 +38,7 @@ def _driven(
         cargo_mass=None if cargo is None else lambda t: np.full_like(t, 50.0),
         settings={"effective_key_presses": 1},
     )
-    trial = rolled(machine, trial, turned)
+    trial = rolled(machine, trial, turned, keys=keys)
     carried = cargo_borne if cargo else 0.0
     return with_bearing(trial, wheels=borne, wheel_ids=wheels_of(machine), cargo=carried)
 
@@ -80,6 +82,32 @@ def test_what_wheels_did_not_drive_does_not_count(tasks, car, motion) -> None:
     assert not result.success
     assert result.indicator < 8.0
     assert result.flags == ("not_driven",)
+
+
+@pytest.mark.parametrize(
+    ("keys", "most"),
+    [
+        ([], 1.0),  # braked, and rolled by a push
+        ([["UpArrow", 0.0, 5.0]], 5.5 * 1.05 + 0.5),  # let go, and pushed on
+        ([["DownArrow", 0.0, 30.0]], 1.0),  # told to go back
+        ([["UpArrow", 0.0, 30.0], ["DownArrow", 0.0, 30.0]], 1.0),  # brakes
+        ([["Alpha1", 0.0, 30.0]], 1.0),  # a key of something else
+    ],
+)
+def test_what_no_key_told_the_wheels_does_not_count(tasks, car, keys, most) -> None:
+    trial = _driven(car, **ROLLING, keys=json.dumps(keys))
+    result = score(tasks["transport-1"], car, trial)
+    assert result.indicator <= most
+    assert (result.success, result.flags) == (False, ("not_driven",))
+
+
+@pytest.mark.parametrize(("speed", "counts"), [(10.4, 10.4), (11.5, 11.5), (20.0, 11.0), (40, 11)])
+def test_wheels_drive_no_faster_than_their_motors_turn(tasks, car, speed, counts) -> None:
+    trial = _driven(car, moved=_north(speed), turned=_turn(speed))
+    indicator = score(tasks["transport-1"], car, trial).indicator
+    most = 10.472 * 1.05 * 30.0 * 1.05 + 1.5
+    assert indicator == pytest.approx(min(counts * 30.0, most), rel=0.06)
+    assert indicator <= most
 
 
 def test_wheels_that_burn_out_in_place_earn_nothing_for_a_throw(tasks, car) -> None:
@@ -162,3 +190,67 @@ def test_wheels_that_are_not_tracked_are_not_measured(tasks, car) -> None:
     first = replace(trial, block_ids=trial.block_ids[:1], **poses)
     result = score(tasks["transport-1"], car, first)
     assert (result.success, result.flags) == (True, ("drive_not_measured",))
+
+
+# There and back
+
+
+def _legs(*points: tuple[float, float], speed: float = 5.0, rest_s: float = 0.5) -> Path:
+    """A way along points from (0, 0) at a speed, with a rest at each."""
+    times, places = [0.0], [(0.0, 0.0)]
+    for point in points:
+        way = float(np.hypot(*np.subtract(point, places[-1])))
+        times += [times[-1] + way / speed, times[-1] + way / speed + rest_s]
+        places += [point, point]
+    return lambda t: np.column_stack(
+        [np.interp(t, times, [place[axis] for place in places]) for axis in (0, 1)]
+    )
+
+
+def _carried_along(machine: Machine, *points: tuple[float, float], **how: object) -> Trajectory:
+    moved = _legs(*points)
+    turned = lambda t: moved(t)[:, 1]  # noqa: E731 - the wheels roll north as it does
+    return _driven(machine, moved=moved, turned=turned, cargo=moved, **how)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("points", "success", "way"),
+    [
+        ([(10, 10), (0, 0)], True, 26.28),
+        ([(8.7, 8.7), (1.3, 1.3)], True, 22.7),
+        ([(8.5, 8.5), (0, 0)], False, 12.02),  # not quite there
+        ([(10, 10), (1.5, 1.5)], False, 24.16),  # not quite back
+        ([(10, 10)], False, 14.14),  # one way
+        ([(30, 30)], False, 14.14),  # straight on
+        ([(30, 30), (0, 0)], True, 26.28),  # beyond, and back
+        ([(0, 30), (0, 0)], False, 4.14),  # north and back
+        ([(-10, -10), (10, 10), (0, 0)], True, 26.28),
+        ([(0, 0)], False, 0.0),
+    ],
+)
+def test_the_way_there_and_back_counts(tasks, car, points, success, way) -> None:
+    result = score(tasks["transport-3"], car, _carried_along(car, *points))
+    assert result.success == success
+    assert result.indicator == pytest.approx(way, abs=0.25)
+    farthest = max(np.hypot(*point) for point in points)
+    assert result.metrics["driven_distance"] == pytest.approx(farthest, abs=0.2)
+
+
+def test_the_way_back_is_driven_and_carried(tasks, car) -> None:
+    trial = _carried_along(car, (10, 10), (0, 0))
+    assert trial.cargo_position is not None
+    there_s = score(tasks["transport-3"], car, trial).metrics["there_s"]
+    late = trial.time_s > float(there_s or 0.0) + 0.5
+    borne = np.where(late, 0.0, 50.0)
+    thrown = _carried_along(car, (10, 10), (0, 0), cargo_borne=borne)
+    pushed = _carried_along(car, (10, 10), (0, 0), keys='[["UpArrow", 0, 30]]')
+    for other in (thrown, pushed):
+        result = score(tasks["transport-3"], car, other)
+        assert (result.success, result.flags) == (False, ("not_driven",))
+        assert result.indicator < 18.0
+
+
+def test_the_papers_reading_of_the_way_stays_with_the_smaller_cargo(tasks, car) -> None:
+    away = _carried_along(car, (0, 30))
+    assert score(tasks["transport-2"], car, away).indicator == pytest.approx(30.0, abs=0.1)
+    assert score(tasks["transport-3"], car, away).metrics["displacement"] == pytest.approx(30.0)

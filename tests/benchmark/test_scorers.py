@@ -8,8 +8,10 @@ import pytest
 from tests.benchmark.conftest import make_trajectory, wheels_of
 
 from buildarena_benchmark import failed_score, score
+from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
+from buildarena_simulation.constants import GRAVITY
 
 Path = Callable[[np.ndarray], np.ndarray]
 
@@ -120,10 +122,11 @@ def test_wheels_that_drift_apart_are_not_intact(tasks, car) -> None:
 
 def _carried(machine: Machine, fall_at: float | None, *, start: float = 10.0) -> Trajectory:
     def height(t: np.ndarray) -> np.ndarray:
-        settled = np.maximum(start - 20 * t, 6.75)
+        settled = np.maximum(start - GRAVITY / 2 * t**2, 6.75)
         if fall_at is None:
             return settled
-        return np.where(t < fall_at, settled, np.maximum(settled - 20 * (t - fall_at), 0.8))
+        fallen = GRAVITY / 2 * np.maximum(t - fall_at, 0.0) ** 2
+        return np.maximum(settled - fallen, 0.8)
 
     return make_trajectory(machine, 17.0, cargo=_upwards(height), cargo_mass=_ramp)
 
@@ -131,7 +134,7 @@ def _carried(machine: Machine, fall_at: float | None, *, start: float = 10.0) ->
 def test_the_load_is_the_cargos_mass_when_it_sinks(tasks, car) -> None:
     result = score(tasks["support-1"], car, _carried(car, 8.0))
     assert result.success
-    below = 8.0 + 2.75 / 20  # from 6.75 to 4 at 20 units/s
+    below = 8.0 + np.sqrt(2 * 2.75 / GRAVITY)  # from 6.75 to 4
     sample = np.ceil(below * 25) / 25
     assert result.indicator == pytest.approx(float(_ramp(np.array([sample]))[0]), abs=4.1)
     assert result.metrics["fall_time_s"] == pytest.approx(sample, abs=0.05)
@@ -222,3 +225,53 @@ def test_a_machine_never_finished_scores_nothing_but_tells_its_parts(tasks, car)
     for task in tasks.values():
         assert (failed_score(task).success, failed_score(task).indicator) == (False, 0.0)
         assert failed_score(task, car).metrics["parts"] == car.part_count
+
+
+def _hops(first_s: float, height: float, low: float) -> Path:
+    """Up to a height and down to another, then up for good, by 10 units/s."""
+    top_s, down_s = first_s + height / 10, first_s + (2 * height - low) / 10
+    times = [0, first_s, top_s, down_s, 40]
+    heights = [0, 0, height, low, low + 10 * (40 - down_s)]
+    return lambda t: np.interp(t, times, heights)
+
+
+def _on_the_ground(machine: Machine, trial: Trajectory) -> Trajectory:
+    """The trajectory from where the machine, its blocks upright, stands on the ground."""
+    low = extents(machine, trial, axis=2)[0][0].min()
+    return replace(trial, positions=trial.positions - np.array([0, 0, low], dtype=np.float32))
+
+
+@pytest.mark.parametrize(
+    ("height", "low", "counts"),
+    [
+        (20.0, 0.0, 20.0),  # it lands and takes off again
+        (3.0, 0.0, 3.0),
+        (1.6, 0.0, 1.6),
+        (0.8, 0.0, None),  # it hops on its pad before it takes off
+        (20.0, 1.0, None),  # it passes over the ground
+    ],
+)
+def test_a_flight_ends_when_a_rocket_touches_the_ground(
+    tasks, engine_machine, height, low, counts
+) -> None:
+    flight = _climb(engine_machine, _hops(2.0, height, low), heated=[True, True])
+    flight = _on_the_ground(engine_machine, flight)
+    result = score(tasks["lift-2"], engine_machine, flight)
+    assert result.success == (counts is None)
+    if counts is not None:
+        top = float(flight.positions[0, :, 2].max())
+        assert result.indicator == pytest.approx(counts + top, abs=0.4)
+        assert result.metrics["landed_s"] == pytest.approx(2.0 + 2 * height / 10, abs=0.09)
+
+
+@pytest.mark.parametrize("bounce_s", [6.0, 6.011, 6.027])
+def test_a_bounce_between_two_samples_is_a_touch(tasks, engine_machine, bounce_s) -> None:
+    def height(t: np.ndarray) -> np.ndarray:
+        falling = 100.0 - np.abs(t - bounce_s / 2) * 200.0 / bounce_s
+        return np.where(t < bounce_s, falling, 100.0 * (t - bounce_s))
+
+    flight = _on_the_ground(engine_machine, _climb(engine_machine, height, heated=[True, True]))
+    result = score(tasks["lift-2"], engine_machine, flight)
+    assert not result.success
+    assert result.indicator < 103.0
+    assert result.metrics["landed_s"] == pytest.approx(bounce_s, abs=0.05)

@@ -4,7 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from tests.benchmark.conftest import make_trajectory, with_bearing
+from support.machines.building import connect
+from support.machines.families import beam
+from tests.benchmark.conftest import make_trajectory, with_bearing, with_pieces
 
 from buildarena_benchmark import score
 from buildarena_benchmark.scorers.measures.spanning import terrain_sides
@@ -126,10 +128,22 @@ def test_a_cargo_that_slides_onto_a_terrain_is_no_longer_carried(tasks, car) -> 
     trial = _carried(car, north=lambda t: np.maximum(t - 4.0, 0.0))
     result = score(tasks["support-1"], car, _shared(trial))
     assert result.success
-    assert result.indicator == pytest.approx(float(_mass(np.array([6.52]))[0]), abs=4.1)
+    assert result.indicator == pytest.approx(float(_mass(np.array([5.04]))[0]), abs=4.1)
     assert "never_fell" not in result.flags
-    wide = score(tasks["support-2"], car, _shared(trial))  # still over the wider gap
-    assert wide.indicator == pytest.approx(float(_mass(np.array([9.04]))[0]), abs=4.1)
+    wide = score(tasks["support-2"], car, _shared(trial))  # a wider gap allows more
+    assert wide.indicator == pytest.approx(float(_mass(np.array([5.28]))[0]), abs=4.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "most"), [("support-1", 1.0), ("support-2", 1.25), ("support-3", 2.5)]
+)
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_cargo_stays_near_the_middle(tasks, car, name, most, way) -> None:
+    for aside, success in ((0.95 * most, True), (1.05 * most, False)):
+        trial = _carried(car, north=lambda t, far=aside: way * np.clip(t - 1.0, 0.0, far))
+        result = score(tasks[name], car, _shared(trial))
+        assert ("never_fell" in result.flags) == success
+        assert (result.indicator == 1500.0) == success
 
 
 def test_a_cargo_that_slides_off_at_once_was_not_carried(tasks, car) -> None:
@@ -157,3 +171,58 @@ def test_islands_in_the_gap_and_boxes_behind_belong_to_the_scenario(tasks) -> No
     one = Scenario.model_validate(content | {"terrain": [south]})
     assert terrain_sides(one) is None
     assert terrain_sides(tasks["transport-1"].scenario) is None
+
+
+# Bridges that collapse
+
+
+@pytest.fixture(scope="module")
+def bar() -> Machine:
+    return beam(7)
+
+
+def _north_of_the_middle(machine: Machine) -> list[str]:
+    return [block.id for block in machine.blocks.values() if block.center[1] > 0.1]
+
+
+@pytest.mark.parametrize("pieces", ["halves", "an end", "thirds", "bits"])
+def test_what_debris_carries_is_a_metric(tasks, bar, pieces) -> None:
+    north = _north_of_the_middle(bar)
+    south = [block for block in bar.blocks if block not in {"1", *north}]
+    groups = {
+        "halves": [north],
+        "an end": [north[-2:]],
+        "thirds": [north, south],
+        "bits": [[block] for block in bar.blocks],
+    }[pieces]
+    trial = with_pieces(_shared(_carried(bar)), *groups, since_s=6.0)
+    result = score(tasks["support-1"], bar, trial)
+    assert result.success
+    assert result.indicator == pytest.approx(float(_mass(np.array([6.0]))[0]), abs=4.1)
+    assert result.metrics["load_on_debris"] == 1500.0
+    assert result.metrics["collapse_time_s"] == pytest.approx(6.0)
+    assert result.flags == ()
+
+
+def test_a_part_that_breaks_off_a_bridge_is_no_collapse(tasks) -> None:
+    bar = beam(9)
+    tip = max(bar.blocks.values(), key=lambda block: block.center[1]).id
+    trial = with_pieces(_shared(_carried(bar)), [tip], since_s=6.0)
+    result = score(tasks["support-1"], bar, trial)
+    assert (result.success, result.indicator, result.flags) == (True, 1500.0, ("never_fell",))
+    assert result.metrics["load_on_debris"] is None
+
+
+def test_a_bridge_that_ropes_hold_together_has_not_collapsed(tasks) -> None:
+    bar = beam(7)
+    ends = _north_of_the_middle(bar)
+    assert connect(bar, "1", "E", ends[-1], "D", connector="Winch").ok
+    trial = with_pieces(_shared(_carried(bar)), ends, since_s=6.0)
+    assert score(tasks["support-1"], bar, trial).indicator == 1500.0
+
+
+def test_debris_that_holds_from_the_start_is_no_bridge(tasks, bar) -> None:
+    ends = _north_of_the_middle(bar)
+    trial = with_pieces(_shared(_carried(bar)), ends, since_s=1.0)
+    result = score(tasks["support-1"], bar, trial)
+    assert (result.success, result.indicator) == (False, 0.0)

@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.benchmark.conftest import make_trajectory, with_pieces
+from support.machines.building import BLOCK, attach, built
+from tests.benchmark.conftest import make_trajectory, with_bearing, with_pieces
 
 from buildarena_benchmark import score
+from buildarena_benchmark.scorers.measures.energy import gains_energy
+from buildarena_geometry import module_set
 from buildarena_simulation.constants import GRAVITY
 
 
@@ -105,3 +108,58 @@ def test_a_rocket_may_be_as_fast_as_its_thrust_makes_it(tasks, engine_machine) -
 
     assert flight(1.0).success
     assert "unstable" in flight(3.0).flags
+
+
+def _flown(machine, *, climb: float, speed: float = 15.0, sink: float = 0.0):
+    """A flight at a speed, from 40 up that climbs evenly for 10 s."""
+
+    def moved(t: np.ndarray) -> np.ndarray:
+        up = 40.0 + climb * np.minimum(t, 10.0) / 10.0 - sink * t
+        return np.column_stack([np.zeros_like(t), speed * t, up])
+
+    return make_trajectory(machine, 12.0, moved=moved)
+
+
+@pytest.mark.parametrize(
+    ("how", "gains"),
+    [
+        ({"climb": 20.0}, True),
+        ({"climb": 5.0}, True),
+        ({"climb": 1.0}, False),  # within what engines err
+        ({"climb": 0.0}, False),
+        ({"climb": 0.0, "speed": 21.0}, True),
+        ({"climb": 2.0, "speed": 9.0}, False),  # it climbs on its speed
+        ({"climb": 0.0, "speed": 24.0, "sink": 3.0}, True),
+    ],
+)
+def test_what_nothing_drives_gains_no_energy(tasks, how, gains) -> None:
+    machine = built(*(("1", face, BLOCK) for face in "ABE"))
+    flown = score(tasks["flight-2"], machine, with_bearing(_flown(machine, **how)))
+    assert ("unstable" in flown.flags) == gains
+
+
+def test_what_drives_a_machine_may_give_it_energy(tasks, car) -> None:
+    flight = _flown(car, climb=20.0)
+    for presses, gains in (("[]", True), ('[["UpArrow",0.0,1.0]]', False), ('[["x",0,1]]', True)):
+        trial = with_bearing(replace(flight, settings={"presses": presses}))
+        task = tasks["transport-1"]
+        assert gains_energy(task.scenario, car, trial, 300) == gains
+
+
+@pytest.mark.parametrize("module", ["Balloon", "Sqr Balloon"])
+def test_balloons_drive_a_machine(tasks, module) -> None:
+    machine = built(("1", "E", BLOCK), catalogue=module_set("workshop"))
+    risen = with_bearing(_flown(machine, climb=20.0))
+    assert gains_energy(tasks["flight-1"].scenario, machine, risen, 300)
+    assert attach(machine, "2", "E", module).ok
+    risen = with_bearing(_flown(machine, climb=20.0))
+    assert not gains_energy(tasks["flight-1"].scenario, machine, risen, 300)
+
+
+def test_a_cargo_that_grows_brings_energy(tasks, car) -> None:
+    trial = _bridge(car, falls_at=99.0)
+    assert not gains_energy(tasks["support-1"].scenario, car, trial, len(trial.time_s))
+    cargo = trial.cargo_position.copy()
+    cargo[:, 2] += 0.2 * np.maximum(trial.time_s - 8.0, 0.0)
+    raised = replace(trial, cargo_position=cargo)
+    assert gains_energy(tasks["support-1"].scenario, car, raised, len(trial.time_s))

@@ -95,6 +95,12 @@ OTHERS: dict[str, Callable[[Trajectory], Trajectory]] = {
     "another version": lambda t: replace(t, simulation_version="2"),
     "an engine that manifests do not have": lambda t: replace(t, engine_version="0.0.1"),
     "another scenario": lambda t: replace(t, settings={**t.settings, "scenario": "0" * 16}),
+    "another key pressed": lambda t: replace(
+        t, settings={**t.settings, "presses": '[["UpArrow",0.0,1.0]]'}
+    ),
+    "no keys told": lambda t: replace(
+        t, settings={k: v for k, v in t.settings.items() if k != "presses"}
+    ),
     "no scenario": lambda t: replace(t, settings={}),
     "a varied start": lambda t: replace(t, settings={**t.settings, "seed": 1}),
     "a setting without end": lambda t: replace(t, settings={**t.settings, "note": LONG}),
@@ -192,7 +198,7 @@ def test_what_is_said_beside_a_trajectory_is_checked(refused) -> None:
     for versions in (
         {},
         {**VERSIONS, "engine": "pybullet"},
-        {**VERSIONS, "simulation": "4"},
+        {**VERSIONS, "simulation": "5"},
         {**VERSIONS, "engine_version": "1"},
         {**VERSIONS, "note": LONG * 10},
         {**VERSIONS, "deep": {"a": {"b": {"c": 1}}}},
@@ -205,7 +211,7 @@ def test_what_is_said_beside_a_trajectory_is_checked(refused) -> None:
         refused(same, wall_s=wall_s)
     said = {"success": True, "indicator": 1.0, "flags": []}
     for engine in ("mujoco", "unity"):
-        told = {**said, "simulation": "3", "engine_version": "1"}
+        told = {**said, "simulation": "4", "engine_version": "1"}
         refused(same, annotations={engine: told})
     assert "does not refuse this machine" in refused(lambda _: None)
 

@@ -186,7 +186,7 @@ def test_workers_are_listed(context, url, monkeypatch) -> None:
         queues=["simulate.mujoco"],
         host="lab-1",
         pid=1,
-        versions={"engine": "mujoco", "simulation": "3"},
+        versions={"engine": "mujoco", "simulation": "4"},
     )
     done = run_cli(url, "worker", "list")
     assert "runner@key_0a/lab-1" in done.stdout

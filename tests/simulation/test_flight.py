@@ -114,9 +114,44 @@ def test_the_published_law_holds_for_any_flow(name) -> None:
     mirrored = velocity * np.array([-1.0, 1.0, 1.0])
     along = mirrored @ np.array([-math.sin(pitch), math.cos(pitch), 0.0])
     expected = -0.015 * along * np.minimum((velocity**2).sum(axis=1), 900.0)
-    found = wings_of([wing] * 200, np.tile(np.eye(3), (200, 1, 1))).forces(velocity)
+    found = wings_of([wing] * 200, np.tile(np.eye(3), (200, 1, 1))).forces(
+        velocity, np.zeros(200, dtype=bool)
+    )
     assert found[:, 1] == pytest.approx(expected)
     assert (found[:, [0, 2]] == 0.0).all()
+
+
+@pytest.mark.parametrize("name", ["Propeller", "Small Propeller", "Wing Panel", "Drag Block"])
+def test_still_air_gives_what_is_fixed_no_energy(name) -> None:
+    wing = WORKSHOP[name].wing
+    rng = np.random.default_rng(11)
+    velocity = 20.0 * rng.normal(size=(500, 3))
+    wings = wings_of([wing] * 500, np.tile(np.eye(3), (500, 1, 1)))
+    free, fixed = (wings.forces(velocity, np.full(500, held)) for held in (False, True))
+    power = (free * velocity).sum(axis=1)
+    assert (fixed * velocity).sum(axis=1) == pytest.approx(np.minimum(power, 0.0), abs=1e-6)
+    unchanged = power <= 0.0
+    assert np.array_equal(fixed[unchanged], free[unchanged])
+    across = free - power[:, None] * velocity / (velocity**2).sum(axis=1)[:, None]
+    assert fixed[~unchanged] == pytest.approx(across[~unchanged])
+    assert unchanged.all() == (not wing.pitch_deg)
+
+
+@pytest.mark.parametrize("height", [30.0, 60.0])
+@pytest.mark.parametrize("y_axis", [NORTH, SOUTH, UP, DOWN])
+def test_a_frame_with_blades_gains_no_energy_as_it_flies(engine, y_axis, height) -> None:
+    draft = KeyedDraft(modules="workshop")
+    start = draft.start()
+    spine = [start, *draft.row(start, SOUTH, 2)]
+    for base in spine:
+        for side in (EAST, WEST):
+            draft.placed(base, side, "Propeller", y_axis)
+    speed = (0.0, 15.0, 0.0)
+    trial = _released(draft.machine, engine, seconds=1.2, velocity=speed, height=height)
+    path = trial.positions.astype(float).mean(axis=1)
+    rate = np.diff(path, axis=0) * 25.0
+    energy = (rate**2).sum(axis=1) / 2 + GRAVITY * (path[1:, 2] + path[:-1, 2]) / 2
+    assert energy.max() <= energy[0] * 1.01
 
 
 def _lifted(engine: str, module: str, y_axis: Direction, flip: bool) -> float:

@@ -57,7 +57,8 @@ def test_a_cargo_stays_on_a_deck(engine, tasks, rails) -> None:
 def test_the_large_cargo_stays_on_a_long_deck(engine, tasks) -> None:
     actions = car(9, 2, deck_half=(2, 4), drive=[("UpArrow", 3.0, 2.0), ("DownArrow", 5.5, 2.0)])
     result, trajectory = trial(tasks["transport-3"], actions, engine, duration_s=8.0)
-    assert result.success
+    assert result.metrics["driven_distance"] > 10.0
+    assert not result.success, "it goes north"
     assert trajectory.cargo_position is not None
     assert trajectory.cargo_position[-1, 2] > 1.5
 

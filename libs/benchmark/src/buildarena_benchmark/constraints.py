@@ -6,12 +6,16 @@ submissions, of imported archives that are verified, and of the command `machine
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine, modules_named
+from buildarena_simulation.constants import JointKind
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.structure.model import JOINT_KINDS
 
 _MAX_NAMED = 10
 
@@ -113,6 +117,64 @@ def _wrong_structures(task: Task, machine: Machine) -> str | None:
     return None
 
 
+def _wrong_frame(task: Task, machine: Machine) -> str | None:
+    """Whether the sub-structures without cannons are no frame: small, light, or stuck on.
+
+    A frame is held by connectors alone. Blocks that lie flush on others hold on to them, so that
+    connectors would hold nothing.
+    """
+    wanted = task.constraints.frame
+    if wanted is None:
+        return None
+    armed = {block.structure for block in machine.blocks.values() if block.module.thrust}
+    letters = [letter for letter in machine.sub_structures if letter not in armed]
+    if not letters:
+        return "every sub-structure has cannons: the task asks for a frame without any"
+    sizes = Counter(block.structure for block in machine.blocks.values())
+    for letter in letters:
+        if sizes[letter] < wanted.min_blocks:
+            return (
+                f"the frame {letter} has {sizes[letter]} blocks, the task asks for "
+                f"{wanted.min_blocks} or more"
+            )
+    share = _mass_of(machine, letters) / machine.mass
+    if share < wanted.min_mass_share:
+        return (
+            f"the frame has {share:.1%} of the machine's mass, with its connectors; the task asks "
+            f"for {wanted.min_mass_share:.0%} or more"
+        )
+    stuck = _stuck_together(machine, letters)
+    if stuck is not None:
+        return (
+            f"blocks {stuck[0]} and {stuck[1]} hold on to each other without a connector: leave "
+            "room between the frame and the rest, and join them by connectors"
+        )
+    return None
+
+
+def _mass_of(machine: Machine, letters: Sequence[str]) -> float:
+    """Mass of sub-structures and of all connectors that end on them, mass units."""
+    of = {block.id: block.structure for block in machine.blocks.values()}
+    masses = [b.module.mass for b in machine.blocks.values() if b.structure in letters]
+    masses += [
+        link.module.mass
+        for link in machine.connectors.values()
+        if {of[link.start[0]], of[link.end[0]]} & set(letters)
+    ]
+    return math.fsum(masses)
+
+
+def _stuck_together(machine: Machine, letters: Sequence[str]) -> tuple[str, str] | None:
+    """Two blocks, of some sub-structures and of the others, that more than a connector joins."""
+    structure = structure_of(machine)
+    of = [machine.blocks[block].structure in letters for block in structure.block_ids]
+    members = structure.members
+    for first, second, kind in zip(members.first, members.second, members.kind, strict=True):
+        if JOINT_KINDS[kind] is not JointKind.BRACE and of[first] != of[second]:
+            return structure.block_ids[first], structure.block_ids[second]
+    return None
+
+
 def _unjoined(machine: Machine) -> str | None:
     """Which parts nothing joins to the first starting block, as a sentence.
 
@@ -164,5 +226,6 @@ _CHECKS: Final[tuple[Check, ...]] = (
     _violated(_wrong_modules),
     _violated(_wrong_structures),
     _loose,
+    _violated(_wrong_frame),
 )
 """In this order; each may rely on those before it."""

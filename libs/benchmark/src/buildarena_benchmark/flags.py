@@ -13,7 +13,8 @@ class ScoringPolicy(StrEnum):
     """The scoring policy: how flags are read; the values are what the API and the commands take.
 
     Attributes:
-        OURS: A disqualified trial is a failure with an indicator of 0; other flags change nothing.
+        OURS: A disqualified trial is a failure, and a failure has an indicator of 0; other flags
+            change nothing.
         PUBLISHED: As the published evaluation does it: trials that it calls hacked are left out,
             and everything else counts as it was scored.
     """

@@ -1,9 +1,10 @@
 """What the keys make of a machine: targets of its drives, firing cannons, heated cannons."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import Final, Protocol
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from buildarena_simulation.constants import GRAVITY, KEY_DELAY_S
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.drives import lagged, place_targets, speed_targets
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Part, Structure
+
+PRESSES: Final = "presses"
+"""Where a trajectory's settings keep the key presses of the trial; see `written_presses`."""
 
 
 class KeyHold(Protocol):
@@ -206,8 +210,31 @@ def effective_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> int:
         bindings: (N,) the keys of each block's actions.
         keys: The control sequence.
     """
+    return len(_reaching(bindings, keys))
+
+
+def written_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> str:
+    """The key presses that reach some block's action, as a trajectory's settings keep them.
+
+    Args:
+        bindings: (N,) the keys of each block's actions.
+        keys: The control sequence as it was played.
+    """
+    presses = [[key.key, key.time_s, key.hold_for_s] for key in _reaching(bindings, keys)]
+    return json.dumps(presses, separators=(",", ":"))
+
+
+def read_presses(text: str) -> tuple[KeyPress, ...]:
+    """The key presses that `written_presses` wrote."""
+    return tuple(
+        KeyPress(key=key, time_s=time_s, hold_for_s=hold_for_s)
+        for key, time_s, hold_for_s in json.loads(text)
+    )
+
+
+def _reaching(bindings: Bindings, keys: Sequence[KeyHold]) -> list[KeyHold]:
     bound = {key for actions in bindings for names in actions.values() for key in names}
-    return sum(key.key in bound for key in keys)
+    return [key for key in keys if key.key in bound]
 
 
 def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArray) -> BoolArray:

@@ -11,6 +11,7 @@ from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.clearance import require_clear_start
 from buildarena_simulation.constants import DEFAULT_ENGINE, GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.control import (
+    PRESSES,
     Bindings,
     KeyHold,
     effective_presses,
@@ -18,6 +19,7 @@ from buildarena_simulation.control import (
     plan_schedule,
     recoil,
     varied_presses,
+    written_presses,
 )
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.engines.registry import ENGINES, create_engine, engine_version
@@ -43,7 +45,7 @@ from buildarena_simulation.trajectory import Trajectory
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
 
-SIMULATION_VERSION: Final = "3"
+SIMULATION_VERSION: Final = "4"
 """Version of the shared model: rises with every change that can move a trajectory."""
 
 _PROGRESS_EVERY = 10
@@ -183,6 +185,7 @@ def simulate_structure(
                 **adapter.settings,
                 "gravity": GRAVITY,
                 "effective_key_presses": effective_presses(bindings, controls),
+                PRESSES: written_presses(bindings, controls),
                 **({} if seed is None else {"seed": seed}),
                 **({"start": start_digest(start)} if placed else {}),
                 "scenario": hashlib.sha256(unvaried.model_dump_json().encode()).hexdigest()[:16],

@@ -119,7 +119,7 @@ def counted_trials(
     for trial in trials:
         if not trial.scored or is_left_out(trial.flags, policy):
             continue
-        if policy == ScoringPolicy.OURS and is_disqualified(trial.flags):
+        if policy == ScoringPolicy.OURS and (is_disqualified(trial.flags) or not trial.success):
             counted.append(replace(trial, success=False, indicator=0.0))
         else:
             counted.append(trial)
@@ -220,13 +220,14 @@ def counted_tallies(
     """The tallies that averages are made of, under a scoring policy.
 
     In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
-    model would lose nothing by trying to cheat, and one whose machines blow up would gain.
+    model would lose nothing by trying to cheat, and one whose machines blow up would gain. So does
+    every failure: tasks say when a trial succeeds, and what fails has done nothing that counts.
     """
     counted = []
     for tally in tallies:
         if not tally.scored or is_left_out(tally.flags, policy):
             continue
-        if policy == ScoringPolicy.OURS and is_disqualified(tally.flags):
+        if policy == ScoringPolicy.OURS and (is_disqualified(tally.flags) or not tally.success):
             nothing = np.zeros(tally.number)
             counted.append(replace(tally, success=False, indicators=nothing))
         else:

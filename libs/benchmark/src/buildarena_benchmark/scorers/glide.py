@@ -55,7 +55,7 @@ def infeasible(scoring: GlideScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: GlideScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the horizontal distance flown over the height of release.
+    """The indicator is the horizontal distance flown over the height of release, 0 of a failure.
 
     The flight ends when anything of the machine touches ground or terrain. The distance is the
     starting block's; the speed at landing is that of everything that is still joined to it.
@@ -88,9 +88,10 @@ def judge(
         "sink_at_landing": rounded(sink),
         "broken_joints": len(trajectory.breaks),
     }
+    success = landed and flown > scoring.min_range and sink < scoring.max_sink
     return Verdict(
-        success=landed and flown > scoring.min_range and sink < scoring.max_sink,
-        indicator=rounded(flown / placement.height),
+        success=success,
+        indicator=rounded(flown / placement.height) if success else 0.0,
         metrics=metrics,
         deciding=Deciding(samples=last + 1, members=joined, cargo=False),
     )

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scorers.measures.components import joined_to_start
+from buildarena_benchmark.scorers.measures.carrying import touches_from_below
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.outline import lowest_points
 from buildarena_benchmark.scorers.measures.series import speeds, starting_block
 from buildarena_benchmark.scorers.scorer import Deciding, Flag, Metric, Scorer, Verdict, rounded
 from buildarena_benchmark.scorers.thrust import thrust_to_weight
@@ -14,6 +16,13 @@ from buildarena_simulation import Scenario
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
+
+
+_TAKEN_OFF: Final = 1.0
+"""A rocket has taken off when its starting block is so far above its start, units."""
+
+_GROUNDED: Final = 0.1
+"""What is as low touches the ground, units: it need not be seen to press on it."""
 
 
 TWR_BELOW_ONE: Final = Flag(
@@ -57,7 +66,7 @@ def judge(
 
     The trial succeeds if it exceeds a height and the rocket still rises: the mean height of its
     highest block must grow from one window of time to the next. What has come off counts for
-    nothing.
+    nothing, and neither does what follows once a rocket that has taken off touches the ground.
 
     Args:
         scoring: Thresholds.
@@ -73,17 +82,19 @@ def judge(
     time_s = trajectory.time_s
     positions = trajectory.positions.astype(np.float64)
     joined = joined_to_start(machine, trajectory)
-    highest = np.where(joined, positions[:, :, 2], -np.inf).max(axis=1)
+    start = starting_block(machine, trajectory)
+    flown = _first_flight(machine, trajectory, joined, start)
+    highest = np.where(joined, positions[:, :, 2], -np.inf).max(axis=1)[:flown]
     early, late = (
-        highest[(time_s > start) & (time_s <= end)]
-        for start, end in (scoring.early_s, scoring.late_s)
+        highest[(time_s[:flown] > begin) & (time_s[:flown] <= end)]
+        for begin, end in (scoring.early_s, scoring.late_s)
     )
     rise = float(late.mean() - early.mean()) if len(early) and len(late) else 0.0
     indicator = float(highest.max())
     success = indicator > scoring.min_height and rise > scoring.min_rise
     # Up to the top only: how a rocket falls apart when it comes down does not concern its rise.
     ratio, cannons = thrust_to_weight(machine, trajectory, joined, int(highest.argmax()) + 1)
-    body = positions[:, starting_block(machine, trajectory)]
+    body = positions[:, start]
     sideways = np.linalg.norm(body[:, :2] - body[0, :2], axis=1)
     moving = joined[1:] & joined[:-1]
     metrics: dict[str, Metric] = {
@@ -92,6 +103,7 @@ def judge(
         "rise": rounded(rise),
         "max_speed": rounded(speeds(time_s, positions).max(initial=0.0, where=moving)),
         "lateral_deviation": rounded(sideways.mean()),
+        "landed_s": None if flown == len(time_s) else rounded(time_s[flown]),
         "broken_joints": len(trajectory.breaks),
     }
     flags = (TWR_BELOW_ONE,) if success and ratio < 1.0 else ()
@@ -102,6 +114,23 @@ def judge(
         flags=flags,
         deciding=Deciding(samples=len(time_s), members=joined, cargo=False),
     )
+
+
+def _first_flight(machine: "Machine", trajectory: "Trajectory", joined: Mask, start: int) -> int:
+    """How many samples there are before a rocket that has taken off touches the ground."""
+    height = trajectory.positions[:, start, 2].astype(np.float64)
+    low = lowest_points(machine, trajectory, joined)
+    # Between two samples it may have touched and bounced: it would be below the ground by now.
+    steps = np.diff(low, prepend=low[0])
+    coming = np.concatenate([[False], (low[:-1] + np.minimum(steps[:-1], 0.0)) <= 0.0])
+    touches = (low <= _GROUNDED) | coming
+    if trajectory.bearing is not None:
+        touches |= touches_from_below(machine, trajectory, joined)
+    flies = ~touches & (height - height[0] >= _TAKEN_OFF)
+    if not flies.any():
+        return len(height)
+    landings = np.flatnonzero(touches[flies.argmax() :])
+    return int(flies.argmax() + landings[0]) if len(landings) else len(height)
 
 
 SCORER: Final = Scorer(

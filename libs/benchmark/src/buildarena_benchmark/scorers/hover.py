@@ -8,6 +8,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo, is_airborne
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.outline import lowest_points
 from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
@@ -39,6 +40,13 @@ NOT_AIRBORNE: Final = Flag(
 )
 
 
+NOT_RISEN: Final = Flag(
+    name="not_risen",
+    meaning="The starting block was at its height, but the machine did not rise to it: some of it "
+    "stayed near the ground, or the block began high up.",
+)
+
+
 class HoverScoring(Document):
     """How long a machine holds a height with its cargo.
 
@@ -48,6 +56,8 @@ class HoverScoring(Document):
         hold_s: For how long in a row, seconds.
         max_tilt_deg: Of the starting block against how it stood at the start, degrees.
         max_drift: Horizontal distance of the starting block from its start, units.
+        min_clearance: Least height of the machine's lowest point above the ground, units.
+        min_rise: Least height of the starting block above where it started, units.
     """
 
     name: Literal["hover"]
@@ -56,6 +66,8 @@ class HoverScoring(Document):
     hold_s: Annotated[float, Field(gt=0, le=600)] = 8.0
     max_tilt_deg: Annotated[float, Field(gt=0, le=180)] = 20.0
     max_drift: Threshold = 5.0
+    min_clearance: Threshold = 0.0
+    min_rise: Threshold = 0.0
 
 
 def infeasible(scoring: HoverScoring, scenario: Scenario) -> str | None:
@@ -64,6 +76,10 @@ def infeasible(scoring: HoverScoring, scenario: Scenario) -> str | None:
         return "the cargo is carried, but scenario has no cargo"
     if scoring.hold_s > scenario.duration_s:
         return f"hold_s {scoring.hold_s:g} is longer than the trial"
+    for name in ("min_clearance", "min_rise"):
+        least = getattr(scoring, name)
+        if least >= scoring.height + scoring.band:
+            return f"{name} {least:g} is above the band, which ends at height + band"
     return None
 
 
@@ -73,7 +89,8 @@ def judge(
     """The indicator is the longest time in a row within the band, seconds.
 
     At each moment the starting block must be within the band, nearly upright and near where it
-    started, the machine must bear its cargo, and nothing of it may touch the ground.
+    started, the machine must bear its cargo, nothing of it may touch the ground, and the whole of
+    it must have risen: its lowest point above the ground, the starting block above its start.
 
     Args:
         scoring: Thresholds.
@@ -83,7 +100,8 @@ def judge(
 
     Flags:
         `not_airborne`: it would have passed, but touches the ground. `not_carried`: it would have
-        passed, but without the cargo. `forces_not_measured`: cannot be judged.
+        passed, but without the cargo. `not_risen`: it would have passed, but for a part near the
+        ground, or because it started high up. `forces_not_measured`: cannot be judged.
     """
     lacking = unmeasured(trajectory, cargo=True)
     if lacking is not None:
@@ -98,18 +116,23 @@ def judge(
         & (tilt < scoring.max_tilt_deg)
         & (drift < scoring.max_drift)
     )
-    borne = bears_cargo(trajectory, share=_BORNE_SHARE, samples=_BORNE_SAMPLES)
-    airborne = is_airborne(machine, trajectory, joined)
-    longest = _longest_s(steady & borne & airborne)
-    passes = longest >= scoring.hold_s
-    flags = {
-        NOT_AIRBORNE: not passes and _longest_s(steady & borne) >= scoring.hold_s,
-        NOT_CARRIED: not passes and _longest_s(steady & airborne) >= scoring.hold_s,
+    clearance = lowest_points(machine, trajectory, joined)
+    rules: dict[Flag, Mask] = {
+        NOT_AIRBORNE: is_airborne(machine, trajectory, joined),
+        NOT_CARRIED: bears_cargo(trajectory, share=_BORNE_SHARE, samples=_BORNE_SAMPLES),
+        NOT_RISEN: (clearance >= scoring.min_clearance)
+        & (path[:, 2] - path[0, 2] >= scoring.min_rise),
     }
+    longest = _longest_s(steady & np.all(list(rules.values()), axis=0))
+    passes = longest >= scoring.hold_s
+    flags = {flag: not passes and _would_hold(scoring, steady, rules, flag) for flag in rules}
     metrics: dict[str, Metric] = {
         "max_height": rounded(path[:, 2].max()),
         "max_tilt": rounded(tilt.max(initial=0.0, where=steady)),
         "drift": rounded(drift.max(initial=0.0, where=steady)),
+        "min_clearance": rounded(clearance.min(initial=np.inf, where=steady))
+        if steady.any()
+        else None,
         "broken_joints": len(trajectory.breaks),
     }
     return Verdict(
@@ -119,6 +142,14 @@ def judge(
         flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=True),
     )
+
+
+def _would_hold(
+    scoring: HoverScoring, steady: Mask, rules: dict[Flag, Mask], without: Flag
+) -> bool:
+    """Whether it would have held its height for long enough if it were not for one of the rules."""
+    others = [mask for flag, mask in rules.items() if flag != without]
+    return _longest_s(steady & np.all(others, axis=0)) >= scoring.hold_s
 
 
 def _tilt_deg(trajectory: "Trajectory", start: int) -> Series:
@@ -140,5 +171,5 @@ SCORER: Final = Scorer(
     parameters=HoverScoring,
     judge=judge,
     infeasible=infeasible,
-    flags=(NOT_AIRBORNE, NOT_CARRIED, FORCES_NOT_MEASURED),
+    flags=(NOT_AIRBORNE, NOT_CARRIED, NOT_RISEN, FORCES_NOT_MEASURED),
 )

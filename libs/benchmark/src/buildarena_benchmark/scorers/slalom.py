@@ -1,13 +1,14 @@
 """Slalom: gates passed in order by a vehicle that keeps its wheels."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from buildarena_benchmark.fields import Count, Document
-from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.components import Mask, center_of, joined_to_start
 from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
-from buildarena_benchmark.scorers.measures.series import Series, starting_block
+from buildarena_benchmark.scorers.measures.series import Series
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     FORCES_NOT_MEASURED,
@@ -51,9 +52,9 @@ def judge(
 ) -> Verdict:
     """The indicator is the number of gates passed, and the share of the time that was left then.
 
-    A gate is passed when the starting block crosses its line in its direction, on its wheels, with
-    all of them, and no later gate was passed before. So more gates are always better, and of
-    trials with as many gates the faster one.
+    A gate is passed once the centre of the machine's mass and the middle of its wheels have both
+    crossed its line in its direction, driven by wheels, with all of them, and neither a later gate
+    before. So more gates are always better, and of trials with as many gates the faster one.
 
     Args:
         scoring: Gates and thresholds.
@@ -68,16 +69,14 @@ def judge(
     if lacking is not None:
         return lacking
     joined = joined_to_start(machine, trajectory)
-    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
-    crossings = sorted(
-        (sample, number)
-        for number, gate in enumerate(scenario.gates)
-        for sample in _crossings(path, gate)
-    )
-    drives = _drives(machine, trajectory, joined, path)
-    whole = _has_wheels(machine, trajectory, joined)
-    passed = _in_order([c for c in crossings if whole[c[0]] and drives[c[0]]])
-    anyhow = _in_order([c for c in crossings if whole[c[0]]])
+    wheels = _wheels(machine, trajectory)
+    whole = _has_wheels(joined, wheels)
+    paths = [center_of(machine, trajectory, joined)]
+    if len(wheels):
+        paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
+    driven = [whole & _drives(machine, trajectory, joined, path) for path in paths]
+    passed = _passed(scenario, paths, driven)
+    anyhow = _passed(scenario, paths, [whole] * len(paths))
     gates = len(passed)
     last_s = float(trajectory.time_s[passed[-1]]) if passed else scenario.duration_s
     indicator = gates + (1.0 - last_s / scenario.duration_s if gates else 0.0)
@@ -92,8 +91,29 @@ def judge(
         indicator=rounded(indicator),
         metrics=metrics,
         flags=(NOT_DRIVEN,) if len(anyhow) >= scoring.min_gates > gates else (),
-        deciding=Deciding(samples=len(path), members=joined, cargo=False),
+        deciding=Deciding(samples=len(whole), members=joined, cargo=False),
     )
+
+
+def _passed(scenario: Scenario, paths: Sequence[Series], counts: Sequence[Mask]) -> list[int]:
+    """Samples at which gates were passed by all of some paths, in order.
+
+    Args:
+        scenario: Gives the gates.
+        paths: (T, 3) each.
+        counts: (T,) each: at which samples crossings of the path count.
+    """
+    passed = []
+    for path, counting in zip(paths, counts, strict=True):
+        crossings = sorted(
+            (sample, number)
+            for number, gate in enumerate(scenario.gates)
+            for sample in _crossings(path, gate)
+            if counting[sample]
+        )
+        passed.append(_in_order(crossings))
+    common = set.intersection(*(set(samples) for samples in passed))
+    return sorted(max(samples[gate] for samples in passed) for gate in common)
 
 
 def _crossings(path: Series, gate: "Gate") -> list[int]:
@@ -109,13 +129,12 @@ def _crossings(path: Series, gate: "Gate") -> list[int]:
     return [int(step) + 1 for step in steps[np.abs(at) <= gate.half_width]]
 
 
-def _in_order(crossings: list[tuple[int, int]]) -> list[int]:
-    """Samples of the gates that count, of crossings (sample, gate) in order of time."""
-    samples, last = [], -1
+def _in_order(crossings: list[tuple[int, int]]) -> dict[int, int]:
+    """The sample of each gate that counts, of crossings (sample, gate) in order of time."""
+    samples: dict[int, int] = {}
     for sample, gate in crossings:
-        if gate > last:
-            samples.append(sample)
-            last = gate
+        if gate > max(samples, default=-1):
+            samples[gate] = sample
     return samples
 
 
@@ -128,13 +147,17 @@ def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Se
     return np.asarray(moved <= np.minimum(driven, moved_upright(trajectory, joined, path)))
 
 
-def _has_wheels(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
-    """Until when every wheel is joined to the starting block, (T,)."""
+def _wheels(machine: "Machine", trajectory: "Trajectory") -> list[int]:
+    """The tracked blocks that are wheels."""
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     wheels = set(trajectory.bearing.wheel_ids)
     wheels |= {block.id for block in machine.blocks.values() if block.module.motor}
-    columns = [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
-    whole = joined[:, columns].all(axis=1) if columns else np.zeros(len(joined), dtype=bool)
+    return [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
+
+
+def _has_wheels(joined: Mask, wheels: Sequence[int]) -> Mask:
+    """Until when every wheel is joined to the starting block, (T,); never without wheels."""
+    whole = joined[:, wheels].all(axis=1) if len(wheels) else np.zeros(len(joined), dtype=bool)
     return np.asarray(np.logical_and.accumulate(whole))
 
 

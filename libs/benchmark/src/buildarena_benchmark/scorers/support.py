@@ -10,6 +10,7 @@ from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.components import Mask, spans_of
 from buildarena_benchmark.scorers.measures.spanning import (
     Span,
+    collapsed_sample,
     deciding_sample,
     is_lost,
     measure_span,
@@ -79,10 +80,11 @@ def infeasible(scoring: SupportScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: SupportScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is the cargo's mass at the first moment it is not carried over the gap.
+    """The indicator is the cargo's mass when a bridge first does not carry it over the gap.
 
-    That is when its centre sinks below the fall height or leaves the gap to either terrain; it is
-    the final mass if that never happens. The trial succeeds if the cargo was carried for some time
+    That is when its centre sinks below the fall height or comes too far from the gap's middle, or
+    when no part in one piece reaches from terrain to terrain any more; it is the final mass if
+    that never happens. The trial succeeds if the cargo was carried for some time
     in all, did not start too high, and the load went to both terrains; the indicator is 0
     otherwise.
 
@@ -102,7 +104,9 @@ def judge(
     if trajectory.cargo_position is None or trajectory.cargo_mass is None:
         return Verdict(success=False, indicator=0.0)
     height = trajectory.cargo_position[:, 2].astype(np.float64)
-    decided = deciding_sample(scenario, trajectory, fall_height=scoring.fall_height)
+    fell = deciding_sample(scenario, trajectory, fall_height=scoring.fall_height)
+    collapsed = collapsed_sample(scenario, machine, trajectory)
+    decided = min((sample for sample in (fell, collapsed) if sample is not None), default=None)
     carried = len(height) if decided is None else decided
     step = float(np.median(np.diff(trajectory.time_s))) if len(height) > 1 else 0.0
     time_above = carried * step
@@ -123,8 +127,12 @@ def judge(
         "time_above_s": rounded(time_above),
         "lowest_cargo_height": rounded(height.min()),
         "start_height": rounded(height[0]),
-        "fall_time_s": None if decided is None else rounded(trajectory.time_s[decided]),
+        "fall_time_s": None if fell is None else rounded(trajectory.time_s[fell]),
+        "collapse_time_s": None if collapsed is None else rounded(trajectory.time_s[collapsed]),
         "load_when_decided": rounded(load),
+        "load_on_debris": None
+        if collapsed is None
+        else rounded(trajectory.cargo_mass[-1 if fell is None else fell]),
         "load_at_first_break": first.cargo_mass if first else None,
         "broken_joints": len(trajectory.breaks),
         **_span_metrics(span),
@@ -152,7 +160,8 @@ def decision(
         scenario: Gives the gap.
 
     Returns:
-        Whether the cargo at a position is lost, as `judge` reads it.
+        Whether the cargo at a position is lost, as `judge` reads it; a bridge may have collapsed
+        before.
     """
 
     def decided(cargo: NDArray[np.float32] | None) -> bool:

@@ -1,14 +1,16 @@
 """Transport: how far a vehicle, or a cargo on it, is moved over the ground."""
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
+from pydantic import Field
 
 from buildarena_benchmark.fields import Coordinate, Count, Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo
-from buildarena_benchmark.scorers.measures.components import joined_to_start
+from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scorers.measures.route import there_and_back
 from buildarena_benchmark.scorers.measures.series import Series, speeds, starting_block
 from buildarena_benchmark.scorers.scorer import (
     NOT_DRIVEN,
@@ -55,7 +57,9 @@ class TransportScoring(Document):
         min_distance: The indicator must exceed it, units.
         min_wheels: Fewest wheels of a machine that passes.
         max_start_height: The highest start position must lie below it, units.
-        target: (2,) where to go, units; for secondary metrics only.
+        target: (2,) where to go, units; for secondary metrics only, unless `back` is true.
+        back: Whether it is the way to the target and back that counts, in place of the distance.
+        reach: How near to the target, and then to its start, the subject must come, units.
     """
 
     name: Literal["transport"]
@@ -64,6 +68,8 @@ class TransportScoring(Document):
     min_wheels: Count = 0
     max_start_height: Threshold = 20.0
     target: tuple[Coordinate, Coordinate] = (10.0, 10.0)
+    back: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
+    reach: Threshold = 2.0
 
 
 def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
@@ -72,6 +78,8 @@ def infeasible(scoring: TransportScoring, scenario: Scenario) -> str | None:
         return "the cargo is judged, but scenario has no cargo"
     if scenario.control.mode != "agent":
         return "a vehicle is judged, but nobody drives: scenario.control.mode must be agent"
+    if scoring.back and np.hypot(*scoring.target) <= scoring.reach:
+        return f"the target is within reach {scoring.reach:g} of the start: there is no way to it"
     return None
 
 
@@ -84,7 +92,9 @@ def judge(
     `driven_distances`, and no farther than its other blocks went with it. A cargo counts while the
     machine bears it. The trial succeeds if the indicator exceeds the distance asked for, the
     machine has wheels enough and nothing starts too high. A machine that nothing drives (no key
-    bound, none pressed, nothing powered) fails with an indicator of 0.
+    bound, none pressed, nothing powered) fails with an indicator of 0. Where it is to come back,
+    the indicator is how much of the way there and back it was driven, see `there_and_back`; the
+    trial succeeds if it was there and back, and the distance is a metric.
 
     Args:
         scoring: Thresholds and target.
@@ -107,12 +117,10 @@ def judge(
         )
     joined = joined_to_start(machine, trajectory)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    driven = driven_distances(machine, trajectory, joined, path)
-    counted = moved
-    if driven is not None:
-        counted = np.minimum(moved, np.minimum(driven, moved_upright(trajectory, joined, path)))
-    if driven is not None and scoring.subject == "cargo":
-        counted = np.where(bears_cargo(trajectory), counted, 0.0)
+    measured = driven_distances(machine, trajectory, joined, path) is not None
+    borne = bears_cargo(trajectory) if measured and scoring.subject == "cargo" else None
+    reach = _explained(machine, trajectory, joined, path)
+    counted = np.where(True if borne is None else borne, np.minimum(moved, reach), 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
     start_height = (
         float(path[0, 2])
@@ -123,11 +131,32 @@ def judge(
     enough = len(wheels) >= scoring.min_wheels
     reached = indicator > scoring.min_distance and enough
     moved_enough = distance > scoring.min_distance and enough
+    route: dict[str, Metric] = {}
+    if scoring.back:
+
+        def counts(since: int) -> Mask:
+            explained = _explained(machine, trajectory, joined, path, since=since)
+            gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
+            return np.asarray((gone <= explained) & (True if borne is None else borne))
+
+        target = np.array(scoring.target)
+        done = there_and_back(path, target, scoring.reach, counts)
+        anyhow = there_and_back(
+            path, target, scoring.reach, lambda _: np.ones(len(path), dtype=bool)
+        )
+        route = {
+            "driven_distance": rounded(indicator),
+            "there_s": _time_of(trajectory, done.there),
+            "back_s": _time_of(trajectory, done.back),
+        }
+        indicator = done.way
+        reached = done.back is not None and enough
+        moved_enough = anyhow.back is not None and enough
     flags = {
         NO_WHEELS: moved_enough and not wheels,
         START_TOO_HIGH: too_high,
         NOT_DRIVEN: moved_enough and not reached,
-        DRIVE_NOT_MEASURED: driven is None,
+        DRIVE_NOT_MEASURED: not measured,
     }
     settled = trajectory.time_s >= _SETTLED_S
     metrics: dict[str, Metric] = {
@@ -135,6 +164,7 @@ def judge(
         "driven": True,
         "start_height": rounded(start_height),
         "displacement": rounded(distance),
+        **route,
         "intact": _is_intact(trajectory, wheels),
         "max_speed": rounded(speeds(trajectory.time_s, path[:, None]).max(initial=0.0)),
         "broken_joints": len(trajectory.breaks),
@@ -147,6 +177,20 @@ def judge(
         flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
     )
+
+
+def _explained(
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series, *, since: int = 0
+) -> Series:
+    """How far from where it was the subject counts as driven, (T,); infinite if not measured."""
+    driven = driven_distances(machine, trajectory, joined, path, since=since)
+    if driven is None:
+        return np.full(len(path), np.inf)
+    return np.minimum(driven, moved_upright(trajectory, joined, path, since=since))
+
+
+def _time_of(trajectory: "Trajectory", sample: int | None) -> float | None:
+    return None if sample is None else rounded(trajectory.time_s[sample])
 
 
 def _subject_path(

@@ -8,7 +8,9 @@ from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo, stands
+from buildarena_benchmark.scorers.measures.commands import motor_presses, presses_of
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.gears import gear_turn_deg
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     CAME_APART,
@@ -37,6 +39,13 @@ NOT_STANDING: Final = Flag(
 )
 
 
+NOT_GEARED: Final = Flag(
+    name="not_geared",
+    meaning="The cargo rose before a motor was told to turn, or not through a gear wheel that one "
+    "turned.",
+)
+
+
 class WinchScoring(Document):
     """How high a cargo is raised and held when no key is pressed any more.
 
@@ -44,12 +53,16 @@ class WinchScoring(Document):
         min_rise: The height held, above where the cargo stood, must be no less, units.
         hold_s: For how long it must be held, seconds.
         max_play: How far the height may vary meanwhile, up or down, units.
+        max_early_rise: The cargo stays lower until the first key of a motor is pressed, units.
+        min_gear_turn_deg: How far a large gear wheel must turn while the cargo rises, degrees.
     """
 
     name: Literal["winch"]
     min_rise: Threshold = 5.0
     hold_s: Annotated[float, Field(gt=0, le=600)] = 5.0
     max_play: Threshold = 0.3
+    max_early_rise: Threshold = 0.3
+    min_gear_turn_deg: Annotated[float, Field(gt=0, le=180)] = 20.0
 
 
 def infeasible(scoring: WinchScoring, scenario: Scenario) -> str | None:
@@ -72,7 +85,8 @@ def judge(
 
     The height is the least of the cargo's heights above where it stood, over the best stretch of
     time after all keys were released in which it varies little, the machine is whole, bears the
-    cargo, and stands on the ground with it.
+    cargo, and stands on the ground with it. It counts if the cargo stayed down until a motor was
+    told to turn, and rose through a gear wheel that motors turned; see `gear_turn_deg`.
 
     Args:
         scoring: Thresholds.
@@ -82,8 +96,8 @@ def judge(
 
     Flags:
         `not_carried`: high enough for long enough, but not by the machine. `not_standing`: the
-        ground did not bear machine and cargo. `came_apart`: parts came off. `forces_not_measured`:
-        cannot be judged.
+        ground did not bear machine and cargo. `came_apart`: parts came off. `not_geared`: it was
+        not raised by gears. `forces_not_measured`: cannot be judged.
     """
     lacking = unmeasured(trajectory, cargo=True)
     if lacking is not None:
@@ -94,7 +108,11 @@ def judge(
     height = trajectory.cargo_position[:, 2].astype(np.float64)
     height -= height[0]
     free = trajectory.time_s >= (scenario.control.until_s or 0.0)
+    first_s, turn = _gearing(machine, trajectory, height)
+    early = height[trajectory.time_s < first_s].max(initial=0.0)
+    geared = early < scoring.max_early_rise and (turn or 0.0) >= scoring.min_gear_turn_deg
     rules: dict[Flag, Mask] = {
+        NOT_GEARED: np.full(len(height), geared),
         NOT_CARRIED: bears_cargo(trajectory, share=0.8),
         NOT_STANDING: stands(machine, trajectory, joined),
         CAME_APART: np.asarray(joined.all(axis=1)),
@@ -109,6 +127,8 @@ def judge(
     metrics: dict[str, Metric] = {
         "held_height": rounded(held),
         "max_height": rounded(height.max(initial=0.0)),
+        "early_rise": rounded(early),
+        "gear_turn": None if turn is None else rounded(turn),
         "broken_joints": len(trajectory.breaks),
     }
     return Verdict(
@@ -118,6 +138,21 @@ def judge(
         flags=tuple(flags),
         deciding=Deciding(samples=len(height), members=joined, cargo=True),
     )
+
+
+def _gearing(
+    machine: "Machine", trajectory: "Trajectory", height: "Series"
+) -> tuple[float, float | None]:
+    """When the first key of a motor is pressed, seconds, and the turning from then on, degrees.
+
+    It is that of a gear wheel, until the cargo is highest; without one, never and None.
+    """
+    presses = motor_presses(machine, presses_of(machine, trajectory))
+    first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
+    first, last = int(np.searchsorted(trajectory.time_s, first_s)), int(height.argmax())
+    if first >= last:
+        return first_s, None
+    return first_s, gear_turn_deg(machine, trajectory, presses, first=first, last=last)
 
 
 def _held(scoring: WinchScoring, height: "Series", counts: "Mask") -> float:
@@ -144,5 +179,5 @@ SCORER: Final = Scorer(
     parameters=WinchScoring,
     judge=judge,
     infeasible=infeasible,
-    flags=(NOT_CARRIED, NOT_STANDING, CAME_APART, FORCES_NOT_MEASURED),
+    flags=(NOT_CARRIED, NOT_STANDING, CAME_APART, NOT_GEARED, FORCES_NOT_MEASURED),
 )

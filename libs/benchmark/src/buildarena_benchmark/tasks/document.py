@@ -77,6 +77,19 @@ ModuleNames = Annotated[tuple[ModuleName, ...], Field(min_length=1, max_length=5
 _FORMER_LISTS: Final = {"told": "inline", "looked_up": "on_demand"}
 
 
+class FrameConstraint(Document):
+    """What the sub-structure without cannons must be, so that it is more than a token.
+
+    Attributes:
+        min_blocks: Fewest blocks of each such sub-structure.
+        min_mass_share: Least share of the machine's mass that they have in all, with the
+            connectors that end on them.
+    """
+
+    min_blocks: Annotated[int, Field(ge=2, le=1000)]
+    min_mass_share: Annotated[float, Field(gt=0, lt=1)]
+
+
 class Constraints(Document):
     """What a machine for the task may be made of.
 
@@ -90,6 +103,8 @@ class Constraints(Document):
         module_list: Whether builders are told all modules they may use, or look them up by tools.
         min_modules: Fewest blocks or connectors of a module, by its name.
         min_wheels: Fewest powered wheels; shown to builders, judged by the scorer.
+        frame: What the frame of a rocket must be, held by nothing but connectors; None where the
+            task asks for none.
     """
 
     min_sub_structures: Annotated[int, Field(ge=1, le=20)] = 1
@@ -108,6 +123,7 @@ class Constraints(Document):
     ] = "inline"
     min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
     min_wheels: Count = 0
+    frame: Annotated[FrameConstraint | None, Field(exclude_if=lambda value: value is None)] = None
 
     @property
     def on_demand(self) -> bool:

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_simulation import Scenario
 
-SCORER_VERSION: Final = 3
+SCORER_VERSION: Final = 4
 """Rises with every change of a scorer, or of a constraint's check, that can change a score; part
 of every task's version."""
 

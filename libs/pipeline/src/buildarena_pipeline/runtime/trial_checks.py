@@ -25,7 +25,8 @@ from buildarena_pipeline.errors import PipelineError
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import MachineNotSimulable, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.machine import structure_of
+from buildarena_simulation.control import PRESSES, ended_presses, written_presses
+from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.parquet import SCHEMA_VERSION, read_trajectory, schema_of
 from buildarena_simulation.placement import start_of
 
@@ -56,7 +57,13 @@ class OutcomeRefusedError(PipelineError):
 
 
 def checked_trajectory(
-    data: bytes, *, simulator: str, version: str, machine: Machine, scenario: Scenario
+    data: bytes,
+    *,
+    simulator: str,
+    version: str,
+    machine: Machine,
+    scenario: Scenario,
+    controls: Sequence[KeyPress] | None = None,
 ) -> Trajectory:
     """The trajectory of a file that a runner sent.
 
@@ -66,6 +73,7 @@ def checked_trajectory(
         version: Its version that the job was submitted for.
         machine: The machine.
         scenario: What it was put through.
+        controls: Key presses of this run; None for the machine's own.
 
     Raises:
         OutcomeRefusedError: It is no trajectory, or none of this machine in this scenario.
@@ -88,6 +96,7 @@ def checked_trajectory(
     else:
         _same("simulation_version", trajectory.simulation_version, version)
         _require_engine(trajectory, machine, scenario)
+        _require_presses(trajectory, machine, scenario, controls)
     return trajectory
 
 
@@ -256,6 +265,8 @@ def _require_facts(trajectory: Trajectory) -> None:
     )
     for name, value in settings.items():
         texts.append(name)
+        if name == PRESSES:  # it is compared as a whole
+            continue
         (texts if isinstance(value, str) else figures).append(value)  # type: ignore[arg-type]
     _require(
         all(isinstance(text, str) and len(text) <= MAX_TEXT for text in texts),
@@ -265,6 +276,20 @@ def _require_facts(trajectory: Trajectory) -> None:
         all(isinstance(one, (int, float)) and math.isfinite(one) for one in figures),
         "a figure among its facts is not finite, or is none",
     )
+
+
+def _require_presses(
+    trajectory: Trajectory,
+    machine: Machine,
+    scenario: Scenario,
+    controls: Sequence[KeyPress] | None,
+) -> None:
+    """Checks that the keys were pressed that this run has, and no others."""
+    presses = ended_presses(
+        machine.control_sequence if controls is None else controls, scenario.control
+    )
+    wanted = written_presses(bindings_of(machine), presses)
+    _require(trajectory.settings.get(PRESSES) == wanted, "its key presses are another run's")
 
 
 def _tracked(structure: Structure, scenario: Scenario) -> tuple[str, ...]:

@@ -32,17 +32,24 @@ class Wings:
     def __len__(self) -> int:
         return len(self.coefficient)
 
-    def forces(self, velocity: FloatArray) -> FloatArray:
+    def forces(self, velocity: FloatArray, fixed: BoolArray) -> FloatArray:
         """The force of the air on each block, (K, 3), mass·unit/s².
+
+        A blade's law lets still air speed it up along its pitch, as what turns it makes up for in
+        the game. Nothing turns a blade that is fixed: what would speed it up is left out of its
+        force, so that the air takes energy and gives none.
 
         Args:
             velocity: (K, 3) of the blocks' centres, in the frame of the normals, units/s.
+            fixed: (K,) which of them are fixed to the root of their component.
         """
         along = (velocity * self.flow).sum(axis=1)
         speed = np.sqrt((velocity * velocity).sum(axis=1))
         size = -self.coefficient * along * np.minimum(speed, self.cap_speed) ** self.power
         size = np.where(self.one_sided & (along < 0.0), 0.0, size)
-        return np.asarray(size[:, None] * self.normal)
+        forces = size[:, None] * self.normal
+        power = np.where(fixed, np.maximum((forces * velocity).sum(axis=1), 0.0), 0.0)
+        return np.asarray(forces - (power / np.maximum(speed, 1e-9) ** 2)[:, None] * velocity)
 
 
 def wings_of(wings: Sequence[Wing], rotations: FloatArray) -> Wings:

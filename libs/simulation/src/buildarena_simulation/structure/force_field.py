@@ -113,7 +113,7 @@ class ForceField:
         size = np.concatenate([table.push * commands.pushing, np.zeros(len(lifts))])
         kicks = np.tile(commands.kicks, 2)
         forces = np.concatenate([np.zeros(w), size, kicks])[:, None] * table.direction
-        forces[:w] = table.wings.forces(velocity[:w])
+        forces[:w] = table.wings.forces(velocity[:w], clusters.parent[c[:w]] < 0)
         forces[w + p : w + p + len(lifts)] = lifts[:, None] * up[: len(lifts)]
         return forces
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any, Final
 
 from buildarena_api.checking import Checker, CheckFailedError
-from buildarena_geometry import Machine
+from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.runtime.trial_checks import OutcomeRefusedError, checked_trajectory
 from buildarena_simulation import Scenario, Trajectory
 
@@ -25,7 +25,14 @@ class TrajectoryChecker:
         )
 
     def checked(
-        self, data: bytes, *, simulator: str, version: str, machine: Machine, scenario: Scenario
+        self,
+        data: bytes,
+        *,
+        simulator: str,
+        version: str,
+        machine: Machine,
+        scenario: Scenario,
+        controls: Sequence[KeyPress] | None = None,
     ) -> Trajectory:
         """The trajectory of a file; see `checked_trajectory`.
 
@@ -38,6 +45,7 @@ class TrajectoryChecker:
             "version": version,
             "machine": machine.to_document(),
             "scenario": scenario.model_dump_json(),
+            "controls": controls,
         }
         try:
             refusal, trajectory = self._checker.ask(question)
@@ -71,6 +79,7 @@ def _answer(question: Any) -> tuple[str, Trajectory | None]:
             version=question["version"],
             machine=Machine.from_document(question["machine"]),
             scenario=Scenario.model_validate_json(question["scenario"]),
+            controls=question["controls"],
         )
     except OutcomeRefusedError as error:
         return str(error), None

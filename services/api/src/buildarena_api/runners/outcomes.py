@@ -132,6 +132,7 @@ class Outcomes:
                 version=version,
                 machine=due.machine,
                 scenario=due.task.scenario,
+                controls=due.controls,
             )
         annotations = said.annotations
         return TrialResult(

@@ -61,6 +61,17 @@ def is_airborne(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> M
     return np.asarray(borne <= _summed(allowed, _HALF_A_SECOND))
 
 
+def touches_from_below(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
+    """At which samples ground or terrain bears what is joined to the starting block, (T,).
+
+    Any force counts that is more than a small share of its weight, and more than the weight of
+    what came off, which may lie there.
+    """
+    whole = masses_of(machine, trajectory, np.ones_like(joined))
+    own = masses_of(machine, trajectory, joined)
+    return np.asarray(from_below(trajectory) > whole - own + _TOUCH * own)
+
+
 def from_below(trajectory: "Trajectory") -> Series:
     """Vertical force of ground and terrain on the machine, (T,), mass·g."""
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked

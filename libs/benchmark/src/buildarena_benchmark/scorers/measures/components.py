@@ -27,18 +27,35 @@ def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
         machine: Gives starting block and ropes.
         trajectory: Gives pieces and breaks.
     """
-    pieces = trajectory.pieces
-    if pieces is None:
+    groups = groups_of(machine, trajectory)
+    if groups is None:
         return np.ones(trajectory.positions.shape[:2], dtype=bool)
     start = starting_block(machine, trajectory)
+    return np.asarray(groups == groups[:, start, None])
+
+
+def groups_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.int16] | None:
+    """Which tracked blocks joints, axles, braces and ropes still join, (T, N); None if not known.
+
+    Blocks of one number are joined.
+
+    Args:
+        machine: Gives ropes.
+        trajectory: Gives pieces and breaks.
+    """
+    pieces = trajectory.pieces
+    if pieces is None:
+        return None
     ropes = _ropes(machine, trajectory)
     rope_ends = np.searchsorted(trajectory.time_s, [end for _, _, end in ropes])
-    joined = np.zeros(pieces.shape, dtype=bool)
+    groups = pieces.copy()
     for first, last in spans_of(pieces, rope_ends.tolist()):
         row, time_s = pieces[first], trajectory.time_s[first]
         ties = [(row[a], row[b]) for a, b, end in ropes if time_s < end]
-        joined[first:last] = np.isin(row, _reached(row[start], ties))
-    return joined
+        for piece in np.unique(row):
+            reached = _reached(piece, ties)
+            groups[first:last, np.isin(row, reached)] = min(reached)
+    return groups
 
 
 def spans_of(pieces: NDArray[np.int16], further: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
@@ -69,6 +86,32 @@ def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> floa
         if end not in lost
     ]
     return math.fsum([*blocks, *halves])
+
+
+def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
+    """Where the mass of some of the tracked blocks has its centre, (T, 3), world frame, units.
+
+    A block's mass lies at its centre, and half of each connector's there as well.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        members: (T, N) which of the tracked blocks.
+    """
+    weights = masses_of_blocks(machine, trajectory) * members
+    center = np.einsum("tn,tnk->tk", weights, trajectory.positions.astype(np.float64))
+    return np.asarray(center / np.maximum(weights.sum(axis=1), 1e-9)[:, None])
+
+
+def masses_of_blocks(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.float64]:
+    """Mass of each tracked block, (N,), with half of each connector that ends on it, mass units."""
+    index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
+    for link in machine.connectors.values():
+        for end in (link.start[0], link.end[0]):
+            if end in index:
+                masses[index[end]] += link.module.mass / 2
+    return masses
 
 
 def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:

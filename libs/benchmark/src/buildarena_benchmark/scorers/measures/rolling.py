@@ -1,16 +1,18 @@
 """How far wheels have carried a machine: what their turning on the ground explains."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_benchmark.scorers.measures.commands import held, presses_of
 from buildarena_benchmark.scorers.measures.components import Mask
 from buildarena_geometry.modules.solids import Cylinder
 from buildarena_simulation.constants import GRAVITY
 
 if TYPE_CHECKING:
-    from buildarena_geometry import Block, Machine
+    from buildarena_geometry import Block, KeyPress, Machine
     from buildarena_simulation import Trajectory
 
 SLACK: Final = 0.5
@@ -23,6 +25,9 @@ _COASTING: Final = 0.5 * GRAVITY
 """How fast the speed that a wheel gave fades once it turns slower, units/s²: somewhat less than
 the tyres' friction brakes, so that a skid at the end of a drive counts."""
 
+MOTOR_MARGIN: Final = 1.05
+"""A wheel carries a machine no faster than this times its motor's speed at its rim."""
+
 _TOUCH_SAMPLES: Final = 6
 """A wheel that leaves the ground for so few samples, a quarter of a second, bounces."""
 
@@ -30,13 +35,14 @@ Floats = NDArray[np.float64]
 
 
 def driven_distances(
-    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
 ) -> Floats | None:
-    """How far wheels explain that a path leads away from its start, with what is allowed, (T,).
+    """How far wheels explain that a path leads away from where it was, with what is allowed, (T,).
 
     A powered wheel that bears on ground or terrain, joined to the starting block, drives the
-    machine as far as it rolls: by the horizontal motion of its centre along its rolling direction,
-    at most by its turning times its radius, and aside by no more than ahead. Turning slower takes
+    machine as far as it rolls while its motor is told to turn that way: by the horizontal motion of
+    its centre along its rolling direction, at most by its turning times its radius and by what its
+    motor can do, and aside by no more than ahead. Turning slower, or no longer being told to, takes
     the speed that it gave away gradually, so a skid after a drive counts. Between two samples the
     machine is driven as much as its best wheel: that share of the motion of each wheel that bears
     counts. The distance is the largest of the wheels' displacements made up so, in the direction
@@ -47,6 +53,7 @@ def driven_distances(
         trajectory: Gives their motion, and what bears them.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of what is transported.
+        since: The sample from which on wheels drive, and whose place is meant.
 
     Returns:
         None where the trajectory has no forces on the wheels, or not how they move.
@@ -63,23 +70,27 @@ def driven_distances(
     if not columns:
         return np.full(len(path), SLACK)
     moves, shares = [], []
+    presses = presses_of(machine, trajectory)
     for column in columns:
-        wheel = bearing.wheel_ids[column]
-        row = index[wheel]
+        wheel = machine.blocks[bearing.wheel_ids[column]]
+        row = index[wheel.id]
         touches = (_lasting(bearing.wheels[:, column] > 0.0) & joined[:, row])[1:]
-        moved, share = _rolling(trajectory, row, touches, radius_of(machine.blocks[wheel]))
+        limits = _commanded(wheel, presses, trajectory)
+        moved, share = _rolling(trajectory, row, touches, limits, radius_of(wheel))
         moves.append(np.where(touches[:, None], moved, 0.0))
         shares.append(np.where(touches, share, 0.0))
     driven = np.max(shares, axis=0)[None, :, None] * np.array(moves)
-    away = path[:, :2] - path[0, :2]
+    away = path[:, :2] - path[since, :2]
     direction = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
     carried = np.zeros((len(columns), *away.shape))
-    carried[:, 1:] = np.cumsum(driven, axis=1)
+    carried[:, since + 1 :] = np.cumsum(driven[:, since:], axis=1)
     explained = (carried * direction).sum(axis=2).max(axis=0).clip(0.0)
     return np.asarray(explained * (1.0 + ERROR) + SLACK)
 
 
-def moved_upright(trajectory: "Trajectory", joined: Mask, path: Floats) -> Floats:
+def moved_upright(
+    trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
+) -> Floats:
     """How far a subject can have got with every joined block had the machine only turned, (T,).
 
     A machine that moves and turns on the ground takes no block farther than another by more than
@@ -89,10 +100,11 @@ def moved_upright(trajectory: "Trajectory", joined: Mask, path: Floats) -> Float
         trajectory: The trial.
         joined: (T, N) as `joined_to_start` says.
         path: (T, 2) or (T, 3) of the subject.
+        since: The sample from whose place on it got so far.
     """
     positions = trajectory.positions[:, :, :2].astype(np.float64)
-    apart = np.linalg.norm(positions[0] - path[0, :2], axis=1)
-    moved = np.linalg.norm(positions - positions[0], axis=2)
+    apart = np.linalg.norm(positions[since] - path[since, :2], axis=1)
+    moved = np.linalg.norm(positions - positions[since], axis=2)
     reach = np.where(joined, moved + 2.0 * apart, np.inf)
     return np.asarray(reach.min(axis=1, initial=np.inf) + SLACK)
 
@@ -104,8 +116,23 @@ def radius_of(wheel: "Block") -> float:
     return float(max(radii or boxes, default=0.0))
 
 
+def _commanded(wheel: "Block", presses: "Sequence[KeyPress]", trajectory: "Trajectory") -> Floats:
+    """The least and greatest speed its motor may be told to have between samples, (2, T - 1).
+
+    Rad/s about the wheel's outward axis, with a margin; 0 both where no key is held, or keys for
+    both ways are: it brakes.
+    """
+    motor = wheel.module.motor
+    assert motor is not None  # noqa: S101 - the caller looked
+    speed = MOTOR_MARGIN * motor.speed
+    ahead, back = (held(wheel, way, presses, trajectory) for way in (motor.forward, motor.backward))
+    forward, backward = (speed * (way[1:] | way[:-1]) for way in (ahead & ~back, back & ~ahead))
+    # Clockwise seen from outside is against the outward axis.
+    return np.array([-forward, backward] if wheel.forward_is_clockwise else [-backward, forward])
+
+
 def _rolling(
-    trajectory: "Trajectory", row: int, touches: Mask, radius: float
+    trajectory: "Trajectory", row: int, touches: Mask, limits: Floats, radius: float
 ) -> tuple[Floats, Floats]:
     """A wheel's horizontal steps, (T - 1, 2) units, and which share of each it rolled, (T - 1,)."""
     steps_s = np.diff(trajectory.time_s)
@@ -114,7 +141,7 @@ def _rolling(
     ahead = np.column_stack([axle[:, 1], -axle[:, 0]])
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-9)[:, None]
     along = (moved * ahead).sum(axis=1)
-    rolled = np.where(touches, turn * radius, 0.0)
+    rolled = np.where(touches, np.clip(turn, *(limits * steps_s)) * radius, 0.0)
     credit = np.zeros(len(along))
     speed = 0.0
     for k, step_s in enumerate(steps_s):

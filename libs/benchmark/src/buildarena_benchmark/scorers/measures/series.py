@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_simulation.scenario import ReleasedPlacement
+
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+    from buildarena_simulation import Scenario, Trajectory
 
 Series = NDArray[np.float64]
 
@@ -18,6 +20,14 @@ def starting_block(machine: "Machine", trajectory: "Trajectory") -> int:
         if block.module.kind == "start" and block.id in trajectory.block_ids:
             return trajectory.block_ids.index(block.id)
     return 0
+
+
+def release_speed(scenario: "Scenario") -> float:
+    """Speed that a scenario gives the machine at the start, units/s."""
+    placement = scenario.placement
+    if not isinstance(placement, ReleasedPlacement):
+        return 0.0
+    return float(np.linalg.norm(placement.velocity))
 
 
 def speeds(time_s: Series, positions: Series) -> Series:

@@ -6,10 +6,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_benchmark.scorers.measures.components import groups_of, spans_of
+from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import SpanPlacement
 
 if TYPE_CHECKING:
+    from buildarena_geometry import Machine
     from buildarena_simulation import Scenario, Trajectory
 
 MAX_ON_FLOOR: Final = 0.1
@@ -31,6 +34,15 @@ MIN_CARRIED: Final = 0.9
 COLLAPSE_S: Final = 1.5
 """A bridge that gives way may be in pieces for so long before the cargo is lost, seconds: what
 carries the load from then on does not count. At most half of the time it carried it."""
+
+MAX_ASIDE: Final = 1.0
+"""How far from the gap's middle a cargo may always be, units, towards either terrain."""
+
+MAX_ASIDE_SHARE: Final = 1.0 / 8.0
+"""The same as a share of the gap, where that is more: a bridge bears more near its ends."""
+
+_REACHES: Final = 0.25
+"""What ends so near to a terrain's edge, units, may rest on it, or press against its side."""
 
 _EDGE = 1e-6
 
@@ -72,8 +84,8 @@ def deciding_sample(
 ) -> int | None:
     """The first sample at which the cargo is not carried any more; None if it always is.
 
-    From then on its centre is below the fall height, or beside the gap: what lies on a terrain is
-    not carried over the gap.
+    From then on its centre is below the fall height, or too far from the gap's middle: what is
+    carried near a terrain, or lies on it, is not carried over the gap.
 
     Args:
         scenario: Gives the gap, if it has one.
@@ -92,8 +104,43 @@ def is_lost(
     at = position.astype(np.float64)
     lost = ~(at[:, 2] >= fall_height)
     if isinstance(scenario.placement, SpanPlacement):
-        lost |= np.abs(at[:, 1]) > scenario.placement.gap / 2 + _EDGE
+        lost |= np.abs(at[:, 1]) > max_aside(scenario.placement.gap) + _EDGE
     return np.asarray(lost)
+
+
+def max_aside(gap: float) -> float:
+    """How far towards a terrain the cargo's centre may be from the gap's middle, units."""
+    return min(max(MAX_ASIDE, MAX_ASIDE_SHARE * gap), gap / 2)
+
+
+def collapsed_sample(
+    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory"
+) -> int | None:
+    """The first sample at which no part in one piece reaches from terrain to terrain any more.
+
+    None where one always does, none ever did, or that is not known.
+
+    Args:
+        scenario: Gives the gap.
+        machine: Gives bodies and ropes.
+        trajectory: Gives pieces.
+    """
+    groups = groups_of(machine, trajectory)
+    if groups is None or not groups.shape[1] or not isinstance(scenario.placement, SpanPlacement):
+        return None
+    edge = scenario.placement.gap / 2 - _REACHES
+    low, high = extents(machine, trajectory, axis=1)
+    south, north = low <= -edge, high >= edge
+    spans = np.zeros(len(groups), dtype=bool)
+    for first, last in spans_of(groups):
+        for group in np.unique(groups[first]):
+            members = groups[first] == group
+            rows = slice(first, last)
+            spans[rows] |= south[rows][:, members].any(axis=1) & north[rows][:, members].any(axis=1)
+    if not spans.any():
+        return None
+    lost = np.flatnonzero(~spans[spans.argmax() :])
+    return int(spans.argmax() + lost[0]) if len(lost) else None
 
 
 def measure_span(

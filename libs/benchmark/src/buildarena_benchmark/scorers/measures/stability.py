@@ -4,10 +4,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from buildarena_benchmark.scorers.measures.series import Series
+from buildarena_benchmark.scorers.measures.energy import gains_energy
+from buildarena_benchmark.scorers.measures.series import Series, release_speed
 from buildarena_benchmark.scorers.scorer import Deciding
 from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.scenario import ReleasedPlacement
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -33,7 +33,8 @@ def is_unstable(
     Either something of it is not finite, or its energy exceeds, over several samples in a row,
     what it could have become: what lies highest at the start falling all the way, all its cannons
     pushing all the time, all at the speed of a wheel's rim at the machine's full size; with a
-    margin. Blocks are taken together by mass, the cargo for itself.
+    margin. Blocks are taken together by mass, the cargo for itself. Where nothing drives the
+    machine, it may have no more energy than it began with; see `gains_energy`.
 
     Args:
         scenario: Gives the terrains' heights.
@@ -65,7 +66,9 @@ def is_unstable(
     if cargo is not None:
         path = cargo[:samples].astype(np.float64)[:, None]
         energies.append(_energies(path, steps, np.ones((samples - 1, 1))))
-    return any(_lasts(energy > bound) for energy in energies)
+    return any(_lasts(energy > bound) for energy in energies) or gains_energy(
+        scenario, machine, trajectory, samples
+    )
 
 
 def _energies(positions: Series, steps: Series, weights: Series) -> Series:
@@ -91,7 +94,7 @@ def _bound(
     height = max([0.0, float(start[:, 2].max()), *tops])
     if trajectory.cargo_position is not None:
         height = max(height, float(trajectory.cargo_position[0, 2]))
-    fall = np.sqrt(2.0 * GRAVITY * height) + _release_speed(scenario)
+    fall = np.sqrt(2.0 * GRAVITY * height) + release_speed(scenario)
     modules = [machine.blocks[block].module for block in trajectory.block_ids]
     thrusts = np.array(
         [
@@ -105,14 +108,6 @@ def _bound(
     extent = start.max(axis=0) - start.min(axis=0)
     rim = spin * (float(np.linalg.norm(extent)) + 2.0)
     return np.asarray(0.5 * (_MARGIN * (fall + gained[1:] + rim) + _SLACK) ** 2)
-
-
-def _release_speed(scenario: "Scenario") -> float:
-    """Speed that the scenario gives the machine, units/s."""
-    placement = scenario.placement
-    if not isinstance(placement, ReleasedPlacement):
-        return 0.0
-    return float(np.linalg.norm(placement.velocity))
 
 
 def _top(box: "TerrainBox") -> float:

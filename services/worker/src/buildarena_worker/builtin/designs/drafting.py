@@ -14,12 +14,15 @@ import numpy as np
 from buildarena_geometry import Machine, catalogue_of
 
 Action = tuple[str, Mapping[str, Any]]
-Direction = tuple[int, int, int]
-"""A unit vector along an axis, world frame."""
+Direction = tuple[float, float, float]
+"""A unit vector, world frame."""
 
+_DIAGONAL = 0.5**0.5
 EAST, WEST = (1, 0, 0), (-1, 0, 0)
 NORTH, SOUTH = (0, 1, 0), (0, -1, 0)
 UP, DOWN = (0, 0, 1), (0, 0, -1)
+NORTH_EAST, SOUTH_WEST = (_DIAGONAL, _DIAGONAL, 0), (-_DIAGONAL, -_DIAGONAL, 0)
+SOUTH_EAST, NORTH_WEST = (_DIAGONAL, -_DIAGONAL, 0), (-_DIAGONAL, _DIAGONAL, 0)
 SIDES: tuple[Direction, ...] = (EAST, WEST, NORTH, SOUTH)
 WOOD, WHEEL, CANNON, TORCH = "Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch"
 BRACE = "Brace"
@@ -104,9 +107,9 @@ class Draft:
         return self._aimed(self.attach(base, side, TORCH), flame)
 
     def wheel(self, base: str, side: Direction, module: str = WHEEL) -> str:
-        """Attaches a wheel to an east or west side; forward spin rolls it north."""
+        """Attaches a wheel to an eastern or western side; forward spin rolls it northwards."""
         made = self.attach(base, side, module)
-        if side == WEST:
+        if side[0] < 0:
             self.do("flip_spin", block_id=made)
         return made
 

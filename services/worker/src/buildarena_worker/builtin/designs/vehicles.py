@@ -6,7 +6,20 @@ from collections.abc import Sequence
 from typing import Any
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_worker.builtin.designs.drafting import (
+    DOWN,
+    EAST,
+    NORTH,
+    NORTH_EAST,
+    NORTH_WEST,
+    SOUTH,
+    SOUTH_EAST,
+    SOUTH_WEST,
+    UP,
+    WEST,
+    Direction,
+    Draft,
+)
 
 Press = tuple[str, float, float]
 """Key, time and duration, seconds."""
@@ -26,14 +39,22 @@ def carrier(seed: int) -> Design:
 
 
 def long_carrier(seed: int) -> Design:
-    """A carrier with a railed deck of 5 x 9 for the long cargo, there and back."""
+    """A carrier with a railed deck of 5 x 9 for the long cargo, there and back.
+
+    Its chassis is turned under the deck, so that it faces the target and need not steer.
+    """
     begin = 3.0 + 0.1 * (seed % 5)
-    presses: list[Press] = [("UpArrow", begin, 3.0), ("DownArrow", begin + 4.0, 3.0)]
-    return _vehicle(length=9, track=2, deck=(2, 4), presses=presses)
+    presses: list[Press] = [("UpArrow", begin, 1.37), ("DownArrow", begin + 3.5, 1.37)]
+    return _vehicle(length=7, track=2, deck=(2, 4), presses=presses, diagonal=True)
 
 
 def _vehicle(
-    *, length: int, track: int, deck: tuple[int, int] | None, presses: Sequence[Press]
+    *,
+    length: int,
+    track: int,
+    deck: tuple[int, int] | None,
+    presses: Sequence[Press],
+    diagonal: bool = False,
 ) -> Design:
     """A vehicle that skid-steers: its wheels on one side share their keys.
 
@@ -42,15 +63,23 @@ def _vehicle(
         track: Blocks between the spine and a wheel.
         deck: Half-width and half-length of the deck in blocks, or None.
         presses: The control sequence.
+        diagonal: Whether the chassis hangs below the starting block and faces north-east.
     """
     draft = Draft()
-    middle = draft.start("middle of the spine")
-    front = draft.row(middle, NORTH, length // 2)[-1]
-    back = draft.row(middle, SOUTH, length // 2)[-1]
+    middle = draft.start("under the deck" if diagonal else "middle of the spine")
+    spine = middle
+    ways: tuple[Direction, ...] = (NORTH, SOUTH, EAST, WEST)
+    if diagonal:
+        spine = draft.attach(middle, DOWN)
+        draft.do("twist_block", block_id=spine, angle=45)
+        ways = (NORTH_EAST, SOUTH_WEST, SOUTH_EAST, NORTH_WEST)
+    ahead, behind, east, west = ways
+    front = draft.row(spine, ahead, length // 2)[-1]
+    back = draft.row(spine, behind, length // 2)[-1]
     right: list[str] = []
     left: list[str] = []
     for base in (front, back):
-        for side, wheels in ((EAST, right), (WEST, left)):
+        for side, wheels in ((east, right), (west, left)):
             end = [base, *draft.row(base, side, track)][-1]
             wheels.append(draft.wheel(end, side))
     if deck is not None:
@@ -59,11 +88,15 @@ def _vehicle(
         "no deck" if deck is None else f"a railed deck of {2 * deck[0] + 1} x {2 * deck[1] + 1}"
     )
     description = f"A spine of {length} blocks, two cross members with two wheels each, {carries}"
+    if diagonal:
+        description += "; the spine is turned by 45° under the starting block"
     return Design(
         overall="A vehicle on four powered wheels that steers by driving its sides apart.",
         parts={"vehicle": PartDesign(description=description, actions=tuple(draft.actions))},
         control={
-            "control_design": "Both sides drive together; opposite drive turns on the spot.",
+            "control_design": "It faces the target as built: forwards there, backwards back."
+            if diagonal
+            else "Both sides drive together; opposite drive turns on the spot.",
             "control_config": [*_bindings(right, turn=1), *_bindings(left, turn=-1)],
             "control_sequence": [
                 {"time": time, "key": key, "hold_for": hold_for} for key, time, hold_for in presses
