@@ -209,6 +209,25 @@ def test_a_busy_database_pool_is_503(context, monkeypatch) -> None:
         assert client.get("/v1/sweeps").status_code == 200
 
 
+@pytest.mark.parametrize("body", [None, {"tasks": ["support-1"], "models": ["builtin/idle"]}])
+def test_a_restart_of_the_database_is_503_before_and_after_a_body(as_key, context, body) -> None:
+    """A key is checked before a body is read: whoever checks it meets the lost connection first."""
+    method, path = ("GET", "/v1/sweeps") if body is None else ("POST", "/v1/sweeps")
+    assert as_key().request(method, path, json=body).is_success
+    stranger = as_key()
+    execute(
+        context,
+        "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
+        "WHERE datname = current_database() AND pid <> pg_backend_pid()",
+    )
+    answers = [stranger.request(method, path, json=body) for _ in range(5)]
+    lost = [answer for answer in answers if not answer.is_success]
+    assert lost
+    assert {answer.status_code for answer in lost} == {503}
+    assert all(int(answer.headers["retry-after"]) >= 1 for answer in lost)
+    assert answers[-1].is_success
+
+
 @pytest.fixture
 def session(as_key) -> tuple[httpx.Client, str]:
     client = as_key()

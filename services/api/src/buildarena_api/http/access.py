@@ -16,12 +16,14 @@ from typing import Annotated
 from fastapi import Depends, FastAPI, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi.security.utils import get_authorization_scheme_param
+from sqlalchemy.exc import OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.datastructures import Headers
 from starlette.types import Scope
 
 from buildarena_api.http.admission import PLACE, Admit, Place, address_of
 from buildarena_api.http.key_checks import KeyChecks
-from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.problems import ProblemError, database_problem
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.weights import weight_of
 from buildarena_pipeline.runtime.settings import Settings
@@ -175,6 +177,9 @@ def admission(app: FastAPI) -> Admit:
         except ProblemError:
             await _count(app.state.rate_limits, f"refused:{address_of(scope)}")
             raise
+        except (OperationalError, PoolTimeoutError) as error:
+            # Before the routes, whose handlers answer the same.
+            raise database_problem(error) from error
         _move(scope, caller)
 
     return admit

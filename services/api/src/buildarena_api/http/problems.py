@@ -80,6 +80,15 @@ class ProblemError(Exception):
         self.headers = headers
 
 
+def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError:
+    """What is answered while the database gives no connection; it is in the log."""
+    busy = isinstance(error, PoolTimeoutError)
+    event = "database_connections_in_use" if busy else "database_unreachable"
+    log.warning(event, error=str(error).splitlines()[0])
+    what = "all connections to the database are in use" if busy else "the database can't be reached"
+    return ProblemError(503, f"{what}; nothing was stored", headers={"Retry-After": "2"})
+
+
 def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
     """OpenAPI entries of the problems that an operation answers with."""
     return {
@@ -184,12 +193,6 @@ def _add_store_handlers(app: FastAPI) -> None:
         log.info("unstorable", error=str(error.orig))
         return _answer(422, "a text or number of the request is none that can be stored or found")
 
-    @app.exception_handler(PoolTimeoutError)
-    async def on_busy(_: Request, error: PoolTimeoutError) -> JSONResponse:
-        log.warning("database_connections_in_use", error=str(error).splitlines()[0])
-        detail = "all connections to the database are in use; nothing was stored"
-        return _answer(503, detail, headers={"Retry-After": "2"})
-
     @app.exception_handler(ClientDisconnect)
     async def on_cut_off(request: Request, _: ClientDisconnect) -> JSONResponse:
         # Nobody reads it: the body broke off because the client left.
@@ -197,11 +200,10 @@ def _add_store_handlers(app: FastAPI) -> None:
         return _answer(400, "the body was cut off")
 
     @app.exception_handler(OperationalError)
-    async def on_database(_: Request, error: OperationalError) -> JSONResponse:
-        log.warning("database_unreachable", error=str(error).splitlines()[0])
-        return _answer(
-            503, "the database can't be reached; nothing was stored", headers={"Retry-After": "2"}
-        )
+    @app.exception_handler(PoolTimeoutError)
+    async def on_database(_: Request, error: OperationalError | PoolTimeoutError) -> JSONResponse:
+        problem = database_problem(error)
+        return _answer(problem.status, problem.detail, headers=problem.headers)
 
 
 def _add_artifact_handlers(app: FastAPI) -> None:
