@@ -1,39 +1,21 @@
 """What runners try, and strangers without a key: lies, noise, harm, stalled bodies."""
 
 import json
-import secrets
-import socket
 import statistics
-import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from typing import Any
-from urllib.parse import urlsplit
 
 import httpx
-from cachetools import cached
+from scenarios.attack import by_hand
 from scenarios.attack.arena import MEBI, Arena, Tried
+from scenarios.attack.by_hand import ENGINE, RUNNER, about, beat, leased
 from support.servers.lies import LIES, Lie
 from support.servers.runner_rig import Caller
 from support.servers.stacks import wait_until
 
-from buildarena_benchmark import builtin_tasks
-from buildarena_geometry import KeyPress, Machine
-from buildarena_simulation import (
-    SIMULATION_VERSION,
-    Trajectory,
-    engine_version,
-    processor,
-    simulate,
-    write_trajectory,
-)
-
-ENGINE = "pybullet"
-"""The stack has no worker of this simulator: its trials are the runners'."""
 TASK = "support-1"
-RUNNER = {"name": "runner", "scopes": ["runner"], "simulators": [ENGINE]}
 HEALTH = "/v1/health"
 HEALTH_S = 0.5
 GROWTH_MIB = 150
@@ -82,15 +64,15 @@ def noisy_runner(arena: Arena) -> Tried:
     before = _health(arena)
     answers: Counter[int] = Counter()
     large_taken = 0
-    large = json.dumps({**_beat("noisy"), "versions": {"engine": "x" * 2_000_000}}).encode()
-    wordy = {**_beat("noisy"), "versions": {"engine": "x" * 60_000}}
+    large = json.dumps({**beat("noisy"), "versions": {"engine": "x" * 2_000_000}}).encode()
+    wordy = {**beat("noisy"), "versions": {"engine": "x" * 60_000}}
     for number in range(count):
-        answer = _ask(runner, content=large)
+        answer = by_hand.asked(runner, content=large)
         answers[answer] += 1
         large_taken += answer == 200
-        answers[_ask(runner, json=wordy)] += 1
+        answers[by_hand.asked(runner, json=wordy)] += 1
         for part in range(4):
-            answers[_ask(runner, json=_beat(f"name-{number}-{part}"))] += 1
+            answers[by_hand.asked(runner, json=beat(f"name-{number}-{part}"))] += 1
     after = _health(arena)
     found.require(set(answers) <= {200, 413, 422, 429}, f"answers {answers}")
     found.require(not large_taken, f"{large_taken} of 2 MB were taken")
@@ -115,11 +97,11 @@ def harmful_runner(arena: Arena) -> Tried:
         "/hand-back": {},
     }
     for job in jobs:
-        lease = wait_until(lambda: _leased(runner, job), 60, f"{job} waits")  # noqa: B023
+        lease = wait_until(lambda: leased(runner, job), 60, f"{job} waits")  # noqa: B023
         path, more = list(ways.items())[jobs.index(job) % 2]
         runner.ask("POST", runner.at(lease, path), **more)
     for _ in range(20):
-        again = runner.ask("POST", "/leases", json=_about("by-hand"))
+        again = runner.ask("POST", "/leases", json=about("by-hand"))
         if again.status_code == 200:
             runner.ask("POST", runner.at(again.json(), "/hand-back"))
     states = Counter(arena.operator.get(f"/v1/jobs/{job}")["state"] for job in jobs)
@@ -138,17 +120,8 @@ def strangers(arena: Arena) -> Tried:
     found = Tried(f"{count} invented keys, each with a body of 4 MiB that stalls")
     api = arena.process("api")
     before, quick = api.memory_info().rss, _health(arena)
-    parts = urlsplit(arena.stack.url)
     with ExitStack() as connections:
-        opened = []
-        for _ in range(count):
-            connection = socket.create_connection((parts.hostname or "", parts.port or 80), 10)
-            opened.append(connections.enter_context(connection))
-            connection.sendall(
-                f"POST /v1/jobs HTTP/1.1\r\nHost: {parts.netloc}\r\nAuthorization: Bearer ba_"
-                f"{secrets.token_urlsafe(32)}\r\nContent-Type: application/json\r\n"
-                f"Content-Length: {4 * MEBI}\r\n\r\n{{".encode()
-            )
+        opened = [connections.enter_context(by_hand.stalled(arena.stack.url)) for _ in range(count)]
         answers = Counter(int(c.recv(4096).split()[1]) for c in opened)
         slow = _health(arena)
         grown = (api.memory_info().rss - before) / MEBI
@@ -199,77 +172,12 @@ def _runner(arena: Arena) -> Caller:
     return Caller(arena.stack.url, key["secret"], name=f"attack-{key['id']}")
 
 
-def _about(name: str, **more: Any) -> dict[str, Any]:
-    return {"name": name, "simulators": {ENGINE: SIMULATION_VERSION}, **more}
-
-
-def _beat(name: str) -> dict[str, Any]:
-    return _about(name, leases=[], versions={}, pid=1)
-
-
-def _versions() -> dict[str, str]:
-    return {
-        "engine": ENGINE,
-        "simulation": SIMULATION_VERSION,
-        "engine_version": engine_version(ENGINE),
-        "processor": dict(processor()),
-    }
-
-
-def _ask(runner: Caller, **options: Any) -> int:
-    headers = {"Content-Type": "application/json"}
-    try:
-        return runner.ask("POST", "/heartbeat", headers=headers, **options).status_code
-    except httpx.TransportError:
-        return 413  # it answered and hung up while the body was on its way
-
-
-def _leased(runner: Caller, job: str) -> dict[str, Any] | None:
-    """A lease of this job; others are given back."""
-    answer = runner.ask("POST", "/leases", json=_about(runner.name, wait_s=2))
-    if answer.status_code != 200:
-        return None
-    lease: dict[str, Any] = answer.json()
-    if lease["job_id"] == job:
-        return lease
-    runner.ask("POST", runner.at(lease, "/hand-back"))
-    return None
-
-
 def _bring(runner: Caller, job: str, lie: Lie = lambda true: true) -> httpx.Response:
     """The answer to the outcome of a job's trial, true or not."""
-    lease = wait_until(lambda: _leased(runner, job), 60, f"{job} waits for its trial")
-    with _kept_alive(runner, lease):
-        told = lie(_simulated(json.dumps([lease["machine"], lease["controls"]])))
-        versions = {**_versions(), "engine_version": told.engine_version}
-        return runner.outcome(lease, write_trajectory(told), versions=versions)
-
-
-@contextmanager
-def _kept_alive(runner: Caller, lease: dict[str, Any]) -> Iterator[None]:
-    """Renews a lease meanwhile."""
-    ended = threading.Event()
-
-    def beat() -> None:
-        while not ended.wait(0.5):
-            beat = {**_beat(runner.name), "leases": [runner.named(lease)]}
-            runner.ask("POST", "/heartbeat", json=beat)
-
-    thread = threading.Thread(target=beat)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-
-
-@cached(cache={})
-def _simulated(spoken: str) -> Trajectory:
-    document, presses = json.loads(spoken)
-    machine = Machine.from_document(document)
-    controls = presses and tuple(KeyPress(**press) for press in presses)
-    return simulate(machine, builtin_tasks()[TASK].scenario, ENGINE, controls=controls)
+    lease: dict[str, Any] = wait_until(
+        lambda: leased(runner, job), 60, f"{job} waits for its trial"
+    )
+    return by_hand.brought(runner, lease, TASK, lie)
 
 
 def _verified(arena: Arena, job: str) -> bool:

@@ -1,6 +1,7 @@
 """Soak: a service under steady load and steady kills; nothing lost, and no process that grows.
 
-Beside the processes that are killed run some that never are, in which a leak would show.
+Beside the processes that are killed run some that never are, in which a leak would show. Some of
+the jobs are runners' to simulate, among whom are liars; strangers without a key stall meanwhile.
 """
 
 import argparse
@@ -22,7 +23,9 @@ import httpx
 import psutil
 from scenarios.chaos.accounts import audited, wrongs
 from scenarios.chaos.faults import Fire
+from scenarios.soak.crowd import ENGINE, Crowd, honest_runner, refuted, suspended
 from scenarios.soak.memory import MEBI, Watch, growth
+from support.clients.tenants import ADMIN, WITH_KEYS, Tenant, new_tenant, operator
 from support.servers.stacks import running_stack, wait_until
 
 from buildarena_cli.local import free_port
@@ -32,6 +35,8 @@ from buildarena_store import Database
 BATCH = 100
 MIX = (("builtin/random", 0.6), ("builtin/idle", 0.3), ("builtin/expert", 0.1))
 """Models and their shares: most sessions end early, a tenth is simulated."""
+RUNNERS_EVERY = 20
+"""Every so many batches is the runners': experts in a simulator that no worker of the stack has."""
 MAX_MIB = 400
 SAMPLE_S = 5.0
 READ_EVERY_S = 0.5
@@ -60,7 +65,7 @@ def steady_processes(stack: Stack, port: int) -> Iterator[dict[str, psutil.Proce
 
 
 def processes_of(stack: Stack, steady: Mapping[str, psutil.Process]) -> dict[str, psutil.Process]:
-    """Every process by name: steady ones and their children, and those that are killed."""
+    """Processes by name: steady ones, those that are killed, and their children."""
     parents = dict(steady)
     for managed in stack.supervisor.managed:
         if managed.process is not None:
@@ -68,6 +73,8 @@ def processes_of(stack: Stack, steady: Mapping[str, psutil.Process]) -> dict[str
                 parents[f"{managed.name}, killed"] = psutil.Process(managed.process.pid)
     found = dict(parents)
     for name, process in parents.items():
+        if name.startswith("postgres"):
+            continue  # a child for each connection, which says nothing of ours
         with suppress(psutil.Error):
             for number, child in enumerate(sorted(process.children(), key=lambda c: c.pid), 1):
                 found[f"{name}: child {number}"] = child
@@ -75,7 +82,7 @@ def processes_of(stack: Stack, steady: Mapping[str, psutil.Process]) -> dict[str
 
 
 class Reader(threading.Thread):
-    """Reads lists, sweeps and streams of the API that is never killed, as dashboards do."""
+    """Reads lists, sweeps, boards and streams of the API that is never killed, as dashboards do."""
 
     def __init__(self, url: str, sweeps: list[str]) -> None:
         super().__init__(name="reader")
@@ -84,9 +91,10 @@ class Reader(threading.Thread):
 
     def run(self) -> None:
         rng = random.Random(0)
-        with httpx.Client(base_url=self._url, timeout=60) as client:
+        headers = {"Authorization": f"Bearer {ADMIN}"}
+        with httpx.Client(base_url=self._url, timeout=60, headers=headers) as client:
             while not self._stop_now.wait(READ_EVERY_S):
-                paths = ["/v1/jobs?limit=50", "/v1/sweeps?limit=5", "/v1/health"]
+                paths = ["/v1/jobs?limit=50", "/v1/sweeps?limit=5", "/v1/health", "/v1/leaderboard"]
                 if self._sweeps:
                     sweep = rng.choice(self._sweeps[-20:])
                     paths += [f"/v1/sweeps/{sweep}", f"/v1/jobs?sweep={sweep}"]
@@ -108,21 +116,25 @@ class Reader(threading.Thread):
         self.join()
 
 
-def submit(url: str, number: int, rng: random.Random) -> str:
+def submit(url: str, tenant: Tenant, number: int, rng: random.Random) -> str:
     """Submits a batch of jobs to either API, again until it is accepted."""
     model = rng.choices([name for name, _ in MIX], [share for _, share in MIX])[0]
+    by_runners = number % RUNNERS_EVERY == 1
     payload = {
         "name": f"soak {number}",
         "tasks": ["lift-1"],
-        "models": [model],
+        "models": ["builtin/expert" if by_runners else model],
         "seeds": list(range(number * BATCH, (number + 1) * BATCH)),
-        "simulator": "mujoco",
+        "simulator": ENGINE if by_runners else "mujoco",
         "budget": {"max_requests": 1_000_000},
     }
 
     def ask() -> str | None:
         with suppress(httpx.TransportError):
-            headers = {"Idempotency-Key": f"soak-{number}"}
+            headers = {
+                "Idempotency-Key": f"soak-{number}",
+                "Authorization": f"Bearer {tenant.secret}",
+            }
             answer = httpx.post(f"{url}/v1/sweeps", json=payload, headers=headers, timeout=30)
             return answer.json()["id"] if answer.status_code == 202 else None
         return None
@@ -160,12 +172,19 @@ def main() -> int:
     rng = random.Random(1)
     batches = max(1, given.jobs // BATCH)
     with tempfile.TemporaryDirectory(prefix="buildarena-soak-") as name, ExitStack() as running:
-        stack = running.enter_context(running_stack(Path(name), lease_s=5.0))
+        stack = running.enter_context(running_stack(Path(name), lease_s=5.0, **WITH_KEYS))
         database = Database(stack.environment["BUILDARENA_DATABASE_URL"])
         port = free_port()
         steady = running.enter_context(steady_processes(stack, port))
         url = f"http://127.0.0.1:{port}"
         wait_until(lambda: _answers(url), 60, "the steady API answers")
+        client = running.enter_context(httpx.Client(base_url=url, timeout=60))
+        tenant = new_tenant(client, "soak")
+        runner = running.enter_context(honest_runner(url, operator(client), Path(name) / "runner"))
+        steady |= {"runner, never killed": runner}
+        crowd = Crowd(url, operator(client), Path(name))
+        crowd.start()
+        running.callback(crowd.stop)
         sweeps: list[str] = []
         reader = Reader(url, sweeps)
         reader.start()
@@ -176,15 +195,18 @@ def main() -> int:
         for number in range(batches):
             due = started + given.seconds * number / batches
             time.sleep(max(0.0, due - time.monotonic()))
-            sweeps.append(submit((stack.url, url)[number % 2], number, rng))
+            sweeps.append(submit((stack.url, url)[number % 2], tenant, number, rng))
             if number % 10 == 0:
                 _tell(f"{number * BATCH} submitted, {len(fire.strikes)} kills")
         time.sleep(max(0.0, started + given.seconds - time.monotonic()))
         fire.stop()
+        crowd.stop()
         wait_until(lambda: _reachable(database), 60, "the last kill is over")
-        wait_until(lambda: ended_jobs(database) == batches * BATCH, 1800, "every job has ended")
+        lies = _settled(database, tenant, batches * BATCH)
         seconds = time.monotonic() - started
         figures = _figures(database, watch, fire, reader)
+        figures |= {"crowd": dict(sorted(crowd.answers.items())), "lies_undone": len(lies)}
+        figures |= {"keys_suspended": suspended(database)}
         figures |= {"jobs": batches * BATCH, "seconds": round(seconds)}
         database.close()
     if given.json:
@@ -194,8 +216,21 @@ def main() -> int:
     return int(bool(figures["failures"]))
 
 
+def _settled(database: Database, tenant: Tenant, jobs: int) -> set[str]:
+    """Waits until every job has ended and counts; those whose trial was refuted have it again."""
+    lies: set[str] = set()
+    while True:
+        wait_until(lambda: ended_jobs(database) == jobs, 1800, "every job has ended")
+        wait_until(lambda: audited(database), 1800, "all is verified that must be")
+        wrong = refuted(database)
+        if not wrong:
+            return lies
+        lies.update(wrong)
+        for job in wrong:
+            tenant.post(f"/v1/jobs/{job}/retry")
+
+
 def _figures(database: Database, watch: Watch, fire: Fire, reader: Reader) -> dict[str, object]:
-    wait_until(lambda: audited(database), 600, "all is verified that must be")
     wrong = wrongs(database)
     with database.transaction() as connection:
         for name, query in BOOKS.items():
