@@ -199,12 +199,13 @@ def main() -> int:
             if number % 10 == 0:
                 _tell(f"{number * BATCH} submitted, {len(fire.strikes)} kills")
         time.sleep(max(0.0, started + given.seconds - time.monotonic()))
+        steady_until = time.monotonic()
         fire.stop()
         crowd.stop()
         wait_until(lambda: _reachable(database), 60, "the last kill is over")
         lies = _settled(database, tenant, batches * BATCH)
         seconds = time.monotonic() - started
-        figures = _figures(database, watch, fire, reader)
+        figures = _figures(database, watch, fire, reader, steady_until)
         figures |= {"crowd": dict(sorted(crowd.answers.items())), "lies_undone": len(lies)}
         figures |= {"keys_suspended": suspended(database)}
         figures |= {"jobs": batches * BATCH, "seconds": round(seconds)}
@@ -230,18 +231,21 @@ def _settled(database: Database, tenant: Tenant, jobs: int) -> set[str]:
             tenant.post(f"/v1/jobs/{job}/retry")
 
 
-def _figures(database: Database, watch: Watch, fire: Fire, reader: Reader) -> dict[str, object]:
+def _figures(
+    database: Database, watch: Watch, fire: Fire, reader: Reader, steady_until: float
+) -> dict[str, object]:
+    """What is told; memory of the time in which the load was steady."""
     wrong = wrongs(database)
     with database.transaction() as connection:
         for name, query in BOOKS.items():
             ids = list(connection.exec_driver_sql(query).scalars())
             if ids:
                 wrong[name] = ids[:10]
-    memory = {
-        name: growth(samples)
+    steady = {
+        name: [sample for sample in samples if sample[0] <= steady_until]
         for name, samples in sorted(watch.samples.items())
-        if len(samples) >= 8
     }
+    memory = {name: growth(samples) for name, samples in steady.items() if len(samples) >= 8}
     failures = [f"books: {name}" for name in wrong]
     failures += [
         f"{name} had {found.peak_mib:.0f} MiB"
@@ -261,6 +265,11 @@ def _figures(database: Database, watch: Watch, fire: Fire, reader: Reader) -> di
         "memory": {
             name: {key: round(value, 1) for key, value in asdict(found).items()}
             for name, found in memory.items()
+        },
+        "memory_each_minute": {
+            name: [round(size, 1) for _, size in samples[:: round(60 / SAMPLE_S)]]
+            for name, samples in steady.items()
+            if "never killed" in name
         },
         "bars": {"most_mib": MAX_MIB, "grows": "beyond noise, where never killed"},
         "failures": failures,
