@@ -161,14 +161,18 @@ BOOKS = {
 }
 
 
-def main() -> int:
-    """Runs the soak; 0 when every bar was met."""
+def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=3600)
     parser.add_argument("--jobs", type=int, default=20_000)
     parser.add_argument("--every", type=float, default=10, help="seconds between kills")
     parser.add_argument("--json", type=Path)
-    given = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> int:
+    """Runs the soak; 0 when every bar was met."""
+    given = _options()
     rng = random.Random(1)
     batches = max(1, given.jobs // BATCH)
     with tempfile.TemporaryDirectory(prefix="buildarena-soak-") as name, ExitStack() as running:
