@@ -29,7 +29,14 @@ export function StartForm() {
     mutationFn: () =>
       taken(
         client.POST("/v1/sessions", {
-          body: { task, agent: name.trim(), seed: Number(seed), simulator: simulator.value, kind: "human" },
+          body: {
+            task,
+            agent: name.trim(),
+            seed: Number(seed),
+            simulator: simulator.value,
+            data_sheets: true,
+            kind: "human",
+          },
         }),
       ),
     onSuccess: ({ id }) => {
