@@ -33,7 +33,7 @@ def test_the_leaderboard_counts_scored_jobs_and_shows_errored_ones(api, context,
     assert (row["trials"], row["successes"], row["errored"]) == (2, 1, 1)
     assert row["success_rate"] == 0.5
     assert 0 < row["success_low"] < 0.5 < row["success_high"] < 1
-    assert (row["indicator_mean"], row["parts_mean"], row["baseline"]) == (100.0, 7.0, True)
+    assert (row["indicator_mean"], row["parts_mean"], row["baseline"]) == (50.0, 7.0, True)
 
 
 def test_a_board_of_errors_alone_has_no_numbers_and_no_nan(api, context, sweep) -> None:

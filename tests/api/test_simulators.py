@@ -3,6 +3,7 @@
 import pytest
 from support.jobs import report_worker
 
+from buildarena_simulation import SIMULATION_VERSION
 from buildarena_store.states import simulate_queue
 
 
@@ -19,7 +20,7 @@ def test_the_engines_are_listed_whether_or_not_a_worker_is_there(listed) -> None
     assert listed() == {
         name: {
             "name": name,
-            "version": "3",
+            "version": SIMULATION_VERSION,
             "kind": "engine",
             "repeatable": True,
             "default": name == "pybullet",
@@ -42,5 +43,8 @@ def test_what_a_worker_announces_is_listed_and_can_be_asked_for(context, api, li
     unity = listed()["unity"]
     assert (unity["version"], unity["kind"], unity["default"]) == ("7.1", "game", False)
     assert (unity["workers"], unity["served"]) == (2, True)
-    assert (listed()["mujoco"]["version"], listed()["mujoco"]["served"]) == ("3", True)
+    assert (listed()["mujoco"]["version"], listed()["mujoco"]["served"]) == (
+        SIMULATION_VERSION,
+        True,
+    )
     assert api.post("/v1/jobs", json=spec).status_code == 202

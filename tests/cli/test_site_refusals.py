@@ -46,7 +46,7 @@ def test_a_folder_of_something_else_is_left_alone(refused, tmp_path) -> None:
 
 
 def test_names_that_nothing_has_are_refused_with_the_choices(refused) -> None:
-    assert "choose from five-role/mujoco" in refused("--track", "nobody/plays")
+    assert "choose from five-role+data-sheets/mujoco" in refused("--track", "nobody/plays")
     assert "all, best, none or a number" in refused("--jobs", "worst")
     assert "--jobs: '-1'" in refused("--jobs=-1")
     assert "--track" in refused(sweep="")

@@ -20,7 +20,7 @@ def test_a_failure_names_every_threshold_of_its_scorer(name):
     task = builtin_tasks()[name]
     text = score_text(task, FAILED)
     for parameter, value in task.scoring.model_dump(mode="json").items():
-        if isinstance(value, int | float) and value:
+        if isinstance(value, int | float) and not isinstance(value, bool) and value:
             assert f"{parameter.replace('_', ' ')} {value:g}" in text
     # Where a trial looks for progress is no threshold.
     assert "target" not in text

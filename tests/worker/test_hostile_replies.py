@@ -80,8 +80,10 @@ def spiced_expert() -> object:
             else call
             for call in said.calls
         )
-        # The controller's answer is a program: only what stands around it may be spiced.
-        return replace(said, text=f"{next(lures)}\n{said.text}", calls=calls)
+        # The controller's answer is a program: only what stands around it may be spiced. Guidance
+        # begins with a step's number.
+        parts = (said.text, next(lures)) if said.text[:1].isdigit() else (next(lures), said.text)
+        return replace(said, text="\n".join(parts), calls=calls)
 
     return reply
 

@@ -112,7 +112,7 @@ def judge(
     time_above = carried * step
     too_high = bool(height[0] > scoring.max_start_height)
     lasted = time_above >= scoring.min_time_s - 1e-9 and not too_high
-    span = measure_span(scenario, trajectory, decided)
+    span = measure_span(scenario, trajectory, fell)
     spans = span is None or span.spans
     load = float(trajectory.cargo_mass[-1 if decided is None else decided])
     success = lasted and spans

@@ -154,7 +154,7 @@ def measure_span(
     Args:
         scenario: Gives gap and terrains.
         trajectory: The trial, with cargo.
-        decided: As from `deciding_sample`.
+        decided: As from `deciding_sample`: debris of a bridge that collapsed is looked at too.
     """
     bearing, sides = trajectory.bearing, terrain_sides(scenario)
     if bearing is None or sides is None:
