@@ -11,7 +11,7 @@ from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import finished, running_stack
 from tests.web.random_machines import built_session
 
-pytestmark = [needs_pages, pytest.mark.slow]
+pytestmark = [*needs_pages, pytest.mark.slow]
 
 MACHINES, A_SESSION = (50, 10) if LONG else (8, 4)
 LATENCY_S = 0.3

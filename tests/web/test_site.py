@@ -13,7 +13,7 @@ import pytest
 from support.documents.pages import BUILDARENA, in_browser, needs_pages
 from support.servers.stacks import finished, running_stack
 
-pytestmark = [needs_pages, pytest.mark.slow]
+pytestmark = [*needs_pages, pytest.mark.slow]
 
 SWEEP = {
     "name": "published",
