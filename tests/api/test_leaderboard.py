@@ -1,5 +1,6 @@
 import json
 from datetime import UTC, datetime, timedelta
+from urllib.parse import quote
 
 import pytest
 from sqlalchemy import delete, text, update
@@ -134,6 +135,18 @@ def test_a_bridge_that_carries_everything_is_shown_as_at_least_its_load(api, pla
     assert flags["never_fell"]["published"] is True
     assert flags["unstable"]["disqualifying"] is True
     assert all(flag["meaning"].endswith(".") for flag in flags.values())
+
+
+@pytest.mark.parametrize("path", ["/v1/leaderboard", "/v1/jobs"])
+def test_a_track_is_found_by_its_name_as_it_stands(api, played, path) -> None:
+    """Names have pluses, which a URL means as spaces."""
+    played()
+    (track,) = board(api)["tracks"]
+    assert "+" in track
+    whole, written = (api.get(f"{path}?track={name}") for name in (quote(track), track))
+    assert (whole.status_code, written.status_code) == (200, 200)
+    assert whole.json() == written.json()
+    assert api.get(f"{path}?track=no+such").status_code == 422
 
 
 def test_too_few_successes_are_said_to_be_too_few(api, played) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import Depends, Query, Request
+from pydantic import AfterValidator
 
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_pipeline.agents.sessions import ExternalSessions
@@ -45,6 +46,14 @@ async def _external(request: Request) -> ExternalSessions:
 
 ExternalDep = Annotated[ExternalSessions, Depends(_external)]
 SubmissionsDep = Annotated[Submissions, Depends(_submissions)]
+
+
+def _plus(track: str) -> str:
+    return track.replace(" ", "+")
+
+
+# In a URL a plus is a space to those who read it, and no track has one.
+Track = Annotated[str, AfterValidator(_plus)]
 IdPrefix = Annotated[
     str | None,
     Query(pattern=r"^[a-z]+_[0-9a-f]*$", max_length=40, description="Only ids with this prefix"),

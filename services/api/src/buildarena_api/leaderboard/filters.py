@@ -9,7 +9,7 @@ from typing import Annotated, Final
 
 from fastapi import Depends, Query, Request
 
-from buildarena_api.dependencies import ContextDep
+from buildarena_api.dependencies import ContextDep, Track
 from buildarena_api.http.access import who_asks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.weights import HEAVIEST
@@ -62,7 +62,7 @@ def select_board(
     context: ContextDep,
     request: Request,
     *,
-    track: Annotated[str | None, Query(description="Default: the first with ended jobs")] = None,
+    track: Annotated[Track | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
     level: Annotated[list[int] | None, Query(description="Only tasks of these levels")] = None,
     category: Annotated[

@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Response
 
-from buildarena_api.dependencies import ContextDep, IdPrefix, RegistryDep, SubmissionsDep
+from buildarena_api.dependencies import ContextDep, IdPrefix, RegistryDep, SubmissionsDep, Track
 from buildarena_api.http import cursors
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
@@ -74,7 +74,7 @@ def list_jobs(
     sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
     task: Annotated[str | None, Query()] = None,
     model: Annotated[str | None, Query()] = None,
-    track: Annotated[str | None, Query()] = None,
+    track: Annotated[Track | None, Query()] = None,
     task_version: Annotated[str | None, Query()] = None,
     configuration: Annotated[
         str | None, Query(description="Of the model: hash of its decoding and limits too")
