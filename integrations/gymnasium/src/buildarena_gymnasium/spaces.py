@@ -30,7 +30,7 @@ class AnswerText(spaces.Text):
 ACTION_SPACE: Final = spaces.Text(MAX_ACTION, charset=frozenset(_PRINTABLE))
 """A tool call as JSON, which can escape any other character."""
 OBSERVATION_SPACE: Final = AnswerText(
-    MAX_OBSERVATION, min_length=0, charset=frozenset(_PRINTABLE + "\n°—…")
+    MAX_OBSERVATION, min_length=0, charset=frozenset(_PRINTABLE + "\n°²·—…")
 )
 """What a model would read."""
 
