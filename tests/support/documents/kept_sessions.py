@@ -6,6 +6,7 @@ are asked again; other replies are those that were kept.
 
 import json
 from dataclasses import asdict
+from datetime import datetime
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,59 @@ from support.player import Played, Player
 from support.providers.scripted import Scripted
 
 from buildarena_geometry.machine_files import machine_bytes
+from buildarena_store import RolloutRecord
 from buildarena_worker.session.messages import Completion, ToolCall
+from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
 from buildarena_worker.workflow.rounds import Loop
 
 FOLDER = Path(__file__).parents[2] / "data/sessions"
 SCRIPTED = "scripted-failures"
 NAMES = sorted(p.stem for p in FOLDER.glob("*.json") if not p.stem.endswith(".transcript"))
+
+
+def kept_session(name: str) -> dict[str, Any]:
+    """What was kept of a session."""
+    kept: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+    return kept
+
+
+def rollout(data: dict[str, Any]) -> RolloutRecord:
+    times = {name: datetime.fromisoformat(data[name]) for name in ("created_at", "finished_at")}
+    return RolloutRecord(**{**data, **times})
+
+
+def described(result: object) -> dict[str, Any]:
+    """A result in the form of the kept ones."""
+    kind = {"kind": type(result).__name__}
+    match result:
+        case Finished(best=best):
+            return {**kind, "best": best.number}
+        case Suspended(number=number, final=final):
+            return {**kind, "number": number, "final": final}
+        case Failed(reason=reason, detail=detail) | LimitReached(limit=reason, detail=detail):
+            return {**kind, "reason": reason, "detail": detail}
+    raise AssertionError(result)
+
+
+def played_again(play: Any, kept: dict[str, Any], **more: Any) -> Played:
+    """A kept session from its beginning; `play` and further options are those of `Player`."""
+    played: Played = play(
+        kept["model"],
+        task=kept["task"],
+        seed=kept["seed"],
+        workflow=kept["workflow"],
+        loop=Loop(**kept["loop"]),
+        limits=kept["limits"],
+        rollouts=[rollout(data) for data in kept["rollouts"]],
+        **more,
+    )
+    return played
+
+
+def digest_of(played: Played) -> str | None:
+    """Of the machine that a session built."""
+    machine = played.session.machine
+    return None if machine is None else sha256(machine_bytes(machine)).hexdigest()
 
 
 def completion(reply: dict[str, Any]) -> Completion:
@@ -28,46 +76,23 @@ def completion(reply: dict[str, Any]) -> Completion:
     return Completion(text=reply["text"], calls=calls, finish=reply["finish"])
 
 
-def written(name: str, kept: dict[str, Any], rollouts: list[Any], described: Any) -> None:
-    """Plays a session from its beginning and writes it.
-
-    Args:
-        name: Its name.
-        kept: What was kept of it.
-        rollouts: Its rollouts, as the store has them.
-        described: Makes a result's form in the file.
-    """
-    scripted = name == SCRIPTED
-    client = Scripted(*(completion(e["reply"]) for e in kept["journal"])) if scripted else None
-    played: Played = Player()(
-        kept["model"],
-        task=kept["task"],
-        seed=kept["seed"],
-        workflow=kept["workflow"],
-        loop=Loop(**kept["loop"]),
-        limits=kept["limits"],
-        rollouts=rollouts,
-        client=client,
-    )
-    machine, transcript = played.session.machine, played.session.transcript
-    kept |= {
-        "result": described(played.result),
-        "machine": None if machine is None else sha256(machine_bytes(machine)).hexdigest(),
-        "refusals": transcript.refusals,
-        "journal": [json.loads(json.dumps(asdict(e), default=str)) for e in played.entries],
-    }
-    text = json.dumps(kept, indent=1, ensure_ascii=False) + "\n"
-    (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
-    (FOLDER / f"{name}.transcript.json").write_bytes(transcript.to_json())
-
-
 def main() -> None:
-    """Writes all of them."""
-    from worker.test_kept_sessions import described, rollout
-
+    """Plays each from its beginning, and writes it."""
     for name in NAMES:
-        kept = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-        written(name, kept, [rollout(data) for data in kept["rollouts"]], described)
+        kept = kept_session(name)
+        scripted = name == SCRIPTED
+        client = Scripted(*(completion(e["reply"]) for e in kept["journal"])) if scripted else None
+        played = played_again(Player(), kept, client=client)
+        transcript = played.session.transcript
+        kept |= {
+            "result": described(played.result),
+            "machine": digest_of(played),
+            "refusals": transcript.refusals,
+            "journal": [json.loads(json.dumps(asdict(e), default=str)) for e in played.entries],
+        }
+        text = json.dumps(kept, indent=1, ensure_ascii=False) + "\n"
+        (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
+        (FOLDER / f"{name}.transcript.json").write_bytes(transcript.to_json())
 
 
 if __name__ == "__main__":
