@@ -3,9 +3,6 @@
 import json
 import secrets
 import socket
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -13,6 +10,7 @@ import httpx
 from cachetools import cached
 from support.servers.lies import Lie
 from support.servers.runner_rig import Caller
+from support.servers.stacks import meanwhile
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import KeyPress, Machine
@@ -64,7 +62,8 @@ def leased(runner: Caller, job: str | None = None) -> dict[str, Any] | None:
 
 def brought(runner: Caller, lease: dict[str, Any], task: str, lie: Lie) -> httpx.Response:
     """The answer to the outcome of a leased trial, changed by a lie."""
-    with _kept_alive(runner, lease):
+    renewed = beat(runner.name, leases=[runner.named(lease)])
+    with meanwhile(lambda: asked(runner, json=renewed), every_s=0.5):
         told = lie(_simulated(task, json.dumps([lease["machine"], lease["controls"]])))
         versions = {
             "engine": ENGINE,
@@ -85,24 +84,6 @@ def stalled(url: str) -> socket.socket:
         f"Content-Length: {STALLED_BYTES}\r\n\r\n{{".encode()
     )
     return connection
-
-
-@contextmanager
-def _kept_alive(runner: Caller, lease: dict[str, Any]) -> Iterator[None]:
-    """Renews a lease meanwhile."""
-    ended = threading.Event()
-
-    def renew() -> None:
-        while not ended.wait(0.5):
-            asked(runner, json=beat(runner.name, leases=[runner.named(lease)]))
-
-    thread = threading.Thread(target=renew)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
 
 
 @cached(cache={})

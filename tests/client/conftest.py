@@ -1,8 +1,7 @@
 """One service for each module, both clients, and pauses that take no time."""
 
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
 import pytest
@@ -12,6 +11,7 @@ from support.clients.either_client import EitherClient
 from support.clients.tenants import ADMIN
 from support.servers.databases import empty
 from support.servers.live_api import live_api
+from support.servers.stacks import meanwhile
 from support.stages import work
 
 from buildarena_client.transports.asynchronous import AsyncTransport
@@ -52,22 +52,9 @@ class Service:
     jobs: list[str]
     built: str
 
-    @contextmanager
-    def working(self) -> Iterator[None]:
+    def working(self) -> AbstractContextManager[None]:
         """Workers do what waits, beside the test."""
-        ended = threading.Event()
-
-        def run() -> None:
-            while not ended.wait(0.05):
-                work(self.context)
-
-        thread = threading.Thread(target=run)
-        thread.start()
-        try:
-            yield
-        finally:
-            ended.set()
-            thread.join()
+        return meanwhile(lambda: work(self.context), every_s=0.05)
 
 
 @pytest.fixture

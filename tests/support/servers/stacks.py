@@ -1,5 +1,6 @@
 """Running stacks for end-to-end tests."""
 
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -21,6 +22,24 @@ def wait_until(condition: Callable[[], Any], within_s: float, what: str) -> Any:
         assert time.monotonic() < deadline, f"not within {within_s} s: {what}"
         time.sleep(0.05)
     return value
+
+
+@contextmanager
+def meanwhile(do: Callable[[], object], *, every_s: float) -> Iterator[None]:
+    """Does something again and again in a thread, beside what is done inside."""
+    ended = threading.Event()
+
+    def run() -> None:
+        while not ended.wait(every_s):
+            do()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 @contextmanager
