@@ -51,7 +51,10 @@ async def build_car(player: Newcomer) -> None:
                     "The key.": key,
                 },
             )
-    await player.use("Adds one or several key presses", {"goes down": 1, "A key that some": key, "stays down": 20})
+    await player.use(
+        "Adds one or several key presses",
+        {"goes down": 1, "A key that some": key, "stays down": 20},
+    )
 
 
 async def build_rocket(player: Newcomer, reply: str) -> None:
