@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_benchmark.flags import ScoringPolicy, is_censored, is_disqualified, is_left_out
 from buildarena_benchmark.leaderboard import (
@@ -73,10 +74,10 @@ def plain_summary(
     given, trials = len(trials), [trial for trial in trials if not trial.unverified]
     counted = counted_trials(trials, policy=policy)
     number = len(counted)
-    successes = sum(trial.success for trial in counted)
+    successes = math.fsum(trial.share for trial in counted)
     outcomes = Counter(trial.outcome for trial in trials)
     low_high = exact_interval(successes, number) if counted else (None, None)
-    figures = np.array([(t.success, t.indicator) for t in counted], float).reshape(-1, 2)
+    figures = np.array([(t.share, t.indicator) for t in counted], float).reshape(-1, 2)
     indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
     scored = [trial for trial in trials if trial.scored]
     actions = sum(trial.actions for trial in counted)
@@ -116,8 +117,8 @@ def plain_summary(
         cost_usd_mean=mean.of(lambda t: t.cost_usd),
         cost_per_success_usd=cost_per_success([t.cost_usd for t in counted], successes),
         invalid_action_rate=refused / actions if actions else None,
-        pass_at=_pass_chances(pass_at_k, successes, number),
-        pass_all=_pass_chances(pass_hat_k, successes, number),
+        pass_at=_pass_chances(pass_at_k, figures[:, 0]),
+        pass_all=_pass_chances(pass_hat_k, figures[:, 0]),
         outcomes=dict(sorted(outcomes.items())),
         reasons=dict(sorted(Counter(t.reason for t in counted if t.reason).items())),
         refusals=_refusals(counted),
@@ -146,9 +147,9 @@ class _Means:
 
 
 def _pass_chances(
-    estimate: Callable[[int, int, int], float | None], successes: int, trials: int
+    estimate: Callable[[NDArray[np.float64], int], float | None], shares: NDArray[np.float64]
 ) -> dict[str, float]:
-    found = {str(k): estimate(successes, trials, k) for k in PASS_K}
+    found = {str(k): estimate(shares, k) for k in PASS_K}
     return {k: chance for k, chance in found.items() if chance is not None}
 
 

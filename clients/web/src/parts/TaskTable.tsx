@@ -4,7 +4,7 @@ import type { Row, TaskBoard } from "../api/queries";
 import { sharedRanks } from "./ranks";
 import type { BoardSearch } from "../api/board-search";
 import { jobsBehind } from "./jobs-behind";
-import { count, dollars, measured, number, percent, places } from "../format";
+import { count, dollars, measured, number, percent, places, successes } from "../format";
 import { Interval } from "./Interval";
 
 /** All models on one task, the best first. */
@@ -56,7 +56,7 @@ function Proof({ row }: { row: Row }) {
 }
 
 function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch; tied: boolean; several: boolean }) {
-  const success = `${row.successes} of ${row.trials}`;
+  const success = `${successes(row.successes)} of ${row.trials}`;
   return (
     <Table.Tr>
       <Table.Td>

@@ -49,6 +49,7 @@ class Cell:
             else.
         refuted: Those of them that were refuted.
         simulated: Counted trials whose machine was finished and tried.
+        successes: Successes of counted trials; a job in varied worlds counts by its share of them.
         success_rate: Successes of counted trials, with its exact interval.
         success_rate_of_ended: Successes of all ended jobs.
         indicator_mean: Mean indicator, with its interval.
@@ -64,7 +65,8 @@ class Cell:
         reasons: Counted trials that failed, by reason.
         refusals: Refused actions by refusal class.
         newest: When the last of its jobs ended.
-        figures: (N, 2) float64, success and indicator of each counted trial, sorted.
+        figures: (N, 2) float64, success (or its share) and indicator of each counted trial,
+            sorted.
         figures_hash: Hash of them: cells with the same one are the same to all tests of pairs.
     """
 
@@ -83,7 +85,7 @@ class Cell:
     unverified: int
     refuted: int
     simulated: int
-    successes: int
+    successes: float
     success_rate: float | None
     success_low: float | None
     success_high: float | None
@@ -119,10 +121,13 @@ def counted_trials(
     for trial in trials:
         if not trial.scored or is_left_out(trial.flags, policy):
             continue
-        if policy == ScoringPolicy.OURS and (is_disqualified(trial.flags) or not trial.success):
-            counted.append(replace(trial, success=False, indicator=0.0))
+        if policy != ScoringPolicy.OURS:
+            counted.append(replace(trial, robustness=None, robust_indicator=None))
+        elif is_disqualified(trial.flags):
+            failed = replace(trial, robustness=None, robust_indicator=None)
+            counted.append(replace(failed, success=False, indicator=0.0))
         else:
-            counted.append(trial)
+            counted.append(replace(trial, indicator=trial.gained))
     return counted
 
 
@@ -159,7 +164,7 @@ def summarise_tallies(
     scored = [tally for tally in tallies if tally.scored]
     counted = counted_tallies(tallies, policy=policy)
     number, ended = _number(counted), _number(tallies)
-    successes = _number(tally for tally in counted if tally.success)
+    successes = _sum(tally.shares for tally in counted)
     outcomes = _counts((tally.outcome, tally.number) for tally in tallies)
     low_high = exact_interval(successes, number) if counted else (None, None)
     figures = _figures(counted)
@@ -203,8 +208,8 @@ def summarise_tallies(
             [*costs.tolist(), *[None] * (number - len(costs))], successes
         ),
         invalid_action_rate=refused / actions if actions else None,
-        pass_at=_pass_chances(pass_at_k, successes, number),
-        pass_all=_pass_chances(pass_hat_k, successes, number),
+        pass_at=_pass_chances(pass_at_k, figures[:, 0]),
+        pass_all=_pass_chances(pass_hat_k, figures[:, 0]),
         outcomes=outcomes,
         reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
         refusals=_counts(item for tally in counted for item in tally.refusals.items()),
@@ -222,16 +227,20 @@ def counted_tallies(
     In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
     model would lose nothing by trying to cheat, and one whose machines blow up would gain. So does
     every failure: tasks say when a trial succeeds, and what fails has done nothing that counts.
+    A job that was tried in varied worlds counts by what it did in these; the published reading
+    knows the exact one alone.
     """
     counted = []
     for tally in tallies:
         if not tally.scored or is_left_out(tally.flags, policy):
             continue
-        if policy == ScoringPolicy.OURS and (is_disqualified(tally.flags) or not tally.success):
-            nothing = np.zeros(tally.number)
-            counted.append(replace(tally, success=False, indicators=nothing))
+        nothing = np.zeros(tally.number)
+        if policy != ScoringPolicy.OURS:
+            counted.append(replace(tally, shares=nothing + tally.success))
+        elif is_disqualified(tally.flags):
+            counted.append(replace(tally, success=False, indicators=nothing, shares=nothing))
         else:
-            counted.append(tally)
+            counted.append(replace(tally, indicators=tally.gained))
     return counted
 
 
@@ -253,12 +262,10 @@ def _counts(items: Iterable[tuple[str, int]]) -> dict[str, int]:
 
 
 def _figures(counted: Sequence[Tally]) -> NDArray[np.float64]:
-    """Success and indicator of each counted trial, sorted by the indicator."""
+    """Success, or its share, and indicator of each counted trial, sorted by the indicator."""
     figures = np.zeros((_number(counted), 2))
     if counted:
-        figures[:, 0] = np.repeat(
-            [float(tally.success) for tally in counted], [tally.number for tally in counted]
-        )
+        figures[:, 0] = np.concatenate([tally.shares for tally in counted])
         figures[:, 1] = np.concatenate([tally.indicators for tally in counted])
     return figures[np.lexsort(figures.T)]
 
@@ -274,6 +281,11 @@ def _output_tokens(tally: Tally) -> Total:
     return Total(known=len(known), sum=int(known.sum()))
 
 
+def _sum(parts: Iterable[NDArray[np.float64]]) -> float:
+    """The exact sum of shares: whatever their order."""
+    return math.fsum(share for part in parts for share in part.tolist())
+
+
 def _mean(values: NDArray[np.float64]) -> float | None:
     # fsum is exact, so the order of the trials cannot show in the last digit.
     return math.fsum(values.tolist()) / len(values) if len(values) else None
@@ -286,7 +298,7 @@ def _mean_total(totals: Iterable[Total]) -> float | None:
 
 
 def _pass_chances(
-    estimate: Callable[[int, int, int], float | None], successes: int, trials: int
+    estimate: Callable[[NDArray[np.float64], int], float | None], shares: NDArray[np.float64]
 ) -> dict[str, float]:
-    chances = {str(k): estimate(successes, trials, k) for k in PASS_K}
+    chances = {str(k): estimate(shares, k) for k in PASS_K}
     return {k: chance for k, chance in chances.items() if chance is not None}

@@ -54,7 +54,7 @@ class Row(_View):
     )
     refuted: int = Field(description="Jobs whose verification came to other figures")
     simulated: int = Field(description="Counted jobs whose machine was finished and simulated")
-    successes: int
+    successes: float
     success_rate: float | None = Field(description="null when nothing was scored")
     success_low: float | None = Field(description="Lower end of the 95 % exact interval")
     success_high: float | None = Field(description="Upper end of the 95 % exact interval")
@@ -97,7 +97,7 @@ class PublishedView(_View):
     snapshot: str
     matches: list[str] = Field(description="Our models with the same snapshot")
     trials: int
-    successes: int
+    successes: float
     success_rate: float
     success_low: float
     success_high: float
