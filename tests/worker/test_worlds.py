@@ -79,13 +79,14 @@ def test_seeds_are_drawn_anew_for_each_job(context, submissions) -> None:
     assert not seeds[0] & seeds[1]
 
 
+@pytest.mark.slow
 def test_the_best_of_several_trials_is_what_worlds_try(context, submissions) -> None:
     # Its controller tries several times; a closed loop ends in its session, not in a trial.
     loop = ClosedLoop(rounds=2)
-    job = tried(context, submissions, task="transport-1", closed_loop=loop)
+    job = tried(context, submissions, task="transport-1", closed_loop=loop, worlds=1)
     exact, varied = rollouts(context, job)
     best = max(exact, key=lambda r: (r.success, r.indicator, -r.number))
-    assert len(varied) == WORLDS
+    assert len(varied) == 1
     assert {(r.machine_hash, str(r.controls)) for r in varied} == {
         (best.machine_hash, str(best.controls))
     }

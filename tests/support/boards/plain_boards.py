@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_benchmark import references
 from buildarena_benchmark.flags import ScoringPolicy, is_censored, is_disqualified, is_left_out
 from buildarena_benchmark.leaderboard import (
     Board,
@@ -79,6 +80,11 @@ def plain_summary(
     low_high = exact_interval(successes, number) if counted else (None, None)
     figures = np.array([(t.share, t.indicator) for t in counted], float).reshape(-1, 2)
     indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
+    score, score_ends = None, None
+    if counted and first.task in references():
+        scores = np.log2(1 + np.maximum(figures[:, 1], 0) / references()[first.task])
+        score = math.fsum(scores.tolist()) / number
+        score_ends = mean_interval(scores, figures[:, 0] > 0)
     scored = [trial for trial in trials if trial.scored]
     actions = sum(trial.actions for trial in counted)
     refused = sum(trial.refused_actions for trial in counted)
@@ -107,6 +113,9 @@ def plain_summary(
         indicator_mean=mean.of(lambda t: t.indicator),
         indicator_low=indicator_ends[0] if indicator_ends else None,
         indicator_high=indicator_ends[1] if indicator_ends else None,
+        score=score,
+        score_low=score_ends[0] if score_ends else None,
+        score_high=score_ends[1] if score_ends else None,
         too_few_data=bool(counted) and indicator_ends is None,
         indicator_best=max((t.indicator for t in counted), default=None),
         censored=sum(t.success and is_censored(t.flags) for t in counted),

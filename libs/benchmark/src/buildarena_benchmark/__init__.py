@@ -14,6 +14,7 @@ from buildarena_benchmark.tasks.loading import (
     paper_tasks,
     parse_custom_task,
     parse_task,
+    references,
 )
 from buildarena_benchmark.tasks.task import Task
 
@@ -32,6 +33,7 @@ __all__ = [
     "paper_tasks",
     "parse_custom_task",
     "parse_task",
+    "references",
     "robustness",
     "score",
 ]

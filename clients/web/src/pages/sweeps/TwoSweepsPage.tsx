@@ -145,7 +145,8 @@ function Differences({ pair }: { pair: Pair }) {
                 </Table.Td>
                 {([0, 1] as const).map((side) => (
                   <Table.Td key={side} className="figures">
-                    {percent(task.successes[side] / task.trials[side])} ({successes(task.successes[side])} of {task.trials[side]})
+                    {percent(task.successes[side] / task.trials[side])} ({successes(task.successes[side])} of{" "}
+                    {task.trials[side]})
                   </Table.Td>
                 ))}
                 <Table.Td>

@@ -20,10 +20,12 @@ from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_benchmark.statistics import (
     cost_per_success,
     exact_interval,
+    expert_scores,
     mean_interval,
     pass_at_k,
     pass_hat_k,
 )
+from buildarena_benchmark.tasks.loading import references
 
 PASS_K: Final = (1, 2, 4, 8)
 """The k of pass@k and pass^k."""
@@ -53,6 +55,8 @@ class Cell:
         success_rate: Successes of counted trials, with its exact interval.
         success_rate_of_ended: Successes of all ended jobs.
         indicator_mean: Mean indicator, with its interval.
+        score: Mean of the trials' indicators beside the expert's on a log scale, see
+            `expert_scores`, with its interval; None for a task that has no expert.
         too_few_data: Whether too few counted trials succeeded for an interval of the indicator.
         indicator_best: The greatest indicator.
         censored: Counted trials whose indicator is only known to be at least as great; if there
@@ -93,6 +97,9 @@ class Cell:
     indicator_mean: float | None
     indicator_low: float | None
     indicator_high: float | None
+    score: float | None
+    score_low: float | None
+    score_high: float | None
     too_few_data: bool
     indicator_best: float | None
     censored: int
@@ -168,6 +175,7 @@ def summarise_tallies(
     outcomes = _counts((tally.outcome, tally.number) for tally in tallies)
     low_high = exact_interval(successes, number) if counted else (None, None)
     figures = _figures(counted)
+    score, score_ends = _score(name.task, figures)
     indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
     actions = sum(tally.actions for tally in counted)
     refused = sum(tally.refused_actions for tally in counted)
@@ -196,6 +204,9 @@ def summarise_tallies(
         indicator_mean=_mean(figures[:, 1]),
         indicator_low=indicator_ends[0] if indicator_ends else None,
         indicator_high=indicator_ends[1] if indicator_ends else None,
+        score=score,
+        score_low=score_ends[0] if score_ends else None,
+        score_high=score_ends[1] if score_ends else None,
         too_few_data=bool(counted) and indicator_ends is None,
         indicator_best=float(figures[:, 1].max()) if number else None,
         censored=_number(t for t in counted if t.success and is_censored(t.flags)),
@@ -242,6 +253,17 @@ def counted_tallies(
         else:
             counted.append(replace(tally, indicators=tally.gained))
     return counted
+
+
+def _score(
+    task: str, figures: NDArray[np.float64]
+) -> tuple[float | None, tuple[float, float] | None]:
+    """The mean score beside the expert's, and its interval."""
+    reference = references().get(task)
+    if reference is None or not len(figures):
+        return None, None
+    scores = expert_scores(figures[:, 1], reference)
+    return _mean(scores), mean_interval(scores, figures[:, 0] > 0)
 
 
 def _is_flagged(tally: Tally, policy: ScoringPolicy) -> bool:

@@ -1,5 +1,6 @@
 """Reads task files: the built-in ones and custom ones."""
 
+import json
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
@@ -33,6 +34,13 @@ def builtin_tasks() -> Mapping[str, Task]:
 def paper_tasks() -> Mapping[str, Task]:
     """The paper's nine tasks by name: those that the overall ranking is over."""
     return MappingProxyType({name: builtin_tasks()[name] for name in _PAPER})
+
+
+@cache
+def references() -> Mapping[str, float]:
+    """The built-in expert's indicators on MuJoCo, by built-in task."""
+    text = (resources.files("buildarena_benchmark.tasks") / "references.json").read_text("utf-8")
+    return MappingProxyType({str(name): float(value) for name, value in json.loads(text).items()})
 
 
 def load_task(source: str | Path) -> Task:
