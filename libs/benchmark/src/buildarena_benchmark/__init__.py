@@ -4,6 +4,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
+from buildarena_benchmark.canary import CANARY
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.robustness import Robustness, robustness
@@ -19,6 +20,7 @@ from buildarena_benchmark.tasks.loading import (
 from buildarena_benchmark.tasks.task import Task
 
 __all__ = [
+    "CANARY",
     "BenchmarkError",
     "Robustness",
     "Score",

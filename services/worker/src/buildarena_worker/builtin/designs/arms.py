@@ -1,5 +1,8 @@
 """Arms that take hold of a cargo: one swings it over a wall, one lifts it by gears."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign

@@ -1,5 +1,8 @@
 """Flyers: a deck between balloons, and a glider with its weight ahead of its wings."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from typing import Final

@@ -1,5 +1,8 @@
 """Vehicles of the workshop: one on sprung wheels, one that steers."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from typing import Any
