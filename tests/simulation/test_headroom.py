@@ -6,12 +6,16 @@ import pytest
 from support.long_tests import long, slow_on_pybullet
 from support.machines.headroom import boom_on_a_base, drafted, propped_beam
 from support.machines.jet_cars import jet_car
+from support.machines.masts import balloons_on_a_mast
+from support.machines.see_saws import see_saw
 from support.machines.swinging_bars import swinging_bar
 from support.machines.trials import trial
 
 from buildarena_benchmark import Task
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs.arms import swinging_arm
+from buildarena_worker.builtin.designs.arms import loaded_lift, swinging_arm
+from buildarena_worker.builtin.designs.flyers import stepping_hoverer
+from buildarena_worker.builtin.designs.rockets import payload_rocket
 from buildarena_worker.builtin.designs.rovers import long_slalom_car, touring_car
 
 # Support over 30 and 45
@@ -182,3 +186,138 @@ def test_a_car_that_goes_on_in_steps_earns_each_stop(engine, tasks) -> None:
     assert result.success, result
     assert result.metrics["largest_distance_to_mark"] < 0.2
     assert result.indicator > 3.0
+
+
+# Three heights
+
+
+def _stepping(*presses: tuple[float, str, float]) -> Machine:
+    return drafted(stepping_hoverer(0), presses)
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize("mast", ["below", "aside", "hanging", "legs"])
+def test_a_mast_that_is_lifted_a_little_holds_no_height(engine, tasks, mast) -> None:
+    machine = balloons_on_a_mast(mast, rise_s=1.0).machine
+    result, _ = trial(tasks["flight-3"], machine, engine, duration_s=8.0)
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize(
+    ("presses", "held_s"),
+    [
+        ([(0.3, "UpArrow", 7.35)], 0.5),  # past the first height to the second, and there it stays
+        ([(0.3, "UpArrow", 7.35), (13.0, "DownArrow", 3.0)], 0.5),
+        ([(0.3, "UpArrow", 4.35)], 10.0),
+    ],
+    ids=["the second alone", "the second, then the first", "the first alone"],
+)
+def test_heights_are_held_in_their_order(engine, tasks, presses, held_s) -> None:
+    result, _ = trial(tasks["flight-3"], _stepping(*presses), engine, duration_s=17.0)
+    assert not result.success
+    assert result.metrics["heights_held"] == 1
+    assert result.indicator <= 10.0 + held_s
+
+
+@slow_on_pybullet
+def test_a_hoverer_without_its_cargo_holds_nothing(engine, tasks) -> None:
+    task = tasks["flight-3"]
+    cargo = task.scenario.cargo.model_copy(update={"at": (6, 6, 0)})
+    machine = _stepping((0.3, "UpArrow", 3.8), (9.0, "UpArrow", 3.0), (16.0, "DownArrow", 1.5))
+    result, path = trial(task, machine, engine, cargo=cargo, duration_s=21.0)
+    assert path.positions[:, 0, 2].max() > 13.0
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+@slow_on_pybullet
+def test_a_hoverer_may_hurry_from_height_to_height(engine, tasks) -> None:
+    machine = _stepping((0.3, "UpArrow", 4.35), (9.0, "UpArrow", 3.0), (16.5, "DownArrow", 1.5))
+    result, _ = trial(tasks["flight-3"], machine, engine, duration_s=23.0)
+    assert result.success, result
+    assert result.flags == ()
+    assert result.indicator > 9.0
+
+
+# A payload
+
+
+def _payload(*presses: tuple[float, str, float]) -> Machine:
+    """The expert's rocket, whose gripper lets go at a key."""
+    design = payload_rocket(0)
+    gripper = design.control["control_config"][0]
+    released = {**gripper, "action": "release", "keys": ["Alpha3"]}
+    config = [*design.control["control_config"], released]
+    return drafted(replace(design, control={"control_config": config}), presses)
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize("release_s", [0.0, 2.2])
+def test_a_payload_that_is_let_go_does_not_count(engine, tasks, release_s) -> None:
+    machine = _payload((release_s, "Alpha3", 1.0), (1.9, "Alpha1", 12.0))
+    result, path = trial(tasks["lift-4"], machine, engine, duration_s=6.0)
+    assert path.positions[:, 0, 2].max() > 30.0
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize("fires_s", [0.9, 1.0])
+@pytest.mark.parametrize("thrown", [False, True])
+def test_a_payload_that_coasts_or_is_thrown_does_not_count(engine, tasks, fires_s, thrown) -> None:
+    let_go = [(0.24 + fires_s, "Alpha3", 0.5)] if thrown else []
+    machine = _payload((0.2, "Alpha1", fires_s), *let_go)
+    result, path = trial(tasks["lift-4"], machine, engine, duration_s=5.0)
+    assert path.cargo_position[:, 2].max() > 31.0
+    assert (result.success, result.indicator) == (False, 0.0)
+    assert result.flags == ("not_carried",)
+
+
+@slow_on_pybullet
+def test_what_is_too_heavy_stays_down_however_long_it_fires(engine, tasks) -> None:
+    for begin_s in (4.5, 8.0):
+        machine = drafted(payload_rocket(0), [(begin_s, "Alpha1", 5.0)])
+        result, _ = trial(tasks["lift-4"], machine, engine, duration_s=begin_s + 6.0)
+        assert (result.success, result.indicator) == (False, 0.0)
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize("begin_s", [0.5, 1.5])
+def test_a_payload_weighs_what_it_did_when_it_left_the_ground(engine, tasks, begin_s) -> None:
+    machine = drafted(payload_rocket(0), [(begin_s, "Alpha1", 12.0)])
+    result, _ = trial(tasks["lift-4"], machine, engine, duration_s=begin_s + 4.0)
+    assert result.success, result
+    cargo = tasks["lift-4"].scenario.cargo
+    assert cargo.mass_at(begin_s) <= result.indicator <= cargo.mass_at(begin_s + 0.6)
+
+
+# A load hauled
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize(
+    ("pivot", "show"), [("Swivel", "apart"), ("Swivel", "meshing"), ("Swivel", "on the beam")]
+)
+def test_a_see_saw_hauls_no_load(engine, tasks, pivot, show) -> None:
+    machine = see_saw(pivot, show=show).machine
+    result, path = trial(tasks["mechanisms-7"], machine, engine, duration_s=6.0)
+    assert path.cargo_position[:, 2].max() > 5.0, "it does lift the cargo"
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize(("begin_s", "lasts_s"), [(0.7, 0.3), (8.0, 3.0), (3.0, 1.6)])
+def test_a_lift_that_ends_low_hauls_nothing(engine, tasks, begin_s, lasts_s) -> None:
+    machine = drafted(loaded_lift(0), [(begin_s, "UpArrow", lasts_s)])
+    result, path = trial(tasks["mechanisms-7"], machine, engine, duration_s=begin_s + 4.0)
+    assert path.cargo_position[:, 2].max() < 5.5
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize("begin_s", [0.7, 0.84])
+def test_a_load_weighs_what_it_did_when_it_left_the_ground(engine, tasks, begin_s) -> None:
+    machine = drafted(loaded_lift(0), [(begin_s, "UpArrow", 1.3)])
+    result, _ = trial(tasks["mechanisms-7"], machine, engine, duration_s=begin_s + 3.0)
+    assert result.success, result
+    cargo = tasks["mechanisms-7"].scenario.cargo
+    assert cargo.mass_at(begin_s) <= result.indicator <= cargo.mass_at(begin_s + 1.0)

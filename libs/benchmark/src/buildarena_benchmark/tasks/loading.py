@@ -16,7 +16,10 @@ _PAPER: Final = tuple(
     f"{category}-{level}" for category in ("transport", "support", "lift") for level in (1, 2, 3)
 )
 _WORKSHOP: Final = (*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2")
-_HEADROOM: Final = ("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4")
+_HEADROOM: Final = (
+    *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
+    *("flight-3", "lift-4", "mechanisms-7"),
+)
 
 
 @cache

@@ -28,6 +28,9 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "mechanisms-5": rovers.long_slalom_car,
     "mechanisms-6": arms.swinging_arm,
     "transport-4": rovers.touring_car,
+    "flight-3": flyers.stepping_hoverer,
+    "lift-4": rockets.payload_rocket,
+    "mechanisms-7": arms.loaded_lift,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 
