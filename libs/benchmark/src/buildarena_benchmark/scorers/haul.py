@@ -108,11 +108,9 @@ def judge(
     else:
         rules[NOT_AIRBORNE] = _all_along(lifts, is_airborne(machine, trajectory, joined))
     counts = np.all(list(rules.values()), axis=0)
-    loads = [
-        float(trajectory.cargo_mass[begin])
-        for (begin, _), good in zip(lifts, counts, strict=True)
-        if good
-    ]
+    good = [lift for lift, counting in zip(lifts, counts, strict=True) if counting]
+    loads = [float(trajectory.cargo_mass[begin]) for begin, _ in good]
+    decided = good[int(np.argmax(loads))][1] + 1 if good else len(height)
     flags = [flag for flag in rules if not loads and _alone(rules, flag)]
     metrics: dict[str, Metric] = {
         "lifts": len(loads),
@@ -124,7 +122,7 @@ def judge(
         indicator=rounded(max(loads, default=0.0)),
         metrics=metrics,
         flags=tuple(flags),
-        deciding=Deciding(samples=len(height), members=joined, cargo=True),
+        deciding=Deciding(samples=decided, members=joined, cargo=True),
     )
 
 

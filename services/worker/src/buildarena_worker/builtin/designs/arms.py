@@ -17,7 +17,7 @@ _LIFTS_S = (18.5, 18.2, 17.9, 17.6)
 """When the lift begins, by seed, seconds."""
 
 _MOTORS = 4
-_LIGHT_S = 0.7
+_LIGHT_S = 0.8
 """When a cargo that grows heavier is still light enough for three motors, seconds."""
 
 
