@@ -85,8 +85,8 @@ def judge(
 
     Flags:
         `not_carried`: it got high enough, but the machine did not bear it. `came_apart`: parts came
-        off. `not_geared`, `not_standing`: not raised by gears of a machine that stands.
-        `not_airborne`: not by one in the air. `forces_not_measured`: cannot be judged.
+        off. `not_standing`: the machine does not stand. `not_geared`: it was not raised by gears.
+        `not_airborne`: the machine is not in the air. `forces_not_measured`: cannot be judged.
     """
     del scenario
     lacking = unmeasured(trajectory, cargo=True)

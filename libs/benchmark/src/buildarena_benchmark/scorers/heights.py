@@ -96,8 +96,9 @@ def judge(
         trajectory: The trial.
 
     Flags:
-        `not_airborne`, `not_carried`, `not_risen`: it would have passed but for that.
-        `forces_not_measured`: cannot be judged.
+        `not_airborne`: it would have passed, but touches the ground. `not_carried`: it would have
+        passed, but without the cargo. `not_risen`: it would have passed, but for a part near the
+        ground. `forces_not_measured`: cannot be judged.
     """
     del scenario
     lacking = unmeasured(trajectory, cargo=True)
