@@ -1,4 +1,4 @@
-"""Haul: how heavy a cargo, which grows heavier, is when a machine takes it up."""
+"""Haul: how heavy a cargo, which grows heavier, is when a machine raises it."""
 
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -42,12 +42,12 @@ _SHARE: Final = 0.5
 
 
 class HaulScoring(Document):
-    """How heavy a cargo is taken up.
+    """How heavy a cargo is raised.
 
     Attributes:
         by: "gears": the machine stands on the ground, and a large gear wheel that motors turn lies
             between it and the cargo; "flight": it is in the air.
-        min_rise: How high above where it stood the cargo is to be taken, units.
+        min_rise: How high above where it stood the cargo is to be, units.
         start_rise: The lift begins when it was last lower than that above where it stood, units.
         min_gear_turn_deg: How far a large gear wheel must turn in the lift, degrees.
     """
@@ -62,7 +62,7 @@ class HaulScoring(Document):
 def infeasible(scoring: HaulScoring, scenario: Scenario) -> str | None:
     """Why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
-        return "the cargo is taken up from its place, but scenario.cargo has none: give cargo.at"
+        return "the cargo is raised from its place, but scenario.cargo has none: give cargo.at"
     if scoring.start_rise >= scoring.min_rise:
         return f"start_rise {scoring.start_rise:g} is not below min_rise {scoring.min_rise:g}"
     return undriven(scenario)
