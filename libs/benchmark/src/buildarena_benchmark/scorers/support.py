@@ -1,10 +1,11 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.components import Mask, spans_of
@@ -60,12 +61,14 @@ class SupportScoring(Document):
         fall_height: The cargo has fallen when its centre is below it, units.
         min_time_s: How long in all it must be at or above that height.
         max_start_height: Its start height may not exceed it, units.
+        per_mass: Whether the load over the machine's mass is a metric.
     """
 
     name: Literal["support"]
     fall_height: Threshold = 4.0
     min_time_s: Threshold = 2.0
     max_start_height: Threshold = 20.0
+    per_mass: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
 
 
 def infeasible(scoring: SupportScoring, scenario: Scenario) -> str | None:
@@ -137,6 +140,8 @@ def judge(
         "broken_joints": len(trajectory.breaks),
         **_span_metrics(span),
     }
+    if scoring.per_mass:
+        metrics["load_per_mass"] = rounded(load / machine.mass) if success else 0.0
     return Verdict(
         success=success,
         indicator=rounded(load) if success else 0.0,

@@ -26,6 +26,14 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "mechanisms-4": arms.swinging_arm,
     "flight-1": flyers.hoverer,
     "flight-2": flyers.glider,
+    "support-4": lambda seed: bridges.braced_beam(seed, gap=30, overlap=6),
+    "support-5": lambda seed: bridges.braced_beam(seed, gap=45, overlap=6),
+    "mechanisms-5": rovers.long_slalom_car,
+    "mechanisms-6": arms.swinging_arm,
+    "transport-4": rovers.touring_car,
+    "flight-3": flyers.stepping_hoverer,
+    "lift-4": rockets.payload_rocket,
+    "mechanisms-7": arms.loaded_lift,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

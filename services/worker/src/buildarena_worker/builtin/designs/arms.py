@@ -19,6 +19,10 @@ from buildarena_worker.builtin.designs.drafting import (
 _LIFTS_S = (18.5, 18.2, 17.9, 17.6)
 """When the lift begins, by seed, seconds."""
 
+_MOTORS = 4
+_LIGHT_S = 0.8
+"""When a cargo that grows heavier is still light enough for three motors, seconds."""
+
 
 def swinging_arm(seed: int) -> Design:
     """An arm that turns over the top of a post; its gripper hangs from a swivel, upright."""
@@ -61,7 +65,23 @@ def swinging_arm(seed: int) -> Design:
 
 def geared_lift(seed: int) -> Design:
     """An arm on a large gear wheel that four powered ones drive, with a counterweight."""
-    begin = _LIFTS_S[seed % len(_LIFTS_S)]
+    return _geared_lift(_LIFTS_S[seed % len(_LIFTS_S)], lasts=1.2)
+
+
+def loaded_lift(seed: int) -> Design:
+    """The same machine with three of its motors: all four jerk, and a light cargo slips off."""
+    return _geared_lift(_LIGHT_S + 0.04 * (seed % 4), lasts=1.3, driven=3)
+
+
+def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design:
+    """A geared arm with a counterweight.
+
+    Args:
+        begin: When it begins to lift, seconds.
+        lasts: For how long it does, seconds.
+        driven: How many of its motors do.
+    """
+    named = "All four motors" if driven == _MOTORS else f"{driven} of the motors"
     draft = Draft(modules="workshop")
     beams, hub, post = _trestle(draft)
     wheel = draft.attach(hub, EAST, "Cog Large Unpowered")
@@ -83,12 +103,12 @@ def geared_lift(seed: int) -> Design:
             )
         },
         control={
-            "control_design": "All four motors lift together, and brake when the key is let go.",
+            "control_design": f"{named} lift together, and brake when the key is let go.",
             "control_config": [
                 {"block": motor, "action": "spinning_forward", "keys": ["UpArrow"]}
-                for motor in motors
+                for motor in motors[:driven]
             ],
-            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": 1.2}],
+            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": lasts}],
         },
     )
 
