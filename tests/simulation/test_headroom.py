@@ -7,6 +7,7 @@ from support.long_tests import long, slow_on_pybullet
 from support.machines.headroom import boom_on_a_base, drafted, propped_beam
 from support.machines.jet_cars import jet_car
 from support.machines.masts import balloons_on_a_mast
+from support.machines.people.bridges import beam
 from support.machines.see_saws import see_saw
 from support.machines.swinging_bars import swinging_bar
 from support.machines.trials import trial
@@ -30,6 +31,16 @@ def test_what_the_gaps_floor_bears_is_no_long_bridge(engine, tasks, task, gap, b
     result, _ = trial(tasks[task], propped_beam(gap, **below), engine, duration_s=6.0)
     assert (result.success, result.indicator) == (False, 0.0)
     assert result.metrics["load_per_mass"] == 0.0
+
+
+@slow_on_pybullet
+@pytest.mark.parametrize(("overlap", "depth"), [(8, 1), (6, 2)])
+def test_debris_that_lies_on_the_floor_takes_nothing_back(engine, tasks, overlap, depth) -> None:
+    machine = beam(30, overlap=overlap, depth=depth)
+    result, path = trial(tasks["support-4"], machine, engine, duration_s=10.0)
+    assert path.bearing.ground.max() > 100.0, "it does come down"
+    assert result.success, result
+    assert result.flags == ()
 
 
 @slow_on_pybullet
