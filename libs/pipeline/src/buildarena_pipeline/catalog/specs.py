@@ -9,10 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, fi
 
 from buildarena_pipeline.catalog.workflows import DEFAULT_WORKFLOW
 from buildarena_simulation import DEFAULT_ENGINE
+from buildarena_simulation.constants import MAX_WORLDS
 from buildarena_store import BudgetLimits
 
 MAX_SEED = 2**53 - 1
-MAX_WORLDS = 16
 """Largest seed: every JSON reader keeps integers up to here exact."""
 
 Worlds = Annotated[

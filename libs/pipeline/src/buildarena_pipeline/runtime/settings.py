@@ -18,9 +18,9 @@ from pydantic_settings import (
     SettingsError,
 )
 
-from buildarena_pipeline.catalog.specs import MAX_WORLDS
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.secret_files import read_secret
+from buildarena_simulation.constants import MAX_WORLDS
 
 PREFIX: Final = "BUILDARENA_"
 DEFAULT_PORT = 8321

@@ -197,7 +197,7 @@ _SHARE: Final = func.coalesce(
     jobs.c.metrics[ROBUSTNESS].as_float(), case((_SUCCESS, 1.0), else_=0.0)
 )
 _GAINED: Final = func.coalesce(
-    jobs.c.metrics[ROBUST_INDICATOR].as_float(), case((_SUCCESS, jobs.c.indicator), else_=0.0)
+    jobs.c.metrics[ROBUST_INDICATOR].as_float(), case((_SUCCESS, jobs.c.indicator), else_=0.0), 0.0
 )
 """As `EndedJob.share` and `EndedJob.gained`."""
 _SUMS: Final = [
