@@ -175,8 +175,9 @@ describe("every figure of the board", () => {
       expect(shown?.[2]).toBe([...new Set(ends)].join("–"));
       for (const [column, name] of [
         [3, "3 mean rank"],
-        [4, "4 success"],
-        [5, "5 USD"],
+        [4, "4 score"],
+        [5, "5 success"],
+        [6, "6 USD"],
       ] as const) {
         expect(
           agree(shown?.[column] ?? "", row[name] ?? ""),
@@ -195,7 +196,8 @@ describe("every figure of the board", () => {
       expect(agree(/^[≥\d.,–-]+/.exec((shown[4] ?? "").replace("≥ ", ""))?.[0] ?? "", row["8 indicator"] ?? "")).toBe(
         true,
       );
-      expect(agree(shown[5] ?? "", row["10 best"] ?? "")).toBe(true);
+      expect(agree(/^-?[\d.]*/.exec(shown[5] ?? "")?.[0] ?? "", row["10 score"] ?? "")).toBe(true);
+      expect(agree(shown[6] ?? "", row["11 best"] ?? "")).toBe(true);
     }
   });
 
