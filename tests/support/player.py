@@ -89,6 +89,7 @@ class Player:
         workflows: dict[str, str] = MappingProxyType({}),  # type: ignore[assignment]
         trajectories: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
         data_sheets: bool = True,
+        worlds: int = 0,
     ) -> Played:
         config = model_config(self.registry, model, Decoding())
         if client is None and not offline:
@@ -119,6 +120,7 @@ class Player:
             pack=pack or PromptPacks().load("default"),
             host=host,
             data_sheets=data_sheets,
+            worlds=worlds,
         )
         try:
             with gate.acquired():

@@ -20,6 +20,13 @@ from buildarena_environment.world import world_text
 from buildarena_geometry import Catalogue, module_set, modules_named
 from buildarena_geometry.feedback.modules import lookup_text, modules_text
 from buildarena_geometry.feedback.words import counted
+from buildarena_simulation.constants import (
+    CARGO_SHIFT,
+    KEY_DELAY_S,
+    START_DROP,
+    START_SHIFT,
+    START_YAW_DEG,
+)
 
 _CONTROL: Final = {
     "agent": (
@@ -75,6 +82,23 @@ def briefing(
         checks=_checks(task),
         modules=modules_told(task.constraints, data_sheets=data_sheets),
         **values,
+    )
+
+
+def worlds_told(worlds: int) -> str:
+    """What a builder reads of the varied worlds that its machine is scored in.
+
+    Args:
+        worlds: How many; with 0 there is nothing to read.
+    """
+    if not worlds:
+        return ""
+    return (
+        f"**Worlds.** What you finish is tried in {counted(worlds, 'further world')} too, drawn "
+        f"afterwards: there it starts up to {START_SHIFT:g} to any side and up to {START_DROP:g} "
+        f"higher, turned by up to {START_YAW_DEG:g}°, a cargo up to {CARGO_SHIFT:g} to any side, "
+        f"and each key goes down and up by up to {KEY_DELAY_S:g} s late. Your score is the mean "
+        "over them, where a failure counts 0: leave some margin."
     )
 
 

@@ -50,28 +50,31 @@ def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
     )
 
 
-def rollout_score(
-    job: Job, record: RolloutRecord, varied: Sequence[RolloutRecord] = ()
-) -> JobScore:
+def varied_rollouts(records: Sequence[RolloutRecord]) -> Sequence[RolloutRecord]:
+    """Those in varied worlds, done or not."""
+    return [record for record in records if record.seed is not None]
+
+
+def rollout_score(job: Job, records: Sequence[RolloutRecord]) -> JobScore:
     """The score of a job.
 
     Args:
         job: The job.
-        record: Its best rollout.
-        varied: Rollouts of the same machine in varied worlds.
+        records: All its rollouts: those in varied worlds are of the best one's machine.
     """
+    record = best_rollout(records)
     success = bool(record.success)
     return JobScore(
         outcome=Outcome.SUCCESS if success else Outcome.UNSUCCESSFUL,
         success=success,
         indicator=float(record.indicator or 0.0),
-        metrics={**(record.metrics or {}), **robustness_metrics(varied)},
+        metrics={**(record.metrics or {}), **_robustness(varied_rollouts(records))},
         flags=record.flags or (),
         manifest=job_manifest(job, record),
     )
 
 
-def robustness_metrics(varied: Sequence[RolloutRecord]) -> Mapping[str, float]:
+def _robustness(varied: Sequence[RolloutRecord]) -> Mapping[str, float]:
     """What a machine did in varied worlds, as metrics of its job; empty without any.
 
     In a world in which it fails, or succeeds in a way that disqualifies, it has done nothing.

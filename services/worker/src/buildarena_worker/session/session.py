@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Score, Task, broken_constraint
-from buildarena_environment.briefing import catalogue_told
+from buildarena_environment.briefing import catalogue_told, worlds_told
 from buildarena_environment.trials import score_text
 from buildarena_geometry import Catalogue, Machine, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
@@ -35,9 +35,10 @@ class Session:
         host: Where answers come from.
         on_turn: Takes every turn, those of stored replies included.
         data_sheets: Whether roles are told the numbers of modules and world.
+        worlds: In how many varied worlds what is built is scored.
 
     Attributes:
-        additions: What follows the task's statement: an example, results of rounds.
+        additions: What follows the task's statement: varied worlds, an example, results of rounds.
         machine: What is being built.
         plan: What the plan says of the whole machine, "" without one.
     """
@@ -52,6 +53,7 @@ class Session:
         host: SessionHost,
         on_turn: OnTurn | None = None,
         data_sheets: bool = True,
+        worlds: int = 0,
     ) -> None:
         self.task = task
         self.data_sheets = data_sheets
@@ -59,7 +61,7 @@ class Session:
         self.pack = pack
         self.host = host
         self.transcript = Transcript()
-        self.additions: list[str] = []
+        self.additions = [worlds_told(worlds)] if worlds else []
         self.machine: Machine | None = None
         self.plan = ""
         self._model_config = model_config
