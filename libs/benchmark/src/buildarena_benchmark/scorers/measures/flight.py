@@ -77,8 +77,11 @@ class Flight:
 
     def holds(self, *, without: Flag | None = None) -> Mask:
         """(T,) whether it flies steadily by all rules, or by all but one."""
-        kept = [mask for flag, mask in self.rules.items() if flag != without]
-        return np.all([self.steady, *kept], axis=0)
+        holds = self.steady
+        for flag, mask in self.rules.items():
+            if flag != without:
+                holds = holds & mask
+        return holds
 
     def flags(self, passes: Callable[[Mask], bool]) -> dict[Flag, bool]:
         """Which single rule a trial failed by.
