@@ -17,9 +17,9 @@ from buildarena_environment.trials import try_machine
 from buildarena_geometry import Machine
 
 FORGETFUL: Final[Mapping[str, float]] = MappingProxyType(
-    {"strong": 0.0, "middling": 0.05, "weak": 0.3}
+    {"strong": 0.0, "middling": 1.0, "weak": 8.0}
 )
-"""The share of steps that each model forgets."""
+"""How many steps of a machine each model forgets, on average."""
 _OUTCOMES: Final = ("unsuccessful", "success")
 
 
@@ -35,8 +35,9 @@ def job_of(task: Task, model: str, seed: int, *, worlds: Sequence[int], engine: 
     """
     environment = Environment(task, simulator=engine)
     forgotten = np.random.default_rng([seed, crc32(model.encode()), crc32(task.name.encode())])
-    for made in calls_of(task.name, seed):
-        if forgotten.random() >= FORGETFUL[model]:
+    calls = calls_of(task.name, seed)
+    for made in calls:
+        if forgotten.random() >= FORGETFUL[model] / len(calls):
             # What hangs on a forgotten step is refused, as a model's own slips are.
             environment.step(made["tool"], made["arguments"], machine=made["machine"])
     try:
