@@ -1,7 +1,7 @@
 """Measures on how many tasks a board separates a strong, a middling and a weak model.
 
-The models build as the expert does and forget none, some and many of its steps. Each plays a number
-of jobs of every task, and is ranked as a service ranks it.
+All build as the expert does; the weak one forgets some of the steps in every job, the middling one
+in every second. Each plays a number of jobs of every task, and is ranked as a service ranks it.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.figures import keep
-from support.boards.apprentices import FORGETFUL, job_of
+from support.boards.apprentices import APPRENTICES, job_of
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import BoardQuery, TrackBoard
@@ -36,7 +36,7 @@ def main() -> int:
     tasks = {name: builtin_tasks()[name] for name in options.tasks}
     ranked = TrackBoard({name: task.version for name, task in tasks.items()}, {})
     for number, (name, task) in enumerate(tasks.items()):
-        for model in FORGETFUL:
+        for model in APPRENTICES:
             for seed in range(options.jobs):
                 first = (number * options.jobs + seed) * options.worlds
                 worlds = range(first, first + options.worlds)
@@ -45,7 +45,7 @@ def main() -> int:
         sys.stdout.write(f"{name:14s} {row['ranks']}  {row['success']}\n")
         sys.stdout.flush()
     rows = _rows(ranked, list(tasks))
-    separated = sum(len(set(row["ranks"].values())) == len(FORGETFUL) for row in rows)
+    separated = sum(len(set(row["ranks"].values())) == len(APPRENTICES) for row in rows)
     ends = sum(row["ranks"]["strong"] < row["ranks"]["weak"] for row in rows)
     sys.stdout.write(
         f"all three ranks differ on {separated} of {len(rows)} tasks (bar {BAR}), "
@@ -65,11 +65,11 @@ def _rows(ranked: TrackBoard, names: Sequence[str]) -> list[dict[str, Any]]:
         found.append(
             {
                 "task": name,
-                "ranks": {model: rows[model].rank for model in FORGETFUL},
+                "ranks": {model: rows[model].rank for model in APPRENTICES},
                 "success": {
-                    model: round(rows[model].cell.success_rate or 0, 3) for model in FORGETFUL
+                    model: round(rows[model].cell.success_rate or 0, 3) for model in APPRENTICES
                 },
-                "indicator": {model: rows[model].cell.indicator_mean for model in FORGETFUL},
+                "indicator": {model: rows[model].cell.indicator_mean for model in APPRENTICES},
             }
         )
     return found

@@ -1,4 +1,4 @@
-"""Models of known strength: they build what the expert builds, and forget some of its steps."""
+"""Models of known strength: they build as the expert does, and in some jobs forget steps."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from buildarena_environment import Environment, NothingToSubmitError
 from buildarena_environment.trials import try_machine
 from buildarena_geometry import Machine
 
-FORGETFUL: Final[Mapping[str, float]] = MappingProxyType(
-    {"strong": 0.0, "middling": 1.0, "weak": 8.0}
-)
-"""How many steps of a machine each model forgets, on average."""
+APPRENTICES: Final[Mapping[str, int]] = MappingProxyType({"strong": 0, "middling": 2, "weak": 1})
+"""By model: in every how manyth job it forgets steps; 0 for none."""
+FORGOTTEN: Final = 8
+"""How many steps are forgotten then, on average."""
 _OUTCOMES: Final = ("unsuccessful", "success")
 
 
@@ -28,16 +28,17 @@ def job_of(task: Task, model: str, seed: int, *, worlds: Sequence[int], engine: 
 
     Args:
         task: One of the built-in tasks.
-        model: One of `FORGETFUL`.
+        model: One of `APPRENTICES`.
         seed: Of the job: what is forgotten, and how the expert varies its design.
         worlds: Seeds of the varied worlds.
         engine: What simulates.
     """
     environment = Environment(task, simulator=engine)
     forgotten = np.random.default_rng([seed, crc32(model.encode()), crc32(task.name.encode())])
-    calls = calls_of(task.name, seed)
+    calls, every = calls_of(task.name, seed), APPRENTICES[model]
+    share = FORGOTTEN / len(calls) if every and seed % every == 0 else 0.0
     for made in calls:
-        if forgotten.random() >= FORGETFUL[model] / len(calls):
+        if forgotten.random() >= share:
             # What hangs on a forgotten step is refused, as a model's own slips are.
             environment.step(made["tool"], made["arguments"], machine=made["machine"])
     try:
