@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any, Final
 
+from buildarena_benchmark import Task
 from buildarena_environment import ASSEMBLY
 from buildarena_environment.tools import OBJECTION
 from buildarena_geometry import Catalogue, Machine, RefusalClass
@@ -31,15 +32,19 @@ BEFORE_THE_MACHINE: Final = frozenset({"parallel_calls", "unknown_action"})
 """Refusals of the session, which the machine never heard of."""
 
 
-def replay_of_turns(turns: Sequence[Turn]) -> Replay:
+def replay_of_turns(turns: Sequence[Turn], task: Task | None = None) -> Replay:
     """What the actions of a transcript, done again, build.
 
     Of a session in several rounds it tells the last one. What a controller programs is no action,
     so it is not in it.
+
+    Args:
+        turns: Those of the transcript.
+        task: The job's, drawn by its seed: it may give the machine that is built on.
     """
     if turns and turns[0]["stage"] == EXTERNAL:
-        return _replay_of_calls(turns)
-    session = _Session(_offered(turns))
+        return _replay_of_calls(turns, task)
+    session = _Session(_offered(turns), task)
     for (phase, part), dialogue in groupby(turns, key=place):
         session.play(phase, part, list(dialogue))
     return Replay(
@@ -66,9 +71,9 @@ def _offered(turns: Sequence[Turn]) -> Catalogue:
     )
 
 
-def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
+def _replay_of_calls(turns: Sequence[Turn], task: Task | None) -> Replay:
     """An agent's machines grow side by side, each in a chapter of its own."""
-    bench = Workbench(_offered(turns), on_demand=True)
+    bench = Workbench(_offered(turns), on_demand=True, task=task)
     recorder, chapters = Recorder(), dict[str, Chapter]()
     for turn in turns:
         name = str(turn["sub_structure"])
@@ -90,8 +95,9 @@ def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
 class _Session:
     """The machines of a model's session, dialogue by dialogue."""
 
-    def __init__(self, catalogue: Catalogue) -> None:
+    def __init__(self, catalogue: Catalogue, task: Task | None) -> None:
         self._catalogue = catalogue
+        self._task = task
         self.chapters: dict[str, Chapter] = {}
         self.recorder = Recorder()
         self.machine: Machine | None = None
@@ -152,6 +158,8 @@ class _Session:
         self.recorder.record(chapter, turn, action["name"], action["arguments"])
 
     def _empty(self, available: Mapping[str, Machine] | None = None) -> Machine:
+        if available is None and self._task is not None:
+            return self._task.new_machine(self._catalogue)
         return Machine(catalogue=self._catalogue, available=available)
 
     def _is_anew(self, chapter: Chapter, action: Mapping[str, Any]) -> bool:
