@@ -26,6 +26,13 @@ def test_the_seed_draws_the_machine_that_stands_there() -> None:
     assert environment.step(LOOK).feedback == told[3]
 
 
+def test_it_is_told_that_a_machine_stands_there_and_that_keys_are_pressed_already() -> None:
+    text = Environment(TASK).observation.briefing
+    assert "A machine stands in `main` already" in text
+    assert "You write the key presses" not in text
+    assert "A machine stands in" not in Environment("transport-1").observation.briefing
+
+
 def test_an_edit_too_many_is_refused_with_the_number_and_changes_nothing() -> None:
     environment = Environment(TASK, seed=1)
     assert environment.step(LOOK).ok
