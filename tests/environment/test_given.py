@@ -90,7 +90,7 @@ def test_a_drawn_task_comes_through_text_as_it_is() -> None:
     own = replace(known, name="own-repair")
     for task in (known, known.drawn(7), own, own.drawn(8), builtin_tasks()["support-1"]):
         again = task_from(text_of(task))
-        assert (again.name, again.seed, again.given) == (task.name, task.seed, task.given)
+        assert (again.name, again.seed, again.beginning) == (task.name, task.seed, task.beginning)
     assert parse_task(text_of(own), origin="x").version == known.version
     assert reference_of(known.drawn(7)) == reference_of(known)
 

@@ -21,7 +21,7 @@ def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, see
     result, _ = trial(task, faulty(task), engine)
     assert broken_constraint(task, faulty(task)) is None
     assert (result.success, result.indicator) == (False, 0.0), result
-    result, _ = trial(task, whole_machine(task.given, seed), engine)
+    result, _ = trial(task, whole_machine(task.beginning, seed), engine)
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
 
 
@@ -66,7 +66,7 @@ def test_a_fault_that_stays_keeps_it_from_driving_straight(engine, tasks, seed) 
 def test_a_car_that_is_thrown_far_is_not_driven(engine, tasks) -> None:
     """Where its keys are never pressed, nothing that happens to it counts."""
     task = tasks["repair-1"].drawn(0)
-    machine = whole_machine(task.given, 0)
+    machine = whole_machine(task.beginning, 0)
     path = simulate(machine, task.scenario, engine, controls=())
     thrown = path.positions.copy()
     thrown[:, :, 1] += 10.0 * path.time_s[:, None].astype(thrown.dtype)
@@ -87,12 +87,12 @@ def test_a_new_car_drives_straight_and_is_refused(engine, tasks) -> None:
 
 def test_the_car_of_another_seed_is_refused(tasks) -> None:
     for seed in range(1, 6):
-        whole = whole_machine(tasks["repair-1"].given, seed)
+        whole = whole_machine(tasks["repair-1"].beginning, seed)
         assert broken_constraint(tasks["repair-1"].drawn(0), whole) is not None
 
 
 def test_all_faults_are_on_one_side_and_each_is_one_edit(tasks) -> None:
-    given, sides, faults, sizes = tasks["repair-1"].given, set(), set(), set()
+    given, sides, faults, sizes = tasks["repair-1"].beginning, set(), set(), set()
     for seed in range(60):
         car = drawn_car(seed, given.faults)
         wrong = [wheel for wheel in car.wheels if wheel.fault]
@@ -127,7 +127,7 @@ def test_what_is_undone_is_no_edit_and_what_is_put_back_is_two(tasks) -> None:
 
 def test_its_log_tells_no_fault(tasks) -> None:
     """A machine's document holds the actions that built it: none of them takes anything away."""
-    given = tasks["repair-1"].given
+    given = tasks["repair-1"].beginning
     for seed in range(10):
         names = {record.name for record in given_machine(given, seed).log}
         assert names <= {

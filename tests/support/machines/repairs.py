@@ -14,8 +14,8 @@ from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, WEST
 
 def faulty(task: Task) -> Machine:
     """The car of a task as a builder gets it."""
-    assert task.given is not None
-    return given_machine(task.given, task.seed)
+    assert task.beginning is not None
+    return given_machine(task.beginning, task.seed)
 
 
 def repaired(task: Task, count: int | None = None) -> Machine:
@@ -34,8 +34,8 @@ def wheels_of(machine: Machine, side: int) -> list[Block]:
 
 
 def faulty_side(task: Task) -> int:
-    assert task.given is not None
-    return next(w.side for w in drawn_car(task.seed, task.given.faults).wheels if w.fault)
+    assert task.beginning is not None
+    return next(w.side for w in drawn_car(task.seed, task.beginning.faults).wheels if w.fault)
 
 
 def without_that_side(task: Task) -> Machine:

@@ -155,12 +155,12 @@ def _wrong_frame(task: Task, machine: Machine) -> str | None:
 
 def too_much_changed(task: Task, machine: Machine) -> str | None:
     """Whether a machine is no longer the one that was given, but for the edits that are allowed."""
-    if task.given is None:
+    if task.beginning is None:
         return None
-    given = given_machine(task.given, task.seed)
-    if has_other_presses(given, machine):
+    original = given_machine(task.beginning, task.seed)
+    if has_other_presses(original, machine):
         return "the key presses are given with the machine and stay as they are"
-    edits, most = edits_between(given, machine), task.given.edits
+    edits, most = edits_between(original, machine), task.beginning.edits
     if edits > most:
         return f"the machine differs from the given one by {edits} edits, the task allows {most}"
     return None
@@ -247,4 +247,4 @@ _CHECKS: Final[tuple[Check, ...]] = (
 
 def _checks(task: Task) -> tuple[Check, ...]:
     """The checks of a task: where no machine is given, none can be changed too much."""
-    return _CHECKS if task.given is None else (*_CHECKS, _violated(too_much_changed))
+    return _CHECKS if task.beginning is None else (*_CHECKS, _violated(too_much_changed))

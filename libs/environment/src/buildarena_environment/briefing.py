@@ -133,7 +133,7 @@ def _text(trials: str, guidelines: str) -> str:
 
 
 def _control(task: Task) -> str:
-    if task.given is not None:
+    if task.beginning is not None:
         return _GIVEN.format(main=MAIN)
     return _CONTROL[task.control].format(from_s=task.scenario.control.from_s)
 

@@ -22,7 +22,7 @@ def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
         task: The task.
         machine: What is built.
     """
-    if task.given is None:
+    if task.beginning is None:
         return machine.act
 
     def act(name: object, arguments: Any = None) -> Outcome:

@@ -162,8 +162,8 @@ def _grown(
     return order
 
 
-def _beside(one: tuple[int, int], other: tuple[int, int]) -> bool:
-    return abs(one[0] - other[0]) + abs(one[1] - other[1]) == 1
+def _beside(first: tuple[int, int], second: tuple[int, int]) -> bool:
+    return abs(first[0] - second[0]) + abs(first[1] - second[1]) == 1
 
 
 def _mounted(machine: Machine, base: str, wheel: Wheel) -> None:

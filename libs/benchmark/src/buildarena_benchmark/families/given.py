@@ -14,7 +14,7 @@ from buildarena_benchmark.fields import Document
 from buildarena_geometry import Block, Catalogue, Machine
 
 
-class Given(Document):
+class Beginning(Document):
     """What a builder begins with: a machine with faults, drawn by the job's seed.
 
     Attributes:
@@ -29,52 +29,52 @@ class Given(Document):
 
 
 @lru_cache(maxsize=256)
-def _machines(given: Given, seed: int) -> tuple[Machine, Machine]:
-    car = drawn_car(seed, given.faults)
+def _machines(beginning: Beginning, seed: int) -> tuple[Machine, Machine]:
+    car = drawn_car(seed, beginning.faults)
     return built(car), built(car.whole)
 
 
-def given_machine(given: Given, seed: int, catalogue: Catalogue | None = None) -> Machine:
+def given_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None = None) -> Machine:
     """The machine with its faults; its log is that of a builder who built it so.
 
     Args:
-        given: What is drawn.
+        beginning: What is drawn.
         seed: The job's.
         catalogue: What may be built on with; the basic modules if left out.
     """
-    machine = _machines(given, seed)[0]
+    machine = _machines(beginning, seed)[0]
     if catalogue is None:
         return machine.copy()
     logged = machine.logged
     return Machine.restored(replace(logged, state=replace(logged.state, catalogue=catalogue)))
 
 
-def whole_machine(given: Given, seed: int) -> Machine:
+def whole_machine(beginning: Beginning, seed: int) -> Machine:
     """The same machine without its faults."""
-    return _machines(given, seed)[1].copy()
+    return _machines(beginning, seed)[1].copy()
 
 
-def edits_between(given: Machine, machine: Machine) -> int:
+def edits_between(original: Machine, machine: Machine) -> int:
     """By how many edits a machine differs from the one that was given.
 
     Each block and each connector that is gone or new is one edit; so is each that stayed and is
     another one, lies or stands otherwise, or turns the other way, and each whose keys are others.
     What was undone is no edit. Ids are never used twice: what is taken away and put back is two.
     """
-    before, after = given.blocks, machine.blocks
+    before, after = original.blocks, machine.blocks
     count = len(before.keys() ^ after.keys())
     for name in before.keys() & after.keys():
-        one, other = before[name], after[name]
-        moved = _shape(one) != _shape(other) or other.mount not in (None, one.mount)
-        count += moved + (_keys(one) != _keys(other))
-    old, new = given.connectors, machine.connectors
+        was, is_now = before[name], after[name]
+        moved = _shape(was) != _shape(is_now) or is_now.mount not in (None, was.mount)
+        count += moved + (_keys(was) != _keys(is_now))
+    old, new = original.connectors, machine.connectors
     count += len(old.keys() ^ new.keys())
     return count + sum(old[name] != new[name] for name in old.keys() & new.keys())
 
 
-def has_other_presses(given: Machine, machine: Machine) -> bool:
+def has_other_presses(original: Machine, machine: Machine) -> bool:
     """Whether the key presses are not those of the machine that was given, in any order."""
-    return Counter(given.control_sequence) != Counter(machine.control_sequence)
+    return Counter(original.control_sequence) != Counter(machine.control_sequence)
 
 
 def _shape(block: Block) -> tuple[object, ...]:

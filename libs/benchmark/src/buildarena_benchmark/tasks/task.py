@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
-from buildarena_benchmark.families.given import Given, given_machine
+from buildarena_benchmark.families.given import Beginning, given_machine
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Scenario
@@ -49,7 +49,7 @@ class Task:
     scoring: Scoring
     indicator: Indicator
     difficulty: Mapping[str, int]
-    given: Given | None = None
+    beginning: Beginning | None = None
     seed: int = 0
 
     @property
@@ -64,13 +64,13 @@ class Task:
 
     def drawn(self, seed: int) -> Self:
         """The task as a job of this seed has it; the same for all unless something is drawn."""
-        return self if self.given is None else replace(self, seed=seed)
+        return self if self.beginning is None else replace(self, seed=seed)
 
     def new_machine(self, catalogue: Catalogue) -> Machine:
         """What a builder begins with: an empty machine, or the one that is given."""
-        if self.given is None:
+        if self.beginning is None:
             return Machine(catalogue=catalogue)
-        return given_machine(self.given, self.seed, catalogue)
+        return given_machine(self.beginning, self.seed, catalogue)
 
     def as_document(self) -> Mapping[str, Any]:
         """All fields of a task file, defaults included, as JSON values."""
@@ -84,7 +84,7 @@ class Task:
                 part: getattr(self, part).model_dump(mode="json")
                 for part in ("constraints", "scenario", "scoring", "indicator")
             },
-            **({"given": self.given.model_dump(mode="json")} if self.given else {}),
+            **({"beginning": self.beginning.model_dump(mode="json")} if self.beginning else {}),
             "difficulty": dict(self.difficulty) or None,
         }
 
@@ -104,13 +104,13 @@ def task_of(document: TaskDocument) -> Task:
         scoring=document.scoring,
         indicator=document.indicator,
         difficulty=MappingProxyType(weights),
-        given=document.given,
+        beginning=document.beginning,
     )
 
 
 def _version_of(document: TaskDocument) -> str:
     content = document.model_dump(
-        mode="json", include={"statement", "constraints", "given", "scenario", "scoring"}
+        mode="json", include={"statement", "constraints", "beginning", "scenario", "scoring"}
     )
     del content["constraints"]["module_list"]
     if document.constraints.on_demand:

@@ -59,6 +59,12 @@ def place(turn: Turn) -> tuple[str, str | None]:
     return (turn["stage"], turn.get("sub_structure"))
 
 
+def _is_refused_by_session(action: Mapping[str, Any], task: Task | None) -> bool:
+    """Whether an action was refused by the session, or may have been: by the edits of its task."""
+    given = task is not None and task.beginning is not None
+    return not action["ok"] and (given or action["reason"] in BEFORE_THE_MACHINE)
+
+
 def _offered(turns: Sequence[Turn]) -> Catalogue:
     """The smallest set with the modules that a transcript's actions name and were given."""
     actions = [action for turn in turns for action in turn["actions"]]
@@ -81,6 +87,9 @@ def _replay_of_calls(turns: Sequence[Turn], task: Task | None) -> Replay:
             kind: Kind = "assembly" if name == ASSEMBLY else "sub_structure"
             chapters[name] = Chapter(name=name, kind=kind, machine=bench.machine(name))
         for action in turn["actions"]:
+            if _is_refused_by_session(action, task):
+                chapters[name].steps.append(refused_step(turn["index"], action))
+                continue
             recorder.record(chapters[name], turn["index"], action["name"], action["arguments"])
     if len(chapters) == 1:
         next(iter(chapters.values())).kind = "machine"
@@ -148,7 +157,7 @@ class _Session:
     def _act(self, chapter: Chapter, turn: int, action: Mapping[str, Any]) -> None:
         if action["name"] == OBJECTION.name:
             return
-        if not action["ok"] and action["reason"] in BEFORE_THE_MACHINE:
+        if _is_refused_by_session(action, self._task):
             chapter.steps.append(refused_step(turn, action))
             return
         if action["ok"] and chapter.kind == "machine" and self._is_anew(chapter, action):

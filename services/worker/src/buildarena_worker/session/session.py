@@ -78,7 +78,7 @@ class Session:
     @property
     def _given(self) -> list[str]:
         """The machine that the task gives, as the tools tell it."""
-        if self.task.given is None:
+        if self.task.beginning is None:
             return []
         machine = self.task.new_machine(self.catalogue)
         told = [machine.act(name, {}).text for name in GIVEN_IS_TOLD_BY]

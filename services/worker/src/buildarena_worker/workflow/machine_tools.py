@@ -53,7 +53,7 @@ ASSEMBLE = (
 
 def building(task: Task) -> Sequence[str]:
     """The names of a builder's tools."""
-    return BUILD if task.given is None else (*BUILD, *MEND)
+    return BUILD if task.beginning is None else (*BUILD, *MEND)
 
 
 def tools_named(names: Sequence[str]) -> list[ToolDefinition]:

@@ -22,16 +22,16 @@ def repaired_car(seed: int) -> Design:
         seed: The job's: it draws the car.
     """
     task = builtin_tasks()["repair-1"].drawn(seed)
-    assert task.given is not None  # noqa: S101 - the task's own file
+    assert task.beginning is not None  # noqa: S101 - the task's own file
     draft = Draft()
     draft.machine = task.new_machine(draft.machine.catalogue)
-    car = drawn_car(seed, task.given.faults)
+    car = drawn_car(seed, task.beginning.faults)
     # Blocks other than wheels were built in the order of their places.
     places = dict(zip(car.blocks, draft.machine.blocks, strict=False))
     for wheel in car.wheels:
         if wheel.fault:
             _mend(draft, places[wheel.place], wheel)
-    described = f"The car, of which {task.given.faults} wheels are put right"
+    described = f"The car, of which {task.beginning.faults} wheels are put right"
     return Design(
         overall="The car that stands there, repaired.",
         parts={"car": PartDesign(description=described, actions=tuple(draft.actions))},
