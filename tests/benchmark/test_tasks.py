@@ -38,15 +38,16 @@ HEADROOM = [
     *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
     *("flight-3", "lift-4", "mechanisms-7"),
 ]
+FAMILIES = ["budget-1", "repair-1"]
 
 
-def test_there_are_the_papers_tasks_those_of_the_workshop_and_those_with_headroom(tasks) -> None:
+def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
-    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM]
+    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES]
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         kind, _, level = name.rpartition("-")
-        category = "headroom" if name in HEADROOM else kind
+        category = "headroom" if name in HEADROOM else "families" if name in FAMILIES else kind
         assert (task.category, task.level) == (category, int(level))
         assert set(task.difficulty) == DIMENSIONS
         assert all(1 <= weight <= 3 for weight in task.difficulty.values())
@@ -87,7 +88,7 @@ def test_a_statement_tells_what_the_scorer_measures(tasks) -> None:
             assert "four powered wheels" in text
 
 
-@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM])
+@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM, *FAMILIES])
 def test_a_statement_tells_every_threshold(tasks, name) -> None:
     task = tasks[name]
     text = " ".join(task.statement.split())

@@ -114,7 +114,7 @@ class Player:
                 first_wait_s=0.001,
             )
         session = Session(
-            task=builtin_tasks()[task] if isinstance(task, str) else task,
+            task=(builtin_tasks()[task] if isinstance(task, str) else task).drawn(seed),
             seed=seed,
             model_config=config,
             pack=pack or PromptPacks().load("default"),

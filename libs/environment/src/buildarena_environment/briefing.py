@@ -39,6 +39,12 @@ _CONTROL: Final = {
     "none": "No key is pressed in this trial, so you need not bind any.",
 }
 
+_GIVEN: Final = (
+    "A machine stands in `{main}` already, with its keys and its key presses: your first call "
+    "finds it there, and you change it."
+)
+"""What a task with a given machine says of control; its statement says the rest."""
+
 _CHECKS: Final = {
     "always": (
         "There is more than the starting block. Joints that hold and connectors join every part to "
@@ -74,7 +80,7 @@ def briefing(
     """
     return Template(_text(trials, guidelines)).substitute(
         task=task.name,
-        control=_CONTROL[task.control].format(from_s=task.scenario.control.from_s),
+        control=_control(task),
         statement=task.statement.strip(),
         sub_structures=_sub_structures(task),
         main=MAIN,
@@ -148,6 +154,12 @@ def _text(trials: str, guidelines: str) -> str:
     return (
         frame.strip().replace("$trials", trials).replace("$guidelines", guidelines.strip()) + "\n"
     )
+
+
+def _control(task: Task) -> str:
+    if task.beginning is not None:
+        return _GIVEN.format(main=MAIN)
+    return _CONTROL[task.control].format(from_s=task.scenario.control.from_s)
 
 
 def _sub_structures(task: Task) -> str:

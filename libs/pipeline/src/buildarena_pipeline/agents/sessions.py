@@ -291,7 +291,8 @@ class ExternalSessions:
         return rebuild(calls, self._task(job), data_sheets=data_sheets)
 
     def _task(self, job: Job) -> Task | None:
-        return self._context.tasks.exact(job.task, job.task_version)
+        task = self._context.tasks.exact(job.task, job.task_version)
+        return None if task is None else task.drawn(job.seed)
 
     def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:

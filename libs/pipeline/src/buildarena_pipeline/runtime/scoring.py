@@ -18,7 +18,7 @@ from buildarena_store import Job, JobScore, Outcome, RolloutRecord
 
 
 def task_of(job: Job, catalogue: TaskCatalog) -> Task:
-    """The job's task, in the version that the job was submitted for.
+    """The job's task, in the version that the job was submitted for, drawn by its seed.
 
     Raises:
         PermanentError: It is gone, or is no longer scored as it was.
@@ -29,7 +29,7 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
             f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
             reason="task_changed",
         )
-    return task
+    return task.drawn(job.seed)
 
 
 def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
