@@ -83,7 +83,6 @@ def _as_support(scoring: BudgetScoring, scenario: Scenario) -> support.SupportSc
         fall_height=scoring.fall_height,
         min_time_s=cargo.ramp_start_s + cargo.ramp_s if cargo else 0.0,
         max_start_height=scoring.max_start_height,
-        span_until="collapse",
     )
 
 
