@@ -52,6 +52,8 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # What is no test of varied worlds has its machines tried once.
+    os.environ.setdefault("BUILDARENA_WORLDS", "0")
     if hasattr(config, "workerinput") or config.option.collectonly:
         return
     with ExitStack() as stack:

@@ -39,8 +39,20 @@ ROOM_S = 2.0
 """Within so long another key's session starts beside forty that hang."""
 MANY = 36
 """Of 40 slots one key gets a few less while another has a session."""
+CALM_LOOKS, CALM_EVERY_S = 3, 0.5
+"""So many looks must show the same before nothing is under way any more."""
 END_S = 3.0
 """Within so long a cancelled session's request ends."""
+
+
+def _settled(arena: Arena) -> Any:
+    """What the database holds once nothing of the service's own is under way."""
+    seen, same = everything(arena.database), 0
+    while same < CALM_LOOKS:
+        time.sleep(CALM_EVERY_S)
+        now = everything(arena.database)
+        seen, same = now, same + 1 if now == seen else 0
+    return seen
 
 
 def other_tenants(arena: Arena) -> Tried:
@@ -68,8 +80,7 @@ def other_tenants(arena: Arena) -> Tried:
         ("POST", "/v1/archives", {"content": b"PK"}),
     ]
     found = Tried(f"{len(tries)} commands over another key's things")
-    time.sleep(1.5)  # until nothing of the service's own is under way
-    before = everything(arena.database)
+    before = _settled(arena)
     answers = Counter(thief.ask(m, path, **more).status_code for m, path, more in tries)
     found.refused = f"answers {dict(sorted(answers.items()))}"
     found.require(set(answers) <= {403, 409}, "a command over another key's things was accepted")

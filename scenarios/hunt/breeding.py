@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenarios.hunt.genome import Genome
+from scenarios.hunt.kinds import kind_of
 from scenarios.hunt.mutation import crossed, mutated
 from scenarios.hunt.trial import Finding, Scorer, tried
 from threadpoolctl import threadpool_limits
-
-from buildarena_benchmark import builtin_tasks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,6 +28,6 @@ def made(child: Child) -> Finding | None:
     if len(child.parents) > 1:
         genome = crossed(genome, child.parents[1], draw)
     if child.changed:
-        genome = mutated(genome, builtin_tasks()[child.task].category, draw)
+        genome = mutated(genome, kind_of(child.task), draw)
     with threadpool_limits(limits=1):
         return tried(child.task, genome, child.scorer)

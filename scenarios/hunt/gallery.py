@@ -8,13 +8,14 @@ from typing import Any, Final
 
 from scenarios.hunt.confirming import Confirmed
 from scenarios.hunt.genome import Genome
+from scenarios.hunt.kinds import KINDS, kind_of
 from scenarios.hunt.trial import FULL_MARKS, Finding
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_simulation import SIMULATION_VERSION
 
 BEST: Final = 10
-"""Machines of a category in the index."""
+"""Machines of a kind in the index."""
 
 _HEAD: Final = "| machine | task | parts | MuJoCo | PyBullet | seeds | flags | checks |\n|" + (
     "---|" * 8
@@ -88,13 +89,13 @@ class Gallery:
         path.write_text(json.dumps(content) + "\n", encoding="utf-8")
 
     def write_index(self, confirmed: Iterable[Confirmed]) -> Path:
-        """Writes the index: first what is suspicious, then the best of each category."""
+        """Writes the index: first what is suspicious, then the best of each kind."""
         good = [found for found in confirmed if found.success]
         lines = ["# What the hunt found", "", "## Suspects", ""]
         lines += _table(ranked([f for f in good if f.suspicions])) or ["None.", ""]
-        for category in ("support", "transport", "lift", "mechanisms", "flight"):
-            best = best_of(good, category)
-            lines += [f"## Best of {category}", "", *(_table(best) or ["None.", ""])]
+        for kind in KINDS:
+            best = best_of(good, kind)
+            lines += [f"## Best of {kind}", "", *(_table(best) or ["None.", ""])]
             lines += [f"![{f.task} {f.key}](machines/{f.task}-{f.key}.png)\n" for f in best]
         path = self.folder / "index.md"
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -104,10 +105,9 @@ class Gallery:
         return self.folder / "archives" / f"{task}.json"
 
 
-def best_of(confirmed: Iterable[Confirmed], category: str) -> list[Confirmed]:
-    """The best successes of a category, each by its task's full marks."""
-    tasks = builtin_tasks()
-    return ranked([f for f in confirmed if tasks[f.task].category == category])[:BEST]
+def best_of(confirmed: Iterable[Confirmed], kind: str) -> list[Confirmed]:
+    """The best successes of a kind of task, each by its task's full marks."""
+    return ranked([f for f in confirmed if kind_of(f.task) == kind])[:BEST]
 
 
 def ranked(confirmed: Iterable[Confirmed]) -> list[Confirmed]:

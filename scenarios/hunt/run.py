@@ -13,6 +13,7 @@ from typing import Final
 
 from scenarios.hunt.confirming import Confirmed, Order, confirmed
 from scenarios.hunt.gallery import Gallery, best_of, line_of, ranked
+from scenarios.hunt.kinds import kind_of
 from scenarios.hunt.search import Crew, TaskSearch, hunted
 from scenarios.hunt.seeds import seeds_of
 from scenarios.hunt.trial import Finding
@@ -90,8 +91,8 @@ def _tell(searches: dict[str, TaskSearch], known: list[Confirmed], gallery: Gall
     good = [found for found in known if found.success]
     suspects = ranked([found for found in good if found.suspicions])
     _say(f"suspects: {len(suspects)}", *map(line_of, suspects))
-    for category in sorted({builtin_tasks()[task].category for task in searches}):
-        _say(f"best of {category}", *map(line_of, best_of(good, category)))
+    for kind in sorted({kind_of(task) for task in searches}):
+        _say(f"best of {kind}", *map(line_of, best_of(good, kind)))
     for task, search in searches.items():
         wins = sum(found.success for found in search.elites)
         _say(f"{task}: {search.trials} trials, {len(search.elites)} kinds, {wins} succeed")

@@ -1,4 +1,4 @@
-"""What the search starts from: the reference machines and the past exploits of a category."""
+"""What the search starts from: the reference machines and the past exploits of a kind of task."""
 
 import json
 import sys
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenarios.hunt.genome import Genome, grown
+from scenarios.hunt.kinds import kind_of
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
@@ -54,13 +55,11 @@ def exploits(folder: Path = EXPLOITS) -> list[Exploit]:
 
 
 def seeds_of(task_name: str) -> list[Genome]:
-    """Genomes to start from: all that suit the task's category and number of sub-structures."""
-    tasks = builtin_tasks()
-    task = tasks[task_name]
-    whole = task.constraints.min_sub_structures < 2
+    """Genomes to start from: all that suit the task's kind and number of sub-structures."""
+    whole = builtin_tasks()[task_name].constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
     for other, genome in _stored():
-        if tasks[other].category == task.category and bool(genome.sub_structures) != whole:
+        if kind_of(other) == kind_of(task_name) and bool(genome.sub_structures) != whole:
             found.append(genome)
     return found
 

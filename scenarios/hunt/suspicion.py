@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scenarios.hunt.kinds import kind_of
 
 from buildarena_benchmark import Score, Task
 from buildarena_geometry import Machine
@@ -57,7 +58,7 @@ Check = Callable[[Evidence], bool]
 
 def suspicions(evidence: Evidence) -> tuple[str, ...]:
     """Names of the checks that find a success odd, the general ones last."""
-    checks = {**CHECKS.get(evidence.task.category, {}), **GENERAL}
+    checks = {**CHECKS.get(kind_of(evidence.task.name), {}), **GENERAL}
     return tuple(name for name, check in checks.items() if check(evidence))
 
 
@@ -229,7 +230,7 @@ def _luck(evidence: Evidence) -> bool:
 def _falls_apart(evidence: Evidence) -> bool:
     """A vehicle or rocket of which less than half still holds together at the end."""
     pieces = evidence.trajectory.pieces
-    if pieces is None or not pieces.size or evidence.task.category == "support":
+    if pieces is None or not pieces.size or kind_of(evidence.task.name) == "support":
         return False
     return bool(np.unique(pieces[-1], return_counts=True)[1].max() < 0.5 * pieces.shape[1])
 

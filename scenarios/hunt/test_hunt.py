@@ -9,12 +9,13 @@ from scenarios.hunt import run as hunt
 from scenarios.hunt.confirming import Order, confirmed
 from scenarios.hunt.gallery import Gallery
 from scenarios.hunt.genome import Genome, grown
+from scenarios.hunt.kinds import kind_of
 from scenarios.hunt.mutation import crossed, mutated
 from scenarios.hunt.search import Crew, TaskSearch
 from scenarios.hunt.seeds import exploits, seeds_of
 from scenarios.hunt.trial import tried
 
-from buildarena_benchmark import builtin_tasks, score
+from buildarena_benchmark import score
 
 START = Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])
 GENERATIONS = 6
@@ -69,13 +70,13 @@ def test_a_search_with_the_same_seed_is_the_same_whoever_does_the_work() -> None
 
 def test_genomes_survive_mutation_and_crossing() -> None:
     for task in ("transport-2", "lift-3"):
-        category = builtin_tasks()[task].category
+        kind = kind_of(task)
         pool = seeds_of(task)
         draw = np.random.default_rng(1)
         made = set()
         for _ in range(15):
             first, second = (pool[int(k)] for k in draw.integers(len(pool), size=2))
-            child = mutated(crossed(first, second, draw), category, draw)
+            child = mutated(crossed(first, second, draw), kind, draw)
             machine, again = grown(child)
             assert again.as_json() == child.as_json()
             assert grown(Genome.from_json(child.as_json()))[0] == machine

@@ -34,6 +34,9 @@ FULL_MARKS: Final[Mapping[str, float]] = MappingProxyType(
         "place": 10.0,
         "hover": 28.0,
         "glide": 5.0,
+        "tour": 4.0,
+        "heights": 28.0,
+        "haul": 90.0,
     }
 )
 """Indicators that are worth an objective of 1, by scorer."""
@@ -50,6 +53,9 @@ _SEARCH_S: Final[Mapping[str, float]] = MappingProxyType(
         "place": 30.0,
         "hover": 15.0,
         "glide": 30.0,
+        "tour": 12.0,
+        "heights": 24.0,
+        "haul": 8.0,
     }
 )
 """Seconds of a trial while searching; the full length is for what is confirmed."""

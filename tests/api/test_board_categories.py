@@ -5,6 +5,8 @@ import pytest
 from buildarena_api.leaderboard.filters import _ranked_over
 from buildarena_benchmark import builtin_tasks, paper_tasks
 
+WORKSHOP = {*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"}
+
 
 def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
     answer = api.get("/v1/leaderboard", params={"category": "garage"})
@@ -18,7 +20,9 @@ def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
     [
         (None, None, set(paper_tasks())),
         (None, ["flight"], {"flight-1", "flight-2"}),
-        (None, ["mechanisms", "flight"], set(builtin_tasks()) - set(paper_tasks())),
+        (None, ["mechanisms", "flight"], WORKSHOP),
+        (None, ["headroom"], set(builtin_tasks()) - set(paper_tasks()) - WORKSHOP),
+        (None, ["support"], {"support-1", "support-2", "support-3"}),
         (["support-1"], ["flight"], None),
     ],
 )

@@ -122,7 +122,7 @@ def test_shells_are_offered_ids_tasks_and_models(url, ids, sweep) -> None:
     assert sorted(offered("buildarena job show ")) == ids
     assert offered(f"buildarena job show {ids[3]}") == [ids[3]]
     assert offered("buildarena sweep watch sw") == [sweep]
-    assert offered("buildarena job list --task lift-") == ["lift-1", "lift-2", "lift-3"]
+    assert offered("buildarena job list --task lift-") == ["lift-1", "lift-2", "lift-3", "lift-4"]
     assert offered("buildarena job list --model builtin/e") == ["builtin/expert"]
     assert offered("buildarena job show nothing") == []
 

@@ -14,6 +14,7 @@ import pytest
 import yaml
 from support.documents.manifests import KUBERNETES, OVERLAYS, needs_kubectl, of_kind, pods, rendered
 
+from buildarena_environment.processes import ALLOCATOR
 from buildarena_store.rights import ROLES
 from buildarena_store.roles import OWNER
 
@@ -254,3 +255,8 @@ def test_a_registry_that_does_not_answer_changes_nothing(pin, tmp_path) -> None:
     assert (done.returncode, "has no digest" in done.stderr) == (1, True)
     for file in NAMING:
         assert (tmp_path / file.relative_to(ROOT)).read_text() == file.read_text()
+
+
+@pytest.mark.parametrize(("name", "value"), ALLOCATOR.items())
+def test_images_keep_as_few_arenas_as_processes_on_this_machine(name, value) -> None:
+    assert re.search(rf"^ENV (.*\\\n)*.*\b{name}={value}\b", DOCKERFILE, re.MULTILINE)

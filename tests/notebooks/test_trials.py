@@ -79,8 +79,8 @@ def test_nonsense_is_refused_with_the_choices(tmp_path):
     for call in (ba.simulate, lambda machine, *given: ba.simulate_all([machine], *given)):
         with pytest.raises(ValueError, match="no engine 'mujocco'; there are pybullet, mujoco"):
             call(row(0), "support-1", "mujocco")
-        with pytest.raises(ValueError, match=r"no task 'support-4'; there are .*support-1"):
-            call(row(0), "support-4")
+        with pytest.raises(ValueError, match=r"no task 'support-9'; there are .*support-1"):
+            call(row(0), "support-9")
         with pytest.raises(ValueError, match="no task"):
             call(row(0), tmp_path)
     with pytest.raises(ValueError, match="processes is 0"):
@@ -100,4 +100,4 @@ def test_tasks_are_listed():
     assert repr(known).splitlines()[3] == "support-1     A bridge over a gap of 5"
     assert "<td>support-1</td>" in known._repr_mimebundle_()["text/html"]
     with pytest.raises(KeyError):
-        _ = known["support-4"]
+        _ = known["support-9"]

@@ -85,6 +85,7 @@ def test_a_job_goes_through_processes_with_roles_of_their_own(contexts) -> None:
             "models": ["builtin/expert"],
             "simulator": "mujoco",
             "samples": 1,
+            "worlds": 1,
         }
         limited = {**sweep, "budget": {"max_requests": 1000}}
         made = client.post("/v1/sweeps", json=limited)

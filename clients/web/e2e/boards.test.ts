@@ -98,6 +98,7 @@ describe("every figure of the board", () => {
         `${row.rank ?? "–"}${tied ? "tied" : ""}`,
         place,
         number(row.mean_rank, 2),
+        number(row.score_mean, 2),
         percent(row.success_rate_mean, 1),
         dollars(row.cost_usd_mean),
         count(row.output_tokens_mean),
@@ -111,7 +112,7 @@ describe("every figure of the board", () => {
       const shown = await textsOf(page, `table[aria-label="Models on ${task.task}"]`);
       expect(shown).toHaveLength(task.rows.length);
       task.rows.forEach((row, index) => {
-        const [model, rank, place, success, indicator, best, parts, cost, refused] = shown[index] ?? [];
+        const [model, rank, place, success, indicator, score, best, parts, cost, refused] = shown[index] ?? [];
         const atLeast = row.censored > 0 ? "≥ " : "";
         const spread =
           row.indicator_low === null
@@ -126,6 +127,7 @@ describe("every figure of the board", () => {
           `${percent(row.success_rate)} (${row.successes} of ${row.trials})${percent(row.success_low)} to ${percent(row.success_high)}`,
         );
         expect(indicator).toBe(`${row.indicator_mean === null ? "" : atLeast}${number(row.indicator_mean)}${spread}`);
+        expect(score?.startsWith(number(row.score, 2))).toBe(true);
         expect(best).toBe(`${row.indicator_best === null ? "" : atLeast}${number(row.indicator_best)}`);
         expect([parts, cost, refused]).toEqual([
           count(row.parts_mean),
@@ -173,8 +175,9 @@ describe("every figure of the board", () => {
       expect(shown?.[2]).toBe([...new Set(ends)].join("–"));
       for (const [column, name] of [
         [3, "3 mean rank"],
-        [4, "4 success"],
-        [5, "5 USD"],
+        [4, "4 score"],
+        [5, "5 success"],
+        [6, "6 USD"],
       ] as const) {
         expect(
           agree(shown?.[column] ?? "", row[name] ?? ""),
@@ -193,7 +196,8 @@ describe("every figure of the board", () => {
       expect(agree(/^[≥\d.,–-]+/.exec((shown[4] ?? "").replace("≥ ", ""))?.[0] ?? "", row["8 indicator"] ?? "")).toBe(
         true,
       );
-      expect(agree(shown[5] ?? "", row["10 best"] ?? "")).toBe(true);
+      expect(agree(/^-?[\d.]*/.exec(shown[5] ?? "")?.[0] ?? "", row["10 score"] ?? "")).toBe(true);
+      expect(agree(shown[6] ?? "", row["11 best"] ?? "")).toBe(true);
     }
   });
 

@@ -106,9 +106,10 @@ describe.skipIf(WHOLE === "")("a published site", () => {
       .evaluateAll((found) => found.map((row) => [...row.children].map((cell) => cell.textContent.trim())));
     board.overall.forEach((row, index) => {
       expect(shown[index]?.[0]).toContain(row.model);
-      expect([shown[index]?.[2], shown[index]?.[3], shown[index]?.[4], shown[index]?.[7]]).toEqual([
+      expect([2, 3, 4, 5, 8].map((column) => shown[index]?.[column])).toEqual([
         places(row.rank_low, row.rank_high),
         number(row.mean_rank, 2),
+        number(row.score_mean, 2),
         percent(row.success_rate_mean, 1),
         count(row.trials),
       ]);

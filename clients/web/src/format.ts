@@ -16,6 +16,11 @@ export function percent(share: number | null | undefined, digits = 0): string {
   return share === null || share === undefined ? NONE : `${(100 * share).toFixed(digits)} %`;
 }
 
+/** Successes of trials, which are worth a share each where worlds vary: "3" or "2.75". */
+export function successes(value: number): string {
+  return value.toLocaleString("en", { maximumFractionDigits: 2 });
+}
+
 export function dollars(value: number | null | undefined): string {
   if (value === null || value === undefined) return NONE;
   const digits = value !== 0 && Math.abs(value) < 0.1 ? 4 : 2;

@@ -102,6 +102,21 @@ def test_exact_intervals_hold_every_rate_where_wilsons_do_not(trials) -> None:
     assert min(covered(wilson_interval, trials, rate) for rate in rates) < 0.93
 
 
+@pytest.mark.parametrize("worlds", [2, 4, 16])
+@pytest.mark.parametrize(("low", "high"), [(0.0, 0.1), (0.0, 1.0), (0.4, 0.6), (0.9, 1.0)])
+@pytest.mark.parametrize("sure", [0.0, 0.7])
+def test_exact_intervals_hold_means_of_shares(worlds, low, high, sure) -> None:
+    # A job's machine succeeds in each world with a chance of its own; some always do, or never.
+    rng = np.random.default_rng(worlds)
+    chances = rng.choice([low, high, (low + high) / 2], size=(400, 16))
+    chances = np.where(rng.random(chances.shape) < sure, low, chances)
+    rate = sure * low + (1 - sure) * (low + high) / 2
+    sums = (rng.binomial(worlds, chances) / worlds).sum(axis=1)
+    ends = {total: exact_interval(total, 16) for total in set(sums.tolist())}
+    held = [ends[total][0] <= rate <= ends[total][1] for total in sums.tolist()]
+    assert np.mean(held) >= 0.95 - 2 * (0.05 * 0.95 / 400) ** 0.5
+
+
 @pytest.mark.parametrize("rate", [0.01, 0.05, 0.1, 0.3, 0.9])
 @pytest.mark.parametrize("trials", [8, 20, 64])
 def test_intervals_that_are_shown_from_five_on_hold_when_they_are_shown(trials, rate) -> None:

@@ -87,18 +87,30 @@ def test_pass_at_k_and_pass_hat_k_count_subsets(count, data) -> None:
     k = data.draw(st.integers(1, trials))
     outcomes = [True] * successes + [False] * (trials - successes)
     subsets = list(combinations(outcomes, k))
-    assert pass_at_k(successes, trials, k) == pytest.approx(
-        sum(any(s) for s in subsets) / len(subsets)
-    )
-    assert pass_hat_k(successes, trials, k) == pytest.approx(
-        sum(all(s) for s in subsets) / len(subsets)
-    )
+    assert pass_at_k(outcomes, k) == pytest.approx(sum(any(s) for s in subsets) / len(subsets))
+    assert pass_hat_k(outcomes, k) == pytest.approx(sum(all(s) for s in subsets) / len(subsets))
+
+
+@given(st.lists(st.sampled_from([0.0, 0.25, 1 / 3, 0.5, 0.75, 1.0]), min_size=1), st.data())
+def test_shares_of_worlds_are_chances_of_one_try(shares, data) -> None:
+    shares = shares[:9]
+    k = data.draw(st.integers(1, len(shares)))
+    subsets = [np.array(subset) for subset in combinations(shares, k)]
+    assert pass_at_k(shares, k) == pytest.approx(np.mean([1 - np.prod(1 - s) for s in subsets]))
+    assert pass_hat_k(shares, k) == pytest.approx(np.mean([np.prod(s) for s in subsets]))
+
+
+def test_many_shares_stay_in_range() -> None:
+    shares = np.repeat([0.0, 0.25, 0.5, 0.75, 1.0], 20_000)
+    for k in (1, 8):
+        assert pass_hat_k(shares, k) == pytest.approx(0.5**k, rel=1e-3)
+        assert pass_at_k(shares, k) == pytest.approx(1 - 0.5**k, rel=1e-3)
 
 
 def test_more_tries_than_trials_say_nothing() -> None:
-    assert pass_at_k(1, 3, 4) is None
-    assert pass_hat_k(1, 3, 4) is None
-    assert pass_at_k(0, 64, 8) == 0.0
+    assert pass_at_k([1, 0, 0], 4) is None
+    assert pass_hat_k([1, 0, 0], 4) is None
+    assert pass_at_k(np.zeros(64), 8) == 0.0
 
 
 def test_64_samples_show_a_rise_from_10_to_29_percent_but_not_to_20() -> None:

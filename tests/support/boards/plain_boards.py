@@ -5,7 +5,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from buildarena_benchmark import references
 from buildarena_benchmark.flags import ScoringPolicy, is_censored, is_disqualified, is_left_out
 from buildarena_benchmark.leaderboard import (
     Board,
@@ -73,11 +75,16 @@ def plain_summary(
     given, trials = len(trials), [trial for trial in trials if not trial.unverified]
     counted = counted_trials(trials, policy=policy)
     number = len(counted)
-    successes = sum(trial.success for trial in counted)
+    successes = math.fsum(trial.share for trial in counted)
     outcomes = Counter(trial.outcome for trial in trials)
     low_high = exact_interval(successes, number) if counted else (None, None)
-    figures = np.array([(t.success, t.indicator) for t in counted], float).reshape(-1, 2)
+    figures = np.array([(t.share, t.indicator) for t in counted], float).reshape(-1, 2)
     indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
+    score, score_ends = None, None
+    if counted and first.task in references():
+        scores = np.log2(1 + np.maximum(figures[:, 1], 0) / references()[first.task])
+        score = math.fsum(scores.tolist()) / number
+        score_ends = mean_interval(scores, figures[:, 0] > 0)
     scored = [trial for trial in trials if trial.scored]
     actions = sum(trial.actions for trial in counted)
     refused = sum(trial.refused_actions for trial in counted)
@@ -106,6 +113,9 @@ def plain_summary(
         indicator_mean=mean.of(lambda t: t.indicator),
         indicator_low=indicator_ends[0] if indicator_ends else None,
         indicator_high=indicator_ends[1] if indicator_ends else None,
+        score=score,
+        score_low=score_ends[0] if score_ends else None,
+        score_high=score_ends[1] if score_ends else None,
         too_few_data=bool(counted) and indicator_ends is None,
         indicator_best=max((t.indicator for t in counted), default=None),
         censored=sum(t.success and is_censored(t.flags) for t in counted),
@@ -116,8 +126,8 @@ def plain_summary(
         cost_usd_mean=mean.of(lambda t: t.cost_usd),
         cost_per_success_usd=cost_per_success([t.cost_usd for t in counted], successes),
         invalid_action_rate=refused / actions if actions else None,
-        pass_at=_pass_chances(pass_at_k, successes, number),
-        pass_all=_pass_chances(pass_hat_k, successes, number),
+        pass_at=_pass_chances(pass_at_k, figures[:, 0]),
+        pass_all=_pass_chances(pass_hat_k, figures[:, 0]),
         outcomes=dict(sorted(outcomes.items())),
         reasons=dict(sorted(Counter(t.reason for t in counted if t.reason).items())),
         refusals=_refusals(counted),
@@ -146,9 +156,9 @@ class _Means:
 
 
 def _pass_chances(
-    estimate: Callable[[int, int, int], float | None], successes: int, trials: int
+    estimate: Callable[[NDArray[np.float64], int], float | None], shares: NDArray[np.float64]
 ) -> dict[str, float]:
-    found = {str(k): estimate(successes, trials, k) for k in PASS_K}
+    found = {str(k): estimate(shares, k) for k in PASS_K}
     return {k: chance for k, chance in found.items() if chance is not None}
 
 

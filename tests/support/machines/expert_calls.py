@@ -1,7 +1,7 @@
 """The built-in expert's designs as the calls of one who builds alone.
 
 tests/data/expert_calls.json keeps them for those who can't import the worker; `python -m
-expert_calls` in this folder writes it, and the environment's references, again.
+expert_calls` in this folder writes it, and the benchmark's references, again.
 """
 
 import json
@@ -15,7 +15,7 @@ from buildarena_worker.builtin.designs.design import Design
 
 ROOT = Path(__file__).parents[3]
 DATA = ROOT / "tests/data/expert_calls.json"
-REFERENCES = ROOT / "libs/environment/src/buildarena_environment/references.json"
+REFERENCES = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/references.json"
 
 Call = dict[str, Any]
 

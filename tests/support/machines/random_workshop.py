@@ -21,7 +21,9 @@ from buildarena_worker.builtin.designs import DESIGNS
 
 Draw = np.random.Generator
 
-TASKS: Final = tuple(sorted(name for name in DESIGNS if name.startswith(("mech", "flight"))))
+TASKS: Final = tuple(
+    sorted(n for n, task in builtin_tasks().items() if task.category in ("mechanisms", "flight"))
+)
 """Names of the tasks machines are drawn for."""
 
 _STAND_INS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(

@@ -1,10 +1,10 @@
 import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import type { Row, TaskBoard } from "../api/queries";
-import { sharedRanks } from "./ranks";
+import { SCORE, sharedRanks } from "./ranks";
 import type { BoardSearch } from "../api/board-search";
 import { jobsBehind } from "./jobs-behind";
-import { count, dollars, measured, number, percent, places } from "../format";
+import { count, dollars, measured, number, percent, places, successes } from "../format";
 import { Interval } from "./Interval";
 
 /** All models on one task, the best first. */
@@ -21,6 +21,9 @@ export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: Boa
             <Table.Th className="figures">Place</Table.Th>
             <Table.Th>Success, 95 % interval</Table.Th>
             <Table.Th className="figures">{measured(task.indicator, task.unit)}</Table.Th>
+            <Table.Th className="figures" title={SCORE}>
+              Score
+            </Table.Th>
             <Table.Th className="figures">Best</Table.Th>
             <Table.Th className="figures">Parts</Table.Th>
             <Table.Th className="figures">$ a success</Table.Th>
@@ -56,7 +59,7 @@ function Proof({ row }: { row: Row }) {
 }
 
 function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch; tied: boolean; several: boolean }) {
-  const success = `${row.successes} of ${row.trials}`;
+  const success = `${successes(row.successes)} of ${row.trials}`;
   return (
     <Table.Tr>
       <Table.Td>
@@ -105,6 +108,12 @@ function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch
               ? "too few data"
               : ""
             : `${number(row.indicator_low)} to ${number(row.indicator_high)}`}
+        </Text>
+      </Table.Td>
+      <Table.Td className="figures">
+        {number(row.score, 2)}
+        <Text size="xs" className="dimmed">
+          {row.score_low !== null && `${number(row.score_low, 2)} to ${number(row.score_high, 2)}`}
         </Text>
       </Table.Td>
       <Table.Td className="figures">

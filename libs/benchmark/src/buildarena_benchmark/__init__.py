@@ -4,6 +4,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
+from buildarena_benchmark.canary import CANARY
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.robustness import Robustness, robustness
@@ -14,10 +15,12 @@ from buildarena_benchmark.tasks.loading import (
     paper_tasks,
     parse_custom_task,
     parse_task,
+    references,
 )
 from buildarena_benchmark.tasks.task import Task
 
 __all__ = [
+    "CANARY",
     "BenchmarkError",
     "Robustness",
     "Score",
@@ -32,6 +35,7 @@ __all__ = [
     "paper_tasks",
     "parse_custom_task",
     "parse_task",
+    "references",
     "robustness",
     "score",
 ]

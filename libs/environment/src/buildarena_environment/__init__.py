@@ -7,8 +7,8 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
+from buildarena_benchmark import references
 from buildarena_environment.calls import Answer, call, call_text, read_call
-from buildarena_environment.choices import references
 from buildarena_environment.environment import (
     DEFAULT_STEPS,
     Environment,

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
-from functools import cache
-from importlib import resources
 from typing import Final
 
-from buildarena_benchmark import Task, builtin_tasks
+from buildarena_benchmark import Task, builtin_tasks, references
 from buildarena_environment.errors import UnknownChoiceError
 from buildarena_simulation import DEFAULT_ENGINE, ENGINES, require_engine
 
@@ -65,10 +61,3 @@ def reference_of(task: Task, given: float | None = None, *, needed: bool = False
             f"{task.name} has no reference indicator: give one, or leave the reward 'indicator' out"
         )
     return WITHOUT
-
-
-@cache
-def references() -> Mapping[str, float]:
-    """The built-in expert's indicators on MuJoCo, by built-in task."""
-    text = resources.files(__package__).joinpath("references.json").read_text(encoding="utf-8")
-    return {str(name): float(value) for name, value in json.loads(text).items()}

@@ -39,6 +39,7 @@ def simulate_with(
     engine: str,
     *,
     controls: Sequence[KeyPress] | None = None,
+    seed: int | None = None,
 ) -> Trajectory:
     """As `buildarena_simulation.simulate`, with the kernels that OpenBLAS calls by this name.
 
@@ -55,6 +56,7 @@ def simulate_with(
         "scenario": scenario.model_dump_json(),
         "engine": engine,
         "controls": None if controls is None else [asdict(press) for press in controls],
+        "seed": seed,
     }
     try:
         done = subprocess.run(
@@ -86,6 +88,7 @@ def main() -> None:
             Scenario.model_validate_json(question["scenario"]),
             question["engine"],
             controls=None if controls is None else tuple(KeyPress(**press) for press in controls),
+            seed=question["seed"],
         )
     except MachineNotSimulable as error:
         sys.stdout.write(str(error))

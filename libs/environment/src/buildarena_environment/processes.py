@@ -13,6 +13,9 @@ from pathlib import Path
 
 import psutil
 
+ALLOCATOR = {"MALLOC_ARENA_MAX": "2", "MALLOC_TRIM_THRESHOLD_": "131072"}
+"""Environment of processes that run for long: each arena of glibc keeps what its largest use took,
+and threads of a service would have sixteen on two processors."""
 PR_SET_PDEATHSIG = 1
 PARENT = "BUILDARENA_PARENT_PID"
 """Environment variable of a program that is to end with this process."""

@@ -120,6 +120,7 @@ class TrialPool:
         simulator: str,
         *,
         controls: Sequence[KeyPress] | None = None,
+        seed: int | None = None,
         meanwhile: Callable[[], object] = lambda: None,
     ) -> Trajectory:
         """As `buildarena_simulation.simulate`, in one of the processes; waits for it.
@@ -129,6 +130,7 @@ class TrialPool:
             machine: The machine.
             simulator: Name of the engine.
             controls: Key presses of this run; None for the machine's own.
+            seed: Of a varied world; None for the exact one.
             meanwhile: Called every now and then; what it raises breaks the trial off.
 
         Raises:
@@ -142,6 +144,7 @@ class TrialPool:
             simulator=simulator,
             scored=False,
             controls=controls,
+            seed=seed,
         )
         process = self._free.get()
         try:
@@ -279,6 +282,12 @@ def _answered(question: _Question) -> Any:
 def _simulated(task: Task, question: _Question) -> Trajectory | Exception:
     machine = Machine.from_document(json.loads(question.machine))
     try:
-        return simulate(machine, task.scenario, question.simulator, controls=question.controls)
+        return simulate(
+            machine,
+            task.scenario,
+            question.simulator,
+            controls=question.controls,
+            seed=question.seed,
+        )
     except (MachineNotSimulable, SimulationError) as error:
         return error

@@ -114,6 +114,9 @@ JOINT_STRENGTH: Final = MappingProxyType(
 ROPE_STRENGTH: Final = 1000.0
 """Tension at which a winch's rope gives way, mass·g. Fitted: not public."""
 
+MAX_WORLDS: Final = 16
+"""Varied worlds in which a machine may be scored: each takes as long as a trial. Ours."""
+
 START_SHIFT: Final = 0.1
 """A seed moves the machine's start by up to this along east and along north, units. Ours."""
 

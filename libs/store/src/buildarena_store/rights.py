@@ -101,7 +101,11 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
         "simulate": Role(
             meaning="Simulation workers: trials and their scores.",
             reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS, "journal"}),
-            adds=("artifacts", "attempts", "events", "job_artifacts", "verifications", *_FIGURES),
+            adds=(
+                *("artifacts", "attempts", "events", "job_artifacts"),
+                # Trials in varied worlds are asked for when the exact one is done.
+                *("rollouts", "verifications", *_FIGURES),
+            ),
             changes={**_WORKED, "budgets": _LOST, "verifications": _WHOLE},
             removes=_REAPS,
         ),

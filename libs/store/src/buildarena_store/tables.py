@@ -267,6 +267,8 @@ rollouts = Table(
     Column("engine", Text, nullable=False),
     Column("machine_hash", Text, nullable=False),
     Column("controls", JSON),
+    # Of the varied world in which it is done; none in the exact one.
+    Column("seed", BigInteger),
     Column("success", Boolean),
     Column("indicator", Double),
     Column("metrics", JSON),

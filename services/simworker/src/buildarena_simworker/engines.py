@@ -46,19 +46,25 @@ class EngineSimulator:
 
     def run(self, trial: TrialRequest) -> TrialResult:
         """Simulates the machine; see `Simulator`."""
-        machine, task, controls = trial.machine, trial.task, trial.controls
+        machine, task = trial.machine, trial.task
         try:
             if self._pool is None:
                 trajectory = simulate(
                     machine,
                     task.scenario,
                     engine=self.name,
-                    controls=controls,
+                    controls=trial.controls,
+                    seed=trial.seed,
                     on_progress=lambda _: trial.require_held(),
                 )
             else:
                 trajectory = self._pool.simulate(
-                    task, machine, self.name, controls=controls, meanwhile=trial.require_held
+                    task,
+                    machine,
+                    self.name,
+                    controls=trial.controls,
+                    seed=trial.seed,
+                    meanwhile=trial.require_held,
                 )
         except MachineNotSimulable as error:
             raise MachineRefusedError(str(error)) from error

@@ -51,6 +51,7 @@ class _LeasedInDatabase:
             task=due.task,
             machine=due.machine,
             controls=due.controls,
+            seed=due.request.seed,
             require_held=self._require,
         )
 

@@ -14,9 +14,11 @@ from buildarena_pipeline.catalog.tracks import has_data_sheets
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.notify import Notifier
-from buildarena_pipeline.runtime.scoring import failure_score, rollout_score, task_of
+from buildarena_pipeline.runtime.scoring import failure_score, task_of
+from buildarena_pipeline.runtime.worlds import finish_or_vary
 from buildarena_simulation import read_trajectory
 from buildarena_store import (
+    ArtifactInfo,
     ArtifactStore,
     Job,
     JobScore,
@@ -130,8 +132,8 @@ class ConstructHandler:
         match result:
             case Suspended():
                 self._suspend(lease, session, result)
-            case Finished(best=best):
-                self._write_end(lease, session, rollout_score(lease.job, best))
+            case Finished():
+                self._finish(lease, session)
             case Failed(reason=reason, detail=detail):
                 self._fail(lease, session, Outcome.CONSTRUCTION_FAILED, reason, detail)
             case LimitReached(limit=limit, detail=detail):
@@ -215,14 +217,29 @@ class ConstructHandler:
         )
         self._write_end(lease, session, score)
 
+    def _finish(self, lease: Lease, session: Session) -> None:
+        """Ends a session whose machine was tried; its job may have varied worlds before it."""
+        made, records = self._made(session), self._store.rollouts.read(lease.job.id)
+        with self._store.database.transaction() as connection:
+            self._store.results.attach(lease.job.id, made, connection=connection)
+            queue = finish_or_vary(
+                self._store, lease, records, connection=connection, **_counts(session)
+            )
+        if queue is not None:
+            self._queues.notify_one(queue, lease.job.id)
+
     def _write_end(self, lease: Lease, session: Session, score: JobScore) -> None:
-        job = lease.job
+        made = self._made(session)
+        with self._store.database.transaction() as connection:
+            self._store.results.attach(lease.job.id, made, connection=connection)
+            self._store.results.finish(lease, score, connection=connection, **_counts(session))
+
+    def _made(self, session: Session) -> dict[str, ArtifactInfo]:
+        """What a session ends with, kept."""
         made = {"transcript": self._artifacts.put(session.transcript.to_json(), JSON)}
         if session.machine is not None and session.machine.started:
             made["machine"] = self._artifacts.put(machine_bytes(session.machine), JSON)
-        with self._store.database.transaction() as connection:
-            self._store.results.attach(job.id, made, connection=connection)
-            self._store.results.finish(lease, score, connection=connection, **_counts(session))
+        return made
 
 
 def _counts(session: Session) -> dict[str, object]:

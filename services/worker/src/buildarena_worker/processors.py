@@ -71,10 +71,13 @@ def repetitions(
             task.scenario,
             engine,
             controls=None if controls is None else tuple(controls),
+            seed=record.seed,
         )
         yield Repeated(trajectory=trajectory, processor=own)
     for name in tried:
-        trajectory = simulate_with(name, machine, task.scenario, engine, controls=controls)
+        trajectory = simulate_with(
+            name, machine, task.scenario, engine, controls=controls, seed=record.seed
+        )
         here = {**own, "blas": name, "numpy": _LEVELS.get(name, _LOWEST)}
         yield Repeated(trajectory=trajectory, processor=here)
 

@@ -25,9 +25,14 @@ from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.agents.workbench import bench_of
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, FILE_WORKFLOW, has_data_sheets
+from buildarena_pipeline.catalog.tracks import (
+    EXTERNAL_WORKFLOW,
+    FILE_WORKFLOW,
+    has_data_sheets,
+    worlds_of,
+)
 from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.scoring import best_rollout, task_of
+from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import (
     SIMULATION_VERSION,
@@ -47,6 +52,7 @@ from buildarena_store import (
     ArtifactStoreError,
     ExternalCall,
     Job,
+    JobScore,
     JobState,
     Outcome,
     RolloutRecord,
@@ -151,16 +157,21 @@ class Verifier:
             case _:
                 return [broken_off(getattr(result, "detail", str(result)))]
         records = self._store.rollouts.read(job.id)
+        exact = [record for record in records if record.seed is None]
         checks = [
             compare(
                 "transcript", self._artifact(job, "transcript"), _hash(session.transcript.to_json())
             ),
-            compare("rollouts", len(records), len(host.simulated)),
+            compare("rollouts", len(exact), len(host.simulated)),
             *_usage_checks(job, host.usage),
             *reasons,
         ]
-        for record, (machine, controls) in zip(records, host.simulated, strict=False):
+        runs = list(zip(exact, host.simulated, strict=False))
+        for record, (machine, controls) in runs:
             checks += self._rollout_checks(job, record, machine, controls)
+        for record, (machine, controls) in runs:
+            if record is best_rollout(exact):
+                checks += self._world_checks(job, records, machine, controls)
         checks += self._score_checks(job, session.machine, records)
         return checks
 
@@ -188,8 +199,27 @@ class Verifier:
                 kept = None if records else job.reason
                 checks.append(compare("reason", kept, None if broken is None else broken[0]))
             for record in records:
-                checks += self._rollout_checks(job, record, machine, None)
+                if record.seed is None:
+                    checks += self._rollout_checks(job, record, machine, None)
+            if records:
+                checks += self._world_checks(job, records, machine, None)
         return checks + self._score_checks(job, machine, records)
+
+    def _world_checks(
+        self,
+        job: Job,
+        records: Sequence[RolloutRecord],
+        machine: Machine,
+        controls: Sequence[KeyPress] | None,
+    ) -> list[Check]:
+        """Whether the best machine was tried in as many varied worlds as the track says."""
+        varied = [record for record in records if record.seed is not None]
+        tried = best_rollout(records).trajectory_hash is not None
+        worlds = worlds_of(job.track_config) if tried else 0
+        checks = [compare("worlds", len({record.seed for record in varied}), worlds)]
+        for record in varied:
+            checks += self._rollout_checks(job, record, machine, controls)
+        return checks
 
     def _replay(self, job: Job) -> tuple[Session, ReplayHost, SessionResult]:
         host = ReplayHost(
@@ -316,11 +346,10 @@ class Verifier:
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]
     ) -> list[Check]:
-        counted: RolloutRecord | Score = (
-            best_rollout(records)
-            if any(record.finished_at for record in records)
-            else failed_score(task_of(job, self._tasks), machine)
-        )
+        counted: JobScore | Score = failed_score(task_of(job, self._tasks), machine)
+        if any(record.finished_at for record in records):
+            varied = [record for record in records if record.seed is not None]
+            counted = rollout_score(job, best_rollout(records), varied)
         return [
             compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
         ]

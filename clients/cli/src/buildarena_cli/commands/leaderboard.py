@@ -125,8 +125,8 @@ def compare(
         rows.append(
             (
                 row["task"],
-                f"{won_1}/{of_1}",
-                f"{won_2}/{of_2}",
+                f"{won_1:g}/{of_1}",
+                f"{won_2:g}/{of_2}",
                 f"{100 * row['difference']:+.0f}",
                 f"{100 * row['low']:+.0f}..{100 * row['high']:+.0f}",
                 str(row["success"]["pairs"]) if row["success"] else "0",

@@ -26,6 +26,7 @@ PLAIN: Final[Mapping[str, Any]] = {
     "data_sheets": True,
     "one_shot": False,
     "closed_loop": None,
+    "worlds": None,
 }
 PLAIN_DECODING: Final[Mapping[str, Any]] = {"temperature": 0.5, "top_p": 0.7}
 """The paper's main experiment; what differs from it names a variant."""
@@ -120,6 +121,8 @@ def variant(spec: Mapping[str, Any]) -> str:
     ]
     if not settings["data_sheets"]:
         parts.append("no data sheets")
+    if settings["worlds"] is not None:
+        parts.append(f"{settings['worlds']} worlds")
     if settings["one_shot"]:
         parts.append("one-shot")
     if loop:

@@ -9,6 +9,7 @@ import yaml
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from buildarena_benchmark import CANARY
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column
 from buildarena_cli.dataset.counts import Counts
@@ -35,6 +36,7 @@ def card(counts: Counts) -> str:
     template = environment.get_template("card.md.j2")
     text = template.render(
         counts=counts,
+        canary=CANARY,
         outcomes=sorted(counts.outcomes.items()),
         cells=sorted(counts.cells.items()),
         licences=sorted(counts.licences.items()),

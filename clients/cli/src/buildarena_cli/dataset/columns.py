@@ -101,6 +101,7 @@ JOBS: Final[Sequence[Column]] = (
     Column("verified", _YES, "Of imported jobs and such by runners: whether they were verified."),
     Column("finished_at", pa.timestamp("us", tz="UTC"), "When it ended."),
     Column("license", _TEXT, "Licence of the row."),
+    Column("canary", _TEXT, "The same in every row: a corpus that has it holds benchmark data."),
 )
 
 ACTIONS: Final[Sequence[Column]] = (

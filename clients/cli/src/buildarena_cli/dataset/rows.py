@@ -10,7 +10,7 @@ from functools import lru_cache
 from hashlib import sha256
 from typing import Any, Final
 
-from buildarena_benchmark import TaskError, parse_task
+from buildarena_benchmark import CANARY, TaskError, parse_task
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_cli.dataset.messages import chat, compact
 from buildarena_cli.dataset.reading import Fetched
@@ -98,6 +98,7 @@ def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         "verified": job["verified_at"] is not None if _is_unproved(job) else None,
         "finished_at": job["finished_at"] and datetime.fromisoformat(job["finished_at"]),
         "license": OURS if job["model"].startswith(BASELINE) else licence,
+        "canary": CANARY,
     }
     return Rows(job=row, actions=action_rows(job["id"], turns, document))
 

@@ -30,7 +30,7 @@ from buildarena_client.paths import HEALTH
 from buildarena_client.requests import Request
 from buildarena_client.transport_errors import TransportError
 from buildarena_client.transports.blocking import BlockingTransport
-from buildarena_environment.processes import PARENT, dying_with_me, tree_memory_bytes
+from buildarena_environment.processes import ALLOCATOR, PARENT, dying_with_me, tree_memory_bytes
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
@@ -165,6 +165,7 @@ class Stack:
             self._launch_server(valkey)
             broker_url = valkey.url
         return {
+            **ALLOCATOR,
             **_without_files(os.environ),
             **{
                 f"BUILDARENA_{name.upper()}": (

@@ -82,6 +82,7 @@ def _overall(board: Board) -> list[Block]:
             "-" if row.rank is None else str(row.rank),
             "-" if row.rank is None else f"{row.rank_low}-{row.rank_high}",
             number(row.mean_rank, 2),
+            number(row.score_mean, 2),
             percent(row.success_rate_mean),
             number(row.cost_usd_mean, 2),
             "yes" if row.pareto else "",
@@ -89,7 +90,10 @@ def _overall(board: Board) -> list[Block]:
         )
         for row in board.overall
     ]
-    columns = "model", "rank", "95 % of place", "mean rank", "success", "USD", "cost front", "lacks"
+    columns = (
+        *("model", "rank", "95 % of place", "mean rank", "score"),
+        *("success", "USD", "cost front", "lacks"),
+    )
     return [
         Heading(text="Ranking"),
         Grid(
@@ -115,13 +119,14 @@ def _performance(
                     task.task,
                     cell.model,
                     "-" if ranked.rank is None else str(ranked.rank),
-                    f"{cell.successes}/{cell.trials}",
-                    f"{cell.successes}/{cell.ended}",
+                    f"{cell.successes:g}/{cell.trials}",
+                    f"{cell.successes:g}/{cell.ended}",
                     SUCCESS.text(cell),
                     between(cell.success_low, cell.success_high, 100),
                     SUCCESS.text(reference),
                     INDICATOR.text(cell),
                     indicator_between(cell),
+                    number(cell.score, 2),
                     BEST.text(cell),
                     INDICATOR.text(reference),
                     PARTS.text(cell),
@@ -131,7 +136,8 @@ def _performance(
             )
     columns = (
         *("task", "model", "rank", "of scored", "of ended", SUCCESS.heading, "95 %", "paper"),
-        *(INDICATOR.heading, "95 %", BEST.heading, "paper", PARTS.heading, "paper", "flagged"),
+        *(INDICATOR.heading, "95 %", "score", BEST.heading, "paper"),
+        *(PARTS.heading, "paper", "flagged"),
     )
     labels = {
         name: in_words(material.tasks[name].indicator, material.tasks[name].unit)

@@ -32,12 +32,13 @@ GAP = "   "
 ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "#": lambda row: _rank(row["rank"]),
     "model": lambda row: _marked([row]),
-    "success": lambda row: f"{row['successes']}/{row['trials']}",
+    "success": lambda row: f"{row['successes']:g}/{row['trials']}",
     "95 %": lambda row: _interval(row["success_low"], row["success_high"]),
     "indicator": lambda row: number(row["indicator_mean"], at_least=_is_censored(row)),
     "of it 95 %": lambda row: _spread(
         row["indicator_low"], row["indicator_high"], too_few=row["too_few_data"]
     ),
+    "score": lambda row: number(row.get("score"), 2),
     "best": lambda row: number(row["indicator_best"], at_least=_is_censored(row)),
     "parts": lambda row: number(row.get("parts_mean")),
     "requests": lambda row: number(row["requests_mean"], 0),
@@ -47,11 +48,11 @@ ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
 """The columns of a row on a task: what each shows of the API's answer."""
 RESULTS = ("success", "95 %", "indicator")
 PUBLISHED = ("model", *RESULTS, "parts", "requests", "tokens")
-LEAVING = ("requests", "parts", "tokens", "USD", "best", "of it 95 %", "95 %", "indicator")
+LEAVING = ("requests", "parts", "tokens", "USD", "best", "score", "of it 95 %", "95 %", "indicator")
 OVERALL = columns(
-    *("#", "model", "place", "mean rank", "success", "USD", "front"),
-    numeric=("#", "place", "mean rank", "success", "USD"),
-    leaving=("front", "USD", "mean rank", "place", "success"),
+    *("#", "model", "place", "mean rank", "score", "success", "USD", "front"),
+    numeric=("#", "place", "mean rank", "score", "success", "USD"),
+    leaving=("front", "USD", "mean rank", "score", "place", "success"),
 )
 
 
@@ -140,6 +141,7 @@ def overall_table(board: Mapping[str, Any]) -> None:
                 row["model"] + ("*" if row["baseline"] else ""),
                 f"{row['rank_low']}-{row['rank_high']}" if ranked else "",
                 number(row["mean_rank"], 2),
+                number(row.get("score_mean"), 2),
                 "" if rate is None else f"{100 * rate:.1f} %",
                 number(row["cost_usd_mean"], 2),
                 "+" if row["pareto"] else "",

@@ -1,7 +1,7 @@
 import { Group, SegmentedControl, Text } from "@mantine/core";
 import { Link, useNavigate } from "@tanstack/react-router";
 import type { Board, Row, TaskBoard } from "../../api/queries";
-import { dollars, measured, number, percent } from "../../format";
+import { dollars, measured, number, percent, successes } from "../../format";
 import { ModelByTask } from "../../parts/ModelByTask";
 import { cellOf, entriesOf, type Entry } from "./entries";
 import type { BoardSearch, Figure } from "../../api/board-search";
@@ -104,14 +104,14 @@ function Cell({ task, entry, figure, entries, search }: CellOf) {
       to="/jobs"
       search={jobsBehind(row, search)}
       style={shade(figure === "cost" ? 1 - share : share)}
-      title={`${entry.label} on ${task.task}: ${row.successes} of ${row.trials} succeeded, ${interval}${row.flagged > 0 ? `; ${row.flagged} flagged` : ""}`}
+      title={`${entry.label} on ${task.task}: ${successes(row.successes)} of ${row.trials} succeeded, ${interval}${row.flagged > 0 ? `; ${row.flagged} flagged` : ""}`}
     >
       <span>
         {row.censored > 0 && figure === "indicator" ? "≥ " : ""}
         {shown}
       </span>
       <small>
-        {row.successes} of {row.trials}
+        {successes(row.successes)} of {row.trials}
         {row.flagged > 0 ? ` · ${row.flagged} ⚑` : ""}
       </small>
     </Link>

@@ -4,7 +4,7 @@ import type { Board, OverallView } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { entriesOf, keyOf } from "./entries";
-import { sharedRanks } from "../../parts/ranks";
+import { SCORE, sharedRanks } from "../../parts/ranks";
 import type { BoardSearch } from "../../api/board-search";
 
 type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
@@ -26,6 +26,9 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
             <Table.Th className="figures">Rank</Table.Th>
             <Table.Th>Place, 95 % interval</Table.Th>
             <Table.Th className="figures">Mean rank</Table.Th>
+            <Table.Th className="figures" title={SCORE}>
+              Score
+            </Table.Th>
             <Table.Th className="figures">Success, mean of tasks</Table.Th>
             <Table.Th className="figures">$ a job</Table.Th>
             <Table.Th className="figures">Output tokens</Table.Th>
@@ -54,7 +57,7 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
               </Table.Td>
               <Place row={row} most={most} tied={paperTies.has(row.rank)} />
               <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
-              <Table.Td colSpan={4} className="dimmed">
+              <Table.Td colSpan={5} className="dimmed">
                 ranked by the paper’s own trials, among its models only
               </Table.Td>
             </Table.Tr>
@@ -133,6 +136,7 @@ function OverallRow({ row, label, most, tied }: { row: OverallView; label: strin
       </Table.Td>
       <Place row={row} most={most} tied={tied} />
       <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
+      <Table.Td className="figures">{number(row.score_mean, 2)}</Table.Td>
       <Table.Td className="figures">{percent(row.success_rate_mean, 1)}</Table.Td>
       <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
       <Table.Td className="figures">{count(row.output_tokens_mean)}</Table.Td>

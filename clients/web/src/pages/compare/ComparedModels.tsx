@@ -3,7 +3,7 @@ import { queryOptions, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { client, taken, type Schema } from "../../api/client";
 import type { JobView } from "../../api/queries";
-import { number, percent, words } from "../../format";
+import { number, percent, successes, words } from "../../format";
 import { OutcomeBadge } from "../../parts/Outcome";
 import { Section } from "../../parts/Section";
 import { Answered, Empty } from "../../parts/States";
@@ -102,7 +102,7 @@ function Duels({ found }: { found: Comparison }) {
               </Table.Td>
               {[0, 1].map((side) => (
                 <Table.Td key={side} className="figures">
-                  {task.successes[side]} of {task.trials[side]}
+                  {successes(task.successes[side] ?? 0)} of {task.trials[side]}
                 </Table.Td>
               ))}
               <Table.Td className="figures">

@@ -2,7 +2,7 @@ import { Group, Select, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { sweepComparison, sweeps, type SweepComparison } from "../../api/queries";
-import { count, number, percent, trackLabel } from "../../format";
+import { count, number, percent, successes, trackLabel } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { Section } from "../../parts/Section";
 import { Answered, Empty } from "../../parts/States";
@@ -145,7 +145,8 @@ function Differences({ pair }: { pair: Pair }) {
                 </Table.Td>
                 {([0, 1] as const).map((side) => (
                   <Table.Td key={side} className="figures">
-                    {percent(task.successes[side] / task.trials[side])} ({task.successes[side]} of {task.trials[side]})
+                    {percent(task.successes[side] / task.trials[side])} ({successes(task.successes[side])} of{" "}
+                    {task.trials[side]})
                   </Table.Td>
                 ))}
                 <Table.Td>

@@ -19,7 +19,11 @@ from buildarena_benchmark.leaderboard.cells import (
     summarise_tallies,
 )
 from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
-from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
+from buildarena_benchmark.leaderboard.ended_jobs import (
+    ROBUST_INDICATOR,
+    ROBUSTNESS,
+    EndedJob,
+)
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.plot_data import (
@@ -39,6 +43,8 @@ from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Tota
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
+    "ROBUSTNESS",
+    "ROBUST_INDICATOR",
     "SCORED",
     "UNKNOWN_TOKENS",
     "Board",

@@ -20,10 +20,12 @@ from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_benchmark.statistics import (
     cost_per_success,
     exact_interval,
+    expert_scores,
     mean_interval,
     pass_at_k,
     pass_hat_k,
 )
+from buildarena_benchmark.tasks.loading import references
 
 PASS_K: Final = (1, 2, 4, 8)
 """The k of pass@k and pass^k."""
@@ -49,9 +51,12 @@ class Cell:
             else.
         refuted: Those of them that were refuted.
         simulated: Counted trials whose machine was finished and tried.
+        successes: Successes of counted trials; a job in varied worlds counts by its share of them.
         success_rate: Successes of counted trials, with its exact interval.
         success_rate_of_ended: Successes of all ended jobs.
         indicator_mean: Mean indicator, with its interval.
+        score: Mean of the trials' indicators beside the expert's on a log scale, see
+            `expert_scores`, with its interval; None for a task that has no expert.
         too_few_data: Whether too few counted trials succeeded for an interval of the indicator.
         indicator_best: The greatest indicator.
         censored: Counted trials whose indicator is only known to be at least as great; if there
@@ -64,7 +69,8 @@ class Cell:
         reasons: Counted trials that failed, by reason.
         refusals: Refused actions by refusal class.
         newest: When the last of its jobs ended.
-        figures: (N, 2) float64, success and indicator of each counted trial, sorted.
+        figures: (N, 2) float64, success (or its share) and indicator of each counted trial,
+            sorted.
         figures_hash: Hash of them: cells with the same one are the same to all tests of pairs.
     """
 
@@ -83,7 +89,7 @@ class Cell:
     unverified: int
     refuted: int
     simulated: int
-    successes: int
+    successes: float
     success_rate: float | None
     success_low: float | None
     success_high: float | None
@@ -91,6 +97,9 @@ class Cell:
     indicator_mean: float | None
     indicator_low: float | None
     indicator_high: float | None
+    score: float | None
+    score_low: float | None
+    score_high: float | None
     too_few_data: bool
     indicator_best: float | None
     censored: int
@@ -119,10 +128,13 @@ def counted_trials(
     for trial in trials:
         if not trial.scored or is_left_out(trial.flags, policy):
             continue
-        if policy == ScoringPolicy.OURS and (is_disqualified(trial.flags) or not trial.success):
-            counted.append(replace(trial, success=False, indicator=0.0))
+        if policy != ScoringPolicy.OURS:
+            counted.append(replace(trial, robustness=None, robust_indicator=None))
+        elif is_disqualified(trial.flags):
+            failed = replace(trial, robustness=None, robust_indicator=None)
+            counted.append(replace(failed, success=False, indicator=0.0))
         else:
-            counted.append(trial)
+            counted.append(replace(trial, indicator=trial.gained))
     return counted
 
 
@@ -159,10 +171,11 @@ def summarise_tallies(
     scored = [tally for tally in tallies if tally.scored]
     counted = counted_tallies(tallies, policy=policy)
     number, ended = _number(counted), _number(tallies)
-    successes = _number(tally for tally in counted if tally.success)
+    successes = _sum(tally.shares for tally in counted)
     outcomes = _counts((tally.outcome, tally.number) for tally in tallies)
     low_high = exact_interval(successes, number) if counted else (None, None)
     figures = _figures(counted)
+    score, score_ends = _score(name.task, figures)
     indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
     actions = sum(tally.actions for tally in counted)
     refused = sum(tally.refused_actions for tally in counted)
@@ -191,6 +204,9 @@ def summarise_tallies(
         indicator_mean=_mean(figures[:, 1]),
         indicator_low=indicator_ends[0] if indicator_ends else None,
         indicator_high=indicator_ends[1] if indicator_ends else None,
+        score=score,
+        score_low=score_ends[0] if score_ends else None,
+        score_high=score_ends[1] if score_ends else None,
         too_few_data=bool(counted) and indicator_ends is None,
         indicator_best=float(figures[:, 1].max()) if number else None,
         censored=_number(t for t in counted if t.success and is_censored(t.flags)),
@@ -203,8 +219,8 @@ def summarise_tallies(
             [*costs.tolist(), *[None] * (number - len(costs))], successes
         ),
         invalid_action_rate=refused / actions if actions else None,
-        pass_at=_pass_chances(pass_at_k, successes, number),
-        pass_all=_pass_chances(pass_hat_k, successes, number),
+        pass_at=_pass_chances(pass_at_k, figures[:, 0]),
+        pass_all=_pass_chances(pass_hat_k, figures[:, 0]),
         outcomes=outcomes,
         reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
         refusals=_counts(item for tally in counted for item in tally.refusals.items()),
@@ -222,17 +238,32 @@ def counted_tallies(
     In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
     model would lose nothing by trying to cheat, and one whose machines blow up would gain. So does
     every failure: tasks say when a trial succeeds, and what fails has done nothing that counts.
+    A job that was tried in varied worlds counts by what it did in these; the published reading
+    knows the exact one alone.
     """
     counted = []
     for tally in tallies:
         if not tally.scored or is_left_out(tally.flags, policy):
             continue
-        if policy == ScoringPolicy.OURS and (is_disqualified(tally.flags) or not tally.success):
-            nothing = np.zeros(tally.number)
-            counted.append(replace(tally, success=False, indicators=nothing))
+        nothing = np.zeros(tally.number)
+        if policy != ScoringPolicy.OURS:
+            counted.append(replace(tally, shares=nothing + tally.success))
+        elif is_disqualified(tally.flags):
+            counted.append(replace(tally, success=False, indicators=nothing, shares=nothing))
         else:
-            counted.append(tally)
+            counted.append(replace(tally, indicators=tally.gained))
     return counted
+
+
+def _score(
+    task: str, figures: NDArray[np.float64]
+) -> tuple[float | None, tuple[float, float] | None]:
+    """The mean score beside the expert's, and its interval."""
+    reference = references().get(task)
+    if reference is None or not len(figures):
+        return None, None
+    scores = expert_scores(figures[:, 1], reference)
+    return _mean(scores), mean_interval(scores, figures[:, 0] > 0)
 
 
 def _is_flagged(tally: Tally, policy: ScoringPolicy) -> bool:
@@ -253,12 +284,10 @@ def _counts(items: Iterable[tuple[str, int]]) -> dict[str, int]:
 
 
 def _figures(counted: Sequence[Tally]) -> NDArray[np.float64]:
-    """Success and indicator of each counted trial, sorted by the indicator."""
+    """Success, or its share, and indicator of each counted trial, sorted by the indicator."""
     figures = np.zeros((_number(counted), 2))
     if counted:
-        figures[:, 0] = np.repeat(
-            [float(tally.success) for tally in counted], [tally.number for tally in counted]
-        )
+        figures[:, 0] = np.concatenate([tally.shares for tally in counted])
         figures[:, 1] = np.concatenate([tally.indicators for tally in counted])
     return figures[np.lexsort(figures.T)]
 
@@ -274,6 +303,11 @@ def _output_tokens(tally: Tally) -> Total:
     return Total(known=len(known), sum=int(known.sum()))
 
 
+def _sum(parts: Iterable[NDArray[np.float64]]) -> float:
+    """The exact sum of shares: whatever their order."""
+    return math.fsum(share for part in parts for share in part.tolist())
+
+
 def _mean(values: NDArray[np.float64]) -> float | None:
     # fsum is exact, so the order of the trials cannot show in the last digit.
     return math.fsum(values.tolist()) / len(values) if len(values) else None
@@ -286,7 +320,7 @@ def _mean_total(totals: Iterable[Total]) -> float | None:
 
 
 def _pass_chances(
-    estimate: Callable[[int, int, int], float | None], successes: int, trials: int
+    estimate: Callable[[NDArray[np.float64], int], float | None], shares: NDArray[np.float64]
 ) -> dict[str, float]:
-    chances = {str(k): estimate(successes, trials, k) for k in PASS_K}
+    chances = {str(k): estimate(shares, k) for k in PASS_K}
     return {k: chance for k, chance in chances.items() if chance is not None}

@@ -30,6 +30,8 @@ class OverallRow:
         rank_high: Upper end, or None.
         mean_rank: Mean rank over tasks and both figures, or None.
         missing: Tasks of the board without counted trials.
+        score_mean: Mean of the tasks' scores beside the expert's; None where a task or its expert
+            is missing.
         trials: Counted trials on all tasks.
         success_rate_mean: Mean of the tasks' success rates; None without any.
         cost_usd_mean: Mean of the tasks' mean costs.
@@ -45,6 +47,7 @@ class OverallRow:
     rank_high: int | None
     mean_rank: float | None
     missing: Sequence[str]
+    score_mean: float | None
     trials: int
     success_rate_mean: float | None
     cost_usd_mean: float | None
@@ -83,6 +86,7 @@ def overall_rows(
                 rank_high=int(ranked.high[place]) if ranked else None,
                 mean_rank=float(ranked.mean_rank[place]) if ranked else None,
                 missing=[task for task in tasks if not _counts(cells[task].get(name))],
+                score_mean=_mean_of_all([cells[task].get(name) for task in tasks]),
                 trials=sum(cell.trials for cell in own),
                 success_rate_mean=_mean([cell.success_rate for cell in own]),
                 cost_usd_mean=_mean([cell.cost_usd_mean for cell in own]),
@@ -139,6 +143,12 @@ def _counts(cell: Cell | None) -> bool:
 def _mean(values: Sequence[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return math.fsum(known) / len(known) if known else None
+
+
+def _mean_of_all(row: Sequence[Cell | None]) -> float | None:
+    """The mean score of a configuration that has one on each task."""
+    scores = [None if cell is None else cell.score for cell in row]
+    return None if None in scores else _mean(scores)
 
 
 def _with_pareto(row: OverallRow, rows: Sequence[OverallRow]) -> OverallRow:

@@ -41,12 +41,15 @@ class Tally:
     Attributes:
         outcome: How they ended.
         reason: Class of their failure, if any.
-        success: Whether they met the task's criterion.
+        success: Whether they met the task's criterion in the exact world.
         flags: Remarks on their scores.
         imported: Whether they came from another service's archive.
         by_runner: Whether runners ran trials of theirs.
         unverified: Whether they wait for their verification, or were refuted.
-        indicators: (N,) float64, of each trial.
+        indicators: (N,) float64, of each trial, in the exact world.
+        shares: (N,) float64, 0 to 1, what each trial's success is worth: in varied worlds where
+            there were any.
+        gained: (N,) float64, what each trial's indicator is worth, as `EndedJob.gained`.
         costs_usd: (N,) float64, of each trial; not a number where unknown.
         output_tokens: (N,) int64, of each trial; -1 where unknown.
         requests: Model requests.
@@ -66,6 +69,8 @@ class Tally:
     by_runner: bool
     unverified: bool
     indicators: Floats
+    shares: Floats
+    gained: Floats
     costs_usd: Floats
     output_tokens: Integers
     requests: Total
@@ -125,6 +130,8 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
         by_runner=by_runner,
         unverified=unverified,
         indicators=np.array([trial.indicator for trial in trials], np.float64),
+        shares=np.array([trial.share for trial in trials], np.float64),
+        gained=np.array([trial.gained for trial in trials], np.float64),
         costs_usd=np.array(
             [np.nan if t.cost_usd is None else t.cost_usd for t in trials], np.float64
         ),

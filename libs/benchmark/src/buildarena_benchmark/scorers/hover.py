@@ -9,7 +9,7 @@ from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo, is_airborne
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scorers.measures.outline import lowest_points
-from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
+from buildarena_benchmark.scorers.measures.series import starting_block, tilt_deg
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     FORCES_NOT_MEASURED,
@@ -109,7 +109,7 @@ def judge(
     joined = joined_to_start(machine, trajectory)
     start = starting_block(machine, trajectory)
     path = trajectory.positions[:, start].astype(np.float64)
-    tilt = _tilt_deg(trajectory, start)
+    tilt = tilt_deg(trajectory, start)
     drift = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
     steady = (
         (np.abs(path[:, 2] - scoring.height) <= scoring.band)
@@ -150,14 +150,6 @@ def _would_hold(
     """Whether it would have held its height for long enough if it were not for one of the rules."""
     others = [mask for flag, mask in rules.items() if flag != without]
     return _longest_s(steady & np.all(others, axis=0)) >= scoring.hold_s
-
-
-def _tilt_deg(trajectory: "Trajectory", start: int) -> Series:
-    """Angle of the starting block's upward axis from the vertical, (T,), degrees."""
-    turns = rotations(trajectory.quaternions[:, start])
-    up_at_start = turns[0].T @ np.array([0.0, 0.0, 1.0])
-    cosine = (turns @ up_at_start)[:, 2]
-    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
 def _longest_s(holds: Mask) -> float:

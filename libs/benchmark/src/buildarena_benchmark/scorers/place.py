@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
-NEAREST: Final = 0.1
-"""Nearer to the mark counts no more, units: the cargo's place is drawn as finely."""
+_NEAREST: Final = 0.1
+"""Nearer to the mark usually counts no more, units: the cargo's place is drawn as finely."""
 
 _BORNE_SAMPLES: Final = 5
 """Whether the cargo is borne is judged over a fifth of a second: a throw shows."""
@@ -63,6 +63,7 @@ class PlaceScoring(Document):
         max_base_shift: The starting block must stay nearer to where it was, units.
         max_loose: Farthest that the cargo may move, in all, while the machine does not bear it,
             units.
+        nearest: Nearer to the mark counts no more, units.
     """
 
     name: Literal["place"]
@@ -74,6 +75,9 @@ class PlaceScoring(Document):
     max_speed: Threshold = 0.1
     max_base_shift: Threshold = 0.5
     max_loose: Threshold = 1.5
+    nearest: Annotated[float, Field(gt=0, le=1, exclude_if=lambda value: value == _NEAREST)] = (
+        _NEAREST
+    )
 
 
 def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
@@ -148,7 +152,7 @@ def judge(
     counts = carried and stays and whole
     return Verdict(
         success=lies and counts,
-        indicator=rounded(1.0 / max(apart, NEAREST)) if counts else 0.0,
+        indicator=rounded(1.0 / max(apart, scoring.nearest)) if counts else 0.0,
         metrics=metrics,
         flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=True),

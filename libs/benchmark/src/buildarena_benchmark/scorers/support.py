@@ -1,10 +1,11 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.components import Mask, spans_of
@@ -60,12 +61,19 @@ class SupportScoring(Document):
         fall_height: The cargo has fallen when its centre is below it, units.
         min_time_s: How long in all it must be at or above that height.
         max_start_height: Its start height may not exceed it, units.
+        span_until: "fall": forces are measured until the cargo falls, so debris on the gap's floor
+            counts as well; "collapse": until the load is decided.
+        per_mass: Whether the load over the machine's mass is a metric.
     """
 
     name: Literal["support"]
     fall_height: Threshold = 4.0
     min_time_s: Threshold = 2.0
     max_start_height: Threshold = 20.0
+    span_until: Annotated[
+        Literal["fall", "collapse"], Field(exclude_if=lambda value: value == "fall")
+    ] = "fall"
+    per_mass: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
 
 
 def infeasible(scoring: SupportScoring, scenario: Scenario) -> str | None:
@@ -112,7 +120,7 @@ def judge(
     time_above = carried * step
     too_high = bool(height[0] > scoring.max_start_height)
     lasted = time_above >= scoring.min_time_s - 1e-9 and not too_high
-    span = measure_span(scenario, trajectory, fell)
+    span = measure_span(scenario, trajectory, decided if scoring.span_until == "collapse" else fell)
     spans = span is None or span.spans
     load = float(trajectory.cargo_mass[-1 if decided is None else decided])
     success = lasted and spans
@@ -137,6 +145,8 @@ def judge(
         "broken_joints": len(trajectory.breaks),
         **_span_metrics(span),
     }
+    if scoring.per_mass:
+        metrics["load_per_mass"] = rounded(load / machine.mass) if success else 0.0
     return Verdict(
         success=success,
         indicator=rounded(load) if success else 0.0,

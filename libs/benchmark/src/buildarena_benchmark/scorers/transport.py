@@ -9,7 +9,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Coordinate, Count, Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
-from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scorers.measures.rolling import driven_distances, explained_distances
 from buildarena_benchmark.scorers.measures.route import there_and_back
 from buildarena_benchmark.scorers.measures.series import Series, speeds, starting_block
 from buildarena_benchmark.scorers.scorer import (
@@ -119,7 +119,7 @@ def judge(
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
     measured = driven_distances(machine, trajectory, joined, path) is not None
     borne = bears_cargo(trajectory) if measured and scoring.subject == "cargo" else None
-    reach = _explained(machine, trajectory, joined, path)
+    reach = explained_distances(machine, trajectory, joined, path)
     counted = np.where(True if borne is None else borne, np.minimum(moved, reach), 0.0)
     distance, indicator = float(moved.max()), float(counted.max())
     start_height = (
@@ -135,7 +135,7 @@ def judge(
     if scoring.back:
 
         def counts(since: int) -> Mask:
-            explained = _explained(machine, trajectory, joined, path, since=since)
+            explained = explained_distances(machine, trajectory, joined, path, since=since)
             gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
             return np.asarray((gone <= explained) & (True if borne is None else borne))
 
@@ -177,16 +177,6 @@ def judge(
         flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=scoring.subject == "cargo"),
     )
-
-
-def _explained(
-    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series, *, since: int = 0
-) -> Series:
-    """How far from where it was the subject counts as driven, (T,); infinite if not measured."""
-    driven = driven_distances(machine, trajectory, joined, path, since=since)
-    if driven is None:
-        return np.full(len(path), np.inf)
-    return np.minimum(driven, moved_upright(trajectory, joined, path, since=since))
 
 
 def _time_of(trajectory: "Trajectory", sample: int | None) -> float | None:

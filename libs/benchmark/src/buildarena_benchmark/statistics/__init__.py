@@ -4,6 +4,7 @@ Rates are fractions in [0, 1]. Where a figure does not exist (nothing was tried,
 the answer is None, never NaN. Everything random takes a seed and is reproducible.
 """
 
+from buildarena_benchmark.statistics.absolute import expert_scores
 from buildarena_benchmark.statistics.agreement import Agreement, agreement
 from buildarena_benchmark.statistics.comparisons import (
     PairedTest,
@@ -51,6 +52,7 @@ __all__ = [
     "detectable_difference",
     "difference_interval",
     "exact_interval",
+    "expert_scores",
     "holm",
     "mean_interval",
     "mean_ranks",

@@ -31,11 +31,12 @@ class PairedTest:
     method: Literal["exact McNemar", "Wilcoxon signed-rank"]
 
 
-def paired_successes(first: Sequence[bool], second: Sequence[bool]) -> PairedTest | None:
+def paired_successes(first: Sequence[float], second: Sequence[float]) -> PairedTest | None:
     """The exact McNemar test of success on shared seeds; None without pairs.
 
     Only seeds on which one succeeded and the other did not speak; under equality each of these
-    falls to either side with chance 1/2.
+    falls to either side with chance 1/2. Shares of varied worlds, which may lie between 0 and 1,
+    are tested as indicators are.
 
     Source:
         Q. McNemar, Psychometrika 12 (1947) 153; exact form by the binomial distribution.
@@ -45,8 +46,10 @@ def paired_successes(first: Sequence[bool], second: Sequence[bool]) -> PairedTes
     pairs = list(zip(first, second, strict=True))
     if not pairs:
         return None
-    won = sum(a and not b for a, b in pairs)
-    lost = sum(b and not a for a, b in pairs)
+    if any(0 < share < 1 for pair in pairs for share in pair):
+        return paired_indicators(first, second)
+    won = sum(a > b for a, b in pairs)
+    lost = sum(b > a for a, b in pairs)
     p_value = float(binomtest(won, won + lost, 0.5).pvalue) if won + lost else 1.0
     return PairedTest(
         pairs=len(pairs),

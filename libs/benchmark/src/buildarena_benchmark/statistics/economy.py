@@ -72,12 +72,12 @@ def token_bins(output_tokens: Floats, indicators: Floats, *, bins: int = 8) -> l
     return binned
 
 
-def cost_per_success(costs_usd: Sequence[float | None], successes: int) -> float | None:
+def cost_per_success(costs_usd: Sequence[float | None], successes: float) -> float | None:
     """US dollars spent for each success, failures included.
 
     Args:
         costs_usd: Cost of each trial; None where it is unknown.
-        successes: How many of them succeeded.
+        successes: How many of them succeeded, or the sum of their shares.
 
     Returns:
         None without a success, or with an unknown cost.

@@ -6,6 +6,9 @@ import math
 from statistics import NormalDist
 from typing import Final
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 LEVEL: Final = 0.95
 """Confidence level of every interval that is shown."""
 
@@ -16,12 +19,13 @@ def quantile(level: float = LEVEL) -> float:
 
 
 def exact_interval(
-    successes: int, trials: int, level: float = LEVEL, *, at_least: int = 0
+    successes: float, trials: int, level: float = LEVEL, *, at_least: int = 0
 ) -> tuple[float, float]:
     """The Clopper-Pearson interval of a success rate: it covers at least as often as its level.
 
     Args:
-        successes: How many trials succeeded.
+        successes: How many trials succeeded. Trials may be worth a share from 0 to 1 each: their
+            mean varies at most as much as that of trials that succeed or fail with the same chance.
         trials: How many there were.
         level: Confidence level.
         at_least: Successes without which no interval would have been asked for. That so many
@@ -31,7 +35,8 @@ def exact_interval(
         ValueError: There were no trials, more successes than trials, or fewer than were asked for.
 
     Source:
-        C. J. Clopper & E. S. Pearson, Biometrika 26 (1934) 404.
+        C. J. Clopper & E. S. Pearson, Biometrika 26 (1934) 404; of shares: W. Hoeffding, J. Am.
+        Stat. Assoc. 58 (1963) 13.
     """
     from scipy.special import betaincinv
 
@@ -49,7 +54,7 @@ def exact_interval(
 
 
 def _conditional_low(
-    successes: int, trials: int, at_least: int, tail: float, *, most: float
+    successes: float, trials: int, at_least: int, tail: float, *, most: float
 ) -> float:
     """The rate at which so many successes, given that there are some, have the tail's chance."""
     from scipy.optimize import brentq
@@ -64,7 +69,7 @@ def _conditional_low(
     return float(brentq(excess, 0.0, most)) if excess(most) > 0 else most
 
 
-def wilson_interval(successes: int, trials: int, level: float = LEVEL) -> tuple[float, float]:
+def wilson_interval(successes: float, trials: int, level: float = LEVEL) -> tuple[float, float]:
     """The Wilson score interval of a success rate; it never leaves [0, 1].
 
     Raises:
@@ -87,7 +92,7 @@ def wilson_interval(successes: int, trials: int, level: float = LEVEL) -> tuple[
 
 
 def difference_interval(
-    first: tuple[int, int], second: tuple[int, int], level: float = LEVEL
+    first: tuple[float, int], second: tuple[float, int], level: float = LEVEL
 ) -> tuple[float, float]:
     """The interval of the difference of two independent success rates, first minus second.
 
@@ -111,27 +116,48 @@ def difference_interval(
     )
 
 
-def pass_at_k(successes: int, trials: int, k: int) -> float | None:
+def pass_at_k(shares: ArrayLike, k: int) -> float | None:
     """The chance that at least one of k tries succeeds; None when fewer than k were made.
 
     Unbiased: the share of all k-subsets of the trials that hold a success.
 
+    Args:
+        shares: (N,) 0 or 1 for each trial, or the chance with which it succeeds.
+        k: How many tries.
+
     Source:
         M. Chen et al., arXiv:2107.03374 (2021), equation 1.
     """
-    if not 1 <= k <= trials:
-        return None
-    return 1.0 - math.comb(trials - successes, k) / math.comb(trials, k)
+    missed = _mean_product(1.0 - np.asarray(shares, np.float64), k)
+    return None if missed is None else 1.0 - missed
 
 
-def pass_hat_k(successes: int, trials: int, k: int) -> float | None:
+def pass_hat_k(shares: ArrayLike, k: int) -> float | None:
     """The chance that all of k tries succeed; None when fewer than k were made.
 
     Unbiased: the share of all k-subsets of the trials that hold successes alone.
 
+    Args:
+        shares: (N,) 0 or 1 for each trial, or the chance with which it succeeds.
+        k: How many tries.
+
     Source:
         S. Yao et al., arXiv:2406.12045 (2024), section 3 (pass^k).
     """
-    if not 1 <= k <= trials:
+    return _mean_product(np.asarray(shares, np.float64), k)
+
+
+def _mean_product(values: NDArray[np.float64], k: int) -> float | None:
+    """The mean product of k different values; None when there are fewer."""
+    number = len(values)
+    if not 1 <= k <= number:
         return None
-    return math.comb(successes, k) / math.comb(trials, k)
+    # The coefficients of the product of (1 + value x) are sums of products; many values are equal.
+    sums = [1.0]
+    for value, times in zip(*np.unique(values, return_counts=True), strict=True):
+        powers = [math.comb(int(times), j) * float(value) ** j for j in range(k + 1)]
+        sums = [
+            math.fsum(sums[i] * powers[j - i] for i in range(min(j + 1, len(sums))))
+            for j in range(k + 1)
+        ]
+    return sums[k] / math.comb(number, k)

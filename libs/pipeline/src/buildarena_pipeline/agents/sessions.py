@@ -23,7 +23,11 @@ from buildarena_pipeline.agents.workbench import Workbench, check_arguments, reb
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track, has_data_sheets
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.known import simulation_version
+from buildarena_pipeline.runtime.simulators.known import (
+    simulation_version,
+    worlds_here,
+    worlds_issues,
+)
 from buildarena_pipeline.transcript import Transcript
 from buildarena_pipeline.turns import turn_of_call
 from buildarena_store import (
@@ -108,6 +112,7 @@ class ExternalSessions:
         owner: str | None = None,
         force: bool = False,
         data_sheets: bool = True,
+        worlds: int | None = None,
     ) -> OpenedSession:
         """Opens a session for one task, which belongs to the key that opened it.
 
@@ -122,13 +127,14 @@ class ExternalSessions:
             owner: Id of the API key; None for the operator.
             force: Play under another key's name, as an admin may.
             data_sheets: Whether it is told the numbers of modules and world.
+            worlds: In how many varied worlds its machine is scored; None for the service's default.
 
         Raises:
             SubmissionError: Something is unknown, or the agent's session of this seed is over or
                 another key's.
             NameTakenError: The name is another key's, or of the other kind.
         """
-        further = []
+        further = worlds_issues(self._context, simulator, worlds)
         if not AGENT_NAME.fullmatch(agent):
             message = "1 to 80 letters, digits, dots, dashes and underscores"
             further.append(ValidationIssue(path="agent", message=message))
@@ -141,6 +147,7 @@ class ExternalSessions:
             briefing_digest(on_demand=on_demand, data_sheets=data_sheets),
             on_demand=on_demand,
             data_sheets=data_sheets,
+            worlds=worlds_here(self._context, simulator, worlds),
         )
         model = f"{kind}/{agent}"
         config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}

@@ -9,11 +9,22 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, fi
 
 from buildarena_pipeline.catalog.workflows import DEFAULT_WORKFLOW
 from buildarena_simulation import DEFAULT_ENGINE
+from buildarena_simulation.constants import MAX_WORLDS
 from buildarena_store import BudgetLimits
 
 MAX_SEED = 2**53 - 1
 """Largest seed: every JSON reader keeps integers up to here exact."""
 
+Worlds = Annotated[
+    StrictInt | None,
+    Field(
+        ge=0,
+        le=MAX_WORLDS,
+        description="In how many varied worlds each finished machine is scored: other place, yaw, "
+        "cargo and timing, unknown to the model; 0 for the exact trial alone, null for what the "
+        "service does by default",
+    ),
+]
 Seed = Annotated[StrictInt, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
 Title = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
@@ -88,6 +99,7 @@ class Variant(BaseModel):
             "without, they are found out by trials"
         ),
     ] = True
+    worlds: Worlds = None
     one_shot: Annotated[bool, Field(description="Show an example construction")] = False
     closed_loop: ClosedLoop | None = None
     decoding: Decoding = Decoding()

@@ -34,6 +34,7 @@ class Track:
         analyst: Whether an analyst advises between rounds.
         on_demand: Whether roles look modules up instead of being told them.
         data_sheets: Whether roles are told the numbers of modules and world.
+        worlds: How many varied worlds a finished machine is scored in besides the exact one.
     """
 
     workflow: str
@@ -48,6 +49,7 @@ class Track:
     analyst: bool = False
     on_demand: bool = False
     data_sheets: bool = False
+    worlds: int = 0
 
     @property
     def id(self) -> str:
@@ -63,6 +65,8 @@ class Track:
             workflow += "+data-sheets"
         if self.rounds > 1:
             workflow += f"+{self.rounds}-rounds" + ("-analyst" if self.analyst else "")
+        if self.worlds:
+            workflow += f"+{self.worlds}-worlds"
         return (
             f"{workflow}/{self.simulator}-{self.simulation_version}/"
             f"{self.prompts}-{self.prompts_digest[:8]}-{self.feedback_version}"
@@ -72,9 +76,13 @@ class Track:
         """The parts as a JSON object."""
         parts = {name: getattr(self, name) for name in self.__dataclass_fields__}
         # Rows have the older word; tracks from before modules could be looked up say nothing of it,
-        # nor do those from before data sheets, which had none.
-        further = {"data_sheets": parts.pop("data_sheets"), "looked_up": parts.pop("on_demand")}
-        return {**parts, **{name: True for name, holds in further.items() if holds}}
+        # nor do those from before data sheets, which had none, and from before varied worlds.
+        further = {
+            "data_sheets": parts.pop("data_sheets"),
+            "looked_up": parts.pop("on_demand"),
+            "worlds": parts.pop("worlds"),
+        }
+        return {**parts, **{name: value for name, value in further.items() if value}}
 
 
 def has_data_sheets(config: Mapping[str, Any]) -> bool:
@@ -86,6 +94,15 @@ def has_data_sheets(config: Mapping[str, Any]) -> bool:
     return bool(config.get("data_sheets"))
 
 
+def worlds_of(config: Mapping[str, Any]) -> int:
+    """In how many varied worlds a track scores machines; older ones say nothing of it.
+
+    Args:
+        config: What `Track.as_config` gave.
+    """
+    return int(config.get("worlds", 0))
+
+
 def external_track(
     simulator: str,
     version: str,
@@ -93,6 +110,7 @@ def external_track(
     *,
     on_demand: bool = False,
     data_sheets: bool = True,
+    worlds: int = 0,
 ) -> Track:
     """The track of external agents, which bring their own prompts.
 
@@ -102,6 +120,7 @@ def external_track(
         briefing_digest: Hash of what they read around a task's statement.
         on_demand: Whether they look modules up instead of being told them.
         data_sheets: Whether they are told the numbers of modules and world.
+        worlds: How many varied worlds machines are scored in.
     """
     return Track(
         workflow=EXTERNAL_WORKFLOW,
@@ -112,6 +131,7 @@ def external_track(
         feedback_version=FEEDBACK_VERSION,
         on_demand=on_demand,
         data_sheets=data_sheets,
+        worlds=worlds,
     )
 
 
@@ -142,6 +162,7 @@ def make_track(
     closed_loop: ClosedLoop | None = None,
     on_demand: bool = False,
     data_sheets: bool = True,
+    worlds: int = 0,
 ) -> Track:
     """The track of a submission, with the prompts and feedback that are installed now.
 
@@ -154,6 +175,7 @@ def make_track(
         closed_loop: The closed loop, if there is one.
         on_demand: Whether the task's modules are looked up instead of told.
         data_sheets: Whether the numbers of modules and world are told.
+        worlds: How many varied worlds machines are scored in.
     """
     return Track(
         workflow=workflow.name,
@@ -168,4 +190,5 @@ def make_track(
         analyst=closed_loop is not None and closed_loop.analyst,
         on_demand=on_demand,
         data_sheets=data_sheets,
+        worlds=worlds,
     )

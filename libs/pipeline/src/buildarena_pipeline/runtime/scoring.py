@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Task, failed_score
 from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 from buildarena_pipeline import __version__
@@ -33,10 +35,10 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
 def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
     """The rollout that counts.
 
-    A success before none, one that no flag disqualifies before others, then the larger indicator,
-    then the first.
+    Of those in the exact world a success before none, one that no flag disqualifies before others,
+    then the larger indicator, then the first.
     """
-    done = [record for record in records if record.finished_at is not None]
+    done = [r for r in records if r.finished_at is not None and r.seed is None]
     return max(
         done,
         key=lambda r: (
@@ -48,17 +50,44 @@ def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
     )
 
 
-def rollout_score(job: Job, record: RolloutRecord) -> JobScore:
-    """The score of a job whose best rollout this is."""
+def rollout_score(
+    job: Job, record: RolloutRecord, varied: Sequence[RolloutRecord] = ()
+) -> JobScore:
+    """The score of a job.
+
+    Args:
+        job: The job.
+        record: Its best rollout.
+        varied: Rollouts of the same machine in varied worlds.
+    """
     success = bool(record.success)
     return JobScore(
         outcome=Outcome.SUCCESS if success else Outcome.UNSUCCESSFUL,
         success=success,
         indicator=float(record.indicator or 0.0),
-        metrics=record.metrics or {},
+        metrics={**(record.metrics or {}), **robustness_metrics(varied)},
         flags=record.flags or (),
         manifest=job_manifest(job, record),
     )
+
+
+def robustness_metrics(varied: Sequence[RolloutRecord]) -> Mapping[str, float]:
+    """What a machine did in varied worlds, as metrics of its job; empty without any.
+
+    In a world in which it fails, or succeeds in a way that disqualifies, it has done nothing.
+    """
+    if not varied:
+        return {}
+    gained = [
+        float(record.indicator or 0.0)
+        for record in varied
+        if record.success and not is_disqualified(record.flags or ())
+    ]
+    return {
+        "worlds": len(varied),
+        ROBUSTNESS: len(gained) / len(varied),
+        ROBUST_INDICATOR: math.fsum(gained) / len(varied),
+    }
 
 
 def failure_score(

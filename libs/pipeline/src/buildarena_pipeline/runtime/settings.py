@@ -20,6 +20,7 @@ from pydantic_settings import (
 
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.secret_files import read_secret
+from buildarena_simulation.constants import MAX_WORLDS
 
 PREFIX: Final = "BUILDARENA_"
 DEFAULT_PORT = 8321
@@ -124,6 +125,15 @@ class Settings(BaseSettings):
         SecretStr | None,
         Field(description="Secret that opens the metrics, and nothing else", min_length=16),
     ] = None
+    worlds: Annotated[
+        int,
+        Field(
+            description="In how many varied worlds finished machines are scored where a submission "
+            "does not say",
+            ge=0,
+            le=MAX_WORLDS,
+        ),
+    ] = 4
     rate_limit: Annotated[
         str, Field(description="Requests a caller may send, for example 600/minute")
     ] = "6000/minute"

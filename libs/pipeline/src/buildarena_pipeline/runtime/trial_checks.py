@@ -25,7 +25,13 @@ from buildarena_pipeline.errors import PipelineError
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import MachineNotSimulable, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.control import PRESSES, ended_presses, written_presses
+from buildarena_simulation.control import (
+    PRESSES,
+    KeyHold,
+    ended_presses,
+    varied_presses,
+    written_presses,
+)
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.parquet import SCHEMA_VERSION, read_trajectory, schema_of
 from buildarena_simulation.placement import start_of
@@ -64,6 +70,7 @@ def checked_trajectory(
     machine: Machine,
     scenario: Scenario,
     controls: Sequence[KeyPress] | None = None,
+    seed: int | None = None,
 ) -> Trajectory:
     """The trajectory of a file that a runner sent.
 
@@ -74,6 +81,7 @@ def checked_trajectory(
         machine: The machine.
         scenario: What it was put through.
         controls: Key presses of this run; None for the machine's own.
+        seed: Of the varied world in which it was run; None for the exact one.
 
     Raises:
         OutcomeRefusedError: It is no trajectory, or none of this machine in this scenario.
@@ -95,8 +103,8 @@ def checked_trajectory(
         _require_game(trajectory, machine, scenario)
     else:
         _same("simulation_version", trajectory.simulation_version, version)
-        _require_engine(trajectory, machine, scenario)
-        _require_presses(trajectory, machine, scenario, controls)
+        _require_engine(trajectory, machine, scenario, seed)
+        _require_presses(trajectory, machine, scenario, controls, seed)
     return trajectory
 
 
@@ -283,11 +291,14 @@ def _require_presses(
     machine: Machine,
     scenario: Scenario,
     controls: Sequence[KeyPress] | None,
+    seed: int | None,
 ) -> None:
     """Checks that the keys were pressed that this run has, and no others."""
-    presses = ended_presses(
-        machine.control_sequence if controls is None else controls, scenario.control
-    )
+    asked: Sequence[KeyHold] = machine.control_sequence if controls is None else controls
+    control = scenario.control
+    if seed is not None:
+        asked, control = varied_presses(asked, control, seed)
+    presses = ended_presses(asked, control)
     wanted = written_presses(bindings_of(machine), presses)
     _require(trajectory.settings.get(PRESSES) == wanted, "its key presses are another run's")
 
@@ -302,7 +313,9 @@ def _tracked(structure: Structure, scenario: Scenario) -> tuple[str, ...]:
     return scenario.tracked_blocks
 
 
-def _require_engine(trajectory: Trajectory, machine: Machine, scenario: Scenario) -> None:
+def _require_engine(
+    trajectory: Trajectory, machine: Machine, scenario: Scenario, seed: int | None
+) -> None:
     """Checks that a trajectory of an engine of ours is of this machine."""
     try:
         structure = structure_of(machine)
@@ -319,14 +332,15 @@ def _require_engine(trajectory: Trajectory, machine: Machine, scenario: Scenario
         and len(trajectory.breaks) <= len(names),
         "joints break that the machine does not have",
     )
-    _require(not {"seed", "start"} & set(trajectory.settings), "its start was varied")
+    _require("start" not in trajectory.settings, "its start was chosen")
+    _same("settings.seed", trajectory.settings.get("seed"), seed)
     pieces, bearing = trajectory.pieces, trajectory.bearing
     if pieces is None or bearing is None or trajectory.joint_loads is None:
         raise OutcomeRefusedError("it has no pieces, bearing or joint loads")
     _require(((pieces >= 0) & (pieces < len(ids))).all(), "its pieces name other blocks")
     _same("wheel_ids", bearing.wheel_ids, tuple(ids[i] for i in structure.wheels))
     _same("terrains", bearing.terrain.shape[1], len(scenario.terrain))
-    start = start_of(structure, scenario)
+    start = start_of(structure, scenario, seed)
     shown = structure.shown[[ids.index(block) for block in tracked]]
     _near("the machine", trajectory.positions[0], start.position + shown @ start.rotation.T)
     cargo = scenario.cargo

@@ -18,9 +18,10 @@ from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import Notifier
-from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
+from buildarena_pipeline.runtime.scoring import task_of
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
 from buildarena_pipeline.runtime.trials import PARQUET, File, TrialResult
+from buildarena_pipeline.runtime.worlds import finish_or_vary
 from buildarena_simulation import Trajectory, write_trajectory
 from buildarena_store import ArtifactInfo, ArtifactStore, Job, Lease, RolloutRecord, Stage, Store
 from buildarena_store.jobs.audits import is_unproved, runner_key
@@ -205,15 +206,16 @@ class TrialRepository:
             completed = store.rollouts.complete(
                 job.id, request.number, connection=connection, **values
             )
+            queue: str | None = CONSTRUCT_QUEUE
             if request.final:
-                final = rollout_score(job, best_rollout([*due.records, completed]))
-                store.results.finish(lease, final, connection=connection)
+                records = [completed if r.number == completed.number else r for r in due.records]
+                queue = finish_or_vary(store, lease, records, connection=connection)
             else:
                 store.leases.queue_again(
                     lease, stage=Stage.CONSTRUCT, queue=CONSTRUCT_QUEUE, connection=connection
                 )
-        if not request.final:
-            self._queues.notify_one(CONSTRUCT_QUEUE, job.id)
+        if queue is not None:
+            self._queues.notify_one(queue, job.id)
 
     def _put(self, files: Mapping[str, File]) -> dict[str, ArtifactInfo]:
         return {
@@ -225,9 +227,10 @@ def _same_trial(request: RolloutRecord, records: Sequence[RolloutRecord]) -> Rol
     """An earlier rollout with the same input: the same input gives the same bytes."""
     for record in records:
         done = record.finished_at is not None and record.engine == request.engine
-        if done and (record.machine_hash, record.controls) == (
+        if done and (record.machine_hash, record.controls, record.seed) == (
             request.machine_hash,
             request.controls,
+            request.seed,
         ):
             return record
     return None

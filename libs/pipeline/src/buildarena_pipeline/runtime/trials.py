@@ -42,6 +42,7 @@ class TrialRequest:
         task: What the machine is put through.
         machine: The machine.
         controls: Key presses of this run; None for the machine's own.
+        seed: Of the varied world in which it is run; None for the exact one.
         require_held: Raises `StaleLeaseError` once the job is somebody else's.
     """
 
@@ -53,6 +54,7 @@ class TrialRequest:
     machine: Machine
     controls: Sequence[KeyPress] | None
     require_held: Callable[[], None]
+    seed: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,7 +15,12 @@ from buildarena_pipeline.catalog.workflows import workflow_sources
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
-from buildarena_pipeline.runtime.simulators.known import simulation_version, simulator_issues
+from buildarena_pipeline.runtime.simulators.known import (
+    simulation_version,
+    simulator_issues,
+    worlds_here,
+    worlds_issues,
+)
 from buildarena_pipeline.submission.estimates import SweepEstimate, estimate
 from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
 from buildarena_store.ids import content_hash, new_id
@@ -208,6 +213,7 @@ class Submissions:
             closed_loop=variant.closed_loop,
             on_demand=on_demand,
             data_sheets=variant.data_sheets,
+            worlds=worlds_here(self._context, variant.simulator, variant.worlds),
         )
 
     def _require_known(
@@ -225,6 +231,7 @@ class Submissions:
             *_unknown("model", models, self._registry.models),
             *_unknown("workflow", {"workflow": variant.workflow}, self._workflows),
             *simulator_issues(self._context, variant.simulator),
+            *worlds_issues(self._context, variant.simulator, variant.worlds),
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
         issues = issues or self._infeasible(variant.workflow, tasks, found)

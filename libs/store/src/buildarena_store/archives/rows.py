@@ -261,6 +261,7 @@ class RolloutRow(_Row):
     engine: Word
     machine_hash: Digest
     controls: JsonList | None
+    seed: Annotated[int | None, Field(ge=0, lt=2**31)] = None
     success: bool | None
     indicator: Figure | None
     metrics: JsonObject | None

@@ -126,7 +126,11 @@ class Boards:
         )
         simulated = (
             select(rollouts)
-            .where(rollouts.c.job_id.in_(members), rollouts.c.finished_at.is_not(None))
+            .where(
+                rollouts.c.job_id.in_(members),
+                rollouts.c.finished_at.is_not(None),
+                rollouts.c.seed.is_(None),
+            )
             .order_by(rollouts.c.job_id, rollouts.c.number)
         )
         with self._database.transaction() as connection:

@@ -30,7 +30,13 @@ from sqlalchemy import (
     select,
 )
 
-from buildarena_benchmark.leaderboard import UNKNOWN_TOKENS, Tally, Total
+from buildarena_benchmark.leaderboard import (
+    ROBUST_INDICATOR,
+    ROBUSTNESS,
+    UNKNOWN_TOKENS,
+    Tally,
+    Total,
+)
 from buildarena_store.boards.trials import COUNTS, CellId, TrialFilter, decoding_of
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import EXTERNAL_PROVIDER
@@ -39,6 +45,8 @@ from buildarena_store.tables import jobs
 _FLOATS: Final = np.dtype(">f8")
 _INTEGERS: Final = np.dtype(">i8")
 """As the database sends them."""
+_ARRAYS: Final = 5
+"""Figures of each trial that a row keeps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,6 +118,8 @@ def stored_tallies(tallies: Sequence[Tally]) -> tuple[list[dict[str, Any]], byte
         for tally in tallies
         for part, kind in (
             (tally.indicators, _FLOATS),
+            (tally.shares, _FLOATS),
+            (tally.gained, _FLOATS),
             (tally.costs_usd, _FLOATS),
             (tally.output_tokens, _INTEGERS),
         )
@@ -122,8 +132,10 @@ def tallies_of(said: Sequence[Mapping[str, Any]], figures: bytes) -> list[Tally]
     tallies, start = [], 0
     for one in said:
         size = 8 * one["number"]
-        parts = [figures[start + place * size : start + (place + 1) * size] for place in range(3)]
-        start += 3 * size
+        parts = [
+            figures[start + place * size : start + (place + 1) * size] for place in range(_ARRAYS)
+        ]
+        start += _ARRAYS * size
         tallies.append(
             Tally(
                 outcome=one["outcome"],
@@ -134,8 +146,10 @@ def tallies_of(said: Sequence[Mapping[str, Any]], figures: bytes) -> list[Tally]
                 by_runner=one["by_runner"],
                 unverified=one["unverified"],
                 indicators=_floats(parts[0]),
-                costs_usd=_floats(parts[1]),
-                output_tokens=_integers(parts[2]),
+                shares=_floats(parts[1]),
+                gained=_floats(parts[2]),
+                costs_usd=_floats(parts[3]),
+                output_tokens=_integers(parts[4]),
                 requests=Total(**one["requests"]),
                 input_tokens=Total(**one["input_tokens"]),
                 parts=Total(**one["parts"]),
@@ -178,10 +192,20 @@ def _bytes_of(sent: Any) -> Any:
     return func.string_agg(sent, cast(literal(b"", LargeBinary), LargeBinary), type_=LargeBinary)
 
 
+_SUCCESS: Final = func.coalesce(jobs.c.success, False)
+_SHARE: Final = func.coalesce(
+    jobs.c.metrics[ROBUSTNESS].as_float(), case((_SUCCESS, 1.0), else_=0.0)
+)
+_GAINED: Final = func.coalesce(
+    jobs.c.metrics[ROBUST_INDICATOR].as_float(), case((_SUCCESS, jobs.c.indicator), else_=0.0), 0.0
+)
+"""As `EndedJob.share` and `EndedJob.gained`."""
 _SUMS: Final = [
     func.min(jobs.c.id).label("sample"),
     func.count().label("number"),
     _bytes_of(func.float8send(func.coalesce(jobs.c.indicator, 0.0))).label("indicators"),
+    _bytes_of(func.float8send(_SHARE)).label("shares"),
+    _bytes_of(func.float8send(_GAINED)).label("gained"),
     _bytes_of(func.float8send(cast(jobs.c.cost_usd, Double))).label("costs"),
     _bytes_of(func.int8send(jobs.c.output_tokens)).label("output_tokens"),
     func.sum(jobs.c.requests).label("requests"),
@@ -245,6 +269,8 @@ def _tally_of(row: Row[Any], refusals: Mapping[str, int]) -> Tally:
         by_runner=row.by_runner,
         unverified=row.unverified,
         indicators=_floats(row.indicators),
+        shares=_floats(row.shares),
+        gained=_floats(row.gained),
         costs_usd=_floats(row.costs) if known else np.full(number, np.nan),
         output_tokens=_integers(row.output_tokens) if known else np.full(number, UNKNOWN_TOKENS),
         requests=Total(known=known, sum=int(row.requests) if known else 0),

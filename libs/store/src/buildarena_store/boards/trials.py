@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
 
-from buildarena_benchmark.leaderboard import EndedJob
+from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS, EndedJob
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import EXTERNAL_PROVIDER, FILE_PROVIDER, Audit, JobState
 from buildarena_store.tables import jobs, sweep_jobs
@@ -122,6 +122,8 @@ TRIAL_COLUMNS: Final = [
     (jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER).label("external"),
     jobs.c.limits,
     cast(jobs.c.metrics["parts"], Integer).label("parts"),
+    jobs.c.metrics[ROBUSTNESS].as_float().label("robustness"),
+    jobs.c.metrics[ROBUST_INDICATOR].as_float().label("robust_indicator"),
 ]
 
 
@@ -146,6 +148,8 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             reason=None if row.reason is None else sys.intern(row.reason),
             success=bool(row.success),
             indicator=row.indicator or 0.0,
+            robustness=row.robustness,
+            robust_indicator=row.robust_indicator,
             parts=row.parts,
             flags=tuple(row.flags or ()),
             refusals=row.refusals or {},

@@ -25,6 +25,7 @@ class RolloutRequest:
         engine: Simulator name.
         machine_hash: Artifact hash of the machine document.
         controls: The key presses of this rollout, or None for the task's own.
+        seed: Of the varied world in which it is done; None for the exact one.
     """
 
     number: int
@@ -32,6 +33,7 @@ class RolloutRequest:
     engine: str
     machine_hash: str
     controls: Sequence[Mapping[str, Any]] | None = None
+    seed: int | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +41,7 @@ class RolloutRecord:
     """A rollout as the database has it; the score is None until it was simulated.
 
     Attributes:
+        seed: Of the varied world in which it was done; None for the exact one.
         runner: The key whose runner ran it; None for a worker of the house.
         audited: Whether its job is to be verified before it counts.
         annotations: What our engines say of the machine, by engine; only of trials in the game.
@@ -51,6 +54,7 @@ class RolloutRecord:
     engine: str
     machine_hash: str
     controls: Sequence[Mapping[str, Any]] | None
+    seed: int | None = None
     success: bool | None
     indicator: float | None
     metrics: Mapping[str, Any] | None
@@ -97,6 +101,7 @@ class Rollouts:
                 "engine": request.engine,
                 "machine_hash": request.machine_hash,
                 "controls": controls,
+                "seed": request.seed,
             },
         )
 

@@ -54,7 +54,7 @@ class Row(_View):
     )
     refuted: int = Field(description="Jobs whose verification came to other figures")
     simulated: int = Field(description="Counted jobs whose machine was finished and simulated")
-    successes: int
+    successes: float
     success_rate: float | None = Field(description="null when nothing was scored")
     success_low: float | None = Field(description="Lower end of the 95 % exact interval")
     success_high: float | None = Field(description="Upper end of the 95 % exact interval")
@@ -64,6 +64,13 @@ class Row(_View):
         description="Lower end of the 95 % interval; null when there are too few data"
     )
     indicator_high: float | None
+    score: float | None = Field(
+        description="Mean of the jobs' indicators beside the built-in expert's on a log scale, "
+        "log2(1 + indicator / expert's): 0 for nothing, 1 for as much as the expert, 2 for three "
+        "times as much; it does not depend on who else is listed. null for a task without expert"
+    )
+    score_low: float | None = Field(description="Lower end of its 95 % interval")
+    score_high: float | None
     too_few_data: bool = Field(
         description=f"Fewer than {MIN_SUCCESSES} successes: no interval of the mean indicator "
         "would hold"
@@ -97,7 +104,7 @@ class PublishedView(_View):
     snapshot: str
     matches: list[str] = Field(description="Our models with the same snapshot")
     trials: int
-    successes: int
+    successes: float
     success_rate: float
     success_low: float
     success_high: float
@@ -132,6 +139,9 @@ class OverallView(_View):
     configuration: str
     baseline: bool
     missing: list[str] = Field(description="Tasks of the board without a counted job")
+    score_mean: float | None = Field(
+        description="Mean of the tasks' scores; null where a task or its expert is missing"
+    )
     trials: int
     success_rate_mean: float | None
     cost_usd_mean: float | None

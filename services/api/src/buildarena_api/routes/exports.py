@@ -68,6 +68,12 @@ class Result(BaseModel):
     reason: str | None
     success: bool
     indicator: float
+    robustness: float | None = Field(
+        description="Share of varied worlds in which it succeeded; null where it was tried in none"
+    )
+    robust_indicator: float | None = Field(
+        description="Mean indicator in varied worlds, 0 where it failed; null without any"
+    )
     parts: int | None
     flags: list[str]
     refusals: dict[str, int]

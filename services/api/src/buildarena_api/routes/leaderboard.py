@@ -55,7 +55,7 @@ class TaskDuelView(BaseModel):
     model_config = ConfigDict(from_attributes=True)
 
     task: str
-    successes: tuple[int, int]
+    successes: tuple[float, float]
     trials: tuple[int, int]
     difference: float = Field(description="Success rate of the first minus that of the second")
     low: float = Field(description="Lower end of its 95 % interval, unpaired")

@@ -323,4 +323,5 @@ def _view(leased: Leased, lease_s: float) -> LeasedTrial:
         task=dict(due.task.as_document()),
         machine=due.machine.to_document(),
         controls=None if controls is None else [dict(press) for press in controls],
+        seed=due.request.seed,
     )

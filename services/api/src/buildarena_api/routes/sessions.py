@@ -17,7 +17,7 @@ from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError
 from buildarena_environment.tools import building_tools
 from buildarena_pipeline.agents.briefing import LIMITS
 from buildarena_pipeline.agents.sessions import SessionClosedError
-from buildarena_pipeline.catalog.specs import Name, Seed
+from buildarena_pipeline.catalog.specs import Name, Seed, Worlds
 from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_store import UnknownIdError
@@ -54,6 +54,7 @@ class OpenSession(BaseModel):
         description="Tell each module's data and the world's; sessions with and without are "
         "ranked apart",
     )
+    worlds: Worlds = None
 
 
 class ToolView(BaseModel):
@@ -142,8 +143,8 @@ def open_session(
 ) -> SessionOpened:
     """Opens a session in which an agent of yours, or you yourself, build for one task.
 
-    The same name, kind, task, seed, simulator and data sheets give the same session for as long as
-    it is open.
+    The same name, kind, task, seed, simulator, worlds and data sheets give the same session for as
+    long as it is open.
     """
     opened = sessions.open(
         task=body.task,
@@ -154,6 +155,7 @@ def open_session(
         owner=caller.key_id,
         force=caller.is_admin,
         data_sheets=body.data_sheets,
+        worlds=body.worlds,
     )
     response.headers["Location"] = f"/v1/jobs/{opened.job.id}"
     if opened.reopened:

@@ -33,6 +33,7 @@ class TrajectoryChecker:
         machine: Machine,
         scenario: Scenario,
         controls: Sequence[KeyPress] | None = None,
+        seed: int | None = None,
     ) -> Trajectory:
         """The trajectory of a file; see `checked_trajectory`.
 
@@ -46,6 +47,7 @@ class TrajectoryChecker:
             "machine": machine.to_document(),
             "scenario": scenario.model_dump_json(),
             "controls": controls,
+            "seed": seed,
         }
         try:
             refusal, trajectory = self._checker.ask(question)
@@ -80,6 +82,7 @@ def _answer(question: Any) -> tuple[str, Trajectory | None]:
             machine=Machine.from_document(question["machine"]),
             scenario=Scenario.model_validate_json(question["scenario"]),
             controls=question["controls"],
+            seed=question["seed"],
         )
     except OutcomeRefusedError as error:
         return str(error), None

@@ -133,6 +133,7 @@ class Outcomes:
                 machine=due.machine,
                 scenario=due.task.scenario,
                 controls=due.controls,
+                seed=due.request.seed,
             )
         annotations = said.annotations
         return TrialResult(

@@ -118,6 +118,9 @@ class LeasedTrial(BaseModel):
     controls: list[dict[str, Any]] | None = Field(
         description="Key presses of this trial; null for the machine's own"
     )
+    seed: int | None = Field(
+        description="Of the varied world in which it is run; null for the exact one"
+    )
 
 
 class HeldLease(_Document):

@@ -148,6 +148,7 @@ class LeasedOverHttp:
                 controls=None
                 if controls is None
                 else tuple(KeyPress(**press) for press in controls),
+                seed=document["seed"],
                 require_held=self._active.require,
             )
         except Exception as error:

@@ -60,7 +60,7 @@ class ReplayHost:
 
     Args:
         entries: The job's journal.
-        rollouts: Its rollouts; those that are not finished do not count.
+        rollouts: Its rollouts; those that are not finished, or in varied worlds, do not count.
         limits: Its limits.
         load_trajectory: Reads a stored trajectory by its hash.
 
@@ -78,7 +78,7 @@ class ReplayHost:
         load_trajectory: Callable[[str], Trajectory],
     ) -> None:
         self._entries = entries
-        self._rollouts = [record for record in rollouts if record.finished_at is not None]
+        self._rollouts = [r for r in rollouts if r.finished_at is not None and r.seed is None]
         self._load_trajectory = load_trajectory
         self._spending = Spending(limits)
         self._sequence = 0

@@ -65,6 +65,11 @@ export function Form({ text, value, onText, faults, known }: Filling) {
         }}
       />
       {number(["samples"], "Samples", "Jobs of each model on each task: seeds 0, 1, …")}
+      {number(
+        ["worlds"],
+        "Varied worlds",
+        "Each machine is scored in so many, unknown to its model; 0: in the exact one alone",
+      )}
       <MultiSelect
         label="Tasks"
         data={[...new Set([...choices("tasks"), ...texts(value.tasks)])]}

@@ -41,12 +41,21 @@ def bears_cargo(
     return np.asarray(load >= share * _summed(trajectory.cargo_mass, samples))
 
 
-def stands(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:
-    """At which samples ground and terrain bear the machine and what it bears, (T,)."""
+def stands(
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, *, share: float = _ON_GROUND
+) -> Mask:
+    """At which samples ground and terrain bear the machine and what it bears, (T,).
+
+    Args:
+        machine: The machine.
+        trajectory: A trial with forces.
+        joined: (T, N) as `joined_to_start` says.
+        share: Smallest share of the weight.
+    """
     assert trajectory.bearing is not None  # noqa: S101 - the caller looked
     weight = masses_of(machine, trajectory, joined) + trajectory.bearing.cargo
     borne = _summed(from_below(trajectory), _HALF_A_SECOND)
-    return np.asarray(borne >= _ON_GROUND * _summed(weight, _HALF_A_SECOND))
+    return np.asarray(borne >= share * _summed(weight, _HALF_A_SECOND))
 
 
 def is_airborne(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> Mask:

@@ -88,6 +88,24 @@ def driven_distances(
     return np.asarray(explained * (1.0 + ERROR) + SLACK)
 
 
+def explained_distances(
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
+) -> Floats:
+    """How far from where it was a subject counts as driven upright, (T,); infinite if not measured.
+
+    Args:
+        machine: As for `driven_distances`, like all others.
+        trajectory: The trial.
+        joined: (T, N) as `joined_to_start` says.
+        path: (T, 2) or (T, 3) of the subject.
+        since: The sample from whose place on it got so far.
+    """
+    driven = driven_distances(machine, trajectory, joined, path, since=since)
+    if driven is None:
+        return np.full(len(path), np.inf)
+    return np.minimum(driven, moved_upright(trajectory, joined, path, since=since))
+
+
 def moved_upright(
     trajectory: "Trajectory", joined: Mask, path: Floats, *, since: int = 0
 ) -> Floats:

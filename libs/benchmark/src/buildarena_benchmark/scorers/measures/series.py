@@ -36,6 +36,14 @@ def speeds(time_s: Series, positions: Series) -> Series:
     return np.asarray(np.linalg.norm(np.diff(positions, axis=0), axis=2) / steps)
 
 
+def tilt_deg(trajectory: "Trajectory", block: int) -> Series:
+    """Angle from the vertical of what was a tracked block's upward axis at first, (T,), degrees."""
+    turns = rotations(trajectory.quaternions[:, block])
+    up_at_start = turns[0].T @ np.array([0.0, 0.0, 1.0])
+    cosine = (turns @ up_at_start)[:, 2]
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
 def rotations(quaternions: NDArray[np.floating]) -> Series:
     """Rotation matrices, (T, 3, 3), of quaternions (T, 4) as (w, x, y, z)."""
     wxyz = quaternions.astype(np.float64)

@@ -89,6 +89,34 @@ def simulation_version(context: Context, name: str) -> str:
     return simulator.version
 
 
+def worlds_here(context: Context, name: str, asked: int | None) -> int:
+    """In how many varied worlds machines are scored on a simulator.
+
+    Args:
+        context: The process' connections.
+        name: The simulator's name.
+        asked: What a submission asks for; None for the service's default, which is none where no
+            seed repeats a trial.
+    """
+    if asked is not None:
+        return asked
+    simulator = find_simulator(context, name)
+    return context.settings.worlds if simulator is not None and simulator.repeatable else 0
+
+
+def worlds_issues(context: Context, name: str, asked: int | None) -> list[ValidationIssue]:
+    """What is wrong with the number of worlds that somebody asks for, if anything."""
+    simulator = find_simulator(context, name)
+    if not asked or simulator is None or simulator.repeatable:
+        return []
+    able = tuple(n for n, info in known_simulators(context).items() if info.repeatable)
+    message = (
+        f"{name} can't vary a world by a seed: leave `worlds` out, or take a simulator that can: "
+        f"{', '.join(able)}"
+    )
+    return [ValidationIssue(path="worlds", message=message, choices=("0",))]
+
+
 def simulator_issues(
     context: Context, *names: str, path: str = "simulator"
 ) -> list[ValidationIssue]:

@@ -1,5 +1,8 @@
 """Parametric designs of our own for the built-in tasks; docs/expert.md explains them."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -23,6 +26,14 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "mechanisms-4": arms.swinging_arm,
     "flight-1": flyers.hoverer,
     "flight-2": flyers.glider,
+    "support-4": lambda seed: bridges.braced_beam(seed, gap=30, overlap=6),
+    "support-5": lambda seed: bridges.braced_beam(seed, gap=45, overlap=6),
+    "mechanisms-5": rovers.long_slalom_car,
+    "mechanisms-6": arms.swinging_arm,
+    "transport-4": rovers.touring_car,
+    "flight-3": flyers.stepping_hoverer,
+    "lift-4": rockets.payload_rocket,
+    "mechanisms-7": arms.loaded_lift,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

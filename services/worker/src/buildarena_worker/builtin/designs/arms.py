@@ -1,5 +1,8 @@
 """Arms that take hold of a cargo: one swings it over a wall, one lifts it by gears."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign
@@ -15,6 +18,10 @@ from buildarena_worker.builtin.designs.drafting import (
 
 _LIFTS_S = (18.5, 18.2, 17.9, 17.6)
 """When the lift begins, by seed, seconds."""
+
+_MOTORS = 4
+_LIGHT_S = 0.8
+"""When a cargo that grows heavier is still light enough for three motors, seconds."""
 
 
 def swinging_arm(seed: int) -> Design:
@@ -58,7 +65,23 @@ def swinging_arm(seed: int) -> Design:
 
 def geared_lift(seed: int) -> Design:
     """An arm on a large gear wheel that four powered ones drive, with a counterweight."""
-    begin = _LIFTS_S[seed % len(_LIFTS_S)]
+    return _geared_lift(_LIFTS_S[seed % len(_LIFTS_S)], lasts=1.2)
+
+
+def loaded_lift(seed: int) -> Design:
+    """The same machine with three of its motors: all four jerk, and a light cargo slips off."""
+    return _geared_lift(_LIGHT_S + 0.04 * (seed % 4), lasts=1.3, driven=3)
+
+
+def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design:
+    """A geared arm with a counterweight.
+
+    Args:
+        begin: When it begins to lift, seconds.
+        lasts: For how long it does, seconds.
+        driven: How many of its motors do.
+    """
+    named = "All four motors" if driven == _MOTORS else f"{driven} of the motors"
     draft = Draft(modules="workshop")
     beams, hub, post = _trestle(draft)
     wheel = draft.attach(hub, EAST, "Cog Large Unpowered")
@@ -80,12 +103,12 @@ def geared_lift(seed: int) -> Design:
             )
         },
         control={
-            "control_design": "All four motors lift together, and brake when the key is let go.",
+            "control_design": f"{named} lift together, and brake when the key is let go.",
             "control_config": [
                 {"block": motor, "action": "spinning_forward", "keys": ["UpArrow"]}
-                for motor in motors
+                for motor in motors[:driven]
             ],
-            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": 1.2}],
+            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": lasts}],
         },
     )
 

@@ -1,5 +1,8 @@
 """Bridges: a row of blocks, or a deck of three, stiffened by overlapping braces."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -20,17 +23,18 @@ OVERLAP = 4
 """Blocks that a brace spans: braces that overlap share the load of several joints."""
 
 
-def braced_beam(seed: int, *, gap: int) -> Design:
+def braced_beam(seed: int, *, gap: int, overlap: int = OVERLAP) -> Design:
     """A single row of blocks with braces above and below.
 
     Args:
         seed: Varies how far the beam rests on the terrain, by a block at each end.
         gap: Width of the gap, units.
+        overlap: Blocks that a brace spans.
     """
     draft = Draft()
     row = _row(draft, draft.start("middle of the beam"), _half(seed, gap))
     for way in (UP, DOWN):
-        _brace(draft, row, way)
+        _brace(draft, row, way, overlap)
     return _bridge(draft, gap, f"A row of {len(row)} blocks from south to north, braced both sides")
 
 
@@ -66,8 +70,8 @@ def _row(draft: Draft, middle: str, half: int) -> list[str]:
     return [*reversed(behind), middle, *ahead]
 
 
-def _brace(draft: Draft, row: Sequence[str], way: Direction) -> None:
-    for first, second in zip(row, row[OVERLAP:], strict=False):
+def _brace(draft: Draft, row: Sequence[str], way: Direction, overlap: int = OVERLAP) -> None:
+    for first, second in zip(row, row[overlap:], strict=False):
         draft.connect(first, second, way)
 
 

@@ -1,7 +1,11 @@
 """Flyers: a deck between balloons, and a glider with its weight ahead of its wings."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign
@@ -10,11 +14,40 @@ from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SIDES, SOUTH
 BALLOON, WING = "Sqr Balloon", "Wing Panel"
 _CLIMB: Final = 2.0
 """How fast the height rises that a balloon holds, units/s."""
+_RISE, _SINK = "UpArrow", "DownArrow"
+_STEPS: Final = (8.7, 6.0, 3.0)
+"""How far the three heights are above the ground, above the first, and below the second, units."""
+_LATER_S: Final = (12.5, 22.0)
+"""When it goes on to the second height and to the third, after it first begins to rise, seconds."""
 
 
 def hoverer(seed: int) -> Design:
     """Four balloons round a cross whose middle takes the cargo: they are its walls, too."""
     begin = 1.5 + 0.1 * (seed % 5)
+    return _under_balloons(
+        "All balloons rise together; loaded, they hang a unit lower.",
+        [(begin, _RISE, 10.5 / _CLIMB)],
+    )
+
+
+def stepping_hoverer(seed: int) -> Design:
+    """The same machine, which rises, holds, rises farther, holds, and sinks."""
+    begin = 0.3 + 0.04 * (seed % 5)
+    times = (begin, *(begin + later for later in _LATER_S))
+    keys = (_RISE, _RISE, _SINK)
+    return _under_balloons(
+        "All balloons rise and sink together, and hold each height for some seconds.",
+        list(zip(times, keys, (way / _CLIMB for way in _STEPS), strict=True)),
+    )
+
+
+def _under_balloons(plan: str, presses: Sequence[tuple[float, str, float]]) -> Design:
+    """A cross under four balloons that share their keys.
+
+    Args:
+        plan: What the presses are for.
+        presses: Time, key and duration of each, seconds.
+    """
     draft = Draft(modules="workshop")
     middle = draft.start("takes the cargo")
     balloons = [draft.attach(draft.row(middle, side, 3)[-1], UP, BALLOON) for side in SIDES]
@@ -27,11 +60,16 @@ def hoverer(seed: int) -> Design:
             )
         },
         control={
-            "control_design": "All balloons rise together; loaded, they hang a unit lower.",
+            "control_design": plan,
             "control_config": [
-                {"block": balloon, "action": "rise", "keys": ["UpArrow"]} for balloon in balloons
+                {"block": balloon, "action": action, "keys": [key]}
+                for action, key in (("rise", _RISE), ("sink", _SINK))
+                if key in {pressed for _, pressed, _ in presses}
+                for balloon in balloons
             ],
-            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": 10.5 / _CLIMB}],
+            "control_sequence": [
+                {"time": time, "key": key, "hold_for": hold} for time, key, hold in presses
+            ],
         },
     )
 

@@ -1,5 +1,8 @@
 """Rockets: water cannons that spray down, each heated by a torch below its outlet."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -74,6 +77,36 @@ def framed_rocket(seed: int) -> Design:
             ),
         },
         assembly=tuple(whole.actions),
+    )
+
+
+def payload_rocket(seed: int) -> Design:
+    """Four engines round a gripper, each on a post of its own beside the cargo."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("over the cargo")
+    gripper = draft.attach(middle, DOWN, "Grabber")
+    cannons = []
+    for side in SIDES:
+        end = draft.row(middle, side, 2)[-1]
+        cannons.append(draft.cannon(end, side, DOWN))
+        draft.torch(draft.row(end, DOWN, 2)[-1], side, UP)
+    begin = 1.9 + 0.1 * (seed % 4)
+    return Design(
+        overall="Four heated cannons round a gripper that holds the cargo between their posts.",
+        parts={
+            "rocket": PartDesign(
+                description="A cross, a post of 3 with a cannon and a torch at each end, a gripper",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "It waits until the cargo is heavy, and fires all cannons at once.",
+            "control_config": [
+                {"block": gripper, "action": "grab", "keys": ["Alpha2"]},
+                *({"block": it, "action": "hold_to_fire", "keys": ["Alpha1"]} for it in cannons),
+            ],
+            "control_sequence": [{"time": begin, "key": "Alpha1", "hold_for": 12.0}],
+        },
     )
 
 

@@ -1,7 +1,12 @@
 """Vehicles of the workshop: one on sprung wheels, one that steers."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign
@@ -15,6 +20,10 @@ from buildarena_worker.builtin.designs.drafting import (
     Draft,
 )
 
+Press = tuple[float, str, float]
+"""Time, key and duration, seconds."""
+
+_SAMPLE_S = 0.04
 _HALF_WIDTH, _HALF_LENGTH, _TRAY = 2, 3, 2
 _LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
 _SLALOM = (
@@ -30,6 +39,28 @@ _SLALOM = (
 """When which way the slalom's car steers and for how long, seconds. It lets the third gate be: from
 the second to the fourth it goes straight. Found by search on both engines; it passes the other four
 within 1.2 of their middles."""
+_WAVE_S = 0.36
+_WAVE = (
+    *(3, -2, -2, -3, 0, 0, 5, 5, 5, -3, -7, -10, -7, 2, 8, 11, 10, 6, -5, -11, -13, -11, -6, 6),
+    *(11, 14, 12, 9, -2, -10, -13, -13, -13, -7, 6, 12, 12, 13, 14, 7, -7, -12, -11, -10, -15),
+    *(-13, 4, 11, 11, 10, 13, 17, 5, -9, -12, -10, -9, -13, -18, 0, 10, 11, 8, 9, 13, 16, 3, -9),
+    *(-14, -17, -17, -7, 7, 19, 19, 4, -13, -16, -6, 9, 10, 2),
+)
+"""For how long the car of the long slalom steers at equal intervals, hundredths of a second, to the
+right above 0. Found by steering the car on both engines at once, towards the middle between where
+each of them had it."""
+_TOUR = (
+    (0.4, _AHEAD, 1.96),
+    (0.56, _RIGHT, 0.03),
+    (2.2, _LEFT, 0.04),
+    (3.68, _AHEAD, 1.76),
+    (3.84, _RIGHT, 0.05),
+    (6.76, _BACK, 1.28),
+    (6.92, _LEFT, 0.09),
+    (7.32, _LEFT, 0.02),
+    (7.76, _LEFT, 0.03),
+)
+"""When the car of the three stops presses which key and for how long, seconds; found likewise."""
 
 
 def rough_rider(seed: int) -> Design:
@@ -74,7 +105,44 @@ def rough_rider(seed: int) -> Design:
 
 def slalom_car(seed: int) -> Design:
     """A long car that steers with all wheels and backs off first, for a run-up."""
-    begin = 0.04 * (seed % 4)
+    return _steering_car(
+        [(0.2, _BACK, 1.2), (1.75, _AHEAD, 12.0), *_SLALOM],
+        begin=0.04 * (seed % 4),
+        plan="Back off, then drive through and steer from gate to gate.",
+    )
+
+
+def long_slalom_car(seed: int) -> Design:
+    """The same car, steered in a wave that grows, a little every time."""
+    steps = [
+        (math.ceil((0.7 + _WAVE_S * k) / _SAMPLE_S) * _SAMPLE_S, _RIGHT if way > 0 else _LEFT, way)
+        for k, way in enumerate(_WAVE)
+        if way
+    ]
+    return _steering_car(
+        [(0.3, _AHEAD, 29.0), *((time, key, abs(way) / 100) for time, key, way in steps)],
+        begin=_SAMPLE_S * (seed % 4),
+        plan="Drive through, and steer in a wave that grows.",
+    )
+
+
+def touring_car(seed: int) -> Design:
+    """The same car, ahead to two points and back to a third."""
+    return _steering_car(
+        _TOUR,
+        begin=_SAMPLE_S * (seed % 4),
+        plan="Ahead to the first point, ahead to the second, back to the third.",
+    )
+
+
+def _steering_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design:
+    """A long car whose four wheels all steer.
+
+    Args:
+        presses: Time, key and duration of each, seconds.
+        begin: How much later all of them are, seconds.
+        plan: What they are for.
+    """
     draft = Draft(modules="workshop")
     middle = draft.start("between the axles")
     front, back = (draft.row(middle, way, _HALF_LENGTH)[-1] for way in (NORTH, SOUTH))
@@ -90,7 +158,6 @@ def slalom_car(seed: int) -> Design:
                 {"block": hinge, "action": "turn_left", "keys": [keys[0]]},
                 {"block": hinge, "action": "turn_right", "keys": [keys[1]]},
             ]
-    presses = [(0.2, _BACK, 1.2), (1.75, _AHEAD, 12.0), *_SLALOM]
     return Design(
         overall="A long car whose four wheels all steer, the rear ones against the front ones.",
         parts={
@@ -100,7 +167,7 @@ def slalom_car(seed: int) -> Design:
             )
         },
         control={
-            "control_design": "Back off, then drive through and steer from gate to gate.",
+            "control_design": plan,
             "control_config": config,
             "control_sequence": [
                 {"time": round(begin + time, 2), "key": key, "hold_for": hold}

@@ -1,5 +1,8 @@
 """Vehicles: a spine with cross members, a wheel at each end, and a deck for cargo."""
 
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
 from __future__ import annotations
 
 from collections.abc import Sequence

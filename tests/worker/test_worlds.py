@@ -1,0 +1,167 @@
+"""Finished machines are scored in varied worlds, which no model can know of."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+
+import pytest
+from sqlalchemy import text
+from support.servers.live_api import changed
+from support.stages import work
+
+from buildarena_benchmark.leaderboard import summarise
+from buildarena_geometry import Machine
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import ClosedLoop, JobSpec, SweepSpec
+from buildarena_pipeline.errors import SubmissionError
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.submission.submission import Submissions
+from buildarena_simulation import read_trajectory, simulate, write_trajectory
+from buildarena_store import Job, RolloutRecord, TrialFilter
+from buildarena_worker.wiring import verification_runner
+
+WORLDS = 3
+SAME_TWICE = """
+    UPDATE rollouts SET seed = other.seed, trajectory_hash = other.trajectory_hash
+    FROM rollouts AS other WHERE rollouts.job_id = :job AND rollouts.number = 3
+    AND other.job_id = :job AND other.number = 2
+"""
+
+
+def tried(context: Context, submissions: Submissions, **spec: object) -> Job:
+    """A job of the expert that was tried in varied worlds."""
+    asked = {"task": "lift-1", "model": "builtin/expert", "worlds": WORLDS, **spec}
+    job, _ = submissions.submit_job(JobSpec(**asked))
+    work(context)
+    return context.store.jobs.get(job.id)
+
+
+def verdict(context: Context, job: Job) -> str | None:
+    (check,) = context.store.verifications.request([job.id]).ids.values()
+    runner = verification_runner(context)
+    while runner.process_one():
+        pass
+    return context.store.verifications.get(check).verdict
+
+
+def rollouts(context: Context, job: Job) -> tuple[list[RolloutRecord], list[RolloutRecord]]:
+    """Those in the exact world, and those in varied ones."""
+    records = context.store.rollouts.read(job.id)
+    return [r for r in records if r.seed is None], [r for r in records if r.seed is not None]
+
+
+def test_each_world_is_a_trial_of_the_same_machine_and_the_job_has_their_mean(
+    context, submissions
+) -> None:
+    job = tried(context, submissions)
+    assert f"+{WORLDS}-worlds/" in job.track
+    exact, varied = rollouts(context, job)
+    assert (len(exact), len(varied)) == (1, WORLDS)
+    assert {r.machine_hash for r in varied} == {exact[0].machine_hash}
+    assert len({r.seed for r in varied}) == WORLDS
+    assert len({r.trajectory_hash for r in (*exact, *varied)}) == WORLDS + 1
+    # The exact trial is the published reading; the worlds stand beside it.
+    assert (job.success, job.indicator) == (exact[0].success, exact[0].indicator)
+    assert job.metrics is not None
+    won = [r for r in varied if r.success]
+    assert job.metrics["worlds"] == WORLDS
+    assert job.metrics["robustness"] == len(won) / WORLDS
+    mean = sum(Fraction(r.indicator) for r in won) / WORLDS
+    assert job.metrics["robust_indicator"] == pytest.approx(float(mean))
+    assert verdict(context, job) == "verified"
+
+
+def test_seeds_are_drawn_anew_for_each_job(context, submissions) -> None:
+    jobs = [tried(context, submissions, seed=seed) for seed in (0, 1)]
+    seeds = [{r.seed for r in rollouts(context, job)[1]} for job in jobs]
+    assert not seeds[0] & seeds[1]
+
+
+@pytest.mark.slow
+def test_the_best_of_several_trials_is_what_worlds_try(context, submissions) -> None:
+    # Its controller tries several times; a closed loop ends in its session, not in a trial.
+    loop = ClosedLoop(rounds=2)
+    job = tried(context, submissions, task="transport-1", closed_loop=loop, worlds=1)
+    exact, varied = rollouts(context, job)
+    best = max(exact, key=lambda r: (r.success, r.indicator, -r.number))
+    assert len(varied) == 1
+    assert {(r.machine_hash, str(r.controls)) for r in varied} == {
+        (best.machine_hash, str(best.controls))
+    }
+    assert verdict(context, job) == "verified"
+
+
+def test_what_breaks_a_rule_is_tried_in_no_world(context, submissions) -> None:
+    job = tried(context, submissions, model="builtin/idle")
+    assert (job.success, rollouts(context, job)) == (False, ([], []))
+
+
+@pytest.mark.parametrize(
+    "tampering",
+    [
+        "DELETE FROM rollouts WHERE job_id = :job AND number = 3",
+        SAME_TWICE,
+        "UPDATE rollouts SET seed = seed + 1 WHERE job_id = :job AND number = 3",
+        "UPDATE rollouts SET success = NOT success WHERE job_id = :job AND number = 3",
+        "UPDATE jobs SET metrics = jsonb_set(metrics, '{robustness}', '0.5') WHERE id = :job",
+        "UPDATE jobs SET metrics = metrics - 'robust_indicator' WHERE id = :job",
+    ],
+)
+def test_no_world_can_be_left_out_or_changed(context, submissions, tampering) -> None:
+    job = tried(context, submissions)
+    with context.store.database.transaction() as connection:
+        connection.execute(text(tampering), {"job": job.id})
+    assert verdict(context, context.store.jobs.get(job.id)) == "refuted"
+
+
+def test_boards_count_a_job_by_its_share_of_worlds(context, submissions) -> None:
+    jobs = [tried(context, submissions, seed=seed) for seed in (0, 1)]
+    with context.store.database.transaction() as connection:
+        share = "UPDATE jobs SET metrics = jsonb_set(metrics, '{robustness}', '0.25') WHERE id = :j"
+        connection.execute(text(share), {"j": jobs[0].id})
+    (cell,) = context.store.results.boards.cells.of(TrialFilter(track=jobs[0].track))
+    (tally,) = cell.tallies
+    assert sorted(tally.shares) == [0.25, 1.0]
+    found = summarise(list(context.store.results.boards.trials(TrialFilter())))
+    assert (found.successes, found.success_rate) == (1.25, 0.625)
+    assert found.pass_at["2"] == 1.0
+    assert found.pass_all["2"] == 0.25
+    published = summarise(
+        list(context.store.results.boards.trials(TrialFilter())), policy="published"
+    )
+    assert published.success_rate == 1.0
+
+
+def test_a_service_varies_unless_it_is_told_otherwise(monkeypatch, context) -> None:
+    monkeypatch.delenv("BUILDARENA_WORLDS", raising=False)
+    default = Settings().worlds
+    assert default >= 4
+    with changed(context, worlds=default) as own:
+        submissions = Submissions(own, load_registry())
+        job, _ = submissions.submit_job(JobSpec(task="lift-1", model="builtin/idle"))
+        assert f"+{default}-worlds/" in job.track
+        plain, _ = submissions.submit_job(JobSpec(task="lift-1", model="builtin/idle", worlds=0))
+        assert "worlds" not in plain.track
+
+
+def test_a_game_has_no_worlds_that_a_seed_could_vary(context) -> None:
+    with changed(context, besiege_game="1.0", besiege_mod="1.0", worlds=4) as own:
+        submissions = Submissions(own, load_registry())
+        spec = {"tasks": ["lift-1"], "models": ["builtin/idle"], "simulator": "besiege"}
+        (job,) = submissions.plan(SweepSpec(**spec, samples=1))
+        assert "worlds" not in job.key.track
+        with pytest.raises(SubmissionError, match="worlds"):
+            submissions.plan(SweepSpec(**spec, samples=1, worlds=2))
+
+
+def test_a_world_can_be_run_again_by_anybody(context, submissions) -> None:
+    job = tried(context, submissions)
+    record = rollouts(context, job)[1][0]
+    kept = context.artifacts.get(record.trajectory_hash)
+    machine = Machine.from_document(json.loads(context.artifacts.get(record.machine_hash)))
+    task = context.tasks.exact(job.task, job.task_version)
+    again = simulate(machine, task.scenario, record.engine, seed=record.seed)
+    assert read_trajectory(kept).settings["seed"] == record.seed
+    assert write_trajectory(again) == kept
