@@ -22,7 +22,7 @@ from buildarena_simulation.trajectory import Break, Event, JointPeak
 _CALM: Final = 0.5
 """Share of its strength below which no joint is in danger."""
 
-_BLOW: Final = 5.0
+_BLOW: Final = 3.0
 """A load that rises by this factor from one evaluation to the next may be an error of the step."""
 
 

@@ -134,8 +134,6 @@ class MujocoEngine:
             ropes=self._structure.ropes,
             of=self._addresses.tendons,
         )
-        self._wheels = wheel_contacts(self._model, len(self._structure.wheels), _FRICTION_S)
-        self._wheels.bear(self._model, self._mass + self._cargo_mass)
         self._shapes: dict[int, ShapeTable] = {}
         if self._world.cargo is not None:
             self._cargo_body = self._model.body("cargo").id
@@ -143,6 +141,9 @@ class MujocoEngine:
         self._set_drag(moments)
         self._set_velocities(motion)
         mujoco.mj_forward(self._model, self._data)
+        wheels = len(self._structure.wheels)
+        self._wheels = wheel_contacts(self._model, self._data, wheels, _FRICTION_S)
+        self._wheels.bear(self._model, self._mass + self._cargo_mass)
 
     def set_cargo_mass(self, mass: float) -> None:
         """See `Engine`."""

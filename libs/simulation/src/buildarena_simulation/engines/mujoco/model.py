@@ -109,7 +109,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
             iterations=settings.iterations,
             tolerance=1e-10,
         ),
-        '<flag autoreset="disable"/>',  # a rollout that blows up must not restart unnoticed
+        '<flag autoreset="disable" nativeccd="disable"/>',
         "</option>",
         "<default>",
         tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),

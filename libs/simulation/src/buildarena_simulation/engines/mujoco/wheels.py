@@ -23,9 +23,11 @@ _IMPEDANCE: Final = 0.001
 _POINTS: Final = 2
 """Points at which a wheel stands: the ends of its lowest line."""
 
-_STIFFEST, _MOST_DAMPED = 0.1, 0.5
-"""Bounds of stiffness and damping, per 1/(compliance·dt²) and 1/(compliance·dt): a step is explicit
-in such a contact."""
+_STIFFEST: Final = 7500.0
+_MOST_DAMPED: Final = 125.0
+"""Bounds of a contact's stiffness, 1/s², and damping, 1/s, times the largest compliance of its
+wheel: a step is explicit in such a contact, and a wheel on a spring gives way more than its machine.
+"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,12 +36,15 @@ class WheelContacts:
 
     Attributes:
         pairs: (P,) the model's pairs.
-        compliance: (P,) velocity that each wheel gains per unit impulse, 1/mass unit.
+        compliance: (P,) by which the model scales its contacts' softness, 1/mass unit.
+        largest: (P,) velocity that each wheel gains per unit impulse, where it gives way most,
+            1/mass unit.
         wheels: How many wheels there are.
     """
 
     pairs: IntArray
     compliance: FloatArray
+    largest: FloatArray
     wheels: int
 
     def bear(self, model: "mujoco.MjModel", mass: float) -> None:
@@ -51,22 +56,22 @@ class WheelContacts:
         """
         if not len(self.pairs):
             return
-        gravity, step = -model.opt.gravity[2], model.opt.timestep
         share = mass / (_POINTS * self.wheels)
         given = (1.0 - _IMPEDANCE) * self.compliance
-        stiffness = np.minimum(share * gravity / _SAG, _STIFFEST / (self.compliance * step * step))
-        damping = np.minimum(
-            2.0 * np.sqrt(stiffness * share), _MOST_DAMPED / (self.compliance * step)
-        )
+        stiffness = np.minimum(share * -model.opt.gravity[2] / _SAG, _STIFFEST / self.largest)
+        damping = np.minimum(2.0 * np.sqrt(stiffness * share), _MOST_DAMPED / self.largest)
         model.pair_solref[self.pairs, 0] = -given * stiffness
         model.pair_solref[self.pairs, 1] = -given * damping
 
 
-def wheel_contacts(model: "mujoco.MjModel", wheels: int, friction_s: float) -> WheelContacts:
+def wheel_contacts(
+    model: "mujoco.MjModel", data: "mujoco.MjData", wheels: int, friction_s: float
+) -> WheelContacts:
     """Finds the contacts of wheels in a compiled model, named "wheel …", and softens them.
 
     Args:
         model: The model.
+        data: Its state, after `mj_forward`.
         wheels: How many wheels the machine has.
         friction_s: Time constant with which friction stops a slip, seconds.
     """
@@ -77,5 +82,14 @@ def wheel_contacts(model: "mujoco.MjModel", wheels: int, friction_s: float) -> W
     return WheelContacts(
         pairs=np.array(pairs, dtype=np.int64),
         compliance=model.body_invweight0[bodies, 0],
+        largest=np.array([_largest_compliance(model, data, body) for body in bodies.tolist()]),
         wheels=wheels,
     )
+
+
+def _largest_compliance(model: "mujoco.MjModel", data: "mujoco.MjData", body: int) -> float:
+    """Velocity of a body's centre per unit impulse on it, the largest of all directions."""
+    along, given = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jacBodyCom(model, data, along, None, body)
+    mujoco.mj_solveM(model, data, given, along)
+    return float(np.linalg.eigvalsh(along @ given.T)[-1])

@@ -111,7 +111,9 @@ class PyBulletEngine:
         self._grips = BulletGrips(self._client)
         self._fresh: Motion | None = None
         self._own: list[tuple[int, Force]] = []
-        self._slipping = SlippingWheels(self._client, world.structure, self._surfaces)
+        self._slipping = SlippingWheels(
+            self._client, world.structure, self._surfaces, world.gravity
+        )
 
     @property
     def time_step_s(self) -> float:

@@ -5,7 +5,8 @@ slip along the wheel then counts several times less than one across it, and a wh
 brakes resists being pushed sideways far too much. It also leaves open how the wheels of one rigid
 body share its weight. Here the friction on a slipping wheel is Coulomb's, against its slip, and the
 loads are those of wheels that yield alike: the resultant of PyBullet's contacts, spread by statics.
-A wheel that does not slip is left to PyBullet, which holds it without creep.
+A wheel that does not slip is left to PyBullet, which holds it without creep, and so is one between
+two faces, as on the ground against a ridge.
 """
 
 import math
@@ -38,9 +39,16 @@ turns the machine moves its wheels as well."""
 _BLEND: Final = 0.5
 """Share of a look's loads in those that count: a hard contact's load jumps from step to step."""
 
+_RISE: Final = 2.0
+"""By how much a load rises from look to look at most, times what it was or an even share of the
+weight: a blow lasts one step, and is not to count until the next look."""
+
 _STARTS, _ENDS = 0.6, 0.2
 """A wheel slips from the first, and no longer from the second, times the slip that friction stops
 between two looks."""
+
+_PARALLEL: Final = 0.99
+"""Cosine of the angle between normals above which contacts are with one face."""
 
 _TRACE: Final = 1e-3
 """A push so small that it only says where a contact without one is, mass·unit/s²."""
@@ -62,12 +70,18 @@ class SlippingWheels:
         client: The engine's world.
         structure: The machine.
         surfaces: What `ContactForces.surface` calls each fixed body.
+        gravity: Downward acceleration, units/s².
     """
 
     def __init__(
-        self, client: Mapping[str, int], structure: Structure, surfaces: Mapping[int, int]
+        self,
+        client: Mapping[str, int],
+        structure: Structure,
+        surfaces: Mapping[int, int],
+        gravity: float,
     ) -> None:
         self._client, self._structure, self._surfaces = client, structure, surfaces
+        self._gravity = gravity
 
     def enter(
         self, clusters: Clusters, address: Mapping[int, tuple[int, int]], time_step_s: float
@@ -159,12 +173,13 @@ class SlippingWheels:
         for alike in standing.values():
             share(alike)
         for link in touching:
-            if before[link] > 0.0:
-                wheel = wheels[link]
-                wheel.load = before[link] + _BLEND * (wheel.load - before[link])
+            wheel, was = wheels[link], before[link]
+            blend = _BLEND if was > 0.0 else 1.0
+            even = self._gravity * wheel.mass / len(wheels)
+            wheel.load = min(was + blend * (wheel.load - was), _RISE * max(was, even))
 
     def _touching(self, body: int, wheels: Mapping[int, Wheel]) -> dict[int, list[_Contact]]:
-        """Where each wheel touches; one that touches more than ground and terrain is left out."""
+        """Where each wheel touches; one that touches more than one face of them is left out."""
         touching: dict[int, list[_Contact]] = {}
         elsewhere = set()
         for contact in pybullet.getContactPoints(body, **self._client):
@@ -177,10 +192,18 @@ class SlippingWheels:
                 continue
             x, y, z = contact[7]
             place, normal = (contact[5], (x, y, z)) if ours else (contact[6], (-x, -y, -z))
-            touching.setdefault(link, []).append(_Contact(push, place, normal, other))
+            found = touching.setdefault(link, [])
+            found.append(_Contact(push, place, normal, other))
+            if _cosine(found[0].normal, normal) < _PARALLEL:
+                elsewhere.add(link)
         for link in elsewhere:
             touching.pop(link, None)
         return touching
+
+
+def _cosine(first: Vector, second: Vector) -> float:
+    """Cosine of the angle between two unit vectors."""
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
 
 
 def _stand(wheel: Wheel, contacts: Sequence[_Contact], center: Vector) -> None:
