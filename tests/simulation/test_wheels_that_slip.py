@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from support.machines.families import car
+from support.machines.random_workshop import random_workshop_machine
 from support.planar_car import planar_car
 
+from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.scenario import Control
@@ -65,3 +67,32 @@ def test_the_ground_bears_a_slipping_car_evenly(engine, braked) -> None:
     borne = trajectory.bearing.ground[driving]
     assert borne.min() > 0.7 * weight
     assert borne.max() < 1.4 * weight
+
+
+def _on_the_rough_road(seed: int, engine: str, duration_s: float) -> tuple[Machine, Trajectory]:
+    """A vehicle on suspensions under a cargo, on a road with ridges from y = 5 on."""
+    machine = random_workshop_machine("mechanisms-1", seed)
+    scenario = builtin_tasks()["mechanisms-1"].scenario
+    return machine, simulate(
+        machine, scenario.model_copy(update={"duration_s": duration_s}), engine
+    )
+
+
+@pytest.mark.parametrize("seed", [5, 8, 10])
+def test_edges_under_wheels_push_nothing_on(engine, seed) -> None:
+    """A vehicle on ridges is no faster than its motors turn its wheels, and falls on none."""
+    machine, trajectory = _on_the_rough_road(seed, engine, 3.6)
+    wheel = next(b.module for b in machine.blocks.values() if b.module.name == "Large Wheel")
+    assert wheel.motor is not None
+    rim = wheel.motor.speed * wheel.size[0] / 2
+    speed = np.diff(trajectory.positions[:, 0, 1].astype(float)) * 25.0
+    assert 0.6 * rim < speed.max() < 1.05 * rim
+
+
+@pytest.mark.parametrize("seed", [5, 8])
+def test_the_ground_bears_a_vehicle_on_suspensions_by_its_weight(engine, seed) -> None:
+    machine, trajectory = _on_the_rough_road(seed, engine, 1.2)
+    standing = trajectory.time_s > 0.8
+    wheels = trajectory.bearing.wheels[standing].reshape(standing.sum(), -1)
+    weight = 10.0 + sum(block.module.mass for block in machine.blocks.values())
+    assert wheels.sum(axis=1).mean() == pytest.approx(weight, rel=0.15)

@@ -33,7 +33,7 @@ class BreakingModel:
     out: with the filter's time constant four times the interval, no joint can break in between
     unless its load rises almost threefold at once.
 
-    A load that would break something after it rose fivefold at once counts only if steps of half
+    A load that would break something after it rose threefold at once counts only if steps of half
     the length show it as well: engines make up blows now and then.
 
     Args:

@@ -26,8 +26,8 @@ _POINTS: Final = 2
 _STIFFEST: Final = 7500.0
 _MOST_DAMPED: Final = 125.0
 """Bounds of a contact's stiffness, 1/s², and damping, 1/s, times the largest compliance of its
-wheel: a step is explicit in such a contact, and a wheel on a spring gives way more than its machine.
-"""
+wheel: a step is explicit in such a contact, and a wheel on a spring gives way more than
+a machine."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
