@@ -108,6 +108,8 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
             impratio=settings.impratio,
             iterations=settings.iterations,
             tolerance=1e-10,
+            ccd_tolerance=1e-9,
+            ccd_iterations=200,
         ),
         '<flag autoreset="disable" nativeccd="disable"/>',
         "</option>",
