@@ -43,6 +43,7 @@ class MjcfSettings:
         solimp: Impedance of contacts.
         impratio: Stiffness of friction over that of normal forces.
         iterations: Most iterations of the solver.
+        servo_slip: How far off its target a wheel's motor reaches its torque limit, rad/s.
     """
 
     time_step_s: float
@@ -51,6 +52,7 @@ class MjcfSettings:
     solimp: Sequence[float]
     impratio: float
     iterations: int
+    servo_slip: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,15 +88,14 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
     """The MJCF text of a world with its clusters.
 
     Bodies are named "cluster C", their joints "hinge C", free joints "free C", geoms "solid C K",
-    sites and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo"; a motor's rotor
-    and its joint "rotor C", its tendon "clutch C"; contacts with ground and terrain "wheel …" and
-    "block …".
+    sites and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo".
     """
     joints = JointText(
         structure=world.structure,
         clusters=state.clusters,
         axes=state.axes,
         gravity=world.gravity,
+        servo_slip=settings.servo_slip,
     )
     lines = [
         "<mujoco>",
@@ -108,10 +109,8 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
             impratio=settings.impratio,
             iterations=settings.iterations,
             tolerance=1e-10,
-            ccd_tolerance=1e-9,
-            ccd_iterations=200,
         ),
-        '<flag autoreset="disable" nativeccd="disable"/>',
+        '<flag autoreset="disable"/>',  # a rollout that blows up must not restart unnoticed
         "</option>",
         "<default>",
         tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),
@@ -121,7 +120,6 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         *_static(world),
         *_cargo(world, state.cargo_mass),
         *_components(world.structure, state, joints),
-        *joints.rotors(),
         "</worldbody>",
         "<contact>",
         *_exclusions(state.clusters),
@@ -129,7 +127,6 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         "</contact>",
         "<tendon>",
         *_ropes(world.structure, state),
-        *joints.clutches(),
         "</tendon>",
         "<equality>",
         *joints.equalities(),
@@ -264,17 +261,15 @@ def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> It
     """
     surfaces = ["ground"] * world.ground + [f"terrain {i}" for i in range(len(world.terrain))]
     sliding = [
-        (f"solid {c} {k}", solid)
+        (f"solid {c} {k}", solid.friction)
         for c, solids in enumerate(state.solids)
         for k, solid in enumerate(solids)
     ]
-    for name, solid in sliding:
-        coefficient, roll, spin = _friction(solid.friction)
-        kind = "wheel" if solid.is_wheel else "block"
+    for name, coefficient in sliding:
+        roll, spin = _friction(coefficient)[1:]
         for surface in surfaces:
             yield tag(
                 "pair",
-                name=f"{kind} {name} {surface}",
                 geom1=surface,
                 geom2=name,
                 condim=3,
