@@ -52,7 +52,7 @@ class TaskSearch:
     def __init__(self, task: str, *, seed: int, scorer: Scorer = score) -> None:
         self.task, self.generation, self.trials = task, 0, 0
         self._seed, self._scorer = seed, scorer
-        self._number = sorted(builtin_tasks()).index(task)
+        self._number = list(builtin_tasks()).index(task)  # what is added changes no search before
         self._archive = GridArchive(
             solution_dim=(),
             dims=list(CELLS),

@@ -25,6 +25,8 @@ CELLS: Final = (14, 8, 4)
 FULL_MARKS: Final[Mapping[str, float]] = MappingProxyType(
     {
         "support": 1500.0,
+        "budget": 120.0,
+        "regained": 1.0,
         "transport": 150.0,
         "thrust": 8.0,
         "height": 5000.0,
@@ -44,6 +46,8 @@ FULL_MARKS: Final[Mapping[str, float]] = MappingProxyType(
 _SEARCH_S: Final[Mapping[str, float]] = MappingProxyType(
     {
         "support": 17.0,
+        "budget": 12.0,
+        "regained": 10.0,
         "transport": 12.0,
         "thrust": 4.0,
         "height": 13.0,

@@ -9,6 +9,7 @@ import pytest
 from support.clients.tenants import new_tenant, operator
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import modules_named
 from buildarena_pipeline.agents.briefing import briefing
 
 OPEN = {"task": "support-1", "agent": "me", "seed": 1, "simulator": "mujoco"}
@@ -200,12 +201,14 @@ def test_an_agent_is_told_all_it_needs(api, task) -> None:
     opened = api.post("/v1/sessions", json={**OPEN, "task": task}).json()
     text = opened["briefing"]
     assert opened["statement"].strip() in text
-    offered = builtin_tasks()[task].constraints.catalogue
-    for module in offered.values():
+    constraints = builtin_tasks()[task].constraints
+    offered = {*modules_named(constraints.modules), constraints.catalogue.start.name}
+    for module in constraints.catalogue.values():
         shown = f"- {module.name} (" in text and f"mass {module.mass:g}" in text
-        assert shown is (module.kind != "cargo"), module.name
-    for action in {action for module in offered.values() for action in module.actions}:
-        assert action in text
+        assert shown is (module.name in offered), module.name
+    for name in offered:
+        for action in constraints.catalogue[name].actions:
+            assert action in text
     for said in ("x points east, y north, z up", "one trial", "machine `assembly`:", "2,000 calls"):
         assert text.count(said) == 1, said
     assert "$" not in text

@@ -39,18 +39,10 @@ def test_there_are_sixty_and_the_file_has_each() -> None:
 
 
 @pytest.mark.parametrize("engine_name", ENGINES)
-def test_an_honest_machine_fails_for_no_reason_but_a_known_one(engine_name) -> None:
-    """What is built to succeed succeeds, and nothing disqualifies it: the rest is a finding."""
+def test_what_is_built_to_succeed_succeeds_and_nothing_disqualifies_it(engine_name) -> None:
     failed = {
         name: row[engine_name]
         for name, row in kept().items()
         if not row[engine_name]["success"] or _disqualifying(row[engine_name]["flags"])
     }
-    known = {name for name, design in HONEST.items() if design.finding}
-    assert failed.keys() <= known, failed
-
-
-def test_a_finding_is_seen_on_some_engine() -> None:
-    for name, design in HONEST.items():
-        if design.finding:
-            assert not all(kept()[name][engine]["success"] for engine in ENGINES), name
+    assert not failed

@@ -89,6 +89,7 @@ class Player:
         workflows: dict[str, str] = MappingProxyType({}),  # type: ignore[assignment]
         trajectories: dict[str, Any] = MappingProxyType({}),  # type: ignore[assignment]
         data_sheets: bool = True,
+        worlds: int = 0,
     ) -> Played:
         config = model_config(self.registry, model, Decoding())
         if client is None and not offline:
@@ -113,12 +114,13 @@ class Player:
                 first_wait_s=0.001,
             )
         session = Session(
-            task=builtin_tasks()[task] if isinstance(task, str) else task,
+            task=(builtin_tasks()[task] if isinstance(task, str) else task).drawn(seed),
             seed=seed,
             model_config=config,
             pack=pack or PromptPacks().load("default"),
             host=host,
             data_sheets=data_sheets,
+            worlds=worlds,
         )
         try:
             with gate.acquired():

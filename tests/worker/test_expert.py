@@ -28,10 +28,9 @@ def tried(play, model: str, task: str, seed: int, engine: str):
     if played.suspended is None:
         return played.failure
     machine = played.suspended.machine
-    trajectory = simulate(
-        machine, builtin_tasks()[task].scenario, engine, controls=played.suspended.controls
-    )
-    return score(builtin_tasks()[task], machine, trajectory)
+    drawn = builtin_tasks()[task].drawn(seed)
+    trajectory = simulate(machine, drawn.scenario, engine, controls=played.suspended.controls)
+    return score(drawn, machine, trajectory)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

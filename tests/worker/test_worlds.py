@@ -7,6 +7,8 @@ from fractions import Fraction
 
 import pytest
 from sqlalchemy import text
+from support.player import Player
+from support.providers.scripted import Recording
 from support.servers.live_api import changed
 from support.stages import work
 
@@ -18,7 +20,8 @@ from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.submission.submission import Submissions
-from buildarena_simulation import read_trajectory, simulate, write_trajectory
+from buildarena_pipeline.agents.sessions import ExternalSessions
+from buildarena_simulation import constants, read_trajectory, simulate, write_trajectory
 from buildarena_store import Job, RolloutRecord, TrialFilter
 from buildarena_worker.wiring import verification_runner
 
@@ -165,3 +168,39 @@ def test_a_world_can_be_run_again_by_anybody(context, submissions) -> None:
     again = simulate(machine, task.scenario, record.engine, seed=record.seed)
     assert read_trajectory(kept).settings["seed"] == record.seed
     assert write_trajectory(again) == kept
+
+
+RANGES = ("START_SHIFT", "START_DROP", "START_YAW_DEG", "CARGO_SHIFT", "KEY_DELAY_S")
+
+
+def told_of_worlds(words: str) -> str:
+    """The paragraph on varied worlds; empty where there is none."""
+    return next((line for line in words.splitlines() if line.startswith("**Worlds.**")), "")
+
+
+@pytest.mark.parametrize("worlds", [0, 1, 5])
+def test_every_role_is_told_of_the_worlds_that_score_it(worlds) -> None:
+    model = Recording()
+    Player()("builtin/expert", client=model, worlds=worlds)
+    for request in model.requests:
+        text = "\n".join(message.text for message in request.messages)
+        if "# Build a bridge" in text:
+            assert told_of_worlds(text).startswith("**Worlds.**") is bool(worlds)
+    assert_tells(told_of_worlds("\n".join(m.text for m in model.requests[0].messages)), worlds)
+
+
+@pytest.mark.parametrize("worlds", [0, 1, 5])
+def test_agents_are_told_of_the_worlds_that_score_them(context, worlds) -> None:
+    opened = ExternalSessions(context).open(
+        task="lift-1", agent="told", seed=worlds, simulator="pybullet", worlds=worlds
+    )
+    assert_tells(told_of_worlds(opened.briefing), worlds)
+
+
+def assert_tells(told: str, worlds: int) -> None:
+    """It says how many worlds there are and every range that a seed draws from; nothing of none."""
+    assert bool(told) is bool(worlds)
+    if worlds:
+        assert f" {worlds} further world" in told
+        for name in RANGES:
+            assert f"{getattr(constants, name):g}" in told, name

@@ -16,6 +16,7 @@ from support.player import Player
 from support.providers.scripted import Recording
 
 from buildarena_benchmark import CANARY
+from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.transcript import Turn
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.messages import Message
@@ -60,7 +61,14 @@ def page() -> str:
 def _session(task: str, trials: int) -> Iterator[str]:
     model = Recording()
     rollouts = [_rollout(number) for number in range(trials)]
-    played = Player()("builtin/expert", task=task, client=model, rollouts=rollouts, loop=Loop())
+    played = Player()(
+        "builtin/expert",
+        task=task,
+        client=model,
+        rollouts=rollouts,
+        loop=Loop(),
+        worlds=Settings.model_fields["worlds"].default,
+    )
     read: dict[tuple[str, str | None, str], int] = {}
     requests: Counter[tuple[str, str | None, str]] = Counter()
     turns = played.session.transcript.turns

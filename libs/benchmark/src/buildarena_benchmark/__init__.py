@@ -5,7 +5,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 
 from buildarena_benchmark.canary import CANARY
-from buildarena_benchmark.constraints import broken_constraint
+from buildarena_benchmark.constraints import broken_constraint, too_much_changed
 from buildarena_benchmark.errors import BenchmarkError, SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.robustness import Robustness, robustness
 from buildarena_benchmark.scores import Score, failed_score, score
@@ -38,4 +38,5 @@ __all__ = [
     "references",
     "robustness",
     "score",
+    "too_much_changed",
 ]

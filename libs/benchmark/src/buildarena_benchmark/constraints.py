@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from buildarena_benchmark.families.given import edits_between, given_machine, has_other_presses
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine, modules_named
 from buildarena_simulation.constants import JointKind
@@ -34,7 +35,7 @@ def broken_constraint(task: Task, machine: Machine) -> Broken | None:
     Returns:
         Class and sentence, or None when the machine may be simulated.
     """
-    return next(filter(None, (check(task, machine) for check in _CHECKS)), None)
+    return next(filter(None, (check(task, machine) for check in _checks(task))), None)
 
 
 def share_of_constraints(task: Task, machine: Machine) -> float:
@@ -44,12 +45,12 @@ def share_of_constraints(task: Task, machine: Machine) -> float:
         task: The task.
         machine: What was built so far.
     """
-    held = 0
-    for check in _CHECKS:
+    held, checks = 0, _checks(task)
+    for check in checks:
         if check(task, machine) is not None:
             break
         held += 1
-    return held / len(_CHECKS)
+    return held / len(checks)
 
 
 def _not_started(task: Task, machine: Machine) -> Broken | None:
@@ -152,6 +153,19 @@ def _wrong_frame(task: Task, machine: Machine) -> str | None:
     return None
 
 
+def too_much_changed(task: Task, machine: Machine) -> str | None:
+    """Whether a machine is no longer the one that was given, but for the edits that are allowed."""
+    if task.beginning is None:
+        return None
+    original = given_machine(task.beginning, task.seed)
+    if has_other_presses(original, machine):
+        return "the key presses are given with the machine and stay as they are"
+    edits, most = edits_between(original, machine), task.beginning.edits
+    if edits > most:
+        return f"the machine differs from the given one by {edits} edits, the task allows {most}"
+    return None
+
+
 def _mass_of(machine: Machine, letters: Sequence[str]) -> float:
     """Mass of sub-structures and of all connectors that end on them, mass units."""
     of = {block.id: block.structure for block in machine.blocks.values()}
@@ -229,3 +243,8 @@ _CHECKS: Final[tuple[Check, ...]] = (
     _violated(_wrong_frame),
 )
 """In this order; each may rely on those before it."""
+
+
+def _checks(task: Task) -> tuple[Check, ...]:
+    """The checks of a task: where no machine is given, none can be changed too much."""
+    return _CHECKS if task.beginning is None else (*_CHECKS, _violated(too_much_changed))

@@ -20,6 +20,13 @@ from buildarena_environment.world import world_text
 from buildarena_geometry import Catalogue, module_set, modules_named
 from buildarena_geometry.feedback.modules import lookup_text, modules_text
 from buildarena_geometry.feedback.words import counted
+from buildarena_simulation.constants import (
+    CARGO_SHIFT,
+    KEY_DELAY_S,
+    START_DROP,
+    START_SHIFT,
+    START_YAW_DEG,
+)
 
 _CONTROL: Final = {
     "agent": (
@@ -31,6 +38,12 @@ _CONTROL: Final = {
     "held": "You need not bind any key: every water cannon fires from t = {from_s:g} s on.",
     "none": "No key is pressed in this trial, so you need not bind any.",
 }
+
+_GIVEN: Final = (
+    "A machine stands in `{main}` already, with its keys and its key presses: your first call "
+    "finds it there, and you change it."
+)
+"""What a task with a given machine says of control; its statement says the rest."""
 
 _CHECKS: Final = {
     "always": (
@@ -67,7 +80,7 @@ def briefing(
     """
     return Template(_text(trials, guidelines)).substitute(
         task=task.name,
-        control=_CONTROL[task.control].format(from_s=task.scenario.control.from_s),
+        control=_control(task),
         statement=task.statement.strip(),
         sub_structures=_sub_structures(task),
         main=MAIN,
@@ -75,6 +88,23 @@ def briefing(
         checks=_checks(task),
         modules=modules_told(task.constraints, data_sheets=data_sheets),
         **values,
+    )
+
+
+def worlds_told(worlds: int) -> str:
+    """What a builder reads of the varied worlds that its machine is scored in.
+
+    Args:
+        worlds: How many; with 0 there is nothing to read.
+    """
+    if not worlds:
+        return ""
+    return (
+        f"**Worlds.** What you finish is tried in {counted(worlds, 'further world')} too, drawn "
+        f"afterwards: there it starts up to {START_SHIFT:g} to any side and up to {START_DROP:g} "
+        f"higher, turned by up to {START_YAW_DEG:g}°, a cargo up to {CARGO_SHIFT:g} to any side, "
+        f"and each key goes down and up by up to {KEY_DELAY_S:g} s late. Your score is the mean "
+        "over them, where a failure counts 0: leave some margin."
     )
 
 
@@ -124,6 +154,12 @@ def _text(trials: str, guidelines: str) -> str:
     return (
         frame.strip().replace("$trials", trials).replace("$guidelines", guidelines.strip()) + "\n"
     )
+
+
+def _control(task: Task) -> str:
+    if task.beginning is not None:
+        return _GIVEN.format(main=MAIN)
+    return _CONTROL[task.control].format(from_s=task.scenario.control.from_s)
 
 
 def _sub_structures(task: Task) -> str:

@@ -54,7 +54,7 @@ def reference_of(task: Task, given: float | None = None, *, needed: bool = False
             raise ValueError(f"reference is {given}: it must be above 0")
         return given
     reference = references().get(task.name)
-    if reference is not None and builtin_tasks().get(task.name) == task:
+    if reference is not None and builtin_tasks().get(task.name) == task.drawn(0):
         return reference
     if needed:
         raise ValueError(

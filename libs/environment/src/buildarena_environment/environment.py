@@ -128,8 +128,8 @@ class Environment:
     Args:
         task: The task, or the name of a built-in one.
         simulator: Name of the engine that tries machines.
-        seed: Varies where machine and cargo start, as a fair repetition would; None for the exact
-            start, which the service has.
+        seed: Varies where machine and cargo start, as a fair repetition would, and draws what a
+            family's task has drawn; None for the exact start, which the service has, and seed 0's.
         rounds: How often a builder may submit; a successful trial ends the episode.
         limits: How long an episode may be.
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
@@ -158,7 +158,7 @@ class Environment:
     ) -> None:
         if rounds < 1:
             raise ValueError(f"rounds is {rounds}: a builder submits at least once")
-        self.task = chosen_task(task)
+        self.task = chosen_task(task).drawn(seed or 0)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
         self.rounds = rounds
@@ -168,10 +168,7 @@ class Environment:
         self.data_sheets = data_sheets
         self._tries = tries
         self._shaped = bool(self.weights.keys() - TERMINAL)
-        limits_of = self.task.constraints
-        self._bench = Workbench(
-            catalogue_told(limits_of, data_sheets=data_sheets), on_demand=limits_of.on_demand
-        )
+        self._bench = self._new_bench()
         self._steps = self._changes = self._refused = 0
         self._trials: tuple[Trial, ...] = ()
         self._done = False
@@ -185,6 +182,8 @@ class Environment:
         """
         if seed is not None:
             self.seed = seed
+            self.task = self.task.drawn(seed)
+            self._bench = self._new_bench()
         self._go_to(Snapshot(task=self.task.name, task_version=self.task.version))
         return self.observation
 
@@ -272,6 +271,11 @@ class Environment:
         """
         self._require_a_step()
         return self._stepped(Refused(cause=Cause.MALFORMED_ARGUMENTS, text=reason))
+
+    def _new_bench(self) -> Workbench:
+        limits = self.task.constraints
+        catalogue = catalogue_told(limits, data_sheets=self.data_sheets)
+        return Workbench(catalogue, on_demand=limits.on_demand, task=self.task)
 
     def _acted(self, machine: str, tool: object, arguments: Any) -> Outcome:
         room = self.limits.parts

@@ -50,11 +50,15 @@ def dying_with_me(signal_number: int = signal.SIGTERM) -> Callable[[], None]:
 def end_with_parent(parent: int | None = None) -> None:
     """Has this program end soon after its parent, on all systems and whatever it is busy with.
 
+    A supervisor of many threads starts ours so, and servers of others by `dying_with_me`: what runs
+    between fork and exec can crash in a process of many threads.
+
     Args:
         parent: The parent's process id; by default the one that the environment names, if any.
     """
     named = os.environ.get(PARENT, "") if parent is None else str(parent)
     if named.isdecimal():
+        die_with_parent()
         threading.Thread(target=_watch, args=(int(named),), name="parent", daemon=True).start()
 
 

@@ -230,11 +230,15 @@ class TrialPool:
         return Evaluation(trial=Trial.from_document(answer["trial"], trajectory))
 
 
+_SEED: Final = "\n# seed "
+"""Stands in no task's JSON, which has one line."""
+
+
 def text_of(task: Task) -> str:
-    """A task as text: its name if it is a built-in one, otherwise its file."""
-    if builtin_tasks().get(task.name) == task:
-        return task.name
-    return json.dumps(dict(task.as_document()))
+    """A task as text: its name if it is a built-in one, otherwise its file; what draws it after."""
+    known = builtin_tasks().get(task.name) == task.drawn(0)
+    text = task.name if known else json.dumps(dict(task.as_document()))
+    return f"{text}{_SEED}{task.seed}" if task.seed else text
 
 
 @lru_cache(maxsize=TASKS_READ)
@@ -244,7 +248,10 @@ def task_from(text: str) -> Task:
     Raises:
         TaskError: The task is not one that a file could describe.
     """
-    return builtin_tasks()[text] if text in builtin_tasks() else parse_task(text, origin="task")
+    written, _, seed = text.partition(_SEED)
+    known = builtin_tasks().get(written)
+    task = parse_task(written, origin="task") if known is None else known
+    return task.drawn(int(seed)) if seed else task
 
 
 def _require_before(until: float) -> None:

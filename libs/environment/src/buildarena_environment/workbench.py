@@ -9,11 +9,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from buildarena_environment.errors import NothingToSubmitError
+from buildarena_environment.given import acting
 from buildarena_environment.tools import ASSEMBLY, LOOKUPS
 from buildarena_geometry import Cause, Machine, Refused
 from buildarena_geometry.modules.names import CaselessNames
 
 if TYPE_CHECKING:
+    from buildarena_benchmark import Task
     from buildarena_geometry import Catalogue, Outcome
     from buildarena_geometry.documents.log import LoggedState
 
@@ -31,10 +33,18 @@ class Workbench:
     Args:
         catalogue: The modules they may be made of; the basic ones if left out.
         on_demand: Whether modules may be looked up here; the calls are refused where they are told.
+        task: What is built for; where it gives a machine, every new one is that.
     """
 
-    def __init__(self, catalogue: Catalogue | None = None, *, on_demand: bool = False) -> None:
+    def __init__(
+        self,
+        catalogue: Catalogue | None = None,
+        *,
+        on_demand: bool = False,
+        task: Task | None = None,
+    ) -> None:
         self._catalogue = catalogue
+        self._task = task
         self._looked_up = on_demand
         self._machines: dict[str, Machine] = {}
 
@@ -55,16 +65,23 @@ class Workbench:
                 cause=Cause.UNKNOWN_ACTION,
                 text=f"There is no action {tool} in this task, which tells its modules.",
             )
-        return self.machine(machine).act(tool, arguments)
+        made = self.machine(machine)
+        act = made.act if self._task is None else acting(self._task, made)
+        return act(tool, arguments)
 
     def machine(self, name: str) -> Machine:
-        """The machine with a name, empty when there was none."""
+        """The machine with a name; where there was none an empty one, or the one that is given."""
         machine = self._machines.get(name)
         if machine is None:
-            available = self._machines if name == ASSEMBLY else None
-            machine = Machine(catalogue=self._catalogue, available=available)
-            self._machines[name] = machine
+            machine = self._machines[name] = self._new_machine(name)
         return machine
+
+    def _new_machine(self, name: str) -> Machine:
+        if name == ASSEMBLY:
+            return Machine(catalogue=self._catalogue, available=self._machines)
+        if self._task is None or self._catalogue is None:
+            return Machine(catalogue=self._catalogue)
+        return self._task.new_machine(self._catalogue)
 
     def result(self) -> tuple[str, Machine] | None:
         """What is to be simulated: the assembly if there is one, otherwise the only machine."""

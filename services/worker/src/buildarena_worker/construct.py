@@ -10,7 +10,7 @@ from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_pipeline.catalog.tracks import has_data_sheets
+from buildarena_pipeline.catalog.tracks import has_data_sheets, worlds_of
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_pipeline.runtime.notify import Notifier
@@ -103,6 +103,7 @@ class ConstructHandler:
             host=self._host(active),
             on_turn=TurnKeeper(self._store.turns, lease, self._gate),
             data_sheets=has_data_sheets(job.track_config),
+            worlds=worlds_of(job.track_config),
         )
         workflow = self._workflows.find(str(job.track_config["workflow"]))
         with self._gate.acquired():

@@ -32,7 +32,12 @@ from buildarena_pipeline.catalog.tracks import (
     worlds_of,
 )
 from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, task_of
+from buildarena_pipeline.runtime.scoring import (
+    best_rollout,
+    rollout_score,
+    task_of,
+    varied_rollouts,
+)
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import (
     SIMULATION_VERSION,
@@ -166,12 +171,13 @@ class Verifier:
             *_usage_checks(job, host.usage),
             *reasons,
         ]
-        runs = list(zip(exact, host.simulated, strict=False))
-        for record, (machine, controls) in runs:
+        best = best_rollout(exact) if any(record.finished_at for record in exact) else None
+        varied: list[Check] = []
+        for record, (machine, controls) in zip(exact, host.simulated, strict=False):
             checks += self._rollout_checks(job, record, machine, controls)
-        for record, (machine, controls) in runs:
-            if record is best_rollout(exact):
-                checks += self._world_checks(job, records, machine, controls)
+            if record is best:
+                varied = self._world_checks(job, records, machine, controls)
+        checks += varied
         checks += self._score_checks(job, session.machine, records)
         return checks
 
@@ -213,7 +219,7 @@ class Verifier:
         controls: Sequence[KeyPress] | None,
     ) -> list[Check]:
         """Whether the best machine was tried in as many varied worlds as the track says."""
-        varied = [record for record in records if record.seed is not None]
+        varied = varied_rollouts(records)
         tried = best_rollout(records).trajectory_hash is not None
         worlds = worlds_of(job.track_config) if tried else 0
         checks = [compare("worlds", len({record.seed for record in varied}), worlds)]
@@ -235,6 +241,7 @@ class Verifier:
             pack=pack_of(job, self._packs),
             host=host,
             data_sheets=has_data_sheets(job.track_config),
+            worlds=worlds_of(job.track_config),
         )
         workflow = self._workflows.find(str(job.track_config["workflow"]))
         return session, host, run_session(session, workflow, loop_of(job))
@@ -348,8 +355,7 @@ class Verifier:
     ) -> list[Check]:
         counted: JobScore | Score = failed_score(task_of(job, self._tasks), machine)
         if any(record.finished_at for record in records):
-            varied = [record for record in records if record.seed is not None]
-            counted = rollout_score(job, best_rollout(records), varied)
+            counted = rollout_score(job, records)
         return [
             compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
         ]

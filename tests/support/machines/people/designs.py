@@ -28,16 +28,6 @@ _car = partial(vehicles.car, length=7, drive=_TURN)
 
 Build = Callable[..., Machine]
 
-_DEBRIS: Final = (
-    "does_not_span: it carries to its collapse, and then its debris, some blocks high, keeps the "
-    "cargo above the fall height while it lies on the gap's floor; forces are summed until the "
-    "cargo falls"
-)
-FINDINGS: Final[Mapping[str, str]] = MappingProxyType(
-    {"double beam over 20": _DEBRIS, "box girder over 20": _DEBRIS}
-)
-"""Honest designs that fail on some engine, and by what."""
-
 
 @dataclass(frozen=True, slots=True)
 class HonestDesign:
@@ -46,12 +36,10 @@ class HonestDesign:
     Attributes:
         task: What it is for.
         build: Builds it.
-        finding: By what it fails on some engine, although it is honest; empty if it never does.
     """
 
     task: str
     build: Callable[[], Machine]
-    finding: str = ""
 
 
 def _listed() -> dict[str, HonestDesign]:
@@ -60,8 +48,7 @@ def _listed() -> dict[str, HonestDesign]:
     def add(
         name: str, task: str, build: Callable[..., Machine], *values: Any, **named: Any
     ) -> None:
-        finding = FINDINGS.get(name, "")
-        found[name] = HonestDesign(task, partial(build, *values, **named), finding)
+        found[name] = HonestDesign(task, partial(build, *values, **named))
 
     add("beam over 5", "support-1", bridges.beam, 5)
     add("arch over 5", "support-1", bridges.arch, 5, rise=1)

@@ -17,7 +17,7 @@ from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import action_rows, parts_hash, replayed_hash
 from buildarena_cli.errors import CommandError
 from buildarena_pipeline.agents.briefing import briefing, briefing_digest
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, has_data_sheets
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, has_data_sheets, worlds_of
 from buildarena_store import clean
 
 BASELINE: Final = "builtin/"
@@ -134,15 +134,18 @@ def _first_words(task: Mapping[str, Any] | None, track: Mapping[str, Any]) -> st
     data_sheets = has_data_sheets(track)
     digest = briefing_digest(on_demand=bool(track.get("looked_up")), data_sheets=data_sheets)
     if as_read and track.get("prompts_digest") == digest:
-        return _briefing(compact(task["document"]), data_sheets) or str(task["statement"])
+        return _briefing(compact(task["document"]), data_sheets, worlds_of(track)) or str(
+            task["statement"]
+        )
     return str(task["statement"])
 
 
 @lru_cache(maxsize=64)
-def _briefing(document: str, data_sheets: bool) -> str | None:
+def _briefing(document: str, data_sheets: bool, worlds: int) -> str | None:
     """The briefing of a task's document; None when it is of a version that is not read here."""
     try:
-        return briefing(parse_task(document, origin="task"), data_sheets=data_sheets)
+        task = parse_task(document, origin="task")
+        return briefing(task, data_sheets=data_sheets, worlds=worlds)
     except TaskError:
         return None
 

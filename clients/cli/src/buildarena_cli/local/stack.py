@@ -30,7 +30,7 @@ from buildarena_client.paths import HEALTH
 from buildarena_client.requests import Request
 from buildarena_client.transport_errors import TransportError
 from buildarena_client.transports.blocking import BlockingTransport
-from buildarena_environment.processes import ALLOCATOR, PARENT, dying_with_me, tree_memory_bytes
+from buildarena_environment.processes import ALLOCATOR, PARENT, tree_memory_bytes
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
@@ -222,7 +222,6 @@ class Stack:
                     stdout=log,
                     stderr=subprocess.STDOUT,
                     start_new_session=True,
-                    preexec_fn=dying_with_me(),  # noqa: PLW1509 - one system call
                 )
 
         self.supervisor.launch(ManagedProcess(name=name, start=start))

@@ -6,10 +6,10 @@ import numpy as np
 from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scorers.hover import NOT_AIRBORNE
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo, is_airborne, stands
 from buildarena_benchmark.scorers.measures.commands import motor_presses, presses_of
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.flight import NOT_AIRBORNE
 from buildarena_benchmark.scorers.measures.gears import gear_turn_deg
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (

@@ -5,17 +5,20 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal
 import numpy as np
 from pydantic import Field
 
-from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scorers.measures.carrying import bears_cargo, is_airborne
-from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
-from buildarena_benchmark.scorers.measures.outline import lowest_points
-from buildarena_benchmark.scorers.measures.series import starting_block, tilt_deg
+from buildarena_benchmark.fields import Threshold
+from buildarena_benchmark.scorers.measures.components import Mask
+from buildarena_benchmark.scorers.measures.flight import (
+    NOT_AIRBORNE,
+    NOT_RISEN,
+    FlightScoring,
+    flight_of,
+    runs_of,
+)
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     FORCES_NOT_MEASURED,
     NOT_CARRIED,
     Deciding,
-    Flag,
     Metric,
     Scorer,
     Verdict,
@@ -29,45 +32,20 @@ if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
 
-_BORNE_SHARE = 0.8
-_BORNE_SAMPLES = 25
-"""Whether the cargo is borne is judged over a second: forces swing while a machine settles."""
 
-
-NOT_AIRBORNE: Final = Flag(
-    name="not_airborne",
-    meaning="The machine was at its height, but touched the ground.",
-)
-
-
-NOT_RISEN: Final = Flag(
-    name="not_risen",
-    meaning="The starting block was at its height, but the machine did not rise to it: some of it "
-    "stayed near the ground, or the block began high up.",
-)
-
-
-class HoverScoring(Document):
-    """How long a machine holds a height with its cargo.
+class HoverScoring(FlightScoring):
+    """How long a machine holds a height with its cargo in steady flight.
 
     Attributes:
         height: Of the starting block's centre, units.
         band: How far it may be above or below, units.
         hold_s: For how long in a row, seconds.
-        max_tilt_deg: Of the starting block against how it stood at the start, degrees.
-        max_drift: Horizontal distance of the starting block from its start, units.
-        min_clearance: Least height of the machine's lowest point above the ground, units.
-        min_rise: Least height of the starting block above where it started, units.
     """
 
     name: Literal["hover"]
     height: Threshold = 10.0
     band: Threshold = 1.5
     hold_s: Annotated[float, Field(gt=0, le=600)] = 8.0
-    max_tilt_deg: Annotated[float, Field(gt=0, le=180)] = 20.0
-    max_drift: Threshold = 5.0
-    min_clearance: Threshold = 0.0
-    min_rise: Threshold = 0.0
 
 
 def infeasible(scoring: HoverScoring, scenario: Scenario) -> str | None:
@@ -106,57 +84,34 @@ def judge(
     lacking = unmeasured(trajectory, cargo=True)
     if lacking is not None:
         return lacking
-    joined = joined_to_start(machine, trajectory)
-    start = starting_block(machine, trajectory)
-    path = trajectory.positions[:, start].astype(np.float64)
-    tilt = tilt_deg(trajectory, start)
-    drift = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
-    steady = (
-        (np.abs(path[:, 2] - scoring.height) <= scoring.band)
-        & (tilt < scoring.max_tilt_deg)
-        & (drift < scoring.max_drift)
-    )
-    clearance = lowest_points(machine, trajectory, joined)
-    rules: dict[Flag, Mask] = {
-        NOT_AIRBORNE: is_airborne(machine, trajectory, joined),
-        NOT_CARRIED: bears_cargo(trajectory, share=_BORNE_SHARE, samples=_BORNE_SAMPLES),
-        NOT_RISEN: (clearance >= scoring.min_clearance)
-        & (path[:, 2] - path[0, 2] >= scoring.min_rise),
-    }
-    longest = _longest_s(steady & np.all(list(rules.values()), axis=0))
-    passes = longest >= scoring.hold_s
-    flags = {flag: not passes and _would_hold(scoring, steady, rules, flag) for flag in rules}
+    flight = flight_of(scoring, machine, trajectory)
+    height = flight.path[:, 2]
+    within = np.abs(height - scoring.height) <= scoring.band
+
+    def longest_s(holds: Mask) -> float:
+        runs = runs_of(within & holds)
+        return max((after - first - 1 for first, after in runs), default=0) / SAMPLE_RATE_HZ
+
+    def passes(holds: Mask) -> bool:
+        return longest_s(holds) >= scoring.hold_s
+
+    steady = within & flight.steady
     metrics: dict[str, Metric] = {
-        "max_height": rounded(path[:, 2].max()),
-        "max_tilt": rounded(tilt.max(initial=0.0, where=steady)),
-        "drift": rounded(drift.max(initial=0.0, where=steady)),
-        "min_clearance": rounded(clearance.min(initial=np.inf, where=steady))
+        "max_height": rounded(height.max()),
+        "max_tilt": rounded(flight.tilt.max(initial=0.0, where=steady)),
+        "drift": rounded(flight.drift.max(initial=0.0, where=steady)),
+        "min_clearance": rounded(flight.clearance.min(initial=np.inf, where=steady))
         if steady.any()
         else None,
         "broken_joints": len(trajectory.breaks),
     }
     return Verdict(
-        success=passes,
-        indicator=rounded(longest),
+        success=passes(flight.holds()),
+        indicator=rounded(longest_s(flight.holds())),
         metrics=metrics,
-        flags=raised(flags),
-        deciding=Deciding(samples=len(path), members=joined, cargo=True),
+        flags=raised(flight.flags(passes)),
+        deciding=Deciding(samples=len(height), members=flight.joined, cargo=True),
     )
-
-
-def _would_hold(
-    scoring: HoverScoring, steady: Mask, rules: dict[Flag, Mask], without: Flag
-) -> bool:
-    """Whether it would have held its height for long enough if it were not for one of the rules."""
-    others = [mask for flag, mask in rules.items() if flag != without]
-    return _longest_s(steady & np.all(others, axis=0)) >= scoring.hold_s
-
-
-def _longest_s(holds: Mask) -> float:
-    """Length of the longest run of samples, seconds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
-    runs = edges[1::2] - edges[::2] - 1
-    return float(runs.max(initial=0)) / SAMPLE_RATE_HZ
 
 
 SCORER: Final = Scorer(

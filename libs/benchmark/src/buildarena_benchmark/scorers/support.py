@@ -61,8 +61,6 @@ class SupportScoring(Document):
         fall_height: The cargo has fallen when its centre is below it, units.
         min_time_s: How long in all it must be at or above that height.
         max_start_height: Its start height may not exceed it, units.
-        span_until: "fall": forces are measured until the cargo falls, so debris on the gap's floor
-            counts as well; "collapse": until the load is decided.
         per_mass: Whether the load over the machine's mass is a metric.
     """
 
@@ -70,9 +68,6 @@ class SupportScoring(Document):
     fall_height: Threshold = 4.0
     min_time_s: Threshold = 2.0
     max_start_height: Threshold = 20.0
-    span_until: Annotated[
-        Literal["fall", "collapse"], Field(exclude_if=lambda value: value == "fall")
-    ] = "fall"
     per_mass: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
 
 
@@ -93,8 +88,8 @@ def judge(
     That is when its centre sinks below the fall height or comes too far from the gap's middle, or
     when no part in one piece reaches from terrain to terrain any more; it is the final mass if
     that never happens. The trial succeeds if the cargo was carried for some time
-    in all, did not start too high, and the load went to both terrains; the indicator is 0
-    otherwise.
+    in all, did not start too high, and the load went to both terrains until then; the indicator is
+    0 otherwise.
 
     Args:
         scoring: Thresholds, gap and terrains.
@@ -120,7 +115,7 @@ def judge(
     time_above = carried * step
     too_high = bool(height[0] > scoring.max_start_height)
     lasted = time_above >= scoring.min_time_s - 1e-9 and not too_high
-    span = measure_span(scenario, trajectory, decided if scoring.span_until == "collapse" else fell)
+    span = measure_span(scenario, trajectory, decided)
     spans = span is None or span.spans
     load = float(trajectory.cargo_mass[-1 if decided is None else decided])
     success = lasted and spans

@@ -19,6 +19,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from buildarena_benchmark.families.given import Beginning
 from buildarena_benchmark.fields import Count, Document
 from buildarena_benchmark.scorers.registry import known_scorers, scoring_type
 from buildarena_geometry import (
@@ -203,6 +204,7 @@ class TaskDocument(Document):
     level: Annotated[int, Field(ge=1, le=9)] = 1
     statement: Annotated[Text, Field(min_length=1, max_length=20_000)]
     constraints: Constraints = Constraints()
+    beginning: Annotated[Beginning | None, Field(exclude_if=lambda value: value is None)] = None
     scenario: Scenario
     scoring: scoring_type()  # type: ignore[valid-type]  # known when the registry is read
     indicator: Indicator

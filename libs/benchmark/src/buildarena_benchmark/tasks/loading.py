@@ -21,6 +21,7 @@ _HEADROOM: Final = (
     *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
     *("flight-3", "lift-4", "mechanisms-7"),
 )
+_FAMILIES: Final = ("budget-1", "repair-1")
 
 
 @cache
@@ -28,7 +29,7 @@ def builtin_tasks() -> Mapping[str, Task]:
     """The built-in tasks by name: the paper's nine in its order, the workshop's, then the rest."""
     folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
     tasks = {}
-    for name in (*_PAPER, *_WORKSHOP, *_HEADROOM):
+    for name in (*_PAPER, *_WORKSHOP, *_HEADROOM, *_FAMILIES):
         text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
         tasks[name] = parse_task(text, origin=f"{name}.yaml")
     return MappingProxyType(tasks)

@@ -3,11 +3,13 @@
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, Self
 
+from buildarena_benchmark.families.given import Beginning, given_machine
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
+from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Scenario
 
 SCORER_VERSION: Final = 4
@@ -32,6 +34,8 @@ class Task:
         scoring: The scorer's name and thresholds.
         indicator: The figure the task is ranked by.
         difficulty: Weight of each difficulty dimension, 1 to 3; empty if not stated.
+        given: What builders begin with; None where they begin with nothing.
+        seed: What draws it; always 0 where nothing is drawn.
     """
 
     name: str
@@ -45,6 +49,8 @@ class Task:
     scoring: Scoring
     indicator: Indicator
     difficulty: Mapping[str, int]
+    beginning: Beginning | None = None
+    seed: int = 0
 
     @property
     def scorer(self) -> str:
@@ -55,6 +61,16 @@ class Task:
     def control(self) -> Literal["agent", "held", "none"]:
         """Who presses the keys."""
         return self.scenario.control.mode
+
+    def drawn(self, seed: int) -> Self:
+        """The task as a job of this seed has it; the same for all unless something is drawn."""
+        return self if self.beginning is None else replace(self, seed=seed)
+
+    def new_machine(self, catalogue: Catalogue) -> Machine:
+        """What a builder begins with: an empty machine, or the one that is given."""
+        if self.beginning is None:
+            return Machine(catalogue=catalogue)
+        return given_machine(self.beginning, self.seed, catalogue)
 
     def as_document(self) -> Mapping[str, Any]:
         """All fields of a task file, defaults included, as JSON values."""
@@ -68,6 +84,7 @@ class Task:
                 part: getattr(self, part).model_dump(mode="json")
                 for part in ("constraints", "scenario", "scoring", "indicator")
             },
+            **({"beginning": self.beginning.model_dump(mode="json")} if self.beginning else {}),
             "difficulty": dict(self.difficulty) or None,
         }
 
@@ -87,12 +104,13 @@ def task_of(document: TaskDocument) -> Task:
         scoring=document.scoring,
         indicator=document.indicator,
         difficulty=MappingProxyType(weights),
+        beginning=document.beginning,
     )
 
 
 def _version_of(document: TaskDocument) -> str:
     content = document.model_dump(
-        mode="json", include={"statement", "constraints", "scenario", "scoring"}
+        mode="json", include={"statement", "constraints", "beginning", "scenario", "scoring"}
     )
     del content["constraints"]["module_list"]
     if document.constraints.on_demand:

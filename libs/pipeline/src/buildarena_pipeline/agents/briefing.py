@@ -44,12 +44,13 @@ LIMITS: Final = SessionLimits(
 )
 
 
-def briefing(task: Task, *, data_sheets: bool = True) -> str:
+def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
     """All that an agent must know to play a task, but for its tools.
 
     Args:
         task: The task.
         data_sheets: Whether it is told the numbers of modules and world.
+        worlds: In how many varied worlds its machine is scored.
 
     Returns:
         Markdown: how it plays, the statement, the frame, the rules, the limits, the modules.
@@ -57,7 +58,7 @@ def briefing(task: Task, *, data_sheets: bool = True) -> str:
     return words_around.briefing(
         task,
         trials=TRIALS,
-        guidelines=_guidelines(),
+        guidelines=f"{_guidelines()}\n{words_around.worlds_told(worlds)}",
         values={
             "calls": f"{LIMITS.calls:,}",
             "bytes": f"{LIMITS.session_bytes:,}",

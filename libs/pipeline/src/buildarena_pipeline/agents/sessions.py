@@ -20,7 +20,12 @@ from buildarena_pipeline.agents.briefing import (
 )
 from buildarena_pipeline.agents.submission import chosen_task, submit_machine
 from buildarena_pipeline.agents.workbench import Workbench, check_arguments, rebuild
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, external_track, has_data_sheets
+from buildarena_pipeline.catalog.tracks import (
+    EXTERNAL_WORKFLOW,
+    external_track,
+    has_data_sheets,
+    worlds_of,
+)
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import (
@@ -181,7 +186,7 @@ class ExternalSessions:
         return OpenedSession(
             job=self._context.store.jobs.get(key.job_id),
             task=chosen,
-            briefing=briefing(chosen, data_sheets=data_sheets),
+            briefing=briefing(chosen, data_sheets=data_sheets, worlds=worlds_of(track.as_config())),
             reopened=reopened,
         )
 
@@ -286,7 +291,8 @@ class ExternalSessions:
         return rebuild(calls, self._task(job), data_sheets=data_sheets)
 
     def _task(self, job: Job) -> Task | None:
-        return self._context.tasks.exact(job.task, job.task_version)
+        task = self._context.tasks.exact(job.task, job.task_version)
+        return None if task is None else task.drawn(job.seed)
 
     def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:

@@ -26,8 +26,14 @@ class Workbench(building.Workbench):
         size: Bytes of all arguments and feedback so far.
     """
 
-    def __init__(self, catalogue: Catalogue | None = None, *, on_demand: bool = False) -> None:
-        super().__init__(catalogue, on_demand=on_demand)
+    def __init__(
+        self,
+        catalogue: Catalogue | None = None,
+        *,
+        on_demand: bool = False,
+        task: Task | None = None,
+    ) -> None:
+        super().__init__(catalogue, on_demand=on_demand, task=task)
         self.size = 0
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
@@ -80,6 +86,7 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
     return Workbench(
         catalogue_told(task.constraints, data_sheets=data_sheets),
         on_demand=task.constraints.on_demand,
+        task=task,
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import groupby
 from typing import Any, Final
 
+from buildarena_benchmark import Task
 from buildarena_environment import ASSEMBLY
 from buildarena_environment.tools import OBJECTION
 from buildarena_geometry import Catalogue, Machine, RefusalClass
@@ -31,15 +32,19 @@ BEFORE_THE_MACHINE: Final = frozenset({"parallel_calls", "unknown_action"})
 """Refusals of the session, which the machine never heard of."""
 
 
-def replay_of_turns(turns: Sequence[Turn]) -> Replay:
+def replay_of_turns(turns: Sequence[Turn], task: Task | None = None) -> Replay:
     """What the actions of a transcript, done again, build.
 
     Of a session in several rounds it tells the last one. What a controller programs is no action,
     so it is not in it.
+
+    Args:
+        turns: Those of the transcript.
+        task: The job's, drawn by its seed: it may give the machine that is built on.
     """
     if turns and turns[0]["stage"] == EXTERNAL:
-        return _replay_of_calls(turns)
-    session = _Session(_offered(turns))
+        return _replay_of_calls(turns, task)
+    session = _Session(_offered(turns), task)
     for (phase, part), dialogue in groupby(turns, key=place):
         session.play(phase, part, list(dialogue))
     return Replay(
@@ -54,6 +59,12 @@ def place(turn: Turn) -> tuple[str, str | None]:
     return (turn["stage"], turn.get("sub_structure"))
 
 
+def _is_refused_by_session(action: Mapping[str, Any], task: Task | None) -> bool:
+    """Whether an action was refused by the session, or may have been: by the edits of its task."""
+    given = task is not None and task.beginning is not None
+    return not action["ok"] and (given or action["reason"] in BEFORE_THE_MACHINE)
+
+
 def _offered(turns: Sequence[Turn]) -> Catalogue:
     """The smallest set with the modules that a transcript's actions name and were given."""
     actions = [action for turn in turns for action in turn["actions"]]
@@ -66,9 +77,9 @@ def _offered(turns: Sequence[Turn]) -> Catalogue:
     )
 
 
-def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
+def _replay_of_calls(turns: Sequence[Turn], task: Task | None) -> Replay:
     """An agent's machines grow side by side, each in a chapter of its own."""
-    bench = Workbench(_offered(turns), on_demand=True)
+    bench = Workbench(_offered(turns), on_demand=True, task=task)
     recorder, chapters = Recorder(), dict[str, Chapter]()
     for turn in turns:
         name = str(turn["sub_structure"])
@@ -76,6 +87,9 @@ def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
             kind: Kind = "assembly" if name == ASSEMBLY else "sub_structure"
             chapters[name] = Chapter(name=name, kind=kind, machine=bench.machine(name))
         for action in turn["actions"]:
+            if _is_refused_by_session(action, task):
+                chapters[name].steps.append(refused_step(turn["index"], action))
+                continue
             recorder.record(chapters[name], turn["index"], action["name"], action["arguments"])
     if len(chapters) == 1:
         next(iter(chapters.values())).kind = "machine"
@@ -90,8 +104,9 @@ def _replay_of_calls(turns: Sequence[Turn]) -> Replay:
 class _Session:
     """The machines of a model's session, dialogue by dialogue."""
 
-    def __init__(self, catalogue: Catalogue) -> None:
+    def __init__(self, catalogue: Catalogue, task: Task | None) -> None:
         self._catalogue = catalogue
+        self._task = task
         self.chapters: dict[str, Chapter] = {}
         self.recorder = Recorder()
         self.machine: Machine | None = None
@@ -142,7 +157,7 @@ class _Session:
     def _act(self, chapter: Chapter, turn: int, action: Mapping[str, Any]) -> None:
         if action["name"] == OBJECTION.name:
             return
-        if not action["ok"] and action["reason"] in BEFORE_THE_MACHINE:
+        if _is_refused_by_session(action, self._task):
             chapter.steps.append(refused_step(turn, action))
             return
         if action["ok"] and chapter.kind == "machine" and self._is_anew(chapter, action):
@@ -152,6 +167,8 @@ class _Session:
         self.recorder.record(chapter, turn, action["name"], action["arguments"])
 
     def _empty(self, available: Mapping[str, Machine] | None = None) -> Machine:
+        if available is None and self._task is not None:
+            return self._task.new_machine(self._catalogue)
         return Machine(catalogue=self._catalogue, available=available)
 
     def _is_anew(self, chapter: Chapter, action: Mapping[str, Any]) -> bool:

@@ -18,7 +18,7 @@ from buildarena_store import Job, JobScore, Outcome, RolloutRecord
 
 
 def task_of(job: Job, catalogue: TaskCatalog) -> Task:
-    """The job's task, in the version that the job was submitted for.
+    """The job's task, in the version that the job was submitted for, drawn by its seed.
 
     Raises:
         PermanentError: It is gone, or is no longer scored as it was.
@@ -29,7 +29,7 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
             f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
             reason="task_changed",
         )
-    return task
+    return task.drawn(job.seed)
 
 
 def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
@@ -50,28 +50,31 @@ def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
     )
 
 
-def rollout_score(
-    job: Job, record: RolloutRecord, varied: Sequence[RolloutRecord] = ()
-) -> JobScore:
+def varied_rollouts(records: Sequence[RolloutRecord]) -> Sequence[RolloutRecord]:
+    """Those in varied worlds, done or not."""
+    return [record for record in records if record.seed is not None]
+
+
+def rollout_score(job: Job, records: Sequence[RolloutRecord]) -> JobScore:
     """The score of a job.
 
     Args:
         job: The job.
-        record: Its best rollout.
-        varied: Rollouts of the same machine in varied worlds.
+        records: All its rollouts: those in varied worlds are of the best one's machine.
     """
+    record = best_rollout(records)
     success = bool(record.success)
     return JobScore(
         outcome=Outcome.SUCCESS if success else Outcome.UNSUCCESSFUL,
         success=success,
         indicator=float(record.indicator or 0.0),
-        metrics={**(record.metrics or {}), **robustness_metrics(varied)},
+        metrics={**(record.metrics or {}), **_robustness(varied_rollouts(records))},
         flags=record.flags or (),
         manifest=job_manifest(job, record),
     )
 
 
-def robustness_metrics(varied: Sequence[RolloutRecord]) -> Mapping[str, float]:
+def _robustness(varied: Sequence[RolloutRecord]) -> Mapping[str, float]:
     """What a machine did in varied worlds, as metrics of its job; empty without any.
 
     In a world in which it fails, or succeeds in a way that disqualifies, it has done nothing.

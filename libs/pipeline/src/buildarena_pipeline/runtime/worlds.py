@@ -14,7 +14,7 @@ from typing import Any, Final
 from sqlalchemy import Connection
 
 from buildarena_pipeline.catalog.tracks import worlds_of
-from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score
+from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, varied_rollouts
 from buildarena_store import Lease, RolloutRecord, RolloutRequest, Stage, Store
 from buildarena_store.states import simulate_queue
 
@@ -46,13 +46,13 @@ def finish_or_vary(
         StaleLeaseError: The lease is over; the transaction must be undone.
     """
     best = best_rollout(records)
-    varied = [record for record in records if record.seed is not None]
+    varied = varied_rollouts(records)
     # What no engine can take in the exact world it takes in none.
     worlds = worlds_of(lease.job.track_config) if best.trajectory_hash else 0
     if len(varied) < worlds:
         _request(store, lease.job.id, best, len(records), worlds, connection=connection)
     elif all(record.finished_at for record in varied):
-        score = rollout_score(lease.job, best, varied)
+        score = rollout_score(lease.job, records)
         store.results.finish(lease, score, connection=connection, **values)
         return None
     queue = simulate_queue(best.engine)

@@ -11,6 +11,7 @@ from buildarena_api.http.etags import Answer
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.replays.views import replay_view
+from buildarena_benchmark import Task
 from buildarena_geometry import DocumentError, Machine
 from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_pipeline.replays.chapters import Replay
@@ -37,6 +38,7 @@ class Replays:
     def __init__(self, context: Context) -> None:
         self._artifacts = context.artifacts
         self._jobs = context.store.jobs
+        self._tasks = context.tasks
         self._transcripts = Transcripts(context.store, context.artifacts)
         self._answers = ResponseCache(MAX_CACHED_BYTES)
 
@@ -58,18 +60,22 @@ class Replays:
     def _made(self, job: Job, kept: Mapping[str, str], turns: Turns) -> bytes:
         digest = kept.get("machine")
         if digest is None or self._goes_on(kept, turns):
-            return _body(replay_of_turns(turns), exact=None)
+            return _body(replay_of_turns(turns, self._task(job)), exact=None)
         document = json.loads(self._artifacts.get(digest))
         try:
             machine = Machine.from_document(document)
             if job.track_config.get("workflow") == EXTERNAL_WORKFLOW:
-                replay = replay_of_turns(turns)
+                replay = replay_of_turns(turns, self._task(job))
             else:
                 replay = replay_of_document(document, turns)
         except DocumentError as error:
             detail = f"job {job.id} has a machine that this version does not read: {error}"
             raise ProblemError(404, detail) from error
         return _body(replay, exact=replay.complete and replay.machine == machine)
+
+    def _task(self, job: Job) -> Task | None:
+        task = self._tasks.exact(job.task, job.task_version)
+        return None if task is None else task.drawn(job.seed)
 
     def _goes_on(self, kept: Mapping[str, str], turns: Turns) -> bool:
         """Whether the session built on since its machine was kept."""

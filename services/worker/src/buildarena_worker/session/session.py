@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Score, Task, broken_constraint
-from buildarena_environment.briefing import catalogue_told
+from buildarena_environment.briefing import catalogue_told, worlds_told
+from buildarena_environment.given import acting
 from buildarena_environment.trials import score_text
-from buildarena_geometry import Catalogue, Machine, ToolDefinition
+from buildarena_geometry import Catalogue, Machine, Outcome, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_store import RolloutRecord
@@ -18,6 +19,9 @@ from buildarena_worker.session.results import ConstructionFailedError
 
 OnTurn = Callable[[ModelTurn, int], None]
 """Takes a turn, and the place of its reply in the journal."""
+
+GIVEN_IS_TOLD_BY = ("get_machine_summary", "review_powered_blocks", "review_control_config")
+"""The tools whose answers tell those who hold none of the machine that a task gives."""
 
 MAX_CONVERSATION = 2_000_000
 """Characters of all messages together, some 500,000 tokens: with 40 sessions in a process, their
@@ -35,9 +39,10 @@ class Session:
         host: Where answers come from.
         on_turn: Takes every turn, those of stored replies included.
         data_sheets: Whether roles are told the numbers of modules and world.
+        worlds: In how many varied worlds what is built is scored.
 
     Attributes:
-        additions: What follows the task's statement: an example, results of rounds.
+        additions: What follows the task's statement: varied worlds, an example, results of rounds.
         machine: What is being built.
         plan: What the plan says of the whole machine, "" without one.
     """
@@ -52,6 +57,7 @@ class Session:
         host: SessionHost,
         on_turn: OnTurn | None = None,
         data_sheets: bool = True,
+        worlds: int = 0,
     ) -> None:
         self.task = task
         self.data_sheets = data_sheets
@@ -59,7 +65,7 @@ class Session:
         self.pack = pack
         self.host = host
         self.transcript = Transcript()
-        self.additions: list[str] = []
+        self.additions = [worlds_told(worlds)] if worlds else []
         self.machine: Machine | None = None
         self.plan = ""
         self._model_config = model_config
@@ -69,7 +75,16 @@ class Session:
     def statement(self) -> str:
         """The task as the model reads it: the pack's or the task's words, and additions."""
         statement = self.pack.statements.get(self.task.name, self.task.statement)
-        return "\n\n".join([statement.strip(), *self.additions])
+        return "\n\n".join([statement.strip(), *self._given, *self.additions])
+
+    @property
+    def _given(self) -> list[str]:
+        """The machine that the task gives, as the tools tell it."""
+        if self.task.beginning is None:
+            return []
+        machine = self.task.new_machine(self.catalogue)
+        told = [machine.act(name, {}).text for name in GIVEN_IS_TOLD_BY]
+        return ["\n\n".join(["## The machine as it is", *told])]
 
     @property
     def catalogue(self) -> Catalogue:
@@ -77,13 +92,20 @@ class Session:
         return catalogue_told(self.task.constraints, data_sheets=self.data_sheets)
 
     def new_machine(self, available: Mapping[str, Machine] | None = None) -> Machine:
-        """An empty machine of the task's modules, which is what is being built from now on.
+        """A machine of the task's modules, empty or given, which is what is built from now on.
 
         Args:
             available: Finished machines by name; with some, the new one is their assembly.
         """
-        self.machine = Machine(catalogue=self.catalogue, available=available)
+        if available is None:
+            self.machine = self.task.new_machine(self.catalogue)
+        else:
+            self.machine = Machine(catalogue=self.catalogue, available=available)
         return self.machine
+
+    def acting(self, machine: Machine) -> Callable[[str, Mapping[str, Any]], Outcome]:
+        """What carries out a builder's actions on a machine, within the edits of the task."""
+        return acting(self.task, machine)
 
     def ask(
         self, messages: Sequence[Message], tools: Sequence[ToolDefinition], *, phase: str, role: str

@@ -12,12 +12,13 @@ EXAMPLE_SEED = 0
 def example_for(task: Task, pack: PromptPack) -> str:
     """An example of the task's kind: the expert's design for the first level of its category.
 
-    A task of a category of its own gets the example of the first task that is scored like it, and
-    the first example of all if none is.
+    A task of a category of its own gets the example of the first other task that is scored like it,
+    and the first example of all if none is.
     """
     name = f"{task.category}-1"
     if name not in DESIGNS:
-        alike = [name for name in DESIGNS if builtin_tasks()[name].scorer == task.scorer]
+        others = [name for name in DESIGNS if name != task.name]
+        alike = [name for name in others if builtin_tasks()[name].scorer == task.scorer]
         name = next(iter(alike or DESIGNS))
     part = next(iter(DESIGNS[name](EXAMPLE_SEED).parts.values()))
     actions = "\n".join(

@@ -33,6 +33,8 @@ BUILD = (
     "flip_spin",
     *QUERIES,
 )
+MEND = ("change_control_key", "review_powered_blocks", "review_control_config")
+"""What a machine with keys that a task gives takes besides."""
 REFINE = ("twist_block", "shift_block", "flip_spin", *QUERIES)
 ASSEMBLE = (
     "add_machine",
@@ -47,6 +49,11 @@ ASSEMBLE = (
     "flip_spin",
     *QUERIES,
 )
+
+
+def building(task: Task) -> Sequence[str]:
+    """The names of a builder's tools."""
+    return BUILD if task.beginning is None else (*BUILD, *MEND)
 
 
 def tools_named(names: Sequence[str]) -> list[ToolDefinition]:

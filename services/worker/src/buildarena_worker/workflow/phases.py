@@ -14,8 +14,8 @@ from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import (
     ASSEMBLE,
-    BUILD,
     REFINE,
+    building,
     connectors_of,
     lookups,
     modules_of,
@@ -141,10 +141,10 @@ def build_phase(
         name=part.name,
         blueprint=blueprint,
         modules=modules or parts_of(task, f"{part.text}\n{blueprint}"),
-        tools=tools_text(BUILD),
+        tools=tools_text(building(task)),
     )
     dialogue = Dialogue(session, phase="build", opening=opening, sub_structure=part.name)
-    builder, guidance = _builder(session, machine, BUILD), _guidance(session, brief)
+    builder, guidance = _builder(session, machine, building(task)), _guidance(session, brief)
     _alternate(dialogue, (builder, guidance), ends=guidance, what=f"building {part.name}")
     return machine
 
@@ -226,8 +226,8 @@ def solo_phase(session: Session) -> Machine:
     role = Role(
         name="builder",
         system=pack.roles["solo"],
-        tools=[*tools_named(BUILD), *lookups(task), OBJECTION],
-        act=machine.act,
+        tools=[*tools_named(building(task)), *lookups(task), OBJECTION],
+        act=session.acting(machine),
     )
     _alternate(dialogue, (role,), ends=role, what="building")
     return machine
@@ -238,7 +238,7 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
         name="builder",
         system=session.pack.roles["builder"],
         tools=tools_named(names),
-        act=machine.act,
+        act=session.acting(machine),
         forgets=True,
     )
 

@@ -7,7 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from buildarena_worker.builtin.designs import arms, bridges, flyers, rockets, rovers, vehicles
+from buildarena_worker.builtin.designs import (
+    arms,
+    bridges,
+    flyers,
+    repairs,
+    rockets,
+    rovers,
+    vehicles,
+)
 from buildarena_worker.builtin.designs.design import Design
 
 DESIGNS: dict[str, Callable[[int], Design]] = {
@@ -34,6 +42,8 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "flight-3": flyers.stepping_hoverer,
     "lift-4": rockets.payload_rocket,
     "mechanisms-7": arms.loaded_lift,
+    "budget-1": lambda seed: bridges.light_beam(seed, gap=10),
+    "repair-1": repairs.repaired_car,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

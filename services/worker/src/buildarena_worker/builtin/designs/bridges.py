@@ -59,6 +59,24 @@ def braced_deck(seed: int, *, gap: int) -> Design:
     )
 
 
+def light_beam(seed: int, *, gap: int) -> Design:
+    """A single row of blocks with braces above and below where the moment is greatest.
+
+    Args:
+        seed: Varies how far the beam rests on the terrain, by a block at each end.
+        gap: Width of the gap, units.
+    """
+    draft = Draft()
+    row = _row(draft, draft.start("middle of the beam"), gap // 2 + seed % 2)
+    middle = len(row) // 2
+    for way in (UP, DOWN):
+        for first in (-OVERLAP, -OVERLAP // 2, 0):
+            draft.connect(row[middle + first], row[middle + first + OVERLAP], way)
+    return _bridge(
+        draft, gap, f"A row of {len(row)} blocks from south to north, braced near its middle"
+    )
+
+
 def _half(seed: int, gap: int) -> int:
     return gap // 2 + 1 + seed % 2
 

@@ -69,7 +69,7 @@ class Draft:
 
     def attach(self, base: str, way: Direction, module: str = WOOD, note: str = "") -> str:
         """Attaches a block to a block's side; returns the new block's id."""
-        face = self._face(base, way)
+        face = self.face(base, way)
         noted = {"note": note} if note else {}
         self.do("attach_block_to", base_block=base, face=face, new_block=module, **noted)
         return list(self.machine.blocks)[-1]
@@ -95,9 +95,9 @@ class Draft:
         self.do(
             "connect_blocks",
             block_a=first,
-            face_a=self._face(first, way),
+            face_a=self.face(first, way),
             block_b=second,
-            face_b=self._face(second, other_way or way),
+            face_b=self.face(second, other_way or way),
             connector=connector,
         )
 
@@ -150,7 +150,8 @@ class Draft:
                 return block
         raise ValueError(f"block {block} cannot point towards {way}")
 
-    def _face(self, block: str, way: Direction) -> str:
+    def face(self, block: str, way: Direction) -> str:
+        """The label of the side of a block that looks a way."""
         base = self.machine.blocks[block]
         for face in base.module.faces:
             if np.dot(base.face_normal(face.label), way) > ALIGNED:

@@ -1,0 +1,1 @@
+"""Families: tasks of which each job's seed draws one."""

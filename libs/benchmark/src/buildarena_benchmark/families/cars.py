@@ -1,0 +1,193 @@
+"""Cars that are drawn by a seed: their shape, and what is wrong with them.
+
+A car stands on three wheels at each side of its frame, all bound to one key, and drives northwards
+while that key is held. It is about as wide as long, so that wheels which drive otherwise turn it
+aside; long and narrow ones may go straight on for all their faults. Shape, sides, order of building
+and faults are drawn; every fault is put right by one edit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from random import Random
+from typing import Any, Final
+
+from buildarena_geometry import Machine
+
+KEY: Final = "UpArrow"
+PRESS: Final = (0.5, 9.0)
+"""When the key is pressed, and for how long, seconds."""
+WOOD, WHEEL = "Small Wooden Block", "Powered Wheel"
+EAST, WEST = 1, -1
+OTHER_KEYS: Final = ("DownArrow", "LeftArrow", "RightArrow", "Alpha1")
+FAULTS: Final = ("missing", "turned", "other key", "backward", "unbound")
+"""A wheel that is not there; that spins the other way; whose key is another, or makes it run
+backward; that has no key."""
+
+_ALIGNED: Final = 0.999
+"""Cosine above which two directions count as one."""
+
+Cells = list[tuple[int, int]]
+Drawn = tuple[Cells, list[tuple[tuple[int, int], int]]]
+"""A frame's cells, and the cells and sides at which its wheels sit."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wheel:
+    """A wheel of a car.
+
+    Attributes:
+        place: (east, north) of the block it sits on, blocks from the frame's middle.
+        side: `EAST` or `WEST`: the side of that block.
+        fault: What is wrong with it, one of `FAULTS`; "" for nothing.
+        key: The key that is wrong, where one is.
+    """
+
+    place: tuple[int, int]
+    side: int
+    fault: str = ""
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Car:
+    """A car before it is built.
+
+    Attributes:
+        blocks: (east, north) of its blocks in building order, each beside an earlier one; the
+            first is the starting block.
+        wheels: In building order.
+    """
+
+    blocks: tuple[tuple[int, int], ...]
+    wheels: tuple[Wheel, ...]
+
+    @property
+    def whole(self) -> Car:
+        """The same without its faults."""
+        return replace(self, wheels=tuple(replace(w, fault="", key="") for w in self.wheels))
+
+
+def drawn_car(seed: int, faults: int) -> Car:
+    """The car of a seed.
+
+    All faults are on one side, where they do not make up for each other: at least one wheel drives
+    the other way, and at most one is missing.
+
+    Args:
+        seed: Draws shape and faults.
+        faults: How many wheels have one, 2 or 3: each side has three.
+    """
+    draw = Random(f"car {seed}")  # noqa: S311 - to be repeatable, not secret
+    cells, seats = draw.choice((_spine, _ladder, _cross_frame))(draw)
+    start = draw.randrange(len(cells))
+    order = _grown(cells, cells[start], draw)
+    seats = draw.sample(seats, len(seats))
+    wheels = [Wheel(place=place, side=side) for place, side in seats]
+    wrong_side = draw.choice((EAST, WEST))
+    those = [k for k, wheel in enumerate(wheels) if wheel.side == wrong_side]
+    # One wheel drives the other way: where others only brake or are missing, a car may go straight.
+    kinds = [draw.choice(("turned", "backward")), draw.choice(FAULTS)]
+    kinds += [draw.choice(FAULTS[1:]) for _ in range(faults - len(kinds))]
+    for k, fault in zip(draw.sample(those, faults), kinds, strict=True):
+        wheels[k] = replace(wheels[k], fault=fault, key=draw.choice(OTHER_KEYS))
+    return Car(blocks=tuple(order), wheels=tuple(wheels))
+
+
+def built(car: Car) -> Machine:
+    """The machine of a car, with its faults.
+
+    It is built without what is missing, so its log tells nothing of the faults.
+    """
+    machine = Machine()
+    _do(machine, "start")
+    at = {car.blocks[0]: "1"}
+    for cell in car.blocks[1:]:
+        near = next(c for c in at if abs(c[0] - cell[0]) + abs(c[1] - cell[1]) == 1)
+        way = (cell[0] - near[0], cell[1] - near[1], 0)
+        at[cell] = _attached(machine, at[near], way, WOOD)
+    for wheel in car.wheels:
+        if wheel.fault != "missing":
+            _mounted(machine, at[wheel.place], wheel)
+    _do(machine, "add_control_sequence", time=PRESS[0], key=KEY, hold_for=PRESS[1])
+    return machine
+
+
+def _spine(draw: Random) -> Drawn:
+    """A spine with cross members of one length."""
+    half, reach = draw.randint(2, 3), draw.randint(2, 4)
+    rows = _rows(draw, half)
+    cells = [(0, y) for y in range(-half, half + 1)]
+    cells += [(side * x, y) for y in rows for side in (EAST, WEST) for x in range(1, reach + 1)]
+    return cells, [((side * reach, y), side) for y in rows for side in (EAST, WEST)]
+
+
+def _ladder(draw: Random) -> Drawn:
+    """Two rails with rungs between them; the wheels sit on the rails."""
+    half, reach = draw.randint(2, 3), draw.randint(2, 4)
+    rows = _rows(draw, half)
+    cells = [(side * reach, y) for side in (EAST, WEST) for y in range(-half, half + 1)]
+    cells += [(x, y) for y in rows for x in range(-reach + 1, reach)]
+    return cells, [((side * reach, y), side) for y in rows for side in (EAST, WEST)]
+
+
+def _cross_frame(draw: Random) -> Drawn:
+    """A spine whose cross members are longer in the middle than at its ends."""
+    half, short = draw.randint(2, 3), draw.randint(2, 3)
+    rows = _rows(draw, half)
+    long = short + draw.randint(1, 2)
+    reaches = {y: short if abs(y) == half else long for y in rows}
+    cells = [(0, y) for y in range(-half, half + 1)]
+    cells += [
+        (side * x, y) for y in rows for side in (EAST, WEST) for x in range(1, reaches[y] + 1)
+    ]
+    return cells, [((side * reaches[y], y), side) for y in rows for side in (EAST, WEST)]
+
+
+def _rows(draw: Random, half: int) -> list[int]:
+    """Where the three axles are: at both ends and between, two apart or more."""
+    return [-half, draw.randint(-half + 2, half - 2), half]
+
+
+def _grown(
+    cells: Sequence[tuple[int, int]], first: tuple[int, int], draw: Random
+) -> list[tuple[int, int]]:
+    """The cells in an order in which each lies beside an earlier one."""
+    order, left = [first], set(cells) - {first}
+    while left:
+        near = sorted(c for c in left if any(_beside(c, other) for other in order))
+        order.append(draw.choice(near))
+        left.remove(order[-1])
+    return order
+
+
+def _beside(first: tuple[int, int], second: tuple[int, int]) -> bool:
+    return abs(first[0] - second[0]) + abs(first[1] - second[1]) == 1
+
+
+def _mounted(machine: Machine, base: str, wheel: Wheel) -> None:
+    """A wheel on a block, with what is wrong with it."""
+    made = _attached(machine, base, (wheel.side, 0, 0), WHEEL)
+    if (wheel.side == WEST) != (wheel.fault == "turned"):
+        _do(machine, "flip_spin", block_id=made)
+    action = "spinning_backward" if wheel.fault == "backward" else "spinning_forward"
+    if wheel.fault != "unbound":
+        key = wheel.key if wheel.fault == "other key" else KEY
+        _do(machine, "add_control_key", block_id=made, action=action, new_key=key)
+
+
+def _attached(machine: Machine, base: str, way: tuple[int, int, int], module: str) -> str:
+    block = machine.blocks[base]
+    face = next(
+        face.label
+        for face in block.module.faces
+        if sum(a * b for a, b in zip(block.face_normal(face.label), way, strict=True)) > _ALIGNED
+    )
+    _do(machine, "attach_block_to", base_block=base, face=face, new_block=module)
+    return list(machine.blocks)[-1]
+
+
+def _do(machine: Machine, name: str, /, **arguments: Any) -> None:
+    outcome = machine.act(name, arguments)
+    assert outcome.ok, (name, arguments, outcome.text)  # noqa: S101 - drawn cars are buildable

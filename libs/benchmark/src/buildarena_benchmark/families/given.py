@@ -1,0 +1,86 @@
+"""Machines that builders begin with, and how much they change."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from functools import lru_cache
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from buildarena_benchmark.families.cars import built, drawn_car
+from buildarena_benchmark.fields import Document
+from buildarena_geometry import Block, Catalogue, Machine
+
+
+class Beginning(Document):
+    """What a builder begins with: a machine with faults, drawn by the job's seed.
+
+    Attributes:
+        family: What sort of machine; see the module of this name.
+        faults: How many faults it has.
+        edits: By how many edits the finished machine may differ from it, see `edits_between`.
+    """
+
+    family: Literal["cars"]
+    faults: Annotated[int, Field(ge=2, le=3)]
+    edits: Annotated[int, Field(ge=1, le=100)]
+
+
+@lru_cache(maxsize=256)
+def _machines(beginning: Beginning, seed: int) -> tuple[Machine, Machine]:
+    car = drawn_car(seed, beginning.faults)
+    return built(car), built(car.whole)
+
+
+def given_machine(beginning: Beginning, seed: int, catalogue: Catalogue | None = None) -> Machine:
+    """The machine with its faults; its log is that of a builder who built it so.
+
+    Args:
+        beginning: What is drawn.
+        seed: The job's.
+        catalogue: What may be built on with; the basic modules if left out.
+    """
+    machine = _machines(beginning, seed)[0]
+    if catalogue is None:
+        return machine.copy()
+    logged = machine.logged
+    return Machine.restored(replace(logged, state=replace(logged.state, catalogue=catalogue)))
+
+
+def whole_machine(beginning: Beginning, seed: int) -> Machine:
+    """The same machine without its faults."""
+    return _machines(beginning, seed)[1].copy()
+
+
+def edits_between(original: Machine, machine: Machine) -> int:
+    """By how many edits a machine differs from the one that was given.
+
+    Each block and each connector that is gone or new is one edit; so is each that stayed and is
+    another one, lies or stands otherwise, or turns the other way, and each whose keys are others.
+    What was undone is no edit. Ids are never used twice: what is taken away and put back is two.
+    """
+    before, after = original.blocks, machine.blocks
+    count = len(before.keys() ^ after.keys())
+    for name in before.keys() & after.keys():
+        was, is_now = before[name], after[name]
+        moved = _shape(was) != _shape(is_now) or is_now.mount not in (None, was.mount)
+        count += moved + (_keys(was) != _keys(is_now))
+    old, new = original.connectors, machine.connectors
+    count += len(old.keys() ^ new.keys())
+    return count + sum(old[name] != new[name] for name in old.keys() & new.keys())
+
+
+def has_other_presses(original: Machine, machine: Machine) -> bool:
+    """Whether the key presses are not those of the machine that was given, in any order."""
+    return Counter(original.control_sequence) != Counter(machine.control_sequence)
+
+
+def _shape(block: Block) -> tuple[object, ...]:
+    place = (*block.world_from_block.position, *block.world_from_block.quaternion)
+    return (block.module.name, tuple(round(value, 6) for value in place), block.flipped)
+
+
+def _keys(block: Block) -> dict[str, frozenset[str]]:
+    return {action: frozenset(keys) for action, keys in block.bindings.items() if keys}

@@ -1,0 +1,37 @@
+"""Building on a machine that a task gives: changes beyond its edits are refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from buildarena_benchmark import Task, too_much_changed
+from buildarena_geometry import Cause, Machine, Refused
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Outcome
+
+
+def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:
+    """The machine's `act`, as a task's builder has it.
+
+    Where the task gives a machine, an action after which it differs by too many edits is refused,
+    and leaves everything as it was.
+
+    Args:
+        task: The task.
+        machine: What is built.
+    """
+    if task.beginning is None:
+        return machine.act
+
+    def act(name: object, arguments: Any = None) -> Outcome:
+        before = machine.logged
+        outcome = machine.act(name, arguments)
+        too_much = too_much_changed(task, machine) if outcome.ok else None
+        if too_much is None:
+            return outcome
+        machine.return_to(before)
+        return Refused(cause=Cause.OUT_OF_RANGE, text=f"With that {too_much}.")
+
+    return act
