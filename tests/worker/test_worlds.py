@@ -14,13 +14,13 @@ from support.stages import work
 
 from buildarena_benchmark.leaderboard import summarise
 from buildarena_geometry import Machine
+from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import ClosedLoop, JobSpec, SweepSpec
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.submission.submission import Submissions
-from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_simulation import constants, read_trajectory, simulate, write_trajectory
 from buildarena_store import Job, RolloutRecord, TrialFilter
 from buildarena_worker.wiring import verification_runner
