@@ -41,10 +41,12 @@ def main() -> int:
                 first = (number * options.jobs + seed) * options.worlds
                 worlds = range(first, first + options.worlds)
                 ranked.put(job_of(task, model, seed, worlds=worlds, engine=options.simulator))
-        row = _rows(ranked, [name])[0]
-        sys.stdout.write(f"{name:14s} {row['ranks']}  {row['success']}\n")
+        sys.stdout.write(f"{name}: tried\n")
         sys.stdout.flush()
+    # What a board claims of one task hangs on how many tasks it has.
     rows = _rows(ranked, list(tasks))
+    for row in rows:
+        sys.stdout.write(f"{row['task']:14s} {row['ranks']}  {row['success']}\n")
     separated = sum(len(set(row["ranks"].values())) == len(APPRENTICES) for row in rows)
     ends = sum(row["ranks"]["strong"] < row["ranks"]["weak"] for row in rows)
     sys.stdout.write(
