@@ -52,15 +52,6 @@ class LoadModel:
         self._enter(clusters, motion)
         self._inertial = np.zeros((len(clusters), 6))
 
-    def kept(self) -> tuple[FloatArray, ...]:
-        """What the filter knows, for `put_back`."""
-        known = (self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin)
-        return tuple(array.copy() for array in known)
-
-    def put_back(self, kept: tuple[FloatArray, ...]) -> None:
-        """Forgets what was evaluated since `kept` was called."""
-        self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin = kept
-
     def rebuild(self, clusters: Clusters, motion: Motion) -> None:
         """Takes over the clusters left after a break; filtered loads are carried along."""
         before = self._root_rotation[self._clusters.cluster_of]
