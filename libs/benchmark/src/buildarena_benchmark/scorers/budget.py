@@ -54,8 +54,9 @@ def judge(
         trajectory: The trial; without cargo it fails.
 
     Flags:
-        As of `support`, without `never_fell`: more load would earn nothing, so the indicator is no
-        lower bound.
+        `does_not_span`: the load did not go to both terrains. `start_too_high`: the cargo started
+        above the limit. `span_not_measured`: no contact forces are known. As of `support`, whose
+        further one is left out: more load would earn nothing, so the indicator is no lower bound.
     """
     bridge = support.judge(_as_support(scoring, scenario), scenario, machine, trajectory)
     success = bridge.success and support.NEVER_FELL in bridge.flags
