@@ -127,9 +127,9 @@ def process() -> psutil.Process:
 
 
 def running(checker: UploadChecker) -> psutil.Process:
-    apart = checker._checker._process._process
-    assert apart is not None
-    return psutil.Process(apart.pid)
+    pid = checker._checker._process.pid
+    assert pid is not None
+    return psutil.Process(pid)
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -37,6 +38,7 @@ class WarmProcess:
     """Answers questions one at a time in another process, which stays warm between them.
 
     It is started when it is first needed, and again after it ended. It ends with this process.
+    Another thread may close it at any time: whoever waits for an answer then gets an error.
 
     Args:
         name: What it is called in messages.
@@ -56,23 +58,36 @@ class WarmProcess:
         self._spare_bytes = spare_bytes
         # Forking a process that has threads is not safe, and impossible on Windows.
         self._processes = multiprocessing.get_context("spawn")
-        self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
+        # A process is started whole or not at all before another thread may end it.
+        self._changing = threading.RLock()
+        self._running: tuple[BaseProcess, Connection] | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Of the process, None when none was started."""
+        running = self._running
+        return None if running is None else running[0].pid
 
     def start(self) -> None:
         """Starts the process, unless it runs."""
-        if self._process is not None and self._process.is_alive():
-            return
-        self.close()
-        self._pipe, theirs = self._processes.Pipe()
-        self._process = self._processes.Process(
-            target=_serve,
-            args=(theirs, self._make, self._spare_bytes, os.getpid()),
-            name=self._name,
-            daemon=True,
-        )
-        self._process.start()
-        theirs.close()
+        self._started()
+
+    def _started(self) -> Connection:
+        with self._changing:
+            if self._running is not None and self._running[0].is_alive():
+                return self._running[1]
+            self.close()
+            pipe, theirs = self._processes.Pipe()
+            process = self._processes.Process(
+                target=_serve,
+                args=(theirs, self._make, self._spare_bytes, os.getpid()),
+                name=self._name,
+                daemon=True,
+            )
+            process.start()
+            theirs.close()
+            self._running = process, pipe
+            return pipe
 
     def ask(self, question: Any, *, meanwhile: Callable[[], object] = lambda: None) -> Any:
         """What the process answers.
@@ -84,9 +99,7 @@ class WarmProcess:
         Raises:
             ProcessEndedError: It ended before it answered.
         """
-        self.start()
-        pipe = self._pipe
-        assert pipe is not None  # noqa: S101 - it was started
+        pipe = self._started()
         try:
             self._piped(lambda: pipe.send(question))
             while not self._piped(lambda: pipe.poll(LOOK_EVERY_S)):
@@ -106,17 +119,17 @@ class WarmProcess:
 
     def close(self) -> None:
         """Ends the process at once."""
-        if self._process is not None:
-            self._process.kill()
-        self._ended()
+        self._ended(kill=True)
 
-    def _ended(self) -> int | None:
-        process, self._process = self._process, None
-        pipe, self._pipe = self._pipe, None
-        if pipe is not None:
-            pipe.close()
-        if process is None:
+    def _ended(self, *, kill: bool = False) -> int | None:
+        with self._changing:
+            running, self._running = self._running, None
+        if running is None:
             return None
+        process, pipe = running
+        if kill:
+            process.kill()
+        pipe.close()
         process.join(LONGEST_END_S)
         code = process.exitcode
         if code is not None:
