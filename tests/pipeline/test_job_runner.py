@@ -7,6 +7,7 @@ import pytest
 
 from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_pipeline.errors import PermanentError, TransientError
+from buildarena_pipeline.runtime import job_runner
 from buildarena_pipeline.runtime.active_lease import ActiveLease, LeaseKeeper
 from buildarena_pipeline.runtime.job_runner import SLICE_S, JobRunner
 from buildarena_store import BudgetLimits, JobScore
@@ -125,7 +126,8 @@ def runner_of(context, handler: Callable[..., None]) -> JobRunner:
     return JobRunner(context.store.leases, handler, keeper, "worker")
 
 
-def test_one_message_has_several_short_jobs_done(context, submissions) -> None:
+def test_one_message_has_several_short_jobs_done(context, submissions, monkeypatch) -> None:
+    monkeypatch.setattr(job_runner, "SLICE_S", 60.0)  # jobs are short, however busy the machine
     spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
     sweep = submissions.submit_sweep(spec).sweep
     runner_of(context, finisher(context)).process_some("construct", "")

@@ -39,6 +39,7 @@ def runner(folder: Path, url: str, secret: str, *more: str) -> Iterator[subproce
     key = folder / "key"
     key.write_text(secret + "\n")
     ours = {name: value for name, value in os.environ.items() if "BUILDARENA" not in name}
+    ours["BUILDARENA_STOP_GRACE_S"] = "3"
     words = ["worker", "start", "simulate.mujoco", "--api", url, "--key-file", str(key), *more]
     with (folder / "runner.log").open("ab") as log:
         process = subprocess.Popen([BUILDARENA, *words], env=ours, stdout=log, stderr=log, cwd="/")

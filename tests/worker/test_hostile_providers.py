@@ -125,6 +125,7 @@ def test_shutdown_ends_open_requests(context, settings, tmp_path) -> None:
             "BUILDARENA_BROKER_URL": settings.required_broker_url(),
             "BUILDARENA_DATA": str(settings.data),
             "BUILDARENA_MODELS_FILE": str(file),
+            "BUILDARENA_STOP_GRACE_S": "3",
         }
         process = subprocess.Popen([sys.executable, "-m", "buildarena_worker"], env=environment)
         try:

@@ -109,6 +109,7 @@ def _serve_api(options: argparse.Namespace, settings: Settings) -> None:
             announced=announced(described),
             ca_file=options.ca_file,
             allow_http=options.allow_http,
+            finishing_s=settings.finishing_s,
             log_level=settings.log_level,
         )
     )

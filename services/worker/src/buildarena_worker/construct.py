@@ -39,6 +39,7 @@ from buildarena_worker.session.host import LiveHost, ReplayHost
 from buildarena_worker.session.results import (
     BudgetExhausted,
     Diverged,
+    Drained,
     Failed,
     Finished,
     LimitReached,
@@ -94,21 +95,21 @@ class ConstructHandler:
 
     def __call__(self, active: ActiveLease) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
-        lease, job = active.lease, active.lease.job
+        job = active.lease.job
         session = Session(
             task=task_of(job, self._tasks),
             seed=job.seed,
             model_config=job.model_config,
             pack=pack_of(job, self._packs),
             host=self._host(active),
-            on_turn=TurnKeeper(self._store.turns, lease, self._gate),
+            on_turn=TurnKeeper(self._store.turns, active.lease, self._gate),
             data_sheets=has_data_sheets(job.track_config),
             worlds=worlds_of(job.track_config),
         )
         workflow = self._workflows.find(str(job.track_config["workflow"]))
         with self._gate.acquired():
             result = run_session(session, workflow, loop_of(job))
-        self._move_on(lease, session, result)
+        self._move_on(active, session, result)
 
     def _host(self, active: ActiveLease) -> LiveHost:
         lease, job = active.lease, active.lease.job
@@ -128,8 +129,9 @@ class ConstructHandler:
             owner=job.owner or "",
         )
 
-    def _move_on(self, lease: Lease, session: Session, result: SessionResult) -> None:
+    def _move_on(self, active: ActiveLease, session: Session, result: SessionResult) -> None:
         """Writes down how the session ended, and with it where the job goes."""
+        lease = active.lease
         match result:
             case Suspended():
                 self._suspend(lease, session, result)
@@ -141,6 +143,8 @@ class ConstructHandler:
                 self._fail(lease, session, Outcome.LIMIT, limit, detail)
             case BudgetExhausted(shortage=shortage):
                 self._hand_back(lease, shortage)
+            case Drained():
+                active.returned = True
             case Superseded():
                 raise StaleLeaseError(lease.job.id, lease.token)
             case Diverged(detail=detail):

@@ -61,7 +61,10 @@ def up(
         say("Ctrl-C stops it.")
         while not stopping.wait(0.5):
             stack.require_running()
-        _tell("stopping")
+        _tell(
+            "stopping: open model requests and trials may finish, for at most "
+            f"{settings.finishing_s:.0f} s"
+        )
 
 
 def demo(

@@ -29,7 +29,8 @@ RUN: Final = "run.json"
 SUPERVISOR: Final = "supervisor"
 READY: Final = "ready"
 START_WITHIN_S: Final = 120.0
-STOP_WITHIN_S: Final = 60.0
+SERVERS_STOP_WITHIN_S: Final = 45.0
+"""Database and broker stop after all programs, and write what they have."""
 POLL_S: Final = 0.1
 
 
@@ -43,6 +44,7 @@ class Run:
         ready: Whether everything answered once.
         processes: Process ids by name.
         peak_memory_bytes: Of all processes together.
+        stop_grace_s: Seconds that its programs have to stop.
     """
 
     url: str
@@ -50,6 +52,7 @@ class Run:
     ready: bool
     processes: Mapping[str, int]
     peak_memory_bytes: int
+    stop_grace_s: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,6 +98,7 @@ def noted_run(data: Path) -> Run | None:
             ready=noted["state"] == READY,
             processes=noted["processes"],
             peak_memory_bytes=noted["peak_memory_bytes"],
+            stop_grace_s=noted["stop_grace_s"],
         )
     except (OSError, ValueError, KeyError, TypeError):
         return None
@@ -144,7 +148,7 @@ def stop(data: Path) -> bool:
     Raises:
         CommandError: It belongs to somebody else, or does not end.
     """
-    deadline = time.monotonic() + STOP_WITHIN_S
+    started = time.monotonic()
     if not is_running(data):
         return False
     run = noted_run(data)
@@ -156,11 +160,12 @@ def stop(data: Path) -> bool:
         pass
     except PermissionError as error:
         raise CommandError(f"process {run.pid} belongs to somebody else") from error
+    within_s = run.stop_grace_s + SERVERS_STOP_WITHIN_S
     # The lock goes a moment before its process does.
     while is_running(data) or _lives(run.pid):
-        if time.monotonic() > deadline:
+        if time.monotonic() > started + within_s:
             raise CommandError(
-                f"process {run.pid} has not ended within {STOP_WITHIN_S:.0f} s: "
+                f"process {run.pid} has not ended within {within_s:.0f} s: "
                 f"see {data.absolute() / 'logs'}"
             )
         time.sleep(POLL_S)

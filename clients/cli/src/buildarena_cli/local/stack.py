@@ -69,7 +69,7 @@ class Stack:
         self.admin_key: str | None = None
         self.environment: dict[str, str] = {}
         self.url = f"http://{settings.host}:{settings.port}"
-        self.supervisor = Supervisor()
+        self.supervisor = Supervisor(stop_within_s=settings.stop_grace_s)
         self.peak_memory_bytes = 0
         self._tell = tell
         self._simulators = installed_engines() if simulators is None else simulators
@@ -266,6 +266,7 @@ class Stack:
                 if managed.process is not None
             },
             "peak_memory_bytes": self.peak_memory_bytes,
+            "stop_grace_s": self.settings.stop_grace_s,
         }
         target = self.settings.data.absolute() / RUN
         partial = target.with_suffix(".partial")

@@ -24,10 +24,6 @@ DEATHS_WITHIN_S = 30.0
 LOOK_EVERY_S = 0.2
 
 
-def _terminate(process: subprocess.Popen[bytes]) -> None:
-    stop_process(process, signal.SIGTERM, within_s=15)
-
-
 @dataclass(slots=True, kw_only=True)
 class ManagedProcess:
     """A process that should run.
@@ -35,22 +31,27 @@ class ManagedProcess:
     Attributes:
         name: For logs and messages.
         start: Starts it and waits until it is of use.
-        stop: Ends it.
+        stop: Ends it; None for a program of ours, which ends by SIGTERM.
         process: The running process, if any.
         deaths: When it died without being asked to.
     """
 
     name: str
     start: Callable[[], subprocess.Popen[bytes]]
-    stop: Callable[[subprocess.Popen[bytes]], None] = _terminate
+    stop: Callable[[subprocess.Popen[bytes]], None] | None = None
     process: subprocess.Popen[bytes] | None = None
     deaths: deque[float] = field(default_factory=deque)
 
 
 class Supervisor:
-    """Keeps processes running. Use as a context manager: leaving it stops them all."""
+    """Keeps processes running. Use as a context manager: leaving it stops them all.
 
-    def __init__(self) -> None:
+    Args:
+        stop_within_s: Seconds after which programs that were asked to stop are killed.
+    """
+
+    def __init__(self, *, stop_within_s: float = 60.0) -> None:
+        self._stop_within_s = stop_within_s
         self.managed: list[ManagedProcess] = []
         self.failed: str | None = None
         self._stop = threading.Event()
@@ -88,14 +89,19 @@ class Supervisor:
                 for managed in reversed(self.managed)
                 if managed.process is not None
             ]
-        programs = [pair for pair in running if pair[0].stop is _terminate]
-        threads = [threading.Thread(target=m.stop, args=(p,)) for m, p in programs]
+        threads = [
+            threading.Thread(
+                target=stop_process, args=(process, signal.SIGTERM, self._stop_within_s)
+            )
+            for managed, process in running
+            if managed.stop is None
+        ]
         for thread in threads:
             thread.start()
         for thread in threads:
             thread.join()
         for managed, process in running:
-            if managed.stop is not _terminate:
+            if managed.stop is not None:
                 managed.stop(process)
         self.managed.clear()
         self._stopped.set()

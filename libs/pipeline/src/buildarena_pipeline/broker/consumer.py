@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -29,8 +30,8 @@ class Callbacks:
         process_next: For each message, with its queue and job id.
         start: At the start of each process that works on messages.
         stop: At its end.
-        stopping: Once, from a thread, when the process is asked to stop: what is being worked on
-            should end soon.
+        stopping: Once in each process that works on messages, from a thread, when the consumer is
+            asked to stop: what is being worked on should end soon.
         ready: Once, when messages are received.
     """
 
@@ -39,6 +40,30 @@ class Callbacks:
     stop: Callable[[], None]
     stopping: Callable[[], None]
     ready: Callable[[], None]
+
+
+class _Children:
+    """Tells the children of a forking pool, which hear of no signal, that the worker stops.
+
+    They read from a pipe until their parent, the only one who could write, closes it.
+    """
+
+    def __init__(self) -> None:
+        self._reads, self._writes = os.pipe()
+
+    def listen(self, callback: Callable[[], None]) -> None:
+        """Has something called, in a child, when the worker stops."""
+        os.close(self._writes)
+
+        def wait() -> None:
+            os.read(self._reads, 1)
+            callback()
+
+        threading.Thread(target=wait, name="stopping", daemon=True).start()
+
+    def stop(self) -> None:
+        """Tells all children, and those that are forked yet."""
+        os.close(self._writes)
 
 
 def consume(
@@ -59,7 +84,7 @@ def consume(
     app = queues.app
     app.task(name=PROCESS_NEXT)(callbacks.process_next)
     watchdog = ConsumerWatchdog(queues, names)
-    forks = pool == FORKING_POOL
+    children = _Children() if pool == FORKING_POOL else None
 
     def ready(sender: Any, **_: Any) -> None:
         callbacks.ready()
@@ -67,17 +92,22 @@ def consume(
 
     def start(**_: Any) -> None:
         callbacks.start()
+        if children is not None:
+            children.listen(callbacks.stopping)
 
     def stop(**_: Any) -> None:
         callbacks.stop()
 
     def stopping(**_: Any) -> None:
+        if children is not None:
+            children.stop()
+            return
         # Celery calls this inside its signal handler, where no lock may be waited for.
         threading.Thread(target=callbacks.stopping, name="stopping", daemon=True).start()
 
     worker_ready.connect(ready, weak=False)
     worker_shutting_down.connect(stopping, weak=False)
-    if forks:
+    if children is not None:
         worker_process_init.connect(start, weak=False)
         worker_process_shutdown.connect(stop, weak=False)
     else:
@@ -96,6 +126,6 @@ def consume(
         worker.start()
     finally:
         watchdog.stop()
-        if not forks:
+        if children is None:
             callbacks.stop()
     return int(worker.exitcode or 0)

@@ -164,6 +164,14 @@ class Settings(BaseSettings):
     lease_s: Annotated[
         float, Field(description="Seconds that a lease is valid without a heartbeat", gt=1)
     ] = 10.0
+    stop_grace_s: Annotated[
+        float,
+        Field(
+            description="Seconds that a worker or runner has to stop when it is asked to: in two "
+            "thirds of them open requests and trials finish, then the rest is handed back",
+            gt=0,
+        ),
+    ] = 60.0
     max_faults: Annotated[
         int, Field(description="Faults without progress before a job is given up", ge=1)
     ] = 8
@@ -215,6 +223,11 @@ class Settings(BaseSettings):
         str | None, Field(description="OTLP/HTTP collector of traces; none are made without")
     ] = None
     log_level: Annotated[str, Field(description="debug, info, warning or error")] = "info"
+
+    @property
+    def finishing_s(self) -> float:
+        """Seconds in which what is under way may finish when a process is asked to stop."""
+        return self.stop_grace_s * 2 / 3
 
     @field_validator("trusted_proxies")
     @classmethod

@@ -7,6 +7,7 @@ import resource
 import signal
 import socket
 import sys
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -80,6 +81,7 @@ class _Runtime:
         self.tracing = Tracing(f"{spec.kind}-worker", settings.otlp_endpoint)
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec
+        self._stopping = threading.Lock()
         self.keeper = LeaseKeeper(self.context.store.leases, self.report)
         self.others = spec.make_others(self.context)
         self.runner = JobRunner(
@@ -112,15 +114,18 @@ class _Runtime:
         self.keeper.start()
 
     def begin_stop(self) -> None:
-        """Takes no further job and breaks off those at hand, so that the process can end."""
+        """Takes no further job, lets those at hand finish a step, and hands the rest back."""
         self.runner.stop()
         for other in self.others.values():
             other.stop()
-        self.keeper.stop()
+        with self._stopping:
+            self.keeper.drain(self.context.settings.finishing_s)
+            self.keeper.stop()
 
     def stop(self) -> None:
         """Hands leases back, leaves the register and closes the connections."""
-        self.keeper.stop()
+        with self._stopping:  # a stop under way has leases to hand back
+            self.keeper.stop()
         self.context.store.workers.leave(self.id)
         self.context.close()
         self.tracing.close()

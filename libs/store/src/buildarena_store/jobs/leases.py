@@ -29,7 +29,8 @@ from sqlalchemy import (
 from buildarena_store import events
 from buildarena_store.account_tables import budgets
 from buildarena_store.database import Database
-from buildarena_store.jobs.attempts import Ending, end_attempts, move_on
+from buildarena_store.errors import StaleLeaseError
+from buildarena_store.jobs.attempts import Ending, end_attempts, hand_back, move_on
 from buildarena_store.jobs.claiming import CLAIM
 from buildarena_store.jobs.job import Job
 from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, RUNNER, require_fewer_leases
@@ -212,14 +213,25 @@ class Leases:
         )
 
     def hand_back(self, lease: Lease) -> None:
-        """Gives up the work without fault, for example when a worker shuts down."""
-        with self._database.transaction() as connection:
-            self.advance(
-                lease,
-                to=JobState.QUEUED,
-                connection=connection,
-                result=AttemptResult.HANDED_BACK,
-                notified_at=None,
+        """Gives up the work without fault.
+
+        Raises:
+            StaleLeaseError: The lease is over.
+        """
+        if not self.hand_back_all([lease]):
+            raise StaleLeaseError(lease.job.id, lease.token)
+
+    def hand_back_all(self, leases: Sequence[Lease]) -> set[str]:
+        """Gives up the work on many jobs in one statement, for example when a worker stops.
+
+        Returns:
+            Ids of the jobs that wait again; the leases of the others were over.
+        """
+        if not leases:
+            return set()
+        with self._database.statement() as connection:
+            return hand_back(
+                [(lease.job.id, lease.token) for lease in leases], connection=connection
             )
 
     def fault(

@@ -6,6 +6,7 @@ that asks again under the same name, because an answer was lost, gets the same l
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from datetime import timedelta
 from typing import Final
@@ -63,6 +64,20 @@ class RunnerLeases:
         with self._database.statement() as connection:
             row = connection.execute(query.limit(1)).first()
         return None if row is None else _lease(row)
+
+    def hand_back(self, runner: str) -> None:
+        """Hands back what a runner that leaves still has, such as a lease that it never heard of.
+
+        Args:
+            runner: Its name; its slots are called ``NAME.NUMBER``.
+        """
+        query = select(*_COLUMNS).where(
+            jobs.c.state == JobState.RUNNING,
+            jobs.c.lease_owner.regexp_match(rf"^{re.escape(runner)}(\.[0-9]+)?$"),
+        )
+        with self._database.statement() as connection:
+            held = [_lease(row) for row in connection.execute(query)]
+        self._leases.hand_back_all(held)
 
     def live(self, job_id: str, token: int, prefix: str) -> Lease:
         """The lease that a key's runner names.

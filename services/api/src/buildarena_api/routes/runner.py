@@ -175,8 +175,10 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> H
 
 @router.post("/goodbye", dependencies=[_ORDINARY], responses=problem_responses(422, 503))
 def leave(body: RunnerAbout, caller: RunnerDep, context: ContextDep) -> HeartbeatAnswer:
-    """Takes a runner that shuts down off the list of workers."""
-    context.store.workers.leave(runner_prefix(caller.key_id) + body.name)
+    """Takes a runner that shuts down off the list of workers; leases that it still has go back."""
+    runner = runner_prefix(caller.key_id) + body.name
+    context.store.runner_leases.hand_back(runner)
+    context.store.workers.leave(runner)
     return HeartbeatAnswer(live=[], lost=[])
 
 

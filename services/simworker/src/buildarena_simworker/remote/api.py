@@ -107,11 +107,18 @@ class RunnerApi:
         url: Where the API is.
         key: The runner key; None where none is asked for.
         tls: What its certificate is verified with.
-        stopping: Once it is set, nothing is waited for any more.
+        stopping: Once it is set, no trial is waited for any more.
+        over: Once it is set, nothing is; by default, when no trial is.
     """
 
     def __init__(
-        self, url: str, key: str | None, *, tls: ssl.SSLContext, stopping: threading.Event
+        self,
+        url: str,
+        key: str | None,
+        *,
+        tls: ssl.SSLContext,
+        stopping: threading.Event,
+        over: threading.Event | None = None,
     ) -> None:
         headers = {"Authorization": f"Bearer {key}"} if key else {}
         # A wait for a trial is long: a link that died under it is noticed sooner so. With a
@@ -124,12 +131,14 @@ class RunnerApi:
             timeout=TIMEOUT_S,
             transport=None if getproxies() else direct,
         )
-        self._stopping = stopping
+        self._stopping, self._over, self._never = stopping, over or stopping, threading.Event()
         self._chunk_bytes = 1 << 20
 
     def facts(self, *, retry_for_s: float | None = None) -> dict[str, Any]:
         """Key, versions and limits from the API; waits until it answers."""
-        facts: dict[str, Any] = self._json("GET", "/v1/runner", retry_for_s=retry_for_s)
+        facts: dict[str, Any] = self._json(
+            "GET", "/v1/runner", retry_for_s=retry_for_s, until=self._stopping
+        )
         self._chunk_bytes = int(facts["piece_bytes"])
         return facts
 
@@ -141,6 +150,7 @@ class RunnerApi:
             json={**about, "wait_s": wait_s},
             timeout=TIMEOUT_S + wait_s,
             retry_for_s=None,
+            until=self._stopping,
         )
         return answer
 
@@ -174,7 +184,7 @@ class RunnerApi:
         body: Mapping[str, Any] | None = None,
         *,
         retry_for_s: float = RETRY_FOR_S,
-        although_stopping: bool = False,
+        although_over: bool = False,
     ) -> None:
         """Ends a lease: ``outcome``, ``fault`` or ``hand-back``.
 
@@ -187,7 +197,7 @@ class RunnerApi:
             json=None if body is None else dict(body),
             timeout=60.0 if how == "outcome" else TIMEOUT_S,
             retry_for_s=retry_for_s,
-            although_stopping=although_stopping,
+            until=self._never if although_over else None,
         )
 
     def goodbye(self, about: Mapping[str, Any]) -> None:
@@ -198,7 +208,7 @@ class RunnerApi:
             json=dict(about),
             timeout=2.0,
             retry_for_s=0.0,
-            although_stopping=True,
+            until=self._never,
         )
 
     def close(self) -> None:
@@ -211,19 +221,26 @@ class RunnerApi:
         path: str,
         *,
         retry_for_s: float | None = RETRY_FOR_S,
-        although_stopping: bool = False,
+        until: threading.Event | None = None,
         timeout: float = TIMEOUT_S,
         **options: Any,
     ) -> Any:
         """The answer, once there is one.
+
+        Args:
+            method: Of HTTP.
+            path: Of the API.
+            retry_for_s: How long it is sent again, seconds; None without end.
+            until: Once it is set, it is sent no more; by default, once all is over.
+            timeout: For one sending, seconds.
+            options: Of the sending.
 
         Raises:
             LeaseLostError: 409.
             RefusedError: Any other refusal that will not change.
             UnreachableError: None came in time, or the runner is asked to stop.
         """
-        never = threading.Event()
-        stopping = never if although_stopping else self._stopping
+        stopping = self._over if until is None else until
         stops: list[stop_base] = [stop_when_event_set(stopping)]
         if retry_for_s is not None:
             stops.append(stop_after_delay(retry_for_s))

@@ -48,6 +48,7 @@ class RunnerOptions:
         announced: What the service should know of the simulator besides its versions.
         ca_file: Certificates of authorities to trust besides the system's.
         allow_http: Whether the key may go unencrypted to another machine.
+        finishing_s: Seconds that trials under way have when it is asked to stop.
         log_level: As in the settings.
     """
 
@@ -60,6 +61,7 @@ class RunnerOptions:
     announced: Mapping[str, Any] = field(default_factory=dict)
     ca_file: Path | None = None
     allow_http: bool = False
+    finishing_s: float = 40.0
     log_level: str = "info"
 
 
@@ -92,14 +94,14 @@ class Runner:
 
     def __init__(self, options: RunnerOptions) -> None:
         self._options = options
-        self.stopping = threading.Event()
+        self.stopping, self._over = threading.Event(), threading.Event()
         self._why: str | None = None
         try:
             url = check_url(options.url, allow_http=options.allow_http)
             tls = tls_context(options.ca_file)
         except ValueError as error:
             raise StartupError(str(error)) from error
-        self._api = RunnerApi(url, options.key, tls=tls, stopping=self.stopping)
+        self._api = RunnerApi(url, options.key, tls=tls, stopping=self.stopping, over=self._over)
         host = _NAME.sub("-", socket.gethostname()).strip("-._")[:40] or "runner"
         self._name = f"{host}-{os.getpid()}"
         self._peak = 0
@@ -124,7 +126,7 @@ class Runner:
             raise StartupError(self._why)
 
     def stop(self, why: str | None = None) -> None:
-        """Has it stop soon: trials at hand are broken off and handed back."""
+        """Has it stop: trials under way may finish in time, then they are handed back."""
         self._why = self._why or why
         self.stopping.set()
 
@@ -169,6 +171,10 @@ class Runner:
             self._end(beats, threads)
 
     def _end(self, beats: Heartbeats, threads: list[threading.Thread]) -> None:
+        # A key that is refused ends no trial: what it would bring is refused as well.
+        if self._why is None:
+            beats.drain(self._options.finishing_s)
+        self._over.set()
         held = beats.stop()
         backs = [
             threading.Thread(target=hand_back, args=(self._api, lease), daemon=True)

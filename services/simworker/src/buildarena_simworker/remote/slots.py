@@ -70,6 +70,7 @@ class Heartbeats:
         self._about = about
         self._period_s = lease_s / BEATS_PER_LEASE
         self._lock = threading.Lock()
+        self._ended = threading.Condition(self._lock)
         self._active: dict[HeldLease, _Active] = {}
         self._thread = Periodic(self._beat, name="heartbeats", period_s=self._period_s)
 
@@ -77,6 +78,11 @@ class Heartbeats:
         """Reports once and starts the thread."""
         self._beat()
         self._thread.start()
+
+    def drain(self, within_s: float) -> None:
+        """Waits until nothing is worked on, for so long at most; beats go on meanwhile."""
+        with self._ended:
+            self._ended.wait_for(lambda: not self._active, timeout=within_s)
 
     def stop(self) -> list[HeldLease]:
         """Stops the thread and breaks off what is worked on; returns the leases."""
@@ -96,8 +102,9 @@ class Heartbeats:
         try:
             yield active
         finally:
-            with self._lock:
+            with self._ended:
                 self._active.pop(lease, None)
+                self._ended.notify_all()
 
     def _beat(self) -> None:
         with self._lock:
@@ -283,6 +290,6 @@ class Slot:
 def hand_back(api: RunnerApi, lease: HeldLease) -> None:
     """Gives a lease back at shutdown, if the API answers soon."""
     try:
-        api.end(lease, "hand-back", retry_for_s=HAND_BACK_S, although_stopping=True)
+        api.end(lease, "hand-back", retry_for_s=HAND_BACK_S, although_over=True)
     except RemoteError as error:
         log.info("not_handed_back", job=lease.job_id, error=str(error))

@@ -71,11 +71,11 @@ class ProviderClient:
             options: How long to wait, with all retries.
 
         Raises:
-            CancelledError: The lease was lost.
+            CancelledError: The lease was lost, or its worker stops and nothing was sent.
             TransientError: The provider failed through all attempts.
             PermanentError: The provider refuses the key, the model or the account.
         """
-        return REQUESTS.run(self._in_time(request, options), options.active)
+        return REQUESTS.run(self._in_time(request, options), options)
 
     def close(self) -> None:
         """Closes the connections to the provider."""
@@ -120,6 +120,8 @@ class ProviderClient:
                     ) from error
                 headers = error.headers if isinstance(error, ProviderError) else None
                 wait_s = self._policy.wait_s(attempts, headers, self._rng)
+                if options.active is not None and options.active.draining:
+                    raise asyncio.CancelledError from error  # it would be sent after the stop
                 log.info("model_retry", model=self._entry.name, attempts=attempts, wait_s=wait_s)
                 await asyncio.sleep(wait_s)
             else:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Coroutine
-from contextlib import nullcontext
 from typing import Any, TypeVar
 
-from buildarena_pipeline.runtime.active_lease import ActiveLease
+from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 Result = TypeVar("Result")
 
@@ -22,18 +21,35 @@ class RequestLoop:
         # fail because their locks belong to another loop.
         self._starting = threading.Lock()
 
-    def run(self, work: Coroutine[Any, Any, Result], active: ActiveLease | None = None) -> Result:
+    def run(self, work: Coroutine[Any, Any, Result], options: RequestOptions = UNBOUNDED) -> Result:
         """The result of work on the loop; the calling thread waits for it.
 
         Args:
             work: What is to be done.
-            active: The lease that it is done under.
+            options: The lease that it is done under, and whether it may cost something by now.
 
         Raises:
-            CancelledError: The lease was lost; the work ends at once, wherever it waits.
+            CancelledError: The lease was lost, and the work ended at once, wherever it waited; or
+                its worker stops, and nothing had been sent yet.
         """
-        future = asyncio.run_coroutine_threadsafe(work, self._started())
-        with nullcontext() if active is None else active.calling(future.cancel):
+        loop, active = self._started(), options.active
+        if active is None:
+            return asyncio.run_coroutine_threadsafe(work, loop).result()
+        begun: asyncio.Future[asyncio.Task[Result]] = asyncio.Future(loop=loop)
+
+        async def run() -> Result:
+            task = asyncio.ensure_future(work)
+            begun.set_result(task)
+            return await task
+
+        async def give_up() -> None:
+            # Here nothing is sent between the question and the end.
+            task = await begun
+            if active.lost or not options.sent.is_set():
+                task.cancel()
+
+        future = asyncio.run_coroutine_threadsafe(run(), loop)
+        with active.calling(lambda: asyncio.run_coroutine_threadsafe(give_up(), loop)):
             return future.result()
 
     def _started(self) -> asyncio.AbstractEventLoop:

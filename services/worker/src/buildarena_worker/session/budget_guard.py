@@ -8,7 +8,7 @@ from decimal import Decimal
 from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_store import Budgets, Need, Shortage, StaleLeaseError, Usage
 from buildarena_worker.session.messages import Request
-from buildarena_worker.session.results import BudgetExhausted, SessionEnded, Superseded
+from buildarena_worker.session.results import BudgetExhausted, Drained, SessionEnded, Superseded
 
 WAIT_S = 0.2
 CHARACTERS_PER_TOKEN = 3
@@ -18,6 +18,18 @@ OUTPUT_TOKENS = 4096
 
 Price = Callable[[int, int], Decimal]
 """US dollars for input and output tokens."""
+
+
+def require_open(active: ActiveLease) -> None:
+    """Checks that a request may be begun under a lease.
+
+    Raises:
+        SessionEnded: The lease is over, or its worker stops.
+    """
+    if active.lost:
+        raise SessionEnded(Superseded())
+    if active.draining:
+        raise SessionEnded(Drained())
 
 
 class BudgetGuard:
@@ -47,8 +59,7 @@ class BudgetGuard:
         while (shortage := self._reserved(need)) is not None:
             if not shortage.temporary:
                 raise SessionEnded(BudgetExhausted(shortage=shortage))
-            if self._active.lost:
-                raise SessionEnded(Superseded())
+            require_open(self._active)
             self._active.wait(WAIT_S)
 
     def sent(self, request: Request) -> Usage:

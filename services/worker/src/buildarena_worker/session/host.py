@@ -19,7 +19,7 @@ from buildarena_pipeline.runtime.tracing import span
 from buildarena_simulation import Trajectory
 from buildarena_store import Journal, JournalEntry, RolloutRecord, StaleLeaseError, Usage, clean
 from buildarena_store.jobs.journal import OUT_OF_TIME
-from buildarena_worker.session.budget_guard import BudgetGuard
+from buildarena_worker.session.budget_guard import BudgetGuard, require_open
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.messages import Completion, ModelClient, Request
 from buildarena_worker.session.request_options import RequestOptions
@@ -238,7 +238,7 @@ class LiveHost:
             self._gate.released(),
         ):
             waited_s = self._wait(failures)
-            self._require_held()
+            require_open(self._active)
             self._budget.reserve(request)
             completion = self._completion(request, waited_s)
             latency_s = waited_s + completion.latency_s
@@ -277,15 +277,11 @@ class LiveHost:
         except CancelledError:
             if self._active.lost and options.sent.is_set():
                 self._budget.charge_lost(self._budget.sent(request))
-            self._require_held()
+            require_open(self._active)
             raise
         if completion.finish == OUT_OF_TIME and options.sent.is_set():
             return replace(completion, usage=self._budget.sent(request))
         return completion
-
-    def _require_held(self) -> None:
-        if self._active.lost:
-            raise SessionEnded(Superseded())
 
     def _store(self, entry: JournalEntry) -> None:
         try:

@@ -79,6 +79,11 @@ class Superseded:
     """The lease ended: another worker may have the job, so this one stops without writing."""
 
 
+@dataclass(frozen=True, slots=True)
+class Drained:
+    """The worker stops before the next request: another takes the session up where it was left."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diverged:
     """The session asks something else than its journal says it asked: the code has changed.
@@ -91,7 +96,7 @@ class Diverged:
 
 
 SessionResult = (
-    Suspended | Finished | Failed | LimitReached | BudgetExhausted | Superseded | Diverged
+    Suspended | Finished | Failed | LimitReached | BudgetExhausted | Superseded | Drained | Diverged
 )
 
 
