@@ -66,12 +66,13 @@ def listed(*outputs: ModelOutput) -> Answer:
     return answer
 
 
-def tried(task: str, simulator: str = DEFAULT_ENGINE) -> Trial:
-    """What the library itself says of the expert's machine."""
-    bench = Workbench(builtin_tasks()[task].constraints.catalogue)
-    for made in EXPERTS[task]["calls"]:
+def tried(name: str, simulator: str = DEFAULT_ENGINE) -> Trial:
+    """What the library itself says of the expert's machine for the task of this name."""
+    task = builtin_tasks()[name]
+    bench = Workbench(task.constraints.catalogue, task=task)
+    for made in EXPERTS[name]["calls"]:
         assert bench.act(made["machine"], made["tool"], made["arguments"]).ok
-    return try_machine(builtin_tasks()[task], bench.submitted(), simulator)
+    return try_machine(task, bench.submitted(), simulator)
 
 
 def only(log: EvalLog) -> EvalSample:
