@@ -35,6 +35,7 @@ def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = Non
         position=np.array([0.0, 0.0, height + 0.5 + 0.75 + cargo_height]),
         quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
         velocity=np.zeros(3),
+        spin=np.zeros(3),
     )
     motion = at_rest(clusters, np.array([0.0, 0.0, height]), np.eye(3) if turn is None else turn)
     faces = FaceFinder(world).find(clusters, motion, pose)

@@ -1,5 +1,6 @@
 """Breaking: the worst joint over its strength gives way, one per evaluation."""
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,7 @@ from buildarena_simulation.holding import Holding
 from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import EvenSharing, PointForces, together
-from buildarena_simulation.structure.loads import LoadModel
+from buildarena_simulation.structure.loads import JointLoads, LoadModel
 from buildarena_simulation.structure.model import JOINT_KINDS, BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.supports import EdgeSupports
@@ -21,6 +22,9 @@ from buildarena_simulation.trajectory import Break, Event, JointPeak
 _CALM: Final = 0.5
 """Share of its strength below which no joint is in danger."""
 
+_BLOW: Final = 3.0
+"""A load that rises by this factor from one evaluation to the next may be an error of the step."""
+
 
 class BreakingModel:
     """Follows a machine's loads and lets its joints break.
@@ -28,6 +32,9 @@ class BreakingModel:
     While no joint bears half its strength and nothing is struck, every other evaluation is left
     out: with the filter's time constant four times the interval, no joint can break in between
     unless its load rises almost threefold at once.
+
+    A load that would break something after it rose threefold at once counts only if steps of half
+    the length show it as well: engines make up blows now and then.
 
     Args:
         world: The machine and what is around it.
@@ -67,6 +74,7 @@ class BreakingModel:
         *,
         time_s: float,
         cargo_mass: float | None,
+        repeat_finer: Callable[[], Motion] | None = None,
     ) -> None:
         """Evaluates the loads after one interval and breaks what is overloaded.
 
@@ -76,17 +84,21 @@ class BreakingModel:
             thrusts: (C,) recoil of each cannon during the interval, mass·unit/s².
             time_s: Time now, seconds.
             cargo_mass: Mass of the cargo now.
+            repeat_finer: Repeats the interval in finer steps and says how the clusters move then;
+                None where it cannot be repeated.
         """
         self.motion = motion
         self._unseen_s += self._interval_s
         if self._calm and not engine.struck:
             self._calm = False
             return
-        tensions = engine.rope_tensions()
-        forces = self._forces(engine, thrusts, tensions)
-        # An impact is reported for one interval only, whatever was left out before.
-        seen_s = self._interval_s if engine.struck else self._unseen_s
-        loads = self._loads.evaluate(forces, self.motion, elapsed_s=self._unseen_s, seen_s=seen_s)
+        filters = self._loads.filters()
+        loads, tensions = self._evaluated(engine, thrusts)
+        if repeat_finer is not None and self._is_blow(loads, tensions):
+            self._loads.put_back(filters)
+            self.motion = repeat_finer()
+            loads, tensions = self._evaluated(engine, thrusts)
+            engine.enter(self.clusters, self.motion)
         self._unseen_s = 0.0
         self._calm = bool(loads.ratio.max(initial=0.0) < _CALM) and not engine.struck
         for peak, seen in zip(self._peaks, (loads.force, loads.moment, loads.ratio), strict=True):
@@ -106,6 +118,25 @@ class BreakingModel:
                 )
                 self._loads.holds[broken] = False
             self._fall_apart(engine)
+
+    def _evaluated(self, engine: Engine, thrusts: FloatArray) -> tuple[JointLoads, FloatArray]:
+        """Loads of the joints, and tensions of the ropes."""
+        tensions = engine.rope_tensions()
+        forces = self._forces(engine, thrusts, tensions)
+        # An impact is reported for one interval only, whatever was left out before.
+        seen_s = self._interval_s if engine.struck else self._unseen_s
+        loads = self._loads.evaluate(forces, self.motion, elapsed_s=self._unseen_s, seen_s=seen_s)
+        return loads, tensions
+
+    def _is_blow(self, loads: JointLoads, tensions: FloatArray) -> bool:
+        """Whether a joint or rope would break by a load that has risen all at once."""
+        now = self._shares(loads.ratio, tensions)
+        return bool((now > np.maximum(1.0, _BLOW * self._loads_now)).any())
+
+    def _shares(self, ratio: FloatArray, tensions: FloatArray) -> FloatArray:
+        """Share of its strength that each joint and rope bears."""
+        ropes = np.maximum(tensions, 0.0) / GRAVITY / self._structure.ropes.limit
+        return np.concatenate([ratio, ropes])
 
     def let_go(self, engine: Engine, members: IntArray, *, time_s: float) -> BoolArray:
         """Opens joints that are made to let go; no break.
@@ -151,8 +182,7 @@ class BreakingModel:
         return self._loads_now if seen is None else seen
 
     def _follow_loads(self, ratio: FloatArray, tensions: FloatArray) -> None:
-        ropes = np.maximum(tensions, 0.0) / GRAVITY / self._structure.ropes.limit
-        now = self._loads_now = np.concatenate([ratio, ropes])
+        now = self._loads_now = self._shares(ratio, tensions)
         self._loads_since = now if self._loads_since is None else np.maximum(self._loads_since, now)
 
     def peaks(self) -> tuple[JointPeak, ...]:

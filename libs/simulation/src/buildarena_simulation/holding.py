@@ -75,6 +75,10 @@ class Holding:
                 self._seek(int(k), clusters, motion, cargo, time_s)
         return len(self.events) > before
 
+    def read(self, engine: Engine) -> None:
+        """Takes the loads of what is held, as the engine has them now."""
+        self._borne = list(zip(self.holds, engine.grip_wrenches(), strict=True))
+
     def follow(self, engine: Engine, *, time_s: float, interval_s: float) -> bool:
         """Follows the loads of what is held, and lets go what is too heavy.
 
@@ -88,7 +92,7 @@ class Holding:
         """
         blend = 1.0 - math.exp(-interval_s / LOAD_FILTER_S)
         slipped = False
-        self._borne = list(zip(self.holds, engine.grip_wrenches(), strict=True))
+        self.read(engine)
         for hold, wrench in self._borne:
             load = self._loads[hold.grip]
             load += blend * (wrench / GRAVITY - load)

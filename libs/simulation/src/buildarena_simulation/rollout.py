@@ -38,17 +38,19 @@ from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
 from buildarena_simulation.structure.force_field import field_of
 from buildarena_simulation.structure.model import Structure
-from buildarena_simulation.structure.motion import at_rest
+from buildarena_simulation.structure.motion import Motion, at_rest
 from buildarena_simulation.threads import single_threaded
 from buildarena_simulation.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
 
-SIMULATION_VERSION: Final = "4"
+SIMULATION_VERSION: Final = "5"
 """Version of the shared model: rises with every change that can move a trajectory."""
 
 _PROGRESS_EVERY = 10
+_FINER = 2
+"""Into how many a step is divided where an interval is repeated."""
 
 Decision = Callable[[np.ndarray | None], bool]
 """Whether a trial is decided, from the cargo's position (3,) as it is recorded; None without."""
@@ -319,6 +321,7 @@ class _Trial:
         if mass is not None:
             engine.set_cargo_mass(mass)
         thrusts = recoil(self._structure, firing, self.recorder.heated_now)
+        before, place = self.breaking.motion, engine.cargo() if cargo else None
         engine.advance(targets, thrusts)
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
@@ -330,8 +333,22 @@ class _Trial:
         slipped = holding is not None and holding.follow(
             engine, time_s=time_s + self._interval_s, interval_s=self._interval_s
         )
+
+        def repeat_finer() -> Motion:
+            finer = np.repeat(targets, _FINER, axis=0)
+            engine.enter(self.breaking.clusters, before, cargo=place, finer=_FINER)
+            engine.advance(finer, thrusts)
+            if holding is not None:
+                holding.read(engine)
+            return engine.motion()
+
         self.breaking.follow(
-            engine, motion, thrusts, time_s=time_s + self._interval_s, cargo_mass=mass
+            engine,
+            motion,
+            thrusts,
+            time_s=time_s + self._interval_s,
+            cargo_mass=mass,
+            repeat_finer=None if slipped else repeat_finer,
         )
         if slipped and holding is not None:
             self._hold(holding)

@@ -65,11 +65,13 @@ class CargoPose:
         position: (3,) its centre, world frame, units.
         quaternion: (4,) world_from_cargo as (w, x, y, z).
         velocity: (3,) world frame, units/s.
+        spin: (3,) world frame, rad/s.
     """
 
     position: FloatArray
     quaternion: FloatArray
     velocity: FloatArray
+    spin: FloatArray
 
 
 class Engine(Protocol):
@@ -87,8 +89,22 @@ class Engine(Protocol):
     def settings(self) -> Mapping[str, float | int | str]:
         """Everything about this engine's set-up that can change a trajectory."""
 
-    def enter(self, clusters: Clusters, motion: Motion) -> None:
-        """Puts the clusters into the world in place of those that were there."""
+    def enter(
+        self,
+        clusters: Clusters,
+        motion: Motion,
+        *,
+        cargo: CargoPose | None = None,
+        finer: int = 1,
+    ) -> None:
+        """Puts the clusters into the world in place of those that were there.
+
+        Args:
+            clusters: The clusters.
+            motion: Their motion.
+            cargo: Where the cargo is put; None leaves it where it is.
+            finer: Into how many each step is divided from now on.
+        """
 
     def set_cargo_mass(self, mass: float) -> None:
         """Changes the cargo's mass and, in proportion, its inertia."""

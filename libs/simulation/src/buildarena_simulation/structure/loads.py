@@ -52,6 +52,15 @@ class LoadModel:
         self._enter(clusters, motion)
         self._inertial = np.zeros((len(clusters), 6))
 
+    def filters(self) -> tuple[FloatArray, ...]:
+        """What the filter knows, for `put_back`."""
+        known = (self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin)
+        return tuple(array.copy() for array in known)
+
+    def put_back(self, filters: tuple[FloatArray, ...]) -> None:
+        """Forgets what was evaluated since `filters` gave them."""
+        self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin = filters
+
     def rebuild(self, clusters: Clusters, motion: Motion) -> None:
         """Takes over the clusters left after a break; filtered loads are carried along."""
         before = self._root_rotation[self._clusters.cluster_of]

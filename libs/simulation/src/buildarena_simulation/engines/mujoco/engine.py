@@ -6,7 +6,12 @@ import mujoco
 import numpy as np
 
 from buildarena_simulation.constants import FORCES_EVERY_S, MAX_SPIN
-from buildarena_simulation.engines.base import CargoPose, World, principal_frames
+from buildarena_simulation.engines.base import (
+    CargoPose,
+    World,
+    principal_frames,
+    rotation_of,
+)
 from buildarena_simulation.engines.mujoco.addresses import addresses_in
 from buildarena_simulation.engines.mujoco.joints import (
     drag_apart,
@@ -59,15 +64,7 @@ class MujocoEngine:
     def __init__(self, world: World) -> None:
         self._world = world
         self._structure = world.structure
-        self._mjcf = MjcfSettings(
-            time_step_s=self.time_step_s,
-            solref=_SOLREF,
-            friction_s=_FRICTION_S,
-            solimp=_SOLIMP,
-            impratio=_IMPRATIO,
-            iterations=_ITERATIONS,
-            servo_slip=_SERVO_SLIP,
-        )
+        self._finer = 1
         self._solids = Solids(world.structure)
         self._holds: tuple[Hold, ...] = ()
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
@@ -78,7 +75,7 @@ class MujocoEngine:
     @property
     def time_step_s(self) -> float:
         """See `Engine`."""
-        return _TIME_STEP_S / self._world.substeps
+        return _TIME_STEP_S / (self._world.substeps * self._finer)
 
     @property
     def steps_per_evaluation(self) -> int:
@@ -100,9 +97,22 @@ class MujocoEngine:
             "solimp": str(_SOLIMP),
         }
 
-    def enter(self, clusters: Clusters, motion: Motion) -> None:
+    def enter(
+        self,
+        clusters: Clusters,
+        motion: Motion,
+        *,
+        cargo: CargoPose | None = None,
+        finer: int = 1,
+    ) -> None:
         """See `Engine`."""
-        self._clusters = clusters
+        self._clusters, self._finer = clusters, finer
+        if cargo is not None:
+            spin = rotation_of(cargo.quaternion).T @ cargo.spin
+            self._cargo_state = (
+                np.concatenate([cargo.position, cargo.quaternion]),
+                np.concatenate([cargo.velocity, spin]),
+            )
         self._axes, moments = principal_frames(clusters)
         solids = [self._solids.of(blocks) for blocks in clusters.blocks]
         state = MjcfState(
@@ -115,7 +125,7 @@ class MujocoEngine:
             ropes=np.flatnonzero(self._rope_alive).tolist(),
             holds=self._holds,
         )
-        self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._mjcf))
+        self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._settings()))
         self._data = mujoco.MjData(self._model)
         self._addresses = addresses_in(self._model, self._world, clusters, solids, self._rope_alive)
         self._tendons = Tendons(
@@ -213,12 +223,28 @@ class MujocoEngine:
 
     def cargo(self) -> CargoPose:
         """See `Engine`."""
-        position, velocity = self._data.qpos[:7].copy(), self._data.qvel[:3].copy()
-        return CargoPose(position=position[:3], quaternion=position[3:], velocity=velocity)
+        place, rates = self._data.qpos[:7].copy(), self._data.qvel[:6].copy()
+        return CargoPose(
+            position=place[:3],
+            quaternion=place[3:],
+            velocity=rates[:3],
+            spin=rotation_of(place[3:]) @ rates[3:],
+        )
 
     def close(self) -> None:
         """See `Engine`."""
         del self._tendons, self._data, self._model
+
+    def _settings(self) -> MjcfSettings:
+        return MjcfSettings(
+            time_step_s=self.time_step_s,
+            solref=_SOLREF,
+            friction_s=_FRICTION_S,
+            solimp=_SOLIMP,
+            impratio=_IMPRATIO,
+            iterations=_ITERATIONS,
+            servo_slip=_SERVO_SLIP,
+        )
 
     def _apply_own_forces(self, step: int) -> None:
         field, every = self._world.field, round(FORCES_EVERY_S / self.time_step_s)

@@ -1,12 +1,13 @@
 """Bodies of a PyBullet world: boxes, damping and friction."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 
 from buildarena_simulation.constants import FRICTION_TERRAIN, MAX_SPIN
-from buildarena_simulation.engines.base import CargoPose
+from buildarena_simulation.engines.base import CargoPose, World
 from buildarena_simulation.engines.pybullet.hinges import HingedComponent
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
@@ -16,6 +17,9 @@ with quiet_output():
     import pybullet
 
 _SPEED_CAP: Final = 1e5
+_GROUND_REACH: Final = 2000.0
+RESIDUAL: Final = 1e-9
+"""At which the solver stops."""
 
 
 def add_box(
@@ -78,42 +82,64 @@ def set_friction(client: Mapping[str, int], body: int, link: int, friction: floa
 def pose_of(client: Mapping[str, int], body: int | None) -> CargoPose:
     """Where a body is and how fast its centre moves."""
     position, turn = pybullet.getBasePositionAndOrientation(body, **client)
-    velocity, _ = pybullet.getBaseVelocity(body, **client)
+    velocity, spin = pybullet.getBaseVelocity(body, **client)
     return CargoPose(
         position=np.array(position),
         quaternion=np.array(turn)[[3, 0, 1, 2]],
         velocity=np.array(velocity),
+        spin=np.array(spin),
     )
 
 
-def set_up(
-    client: Mapping[str, int],
-    *,
-    gravity: float,
-    time_step_s: float,
-    iterations: int,
-    residual: float,
-) -> None:
-    """Sets a new world's gravity and solver.
+def put_cargo(client: Mapping[str, int], body: int, pose: CargoPose) -> None:
+    """Puts the cargo where it is to be, with the velocity that it is to have."""
+    turn = pose.quaternion[[1, 2, 3, 0]].tolist()
+    pybullet.resetBasePositionAndOrientation(body, pose.position.tolist(), turn, **client)
+    pybullet.resetBaseVelocity(body, pose.velocity.tolist(), pose.spin.tolist(), **client)
+
+
+def set_time_step(client: Mapping[str, int], time_step_s: float) -> None:
+    """Sets the length of a step, seconds."""
+    pybullet.setPhysicsEngineParameter(fixedTimeStep=time_step_s, **client)
+
+
+def start_world(
+    client: Mapping[str, int], world: World, *, time_step_s: float, iterations: int
+) -> tuple[dict[int, int], int | None]:
+    """Sets a new world's gravity and solver, and adds ground, terrain and cargo.
 
     Args:
         client: The engine's world.
-        gravity: Downward acceleration, units/s².
+        world: What belongs into it.
         time_step_s: Length of a step, seconds.
         iterations: Most iterations of the solver.
-        residual: At which it stops.
+
+    Returns:
+        What `ContactForces.surface` calls each fixed body, and the cargo's body.
     """
-    pybullet.setGravity(0, 0, -gravity, **client)
+    pybullet.setGravity(0, 0, -world.gravity, **client)
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=time_step_s,
         numSubSteps=0,
         numSolverIterations=iterations,
-        solverResidualThreshold=residual,
+        solverResidualThreshold=RESIDUAL,
         enableConeFriction=1,
         deterministicOverlappingPairs=1,
         enableFileCaching=0,
         **client,
     )
+    surfaces = {}
+    if world.ground:
+        half = (_GROUND_REACH, _GROUND_REACH, 1.0)
+        surfaces[add_box(client, half, (0.0, 0.0, -1.0), mass=0.0)] = 0
+    for k, box in enumerate(world.terrain, 1):
+        turn = pybullet.getQuaternionFromEuler((math.radians(box.slope_deg), 0.0, 0.0))
+        half = (box.size[0] / 2, box.size[1] / 2, box.size[2] / 2)
+        surfaces[add_box(client, half, box.center, mass=0.0, turn=turn)] = k
+    cargo = world.cargo
+    if cargo is None:
+        return surfaces, None
+    return surfaces, add_box(client, cargo.size / 2, cargo.position, mass=cargo.mass)
 
 
 def friction_of(structure: Structure, blocks: IntArray) -> float:

@@ -6,7 +6,6 @@ square, so drag is a force of ours.
 """
 
 import itertools
-import math
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -25,13 +24,15 @@ from buildarena_simulation.engines.base import (
     rotation_of,
 )
 from buildarena_simulation.engines.pybullet.bodies import (
-    add_box,
+    RESIDUAL,
     free_of_damping,
     friction_of,
     limit_spin,
     pose_of,
+    put_cargo,
     set_friction,
-    set_up,
+    set_time_step,
+    start_world,
 )
 from buildarena_simulation.engines.pybullet.contacts import read_contacts
 from buildarena_simulation.engines.pybullet.external_forces import (
@@ -68,8 +69,7 @@ with quiet_output():
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
 _ITERATIONS, _ITERATIONS_OF_JOINTS = 100, 60
-_RESIDUAL = 1e-9
-_ORIGIN, _GROUND_REACH = (0.0, 0.0, 0.0), 2000.0
+_ORIGIN = (0.0, 0.0, 0.0)
 
 
 def version() -> str:
@@ -89,7 +89,7 @@ class PyBulletEngine:
     """A PyBullet world; see `Engine` for what its methods mean."""
 
     def __init__(self, world: World) -> None:
-        self._world = world
+        self._world, self._finer = world, 1
         self._structure = world.structure
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
         self._tensions = np.zeros(len(world.structure.ropes))
@@ -101,17 +101,17 @@ class PyBulletEngine:
         self._serial = itertools.count()
         self._components: list[HingedComponent] = []
         self._solids = Solids(world.structure)
-        self._surfaces: dict[int, int] = {}
-        self._cargo: int | None = None
+        self._surfaces, self._cargo = start_world(
+            self._client, world, time_step_s=self.time_step_s, iterations=self._iterations
+        )
         self._grips = BulletGrips(self._client)
         self._fresh: Motion | None = None
         self._own: list[tuple[int, Force]] = []
-        self._start_world()
 
     @property
     def time_step_s(self) -> float:
         """See `Engine`."""
-        return _TIME_STEP_S / self._world.substeps
+        return _TIME_STEP_S / (self._world.substeps * self._finer)
 
     @property
     def steps_per_evaluation(self) -> int:
@@ -125,12 +125,24 @@ class PyBulletEngine:
             "time_step_s": self.time_step_s,
             "steps_per_evaluation": self.steps_per_evaluation,
             "iterations": self._iterations,
-            "residual": _RESIDUAL,
+            "residual": RESIDUAL,
             "cone_friction": 1,
         }
 
-    def enter(self, clusters: Clusters, motion: Motion) -> None:
+    def enter(
+        self,
+        clusters: Clusters,
+        motion: Motion,
+        *,
+        cargo: CargoPose | None = None,
+        finer: int = 1,
+    ) -> None:
         """See `Engine`."""
+        if finer != self._finer:
+            self._finer = finer
+            set_time_step(self._client, self.time_step_s)
+        if cargo is not None and self._cargo is not None:
+            put_cargo(self._client, self._cargo, cargo)
         self._clusters, self._motion = clusters, motion
         self._axes, self._moments = principal_frames(clusters)
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia))
@@ -175,7 +187,8 @@ class PyBulletEngine:
         driven: FloatArray | None = None
         for step, row in enumerate(targets):
             if len(row) and (driven is None or (row != driven).any()):
-                self._drive(row)
+                for component in self._components:
+                    component.follow(row, self._client)
                 driven = row
             self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
             pybullet.stepSimulation(**self._client)
@@ -223,28 +236,6 @@ class PyBulletEngine:
         """See `Engine`."""
         pybullet.disconnect(**self._client)
         shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _start_world(self) -> None:
-        world = self._world
-        set_up(
-            self._client,
-            gravity=world.gravity,
-            time_step_s=self.time_step_s,
-            iterations=self._iterations,
-            residual=_RESIDUAL,
-        )
-        if world.ground:
-            ground = add_box(
-                self._client, (_GROUND_REACH, _GROUND_REACH, 1.0), (0.0, 0.0, -1.0), mass=0.0
-            )
-            self._surfaces[ground] = 0
-        for k, box in enumerate(world.terrain, 1):
-            turn = pybullet.getQuaternionFromEuler((math.radians(box.slope_deg), 0.0, 0.0))
-            half = [v / 2 for v in box.size]
-            self._surfaces[add_box(self._client, half, box.center, mass=0.0, turn=turn)] = k
-        if world.cargo is not None:
-            cargo = world.cargo
-            self._cargo = add_box(self._client, cargo.size / 2, cargo.position, mass=cargo.mass)
 
     def _add_component(self, inside: tuple[int, ...], motion: Motion) -> HingedComponent:
         clusters, structure, root = self._clusters, self._structure, inside[0]
@@ -303,22 +294,6 @@ class PyBulletEngine:
         )
         file.unlink()
         return int(body)
-
-    def _drive(self, speeds: FloatArray) -> None:
-        for component in self._components:
-            if component.articulation is not None:
-                component.articulation.follow(speeds)
-                continue
-            signs = component.wheel_signs
-            if count := len(signs):
-                pybullet.setJointMotorControlArray(
-                    component.body,
-                    range(count),
-                    pybullet.VELOCITY_CONTROL,
-                    targetVelocities=(speeds[component.wheel_places] * signs).tolist(),
-                    forces=component.wheel_torques.tolist(),
-                    **self._client,
-                )
 
     def _apply_forces(
         self, thrusts: list[tuple[int, Force]], drags: list[tuple[int, Force]]

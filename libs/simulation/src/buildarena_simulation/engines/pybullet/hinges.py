@@ -6,10 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from buildarena_simulation.engines.pybullet.joints import Articulation
+from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import cross, turn_about
+
+with quiet_output():
+    import pybullet
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,6 +38,25 @@ class HingedComponent:
     wheel_signs: FloatArray
     wheel_places: IntArray
     wheel_torques: FloatArray
+
+    def follow(self, targets: FloatArray, client: Mapping[str, int]) -> None:
+        """Gives the drives their targets.
+
+        Args:
+            targets: (D,) as in `Schedule.targets`.
+            client: The engine's world.
+        """
+        if self.articulation is not None:
+            self.articulation.follow(targets)
+        elif count := len(self.wheel_signs):
+            pybullet.setJointMotorControlArray(
+                self.body,
+                range(count),
+                pybullet.VELOCITY_CONTROL,
+                targetVelocities=(targets[self.wheel_places] * self.wheel_signs).tolist(),
+                forces=self.wheel_torques.tolist(),
+                **client,
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
