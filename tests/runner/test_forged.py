@@ -22,7 +22,7 @@ from support.servers.runner_rig import (
     waiting,
 )
 
-from buildarena_simulation import Trajectory, write_trajectory
+from buildarena_simulation import SIMULATION_VERSION, Trajectory, write_trajectory
 from buildarena_store import ArtifactStoreError
 
 LONG = "x" * 500
@@ -198,7 +198,7 @@ def test_what_is_said_beside_a_trajectory_is_checked(refused) -> None:
     for versions in (
         {},
         {**VERSIONS, "engine": "pybullet"},
-        {**VERSIONS, "simulation": "5"},
+        {**VERSIONS, "simulation": "999"},
         {**VERSIONS, "engine_version": "1"},
         {**VERSIONS, "note": LONG * 10},
         {**VERSIONS, "deep": {"a": {"b": {"c": 1}}}},
@@ -211,7 +211,7 @@ def test_what_is_said_beside_a_trajectory_is_checked(refused) -> None:
         refused(same, wall_s=wall_s)
     said = {"success": True, "indicator": 1.0, "flags": []}
     for engine in ("mujoco", "unity"):
-        told = {**said, "simulation": "4", "engine_version": "1"}
+        told = {**said, "simulation": SIMULATION_VERSION, "engine_version": "1"}
         refused(same, annotations={engine: told})
     assert "does not refuse this machine" in refused(lambda _: None)
 

@@ -15,9 +15,15 @@ from support.servers.stacks import wait_until
 
 from buildarena_store.tables import jobs
 
-SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 120").replace("short", "seconds")
+FEW_BLOCKS = "constraints: {max_blocks: 30}\n"
+SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 240").replace("short", "seconds")
 ENDLESS = SHORT.replace("duration_s: 0.4", "duration_s: 600").replace("short", "endless")
-ENDLESS += "constraints: {max_blocks: 30}\n"
+
+
+@pytest.fixture
+def lease_s() -> float:
+    """Short enough that trials of seconds see their lease renewed."""
+    return 6.0
 
 
 @contextmanager
@@ -33,7 +39,7 @@ def started(words: list[str], environment: dict[str, str]) -> Iterator[subproces
 
 
 @pytest.fixture(params=["beside the database", "runner"])
-def worker(request, context, settings, tmp_path: Path):
+def worker(request, context, settings, lease_s, tmp_path: Path):
     """Starts one that has so long to stop."""
 
     def start(grace_s: float):
@@ -47,6 +53,7 @@ def worker(request, context, settings, tmp_path: Path):
             "BUILDARENA_DATABASE_URL": settings.required_database_url(),
             "BUILDARENA_BROKER_URL": settings.required_broker_url(),
             "BUILDARENA_DATA": str(settings.data),
+            "BUILDARENA_LEASE_S": str(lease_s),
         }
         return started([], reached | grace)
 
@@ -70,7 +77,7 @@ def at_work(context, job_id: str) -> None:
 
 
 def test_a_trial_under_way_is_finished(context, worker) -> None:
-    job = waiting(context, SECONDS)
+    job = waiting(context, SECONDS + FEW_BLOCKS)
     with worker(120) as process:
         at_work(context, job.id)
         process.send_signal(signal.SIGTERM)
@@ -80,7 +87,7 @@ def test_a_trial_under_way_is_finished(context, worker) -> None:
 
 
 def test_a_trial_that_takes_too_long_is_handed_back(context, worker) -> None:
-    job = waiting(context, ENDLESS)
+    job = waiting(context, ENDLESS + FEW_BLOCKS)
     with worker(3) as process:
         at_work(context, job.id)
         process.send_signal(signal.SIGTERM)

@@ -17,7 +17,7 @@ from support.clients.tenants import ADMIN
 from support.servers.runner_rig import SHORT, ended, runner_key, true_trajectory, waiting
 from support.servers.stacks import wait_until
 
-from buildarena_simulation import write_trajectory
+from buildarena_simulation import SIMULATION_VERSION, write_trajectory
 from buildarena_simworker.remote.api import check_url, tls_context
 from buildarena_simworker.remote.doctor import examined
 
@@ -187,7 +187,7 @@ def test_workers_are_listed(context, url, monkeypatch) -> None:
         queues=["simulate.mujoco"],
         host="lab-1",
         pid=1,
-        versions={"engine": "mujoco", "simulation": "4"},
+        versions={"engine": "mujoco", "simulation": SIMULATION_VERSION},
     )
     done = run_cli(url, "worker", "list")
     assert "runner@key_0a/lab-1" in done.stdout

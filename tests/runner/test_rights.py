@@ -9,7 +9,7 @@ from support.clients.tenants import ADMIN, everything
 from support.servers.runner_rig import Caller, as_admin, runner_key, true_trajectory, waiting
 
 from buildarena_api.runners import lease_queue
-from buildarena_simulation import write_trajectory
+from buildarena_simulation import SIMULATION_VERSION, write_trajectory
 
 CONTRACT = json.loads((Path(__file__).parents[1] / "data" / "openapi.json").read_text())
 OTHERS = [
@@ -115,8 +115,9 @@ def test_only_its_simulators_jobs_are_leased(context, url) -> None:
     assert caller.ask("POST", "/leases", json=unknown).status_code == 403
     own = {**caller.about(), "simulators": {"pybullet": "3"}}
     assert caller.ask("POST", "/leases", json=own).status_code == 204
-    both = {**caller.about(), "simulators": {"pybullet": "4", "mujoco": "4"}}
-    assert caller.ask("POST", "/leases", json=both).status_code == 403
+    both = dict.fromkeys(("pybullet", "mujoco"), SIMULATION_VERSION)
+    asked = {**caller.about(), "simulators": both}
+    assert caller.ask("POST", "/leases", json=asked).status_code == 403
 
 
 def test_jobs_of_other_versions_are_not_leased(context, url) -> None:
@@ -125,10 +126,10 @@ def test_jobs_of_other_versions_are_not_leased(context, url) -> None:
     for faults in (0, 1):  # nor when it comes first
         with context.store.database.transaction() as connection:
             connection.execute(text(f"UPDATE jobs SET faults = {faults}"))
-        for version in ("2", "4.0", "44", "5"):
+        for version in ("2", f"{SIMULATION_VERSION}.0", SIMULATION_VERSION * 2, "999"):
             other = {**caller.about(), "simulators": {"mujoco": version}}
             assert caller.ask("POST", "/leases", json=other).status_code == 204
-    assert caller.lease()["version"] == "4"
+    assert caller.lease()["version"] == SIMULATION_VERSION
 
 
 def test_a_key_for_ones_own_jobs_leases_no_others(context, url) -> None:
@@ -227,7 +228,7 @@ def test_no_lease_is_renewed_forever(context, url) -> None:
 
 def test_runners_are_workers_like_others(context, url) -> None:
     caller = Caller(url, runner_key(context)[1])
-    versions = {"engine": "mujoco", "simulation": "4"}
+    versions = {"engine": "mujoco", "simulation": SIMULATION_VERSION}
     caller.ask("POST", "/heartbeat", json=caller.about(versions=versions, pid=7))
     (listed,) = as_admin(url).ask("GET", "/../workers").json()["workers"]
     assert (listed["queues"], listed["pid"], listed["alive"]) == (["simulate.mujoco"], 7, True)
