@@ -141,6 +141,24 @@ def test_each_service_signs_in_as_its_own_role(name) -> None:
     assert ("postgres_password" in secrets_of(SERVICES[name])) == (name == "postgres")
 
 
+def test_nobody_kills_a_worker_before_its_time() -> None:
+    stopping = "BUILDARENA_STOP_GRACE_S"
+    workers = {"construct", "simulate-pybullet", "simulate-mujoco"}
+    assert workers == {
+        name for name, service in SERVICES.items() if stopping in (service.get("environment") or ())
+    }
+    for name in workers:
+        assert default(SERVICES[name]["environment"][stopping]) == "60"
+        assert SERVICES[name]["stop_grace_period"] == f"${{{stopping}:-60}}s", name
+    base = KUBERNETES / "base"
+    config = yaml.safe_load((base / "config.yaml").read_text())
+    for name in workers:
+        documents = yaml.safe_load_all((base / f"{name}.yaml").read_text())
+        (pod,) = (one["spec"]["template"] for one in documents if one["kind"] == "Deployment")
+        given = pod["spec"]["terminationGracePeriodSeconds"]
+        assert given >= float(config["data"][stopping]), name
+
+
 def test_the_api_trusts_the_proxys_address_and_no_other() -> None:
     trusted = default(SERVICES["api"]["environment"]["BUILDARENA_TRUSTED_PROXIES"])
     networks = SERVICES["proxy"]["networks"]

@@ -29,6 +29,8 @@ RUN: Final = "run.json"
 SUPERVISOR: Final = "supervisor"
 READY: Final = "ready"
 START_WITHIN_S: Final = 120.0
+UNSTATED_GRACE_S: Final = 60.0
+"""Of a run that does not say how long its programs have to stop."""
 SERVERS_STOP_WITHIN_S: Final = 45.0
 """Database and broker stop after all programs, and write what they have."""
 POLL_S: Final = 0.1
@@ -98,7 +100,7 @@ def noted_run(data: Path) -> Run | None:
             ready=noted["state"] == READY,
             processes=noted["processes"],
             peak_memory_bytes=noted["peak_memory_bytes"],
-            stop_grace_s=noted["stop_grace_s"],
+            stop_grace_s=noted.get("stop_grace_s", UNSTATED_GRACE_S),
         )
     except (OSError, ValueError, KeyError, TypeError):
         return None
