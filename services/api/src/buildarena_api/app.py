@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -36,6 +37,7 @@ from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
+from buildarena_api.probes import Probes
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
     archives,
@@ -88,12 +90,12 @@ ORDINARY = (
     catalogue,
     callers,
     keys,
-    metrics,
     simulators,
     workers,
 )
-LIMITED_THEMSELVES = (events, exports, archives, comparisons)
-"""Routes whose requests take long, and don't count among a caller's ordinary ones."""
+LIMITED_THEMSELVES = (events, exports, archives, comparisons, metrics)
+"""Routes whose requests don't count among a caller's ordinary ones: they take long, or no
+thread."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
 details that name the field and the valid choices."""
@@ -107,6 +109,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         registry: The models that jobs can name.
     """
     reaper = Reaper(context)
+    probes = Probes(context)
     watching = OwnPool(context, size=WATCHERS, name="watching")
     exporting = OwnPool(context, size=EXPORTERS, name="exporting")
     rate_limits = RateLimits(context.settings.required_broker_url(), context.settings.rate_limit)
@@ -116,10 +119,12 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        probes.start()
         reaper.start()
         runners.start()
         yield
         reaper.stop()
+        await asyncio.to_thread(probes.close)
         runners.close()
         await hub.close()
         await rate_limits.close()
@@ -138,13 +143,13 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
-    app.state.metrics = ServiceMetrics(context)
+    app.state.probes = probes
+    app.state.metrics = ServiceMetrics(probes)
     app.state.context = context
-    app.state.artifact_probe = health.ArtifactProbe(context.artifacts)
     app.state.metrics.registry.register(
         InfrastructureMetrics(
             context,
-            lambda: app.state.artifact_probe.check().ok,
+            probes,
             {
                 "ordinary": context.store.database.engine,
                 "watching": watching.context.store.database.engine,

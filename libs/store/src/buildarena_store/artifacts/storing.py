@@ -7,7 +7,7 @@ import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Final, cast
 
@@ -28,10 +28,18 @@ HASH_LENGTH: Final = 64
 TRASH: Final = "trash"
 PROBE_BYTES: Final = 64 * 1024
 """About what a session keeps: a store that is full to the last block fails already."""
+CONNECT_S: Final = 3.0
+"""How long a bucket's server may take to accept a connection."""
+TIMEOUT_S: Final = 30.0
+"""How long one request to a bucket may take; large artifacts are sent in parts."""
 
 
 def open_objects(
-    location: str | Path, options: Mapping[str, str] | None = None, *, folders_go: bool = False
+    location: str | Path,
+    options: Mapping[str, str] | None = None,
+    *,
+    folders_go: bool = False,
+    timeout_s: float = TIMEOUT_S,
 ) -> ObjectStore:
     """Opens what objects are kept in.
 
@@ -41,10 +49,19 @@ def open_objects(
         options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
             they go before those of the environment.
         folders_go: Whether folders inside a folder go with what was last in them.
+        timeout_s: How long one request to such a store may take; with its repetitions twice that.
     """
     text = str(location)
     if "://" in text:
-        return from_url(text, config=cast("S3Config", dict(options)) if options else None)
+        return from_url(
+            text,
+            config=cast("S3Config", dict(options)) if options else None,
+            client_options={
+                "connect_timeout": timedelta(seconds=min(CONNECT_S, timeout_s)),
+                "timeout": timedelta(seconds=timeout_s),
+            },
+            retry_config={"max_retries": 3, "retry_timeout": timedelta(seconds=timeout_s)},
+        )
     return LocalStore(prefix=Path(text).absolute(), mkdir=True, automatic_cleanup=folders_go)
 
 
@@ -85,11 +102,18 @@ class ArtifactStore:
         location: A folder, or a URL that obstore knows, for example ``s3://bucket/prefix``.
         options: Further settings of such a URL's store, for example ``AWS_SECRET_ACCESS_KEY``;
             they go before those of the environment.
+        timeout_s: How long one request to such a store may take.
     """
 
-    def __init__(self, location: str | Path, options: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        location: str | Path,
+        options: Mapping[str, str] | None = None,
+        *,
+        timeout_s: float = TIMEOUT_S,
+    ) -> None:
         self._location = str(location).partition("?")[0]
-        self._store = open_objects(location, options)
+        self._store = open_objects(location, options, timeout_s=timeout_s)
 
     def put(self, data: bytes, media_type: str) -> ArtifactInfo:
         """Stores bytes; storing the same bytes again changes nothing, or mends them.

@@ -206,10 +206,3 @@ def limited(
 
     scope: Any = until
     return Depends(take_place, scope=scope)
-
-
-async def anybodys_turn(request: Request) -> AsyncIterator[None]:
-    """The turn of a request that needs no key, among those of its address."""
-    limits: ConcurrencyLimits = request.app.state.concurrency
-    async with limits.ordinary.slot(who_asks(request)):
-        yield

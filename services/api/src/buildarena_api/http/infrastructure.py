@@ -6,7 +6,7 @@ Workers have no port: what they know of themselves they report to the database, 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Final
 
 from prometheus_client.core import GaugeMetricFamily, Metric
@@ -14,6 +14,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy import Engine
 from sqlalchemy.pool import QueuePool
 
+from buildarena_api.probes import Probes
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
 from buildarena_store import WorkerCounts
@@ -27,18 +28,18 @@ class InfrastructureMetrics(Collector):
 
     Args:
         context: The process' connections.
-        artifacts_work: Whether artifacts can be written and read.
+        probes: What the service stands on.
         pools: The process' pools of database connections, by what they are for.
     """
 
     def __init__(
         self,
         context: Context,
-        artifacts_work: Callable[[], bool],
+        probes: Probes,
         pools: Mapping[str, Engine],
     ) -> None:
         self._context = context
-        self._artifacts_work = artifacts_work
+        self._probes = probes
         self._pools = pools
 
     def describe(self) -> Iterable[Metric]:
@@ -47,16 +48,15 @@ class InfrastructureMetrics(Collector):
 
     def collect(self) -> Iterable[Metric]:
         """The figures of this moment."""
-        yield from self._workers(self._context.store.workers.counts())
-        yield self._one(
-            "artifact_store_up",
-            "1 when artifacts can be written and read, else 0.",
-            float(self._artifacts_work()),
-        )
-        broker = self._context.queues.waiting(CONSTRUCT_QUEUE)
-        yield self._one(
-            "broker_up", "1 when the broker answers, else 0.", float(broker is not None)
-        )
+        probes = self._probes
+        for name, probe, what in (
+            ("database_up", probes.database, "the database answers and has the schema expected"),
+            ("artifact_store_up", probes.artifacts, "artifacts can be written and read"),
+            ("broker_up", probes.broker, "the broker answers"),
+        ):
+            yield self._one(name, f"1 when {what}, else 0.", float(probe.works))
+        if probes.database.works:
+            yield from self._workers(probes.database.latest())
         folder = self._context.settings.artifact_folder
         disk = shutil.disk_usage(next(at for at in (folder, *folder.parents) if at.exists()))
         yield self._one(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Iterable
-from typing import Final
 
 from prometheus_client import CollectorRegistry, Histogram
 from prometheus_client.core import (
@@ -17,27 +14,21 @@ from prometheus_client.core import (
 from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
-from buildarena_pipeline.runtime.context import Context
+from buildarena_api.probes import PartFailedError, Probes
 from buildarena_store import STAGE_SECONDS, MetricValues, Outcome, Stage
 from buildarena_store.metrics import StageTimes
 from buildarena_store.states import AttemptResult
-
-CACHED_FOR_S: Final = 10.0
-"""Several scrapes within this time share one reading of the database."""
 
 
 class ServiceMetrics(Collector):
     """The API's registry: its own requests, its process, and the service's figures.
 
     Args:
-        context: The process' connections.
+        probes: What the service stands on.
     """
 
-    def __init__(self, context: Context) -> None:
-        self._context = context
-        self._lock = threading.Lock()
-        self._read_at: float | None = None
-        self._figures: MetricValues | None = None
+    def __init__(self, probes: Probes) -> None:
+        self._probes = probes
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
         self.http_seconds = Histogram(
@@ -53,8 +44,11 @@ class ServiceMetrics(Collector):
         return ()
 
     def collect(self) -> Iterable[Metric]:
-        """The service's figures as metrics."""
-        figures = self._fresh()
+        """The service's figures as metrics; none while the database does not answer."""
+        try:
+            figures, counts = self._probes.values.latest(), self._probes.database.latest()
+        except PartFailedError:
+            return
         yield from _job_metrics(figures)
         yield from _queue_metrics(figures)
         yield from _model_metrics(figures)
@@ -63,17 +57,9 @@ class ServiceMetrics(Collector):
         workers = GaugeMetricFamily(
             "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
         )
-        for kind, alive in sorted(self._context.store.workers.counts().alive.items()):
+        for kind, alive in sorted(counts.alive.items()):
             workers.add_metric([kind], alive)
         yield workers
-
-    def _fresh(self) -> MetricValues:
-        with self._lock:
-            now = time.monotonic()
-            if self._figures is None or now - (self._read_at or 0.0) > CACHED_FOR_S:
-                self._figures = self._context.store.metrics.read()
-                self._read_at = now
-            return self._figures
 
 
 def _job_metrics(figures: MetricValues) -> Iterable[Metric]:

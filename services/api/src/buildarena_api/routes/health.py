@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import shutil
-import threading
-import time
 from pathlib import Path
 from typing import Literal
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
-from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.concurrency import anybodys_turn
+from buildarena_api.probes import PartFailedError, Probes
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
-from buildarena_store import ArtifactStore, ArtifactStoreError, WorkerCounts
+from buildarena_store import SchemaVersionError, WorkerCounts
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
-router = APIRouter(
-    prefix="/v1", tags=["health"], dependencies=[Depends(anybodys_turn, scope="function")]
-)
+# No turn is waited for: an answer takes neither a thread nor a connection.
+router = APIRouter(prefix="/v1", tags=["health"])
 
 LOW_DISK_BYTES = 1_000_000_000
 CLOCK_TOLERANCE_S = 5.0
-PROBE_EVERY_S = 5.0
 
 
 class Check(BaseModel):
@@ -48,83 +43,60 @@ class Health(BaseModel):
     "/health",
     responses={503: {"model": Health, "description": "down"}},
 )
-def health(context: ContextDep, request: Request, response: Response) -> Health:
-    """Checks database, broker, artifacts, workers and disk.
+async def health(context: ContextDep, request: Request, response: Response) -> Health:
+    """Says how database, broker, artifacts, workers and disk are, as they were last asked.
 
-    Answers 503 when jobs can't be accepted.
+    Answers at once, also while one of them accepts connections and does not answer, and 503 when
+    jobs can't be accepted.
     """
-    database = _database(context)
-    artifacts: ArtifactProbe = request.app.state.artifact_probe
-    checks = [database, _broker(context), artifacts.check(), _disk(context)]
-    if database.ok:
-        counts = context.store.workers.counts()
-        checks += [*_workers(context, counts), _clocks(counts)]
-    if not database.ok:
+    probes: Probes = request.app.state.probes
+    await probes.renew(probes.database, probes.broker, probes.artifacts)
+    database, counts = _database(probes)
+    checks = [database, _broker(probes), _artifacts(probes), _disk(context)]
+    if counts is None:
         response.status_code = 503
         return Health(status="down", checks=checks)
+    checks += [*_workers(context, counts), _clocks(counts)]
     return Health(status="ok" if all(c.ok for c in checks) else "degraded", checks=checks)
 
 
-class ArtifactProbe:
-    """Tries the artifact store, at most every few seconds, however often health is asked for.
-
-    Args:
-        store: What artifacts are kept in.
-    """
-
-    def __init__(self, store: ArtifactStore) -> None:
-        self._store = store
-        self._lock = threading.Lock()
-        self._check: Check | None = None
-        self._tried_at = 0.0
-
-    def check(self) -> Check:
-        """Whether artifacts can be written and read, as last tried."""
-        with self._lock:
-            if self._check is None or time.monotonic() - self._tried_at > PROBE_EVERY_S:
-                self._check, self._tried_at = self._try(), time.monotonic()
-            return self._check
-
-    def _try(self) -> Check:
-        try:
-            self._store.probe()
-        except ArtifactStoreError as error:
-            return Check(
-                name="artifacts",
-                ok=False,
-                detail=f"{error}; jobs wait and lose nothing",
-                advice="free space, or correct BUILDARENA_ARTIFACTS and its permissions",
-            )
-        return Check(name="artifacts", ok=True, detail="can be written and read")
-
-
-def _database(context: Context) -> Check:
+def _database(probes: Probes) -> tuple[Check, WorkerCounts | None]:
     try:
-        context.store.database.require_schema()
-    except SQLAlchemyError as error:
-        return Check(
-            name="database",
-            ok=False,
-            detail=str(error).splitlines()[0],
-            advice="start Postgres, or correct BUILDARENA_DATABASE_URL",
-        )
-    except Exception as error:  # noqa: BLE001 - health reports whatever is wrong
-        return Check(
-            name="database", ok=False, detail=str(error), advice="run `buildarena migrate`"
-        )
-    return Check(name="database", ok=True, detail="reachable, schema as expected")
+        counts = probes.database.latest()
+    except PartFailedError as error:
+        advice = "start Postgres, or correct BUILDARENA_DATABASE_URL"
+        if isinstance(error.__cause__, SchemaVersionError):
+            advice = "run `buildarena migrate`"
+        elif error.is_silent:
+            advice = "look at Postgres' log, disk and locks; it accepts connections"
+        return Check(name="database", ok=False, detail=str(error), advice=advice), None
+    return Check(name="database", ok=True, detail="reachable, schema as expected"), counts
 
 
-def _broker(context: Context) -> Check:
-    waiting = context.queues.waiting(CONSTRUCT_QUEUE)
-    if waiting is None:
+def _broker(probes: Probes) -> Check:
+    try:
+        waiting = probes.broker.latest()
+    except PartFailedError as error:
         return Check(
             name="broker",
             ok=False,
-            detail="not reachable; jobs are kept and wait",
+            detail=f"{error}; jobs are kept and wait",
             advice="start Valkey or Redis, or correct BUILDARENA_BROKER_URL",
         )
     return Check(name="broker", ok=True, detail=f"reachable, {waiting} messages for construct")
+
+
+def _artifacts(probes: Probes) -> Check:
+    try:
+        probes.artifacts.latest()
+    except PartFailedError as error:
+        return Check(
+            name="artifacts",
+            ok=False,
+            detail=f"{error}; jobs wait and lose nothing",
+            advice="free space, or correct BUILDARENA_ARTIFACTS_URL and its permissions",
+        )
+    return Check(name="artifacts", ok=True, detail="can be written and read")
 
 
 def _workers(context: Context, counts: WorkerCounts) -> list[Check]:

@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from buildarena_api.http.metrics import ServiceMetrics
-from buildarena_api.http.problems import problem_responses
+from buildarena_api.probes import Probes
 
 router = APIRouter(prefix="/v1", tags=["health"])
 
@@ -14,9 +14,14 @@ router = APIRouter(prefix="/v1", tags=["health"])
 @router.get(
     "/metrics",
     response_class=Response,
-    responses={200: {"content": {"text/plain": {}}}, **problem_responses(503)},
+    responses={200: {"content": {"text/plain": {}}}},
 )
-def show_metrics(request: Request) -> Response:
-    """Figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests."""
+async def show_metrics(request: Request) -> Response:
+    """Figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests.
+
+    Answers at once: what a part of the service does not answer is left out, and its `_up` is 0.
+    """
     metrics: ServiceMetrics = request.app.state.metrics
+    probes: Probes = request.app.state.probes
+    await probes.renew(probes.database, probes.broker, probes.artifacts, probes.values)
     return Response(generate_latest(metrics.registry), media_type=CONTENT_TYPE_LATEST)
