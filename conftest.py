@@ -36,13 +36,31 @@ REMEMBERED = [known for known in vars(dependencies).values() if hasattr(known, "
 LEFT_OUT = ("install the Debian packages", "make web")
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leaves long variants to `make test-long`, and begins with what takes longest."""
+    _leave_all_but_samples_to_slow(items)
     if not LONG:
         left = [item for item in items if item.get_closest_marker("long")]
         config.hook.pytest_deselected(items=left)
         items[:] = [item for item in items if not item.get_closest_marker("long")]
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
+
+
+def _leave_all_but_samples_to_slow(items: list[pytest.Item]) -> None:
+    """Marks as slow what a test of samples has beyond them; they are spread over its variants."""
+    variants: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("samples") and not item.get_closest_marker("slow"):
+            variants.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for group in variants.values():
+        marker = group[0].get_closest_marker("samples")
+        assert marker is not None
+        most = marker.args[0]
+        chosen = {round(number * len(group) / most) for number in range(most)}
+        for number, item in enumerate(group):
+            if number not in chosen:
+                item.add_marker("slow")
 
 
 def pytest_collection_finish() -> None:

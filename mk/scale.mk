@@ -4,3 +4,8 @@ SCALE_JOBS ?= 1000000
 
 bench-scale: $(STAMP) ## Measures boards, lists, claims and a large sweep at 1,000,000 jobs; JSON in .buildarena/
 	@$(TEST_PYTHON) -m benchmarks.scale.bench_scale --jobs $(SCALE_JOBS) --json .buildarena/bench-scale.json
+
+.PHONY: bench-heartbeats
+
+bench-heartbeats: $(STAMP) ## What heartbeats cost Postgres, for one worker and for a hundred
+	@$(TEST_PYTHON) -m benchmarks.scale.bench_heartbeats --json .buildarena/bench-heartbeats.json

@@ -78,6 +78,7 @@ def test_a_scorer_is_one_file(car, tmp_path) -> None:
     assert "'support'" in without.stderr
 
 
+@pytest.mark.slow
 def test_an_engine_is_one_module(car, tmp_path) -> None:
     environment = installed("An engine", tmp_path)
     command = ("-m", "buildarena_cli", "machine", "simulate", car, "--task", "transport-1")
@@ -130,6 +131,7 @@ client.close()
 """
 
 
+@pytest.mark.slow
 def test_a_protocol_is_one_module(endpoint, tmp_path) -> None:
     environment = installed("A provider's protocol", tmp_path)
     file = tmp_path / "models.yaml"

@@ -136,7 +136,7 @@ def used(stack: Stack) -> dict[str, float]:
     found: dict[str, float] = {}
     for managed in stack.supervisor.managed:
         if managed.process is not None and managed.name in PARTS:
-            found[f"{managed.name} cpu_ms"] = 1000 * _cpu_s(managed.process.pid)
+            found[f"{managed.name} cpu_ms"] = 1000 * cpu_s(managed.process.pid)
     with psycopg.connect(stack.environment["BUILDARENA_DATABASE_URL"]) as database:
         row = database.execute(
             "SELECT xact_commit + xact_rollback, blks_read + blks_hit FROM pg_stat_database "
@@ -162,7 +162,8 @@ def used(stack: Stack) -> dict[str, float]:
     return found
 
 
-def _cpu_s(pid: int) -> float:
+def cpu_s(pid: int) -> float:
+    """Processor time of a process and all that it started."""
     process = psutil.Process(pid)
     every = [process, *process.children(recursive=True)]
     times = [one.cpu_times() for one in every]

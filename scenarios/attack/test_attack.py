@@ -40,6 +40,7 @@ def place() -> Iterator[Arena]:
         yield found
 
 
+@pytest.mark.samples(2)
 @pytest.mark.xdist_group("attack")
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize(

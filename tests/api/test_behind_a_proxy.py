@@ -206,6 +206,7 @@ def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context) -> No
         assert httpx.get(f"{url}/v1/models").status_code == 421
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     ("trusted", "seen", "least", "most"),
     [

@@ -323,6 +323,7 @@ def statements(context):
     event.remove(engine, "before_cursor_execute", note)
 
 
+@pytest.mark.samples(6)
 @pytest.mark.parametrize("kind", ["", "/figures", "/compare", "/agreement", "/manifest"])
 @pytest.mark.parametrize("name", INVENTED)
 @pytest.mark.usefixtures("board")

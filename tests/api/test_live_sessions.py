@@ -40,7 +40,7 @@ def act(api, session: str, tool: str, arguments: object) -> None:
 def claimed(context):
     """A lease that nobody needs to renew, however slow the machine is."""
     lease = claim(context)
-    execute(context, "UPDATE jobs SET lease_expires_at = now() + interval '1 hour'")
+    execute(context, "UPDATE leases SET expires_at = now() + interval '1 hour'")
     return lease
 
 

@@ -100,6 +100,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("name", HOSTILE)
 @pytest.mark.parametrize("ask", [check, attempt])
 def test_hostile_files_are_refused_in_words(api, ask, name) -> None:
@@ -125,7 +126,8 @@ def test_a_machine_is_tried_on_no_leaderboard(api, context) -> None:
     assert api.get(f"/v1/jobs/{job['id']}/machine").status_code == 200
     assert api.get(f"/v1/jobs/{job['id']}/scene").json()["machine"] is not None
     assert context.queues.settle()
-    assert context.queues.waiting("simulate.mujoco") == 1
+    # The reaper may have named it too.
+    assert context.queues.waiting("simulate.mujoco") >= 1
     again = attempt(api, document())
     assert (again.status_code, again.json()["id"]) == (200, job["id"])
     assert attempt(api, document(), seed=1).json()["id"] != job["id"]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
+import pytest
 from mcp import ClientSession, StdioServerParameters, stdio_client
 from support.clients.newcomer import Newcomer
 from support.servers.live_api import live_api
@@ -111,6 +112,7 @@ async def play(url: str, simulate: Callable[[], None]) -> dict[str, dict[str, ob
     return results
 
 
+@pytest.mark.slow
 def test_who_knows_only_what_the_server_sends_builds_bridge_car_and_rocket(context) -> None:
     with live_api(context) as url:
         results = asyncio.run(play(url, lambda: work(context)))

@@ -57,6 +57,7 @@ def who(url: str) -> str:
         database.close()
 
 
+@pytest.mark.slow
 def test_roles_then_migration_by_an_owner_who_is_no_superuser(fresh, tmp_path) -> None:
     (owner, owner_url), (api, api_url) = (
         login(tmp_path, fresh, role, "first") for role in ("owner", "api")

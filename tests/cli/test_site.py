@@ -73,6 +73,7 @@ def asked(url: str, question: str, sweeps: list[str]) -> httpx.Response:
     return httpx.get(f"{url}{path}?{urlencode(params)}", headers=accept)
 
 
+@pytest.mark.slow
 def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     sweeps = [submitted(url, EXPERT), submitted(url, {**IDLE, "seeds": [0, 5]})]
     submitted(url, {**IDLE, "tasks": ["lift-1"], "seeds": [9]})
@@ -168,6 +169,7 @@ def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
         assert ADMIN.encode() not in (site / name).read_bytes()
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("place", ["data/", "jobs/", "site.json", "index.html"])
 def test_a_run_that_breaks_off_leaves_nothing_that_looks_whole(
     url, idle, tmp_path, monkeypatch, place

@@ -75,6 +75,7 @@ def test_the_expert_succeeds_and_the_other_baselines_do_not(undisturbed) -> None
     assert not {"errored", "cancelled"} & set(outcomes)
 
 
+@pytest.mark.slow
 def test_killed_processes_lose_nothing_and_change_no_result(undisturbed, tmp_path) -> None:
     with running_stack(tmp_path) as stack, httpx.Client(base_url=stack.url, timeout=30) as client:
         sweep_id = client.post("/v1/sweeps", json=SWEEP).json()["id"]

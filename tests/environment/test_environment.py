@@ -27,6 +27,7 @@ WOOD = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
 ALL = {"success": 1.0, "indicator": 1.0, "accepted_share": 0.1, "constraint_progress": 0.1}
 
 
+@pytest.mark.slow
 def test_what_the_expert_builds_is_scored_as_kept(experts) -> None:
     assert json.loads(REFERENCES.read_text()) == references()
     assert list(references()) == list(builtin_tasks())
@@ -159,6 +160,7 @@ def test_a_disqualified_trial_earns_nothing(bridge_calls) -> None:
     assert environment.reward == pytest.approx(before)
 
 
+@pytest.mark.slow
 def test_states_are_values_and_lead_back(bridge_calls) -> None:
     environment = Environment("support-1", rewards=ALL)
     played(environment, bridge_calls[:6])
@@ -261,6 +263,7 @@ def test_machines_may_be_tried_elsewhere(bridge_calls) -> None:
     assert submitted.trial.reason == "empty_machine"
 
 
+@pytest.mark.slow
 def test_a_seed_varies_the_start_and_none_does_not(bridge_calls) -> None:
     def indicator(seed) -> float:
         environment = Environment("support-1", seed=seed)

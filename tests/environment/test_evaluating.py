@@ -35,6 +35,7 @@ def variants(bridge: Machine, count: int) -> list[Machine]:
     return [*made[:-1], Machine()]
 
 
+@pytest.mark.slow
 def test_results_come_in_order_whatever_the_number_of_processes(short, bridge) -> None:
     machines = variants(bridge, 7)
     with Evaluator(short, processes=1) as one, Evaluator(short, processes=3) as three:
@@ -121,6 +122,7 @@ def test_environments_and_evaluators_agree(short, bridge) -> None:
         assert environment.submit().trial.score == evaluator.evaluate(bridge).trial.score
 
 
+@pytest.mark.slow
 def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> None:
     task = builtin_tasks()["support-1"]
     weak = bridge.copy()

@@ -29,6 +29,7 @@ def example(monkeypatch):
         sys.modules.pop(name, None)
 
 
+@pytest.mark.slow
 def test_the_same_seed_learns_the_same_with_any_number_of_processes(example) -> None:
     told = []
     for processes in (1, 2):
@@ -73,6 +74,7 @@ def test_refused_choices_are_left_out_of_a_bridge(example) -> None:
     assert {link.module.name for link in machine.connectors.values()} == {"Brace"}
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_the_learned_bridge_beats_the_expert(engine) -> None:
     pytest.importorskip(engine)

@@ -25,6 +25,7 @@ def url(context, monkeypatch):
         yield url
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("kind", ["pandas", "polars"])
 def test_boards_and_jobs_are_frames(url, kind):
     board, jobs = ba.leaderboard(kind=kind), ba.jobs(url, kind=kind)
@@ -40,6 +41,7 @@ def test_boards_and_jobs_are_frames(url, kind):
     )
 
 
+@pytest.mark.slow
 def test_a_job_s_machine_and_trial_are_those_that_are_kept(url):
     jobs = {job["model"]: job for job in httpx.get(f"{url}/v1/jobs").json()["jobs"]}
     good, empty = jobs["builtin/expert"], jobs["builtin/idle"]

@@ -50,7 +50,7 @@ def test_a_dead_workers_job_waits_again(context, submissions) -> None:
     submit(context, submissions, 1)
     lease = context.store.leases.claim("construct", owner="dead")
     with context.store.database.transaction() as connection:
-        connection.exec_driver_sql("UPDATE jobs SET lease_expires_at = now() - interval '1 s'")
+        connection.exec_driver_sql("UPDATE leases SET expires_at = now() - interval '1 s'")
     drain(context)
     reap(context)
     assert context.store.jobs.get(lease.job.id).state == "queued"

@@ -43,6 +43,7 @@ def stopped(pid: int) -> Iterator[None]:
         os.kill(pid, signal.SIGCONT)
 
 
+@pytest.mark.slow
 def test_requests_stay_quick_and_jobs_flow_again(context, valkey) -> None:
     url, pid = valkey
     changes = {"broker_url": url, "rate_limit": "25/minute"}

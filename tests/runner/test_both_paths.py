@@ -165,6 +165,7 @@ def test_files_are_kept_by_name(context, do_next) -> None:
     assert (context.artifacts.get(kept.hash), kept.media_type) == (b"it went well", "text/plain")
 
 
+@pytest.mark.samples(1)
 def test_a_cancelled_trial_is_broken_off(context, do_next) -> None:
     job = waiting(context)
 
@@ -199,12 +200,13 @@ def test_who_lost_its_lease_writes_nothing(context, do_next) -> None:
 def lease_of_another(context) -> Iterator[None]:
     """Somebody else has the job from here on, as after a lease that ran out."""
     with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET lease_expires_at = now() - interval '1 hour'"))
+        connection.execute(text("UPDATE leases SET expires_at = now() - interval '1 hour'"))
     context.store.leases.recover()
     assert context.store.leases.claim(QUEUE, owner="another") is not None
     yield
 
 
+@pytest.mark.samples(1)
 def test_a_driven_car_goes_back_to_its_session_each_time(context, submissions, do_next) -> None:
     job = submitted(context, submissions, task="transport-1")
     for _ in range(3):

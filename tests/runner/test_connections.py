@@ -53,6 +53,7 @@ def test_uploads_go_on_where_they_were_cut(context, url) -> None:
     assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("lost", [1, 2, 5])
 def test_lost_answers_do_nothing_twice(context, url, lost) -> None:
     job = waiting(context)

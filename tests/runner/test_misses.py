@@ -26,7 +26,7 @@ def misses(caller: Caller, how: str, context) -> None:
     lease = caller.lease(wait_s=5)
     if how == "lost":
         with context.store.database.transaction() as connection:
-            connection.execute(text("UPDATE jobs SET lease_expires_at = now() - interval '1 s'"))
+            connection.execute(text("UPDATE leases SET expires_at = now() - interval '1 s'"))
         context.store.leases.recover()
         return
     body = {"fault": FAULT, "never": NEVER}.get(how)
@@ -49,6 +49,7 @@ def test_a_key_that_misses_a_trial_again_and_again_counts_once(context, keys, ho
     assert offered(keys[1])
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("how", ["fault", "hand back", "lost", "never"])
 def test_a_key_waits_for_what_it_missed_and_others_do_not(context, keys, how) -> None:
     waiting(context)

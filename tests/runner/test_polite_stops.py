@@ -13,7 +13,7 @@ from sqlalchemy import select
 from support.servers.runner_rig import SHORT, runner_key, waiting
 from support.servers.stacks import wait_until
 
-from buildarena_store.tables import jobs
+from buildarena_store.tables import leases
 
 FEW_BLOCKS = "constraints: {max_blocks: 30}\n"
 SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 240").replace("short", "seconds")
@@ -68,14 +68,15 @@ def at_work(context, job_id: str) -> None:
     """Waits until whoever has the job renews its lease."""
 
     def expires():
-        query = select(jobs.c.lease_expires_at).where(jobs.c.id == job_id)
+        query = select(leases.c.expires_at).where(leases.c.job_id == job_id)
         with context.store.database.statement() as connection:
-            return connection.execute(query).scalar_one()
+            return connection.execute(query).scalar_one_or_none()
 
     first = wait_until(expires, 60, "it is leased")
     wait_until(lambda: expires() != first, 20, "it is worked on")
 
 
+@pytest.mark.samples(1)
 def test_a_trial_under_way_is_finished(context, worker) -> None:
     job = waiting(context, SECONDS + FEW_BLOCKS)
     with worker(120) as process:
@@ -86,6 +87,7 @@ def test_a_trial_under_way_is_finished(context, worker) -> None:
     assert context.store.rollouts.read(job.id)[0].finished_at is not None
 
 
+@pytest.mark.samples(1)
 def test_a_trial_that_takes_too_long_is_handed_back(context, worker) -> None:
     job = waiting(context, ENDLESS + FEW_BLOCKS)
     with worker(3) as process:

@@ -7,6 +7,7 @@ import pytest
 from sqlalchemy import text
 from support.clients.tenants import ADMIN, everything
 from support.servers.runner_rig import Caller, as_admin, runner_key, true_trajectory, waiting
+from support.servers.stacks import wait_until
 
 from buildarena_api.runners import lease_queue
 from buildarena_simulation import SIMULATION_VERSION, write_trajectory
@@ -233,7 +234,11 @@ def test_runners_are_workers_like_others(context, url) -> None:
     (listed,) = as_admin(url).ask("GET", "/../workers").json()["workers"]
     assert (listed["queues"], listed["pid"], listed["alive"]) == (["simulate.mujoco"], 7, True)
     assert listed["id"].startswith("runner@key_")
-    checks = as_admin(url).ask("GET", "/../health").json()["checks"]
-    assert {c["name"]: c["ok"] for c in checks}["workers of simulate.mujoco"]
+
+    def is_served() -> bool:
+        checks = as_admin(url).ask("GET", "/../health").json()["checks"]
+        return {c["name"]: c["ok"] for c in checks}["workers of simulate.mujoco"]
+
+    wait_until(is_served, 20, "health was told")
     caller.ask("POST", "/goodbye", json=caller.about())
     assert as_admin(url).ask("GET", "/../workers").json()["workers"] == []

@@ -49,6 +49,7 @@ def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     assert trajectory.joint_loads[-25:, -1].mean() * 1000 == pytest.approx(net, abs=1.96)
 
 
+@pytest.mark.samples(1)
 def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     start = draft.start()
@@ -81,6 +82,7 @@ def _aloft(load: int) -> tuple[Machine, str]:
     return draft.machine, balloon
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("load", [0, 6, 14])
 def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine, load) -> None:
     machine, balloon = _aloft(load)
@@ -168,6 +170,7 @@ def test_springs_between_the_same_faces_are_worth_one(engine) -> None:
     assert found[1] == pytest.approx(found[0], rel=0.03)
 
 
+@pytest.mark.samples(1)
 def test_a_spring_draws_together_while_its_key_is_held(engine) -> None:
     machine, load = _hung(1, bind=True)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)

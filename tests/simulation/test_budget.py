@@ -15,6 +15,7 @@ from buildarena_worker.builtin.designs.drafting import DOWN
 LOAD = 300.0
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_expert_leaves_room_above_it(engine, tasks, seed) -> None:
     machine = drafted(DESIGNS["budget-1"](seed), [])
@@ -77,6 +78,7 @@ def test_a_bridge_that_bears_the_load_for_a_moment_does_not_carry_it(engine, tas
         assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize(
     "machine",
     [

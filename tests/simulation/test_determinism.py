@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 PROGRAM = """
 import hashlib, sys
 from buildarena_benchmark import builtin_tasks
@@ -31,6 +33,7 @@ def _hash_in_new_process(engine: str, name: str, task: str, hash_seed: str) -> s
     return done.stdout
 
 
+@pytest.mark.samples(1)
 def test_two_processes_give_the_same_bytes(engine) -> None:
     for name, task in (("carrier", "transport-2"), ("beam", "support-1")):
         first, second = (_hash_in_new_process(engine, name, task, seed) for seed in ("1", "2"))

@@ -43,6 +43,7 @@ def test_debris_that_lies_on_the_floor_takes_nothing_back(engine, tasks, overlap
     assert result.flags == ()
 
 
+@pytest.mark.samples(1)
 @slow_on_pybullet
 @pytest.mark.parametrize(("task", "gap"), SPANS)
 @pytest.mark.parametrize("height", [3, 4])
@@ -74,6 +75,7 @@ def test_only_the_tasks_that_ask_for_it_tell_the_load_over_the_mass(tasks) -> No
 # A slalom of twelve gates
 
 
+@pytest.mark.samples(1)
 def test_a_car_that_drives_straight_on_passes_no_more_than_one_side(engine, tasks) -> None:
     for turn_s in (0.0, 0.02):
         steered = [(0.8, "RightArrow", turn_s), (1.2, "LeftArrow", turn_s)] if turn_s else []

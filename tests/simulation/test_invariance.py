@@ -66,6 +66,7 @@ def _turning_car(*, mirrored: bool) -> Machine:
     return draft.machine
 
 
+@pytest.mark.samples(1)
 def test_a_mirrored_car_drives_as_far(engine, tasks) -> None:
     task = tasks["transport-1"]
     found = [trial(task, _turning_car(mirrored=m), engine)[0] for m in (False, True)]
@@ -73,6 +74,7 @@ def test_a_mirrored_car_drives_as_far(engine, tasks) -> None:
     assert found[0].indicator == pytest.approx(found[1].indicator, rel=TOLERANCE[engine])
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     "task", [long(task) if task in {"transport-2", "transport-3"} else task for task in TASKS]
 )

@@ -27,6 +27,7 @@ TASK = builtin_tasks()["support-1"]
 SCENARIO = TASK.scenario.model_copy(update={"duration_s": 2.6})
 
 
+@pytest.mark.slow
 @several
 def test_what_the_libraries_would_choose_does_not_matter() -> None:
     first, second = (lines(TRIALS, as_on(name)) for name in (kernels.runnable()[0], OTHERS[0]))

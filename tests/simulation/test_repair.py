@@ -15,6 +15,7 @@ from buildarena_simulation import simulate
 SEEDS = range(40 if LONG else 3)
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
@@ -25,6 +26,7 @@ def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, see
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("seed", [0, 1, long(2), long(3)])
 def test_the_expert_repairs_it(engine, tasks, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
@@ -43,6 +45,7 @@ def test_a_repaired_car_stays_straight_in_another_world(engine, tasks, seed) -> 
         assert score(task, repaired(task), path).indicator == 1.0
 
 
+@pytest.mark.samples(3)
 @slow_on_pybullet
 @pytest.mark.parametrize("trick", TRICKS)
 @pytest.mark.parametrize("seed", [0, 1, 2, long(3), long(4)])

@@ -24,6 +24,7 @@ def test_more_bracing_carries_more(engine, tasks) -> None:
     assert all(b > 1.2 * a for a, b in itertools.pairwise(loads))
 
 
+@pytest.mark.samples(1)
 def test_a_braced_deck_carries_more_than_a_bare_one(engine, tasks) -> None:
     bare, _ = trial(tasks["support-1"], deck(5, 7), engine)
     braced, trajectory = trial(tasks["support-1"], deck(5, 7, cross=True), engine)
@@ -41,6 +42,7 @@ def test_the_one_shot_bridge_stands_in_the_gap(engine, tasks) -> None:
     assert result.metrics["floor_share"] > 0.5  # its pillars reach the gap's floor
 
 
+@pytest.mark.samples(1)
 def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tasks) -> None:
     # Over a gap so deep that its pillars hang free; over the task's they stand on the floor.
     deep = tasks["support-1"].scenario.model_copy(

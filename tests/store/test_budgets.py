@@ -122,7 +122,7 @@ def test_a_reply_that_came_too_late_was_paid_for(context, sweep) -> None:
 def lose(context, *, jobs: int) -> None:
     """Lets the leases of jobs run out, as if their workers had been killed."""
     with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE jobs SET lease_expires_at = now() - interval '1 s'"))
+        connection.execute(text("UPDATE leases SET expires_at = now() - interval '1 s'"))
     assert len(context.store.leases.recover()) == jobs
 
 

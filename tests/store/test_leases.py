@@ -3,7 +3,7 @@ import time
 from datetime import timedelta
 
 import pytest
-from sqlalchemy import text
+from sqlalchemy import TextClause, text
 from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry
 
 from buildarena_pipeline.runtime.context import Context
@@ -178,7 +178,7 @@ def test_looking_at_leases_says_what_a_heartbeat_says_and_renews_nothing(context
     add(1, 2)
     first, second = claim(context), claim(context)
     cancel(context, second.job.id)
-    expires = text("SELECT lease_expires_at FROM jobs WHERE id = :id")
+    expires = text("SELECT expires_at FROM leases WHERE job_id = :id")
     with context.store.database.transaction() as connection:
         before = connection.execute(expires, {"id": first.job.id}).scalar_one()
     assert context.store.leases.held([first, second]) == {first.job.id: False}
@@ -186,3 +186,74 @@ def test_looking_at_leases_says_what_a_heartbeat_says_and_renews_nothing(context
         assert connection.execute(expires, {"id": first.job.id}).scalar_one() == before
     assert context.store.leases.heartbeat([first, second]) == {first.job.id: False}
     assert context.store.leases.held([]) == {}
+
+
+WRITTEN = text("SELECT pg_current_wal_insert_lsn() - '0/0'::pg_lsn")
+CHANGED = text(
+    """
+    SELECT pg_stat_get_tuples_updated(oid), pg_stat_get_tuples_hot_updated(oid)
+    FROM pg_class WHERE relname = :table
+    """
+)
+
+
+@pytest.mark.parametrize("cost", [0, 7])
+def test_heartbeats_change_a_narrow_row_and_no_index(context, add, cost) -> None:
+    add(*range(40))
+    held = [claim(context) for _ in range(40)]
+    execute(context, "UPDATE jobs SET cost_usd = :cost", {"cost": cost})
+    heartbeats, before, written = 0, changed(context), ask(context, WRITTEN)[0]
+    while heartbeats < 1000 or changed(context)["leases"][0] - before["leases"][0] < heartbeats:
+        assert len(context.store.leases.heartbeat(held)) == len(held)
+        heartbeats += len(held)
+        assert heartbeats < 10_000, "they are never counted"
+    after = changed(context)
+    # The claims, and the costs.
+    assert after["jobs"][0] - before["jobs"][0] <= 2 * len(held)
+    (all_before, hot_before), (all_after, hot_after) = before["leases"], after["leases"]
+    assert hot_after - hot_before == all_after - all_before >= 1000
+    assert (ask(context, WRITTEN)[0] - written) / heartbeats < 900
+
+
+def ask(context: Context, query: TextClause, **values: str) -> tuple[int, ...]:
+    with context.store.database.transaction() as connection:
+        connection.execute(text("SELECT pg_stat_force_next_flush()"))
+        return tuple(map(int, connection.execute(query, values).one()))
+
+
+def changed(context: Context) -> dict[str, tuple[int, ...]]:
+    """Rows changed so far, and how many of them without a change of an index, by table."""
+    return {table: ask(context, CHANGED, table=table) for table in ("jobs", "leases")}
+
+
+def test_what_is_known_of_leases_goes_an_hour_after_their_end(context, add) -> None:
+    add(1, 2, 3)
+    ended, running, young = claim(context), claim(context), claim(context)
+    finish(context, ended)
+    finish(context, young)
+    old = "UPDATE leases SET expires_at = now() - interval '2 hours' WHERE job_id <> :young"
+    execute(context, old, {"young": young.job.id})
+    context.store.leases.forget_ended()
+    with context.store.database.transaction() as connection:
+        left = set(connection.execute(text("SELECT job_id FROM leases")).scalars())
+    assert left == {running.job.id, young.job.id}
+    assert context.store.leases.recover() == [running.job.id]
+
+
+def test_leases_of_the_release_before_end_by_their_own_column(context, add) -> None:
+    add(1, 2)
+    claim(context), claim(context)
+    execute(context, "DELETE FROM leases")
+    assert context.store.leases.recover() == []
+    execute(context, "UPDATE jobs SET lease_expires_at = now() - interval '1 s' WHERE seed = 1")
+    assert len(context.store.leases.recover()) == 1
+
+
+def test_the_release_before_leaves_leases_of_this_one_alone(context, add) -> None:
+    add(1)
+    lease = claim(context)
+    with context.store.database.transaction() as connection:
+        query = text("SELECT lease_expires_at - now() > interval '1 hour' FROM jobs")
+        assert connection.execute(query).scalar_one()
+    expire_leases(context)
+    assert context.store.leases.recover() == [lease.job.id]

@@ -18,7 +18,7 @@ def execute(context: Context, statement: str | Executable, values: Any = None) -
 
 def expire_leases(context: Context) -> None:
     """Every lease is over."""
-    execute(context, "UPDATE jobs SET lease_expires_at = now() - interval '1 hour'")
+    execute(context, "UPDATE leases SET expires_at = now() - interval '1 hour'")
 
 
 def claim(context: Context, owner: str = "w", **more: Any) -> Lease:

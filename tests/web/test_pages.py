@@ -41,12 +41,14 @@ def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> N
         in_browser(stack.url, ["e2e/build", "e2e/strangers"])
 
 
+@pytest.mark.slow
 def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path) -> None:
     with running_stack(tmp_path, require_keys=True, admin_key=SecretStr(ADMIN)) as stack:
         given = {"BUILDARENA_WEB_GUARDED_URL": stack.url, "BUILDARENA_WEB_ADMIN_KEY": ADMIN}
         in_browser(stack.url, ["e2e/keys"], **given)
 
 
+@pytest.mark.slow
 def test_pages_work_below_a_path(tmp_path) -> None:
     with (
         running_stack(tmp_path, base_path="/tools/arena") as stack,

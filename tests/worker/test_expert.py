@@ -33,6 +33,7 @@ def tried(play, model: str, task: str, seed: int, engine: str):
     return score(drawn, machine, trajectory)
 
 
+@pytest.mark.samples(5)
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("task", "engine"), TRIALS)
 def test_the_expert_succeeds(play, task, seed, engine) -> None:

@@ -57,6 +57,7 @@ def test_a_request_ends_with_its_lease(context, tmp_path, how, end) -> None:
     assert context.store.journal.read(job_id) == []
 
 
+@pytest.mark.slow
 def test_a_wait_between_tries_ends_with_the_lease(context, tmp_path) -> None:
     with (
         ProviderStandIn(fault=lambda _: "500") as bad,
@@ -69,6 +70,7 @@ def test_a_wait_between_tries_ends_with_the_lease(context, tmp_path) -> None:
         wait_until(lambda: workers.slots.free == workers.slots.total, SOON_S, "the slot is free")
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("how", ["hang", "drip", "500", "garbage"])
 def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how) -> None:
     with stuck(how) as bad, crew(context, tmp_path, bad=bad) as workers:
@@ -197,6 +199,7 @@ GARBAGE = {
 CHARGED = {"usage alone", "choices of text", "no choices", "text a number", "name a number"}
 
 
+@pytest.mark.samples(3)
 @pytest.mark.parametrize("name", GARBAGE)
 def test_garbage_is_counted_charged_and_bounded(context, tmp_path, name) -> None:
     with (

@@ -99,6 +99,7 @@ def test_a_request_that_takes_too_long_is_given_up_and_counted(context, tmp_path
     assert spent.lost_requests == 1
 
 
+@pytest.mark.slow
 def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
     with (
         ProviderStandIn(fault=lambda _: "500") as model,

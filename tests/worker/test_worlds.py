@@ -101,6 +101,7 @@ def test_what_breaks_a_rule_is_tried_in_no_world(context, submissions) -> None:
     assert (job.success, rollouts(context, job)) == (False, ([], []))
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     "tampering",
     [

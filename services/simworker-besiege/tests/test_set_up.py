@@ -47,6 +47,7 @@ def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> 
     assert not list(rig.machines.iterdir())
 
 
+@pytest.mark.slow
 def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     places = {**Calibration().positions, "open_machine": (0.9, 0.9)}
     Calibration(positions=places).save(rig.folder / "state" / "calibration.json")

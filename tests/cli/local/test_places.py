@@ -60,6 +60,7 @@ print(*sorted(path.name for path in (data / "postgres").iterdir()))
 FEW = ("private folder", "long path", "noexec", "read-only checkout")
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     ("user", "case"),
     [

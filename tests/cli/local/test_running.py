@@ -32,6 +32,7 @@ def gone(pids: list[int]) -> bool:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(240)
 def test_the_life_of_a_service_in_the_background(data) -> None:
     where, port = ("--data", str(data)), str(free_port())

@@ -29,6 +29,7 @@ def vectors():
     }
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("name", ["single", "assembly"])
 @pytest.mark.parametrize("part", range(PARTS))
 def test_every_step_has_the_vectors_verdict_and_state(vectors, name, part):

@@ -54,6 +54,7 @@ def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
         one.close()
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("status", ["301", "307"])
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_no_protocol_follows_a_redirect(client, protocol, status) -> None:

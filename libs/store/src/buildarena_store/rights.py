@@ -16,7 +16,7 @@ from sqlalchemy import Connection, text
 
 _ACCOUNTS = ("api_keys", "names")
 _SUBMITTED = ("budgets", "job_wants", "sweeps", "sweep_jobs", "tasks")
-_WORK = ("artifacts", "attempts", "events", "job_artifacts", "jobs", "rollouts")
+_WORK = ("artifacts", "attempts", "events", "job_artifacts", "jobs", "leases", "rollouts")
 _SESSIONS = ("external_calls", "journal")
 _FIGURES = ("board_changes", "figure_changes", "figures", "workers")
 _BOARDS = ("board_cells", "board_state")
@@ -59,10 +59,11 @@ class Role:
 
 
 _WHOLE: tuple[str, ...] = ()
-_REAPS: Final = ("figure_changes", "job_artifacts", "reservations", "workers")
+_REAPS: Final = ("figure_changes", "job_artifacts", "leases", "reservations", "workers")
 """What every process removes: each may be the one whose reaper ends leases and counts figures."""
 _WORKED: Final = dict.fromkeys(
-    ("artifacts", "attempts", "figures", "job_artifacts", "jobs", "rollouts", "workers"), _WHOLE
+    ("artifacts", "attempts", "figures", "job_artifacts", "jobs", "leases", "rollouts", "workers"),
+    _WHOLE,
 )
 
 ROLES: Final[Mapping[str, Role]] = MappingProxyType(
@@ -80,7 +81,7 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
             meaning="Construct workers: sessions, their costs, verifications.",
             reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS}),
             adds=(
-                *("artifacts", "attempts", "events", "job_artifacts", "rollouts"),
+                *("artifacts", "attempts", "events", "job_artifacts", "leases", "rollouts"),
                 *_SESSIONS,
                 *_FIGURES,
                 *("reservations", "verifications"),
@@ -102,7 +103,7 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
             meaning="Simulation workers: trials and their scores.",
             reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS, "journal"}),
             adds=(
-                *("artifacts", "attempts", "events", "job_artifacts"),
+                *("artifacts", "attempts", "events", "job_artifacts", "leases"),
                 # Trials in varied worlds are asked for when the exact one is done.
                 *("rollouts", "verifications", *_FIGURES),
             ),

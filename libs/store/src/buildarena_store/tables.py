@@ -163,6 +163,15 @@ Index(
 Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != JobState.DONE)
 Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != JobState.DONE)
 
+# Until when leases are valid. Heartbeats change nothing else: a narrow row, no column of an index.
+leases = Table(
+    "leases",
+    metadata,
+    Column("job_id", Text, primary_key=True),
+    Column("token", BigInteger, nullable=False),
+    time_column("expires_at", now=True),
+)
+
 sweeps = Table(
     "sweeps",
     metadata,

@@ -18,6 +18,8 @@ from buildarena_store.states import VERIFY_QUEUE
 
 REAPER_LOCK = 0x726561706572  # "reaper"
 PERIOD_S = 1.0
+FORGETS_EVERY = 600
+"""Runs after which what is known of old leases is removed."""
 
 log = structlog.get_logger(__name__)
 
@@ -33,6 +35,7 @@ class Reaper:
     def __init__(self, context: Context, *, period_s: float = PERIOD_S) -> None:
         self._context = context
         self._most: dict[str, int] = {}
+        self._runs = 0
         self._thread = Periodic(self._reap_safely, name="reaper", period_s=period_s)
 
     def start(self) -> None:
@@ -69,6 +72,9 @@ class Reaper:
                 self._context.queues.announce(VERIFY_QUEUE, checks)
             # So that whoever reads the counts first after a year finds little to add.
             self._context.store.metrics.gather()
+            self._runs += 1
+            if self._runs % FORGETS_EVERY == 1:
+                self._context.store.leases.forget_ended()
 
     def _notify(self, queue: str) -> None:
         """Notifies a queue's workers; of twice as many jobs each time they have taken all."""

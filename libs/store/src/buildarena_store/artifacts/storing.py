@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -22,8 +23,20 @@ from buildarena_store.errors import (
 )
 
 if TYPE_CHECKING:
-    from obstore.store import S3Config
+    from obstore.store import ClientConfig, S3Config
 
+CLOUDS: Final = ("s3://", "s3a://", "gs://", "az://", "adl://", "abfs://", "abfss://", "https://")
+"""What URLs of stores begin with that are asked over the network."""
+CLIENT_OPTIONS: Final = (
+    "allow_http",
+    "allow_invalid_certificates",
+    "connect_timeout",
+    "proxy_ca_certificate",
+    "proxy_excludes",
+    "proxy_url",
+    "timeout",
+)
+"""Of connections, what an environment may say (obstore's names)."""
 HASH_LENGTH: Final = 64
 TRASH: Final = "trash"
 PROBE_BYTES: Final = 64 * 1024
@@ -53,16 +66,30 @@ def open_objects(
     """
     text = str(location)
     if "://" in text:
-        return from_url(
-            text,
-            config=cast("S3Config", dict(options)) if options else None,
-            client_options={
-                "connect_timeout": timedelta(seconds=min(CONNECT_S, timeout_s)),
-                "timeout": timedelta(seconds=timeout_s),
-            },
-            retry_config={"max_retries": 3, "retry_timeout": timedelta(seconds=timeout_s)},
-        )
+        if text.startswith(CLOUDS):
+            return from_url(
+                text,
+                config=cast("S3Config", dict(options)) if options else None,
+                client_options=_client_options(text, options or {}, timeout_s),
+                retry_config={"max_retries": 3, "retry_timeout": timedelta(seconds=timeout_s)},
+            )
+        return from_url(text)
     return LocalStore(prefix=Path(text).absolute(), mkdir=True, automatic_cleanup=folders_go)
+
+
+def _client_options(location: str, options: Mapping[str, str], timeout_s: float) -> ClientConfig:
+    """Time limits, beside what the environment says of connections, which they would hide."""
+    prefix = "AWS_" if location.startswith(("s3://", "s3a://")) else ""
+    known = {f"{prefix}{name.upper()}": name for name in CLIENT_OPTIONS}
+    given = {**os.environ, **options}
+    return cast(
+        "ClientConfig",
+        {
+            "connect_timeout": f"{min(CONNECT_S, timeout_s):g} seconds",
+            "timeout": f"{timeout_s:g} seconds",
+            **{known[name]: value for name, value in given.items() if name in known},
+        },
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

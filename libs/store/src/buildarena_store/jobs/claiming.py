@@ -15,6 +15,9 @@ from buildarena_store.states import JobState
 OPERATOR = ""
 """Who owns the jobs that no API key submitted."""
 
+LEFT_ALONE = "1 day"
+"""How long programs of 1.0.0rc1, which know the column of `jobs` only, leave a lease alone."""
+
 _OWNER = "COALESCE(owner, '')"
 _QUEUED = f"state = '{JobState.QUEUED}' AND queue = :queue"
 _WAITS = f"{_QUEUED} AND available_at <= clock_timestamp()"
@@ -50,7 +53,7 @@ CLAIM = text(
             state = '{JobState.RUNNING}',
             lease_owner = :owner,
             lease_token = lease_token + 1,
-            lease_expires_at = clock_timestamp() + :duration,
+            lease_expires_at = clock_timestamp() + interval '{LEFT_ALONE}',
             started_at = COALESCE(started_at, clock_timestamp())
         WHERE id = COALESCE(
             (SELECT id FROM jobs WHERE {_WAITS} AND faults > 0 AND {_ROOM}
@@ -65,6 +68,10 @@ CLAIM = text(
              ) AS oldest LIMIT 1)
         )
         RETURNING *
+    ), leased AS (
+        INSERT INTO leases (job_id, token, expires_at)
+        SELECT id, lease_token, clock_timestamp() + :duration FROM taken
+        ON CONFLICT (job_id) DO UPDATE SET token = excluded.token, expires_at = excluded.expires_at
     ), attempted AS (
         INSERT INTO attempts (job_id, token, stage, worker)
         SELECT id, lease_token, stage, lease_owner FROM taken

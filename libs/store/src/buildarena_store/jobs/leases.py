@@ -10,14 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Any
+from typing import Any, Final
 
 from sqlalchemy import (
     Boolean,
     ColumnElement,
     Connection,
+    Update,
     and_,
     case,
+    delete,
     func,
     literal,
     literal_column,
@@ -37,9 +39,12 @@ from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, RUNNER, requir
 from buildarena_store.rows import value_of
 from buildarena_store.states import AttemptResult, JobState, Outcome, Stage
 from buildarena_store.tables import jobs
+from buildarena_store.tables import leases as expiries
 
 LONGEST_DELAY_S = 300.0
 """A job waits no longer than this between two attempts."""
+REMEMBERED: Final = timedelta(hours=1)
+"""How long it is known when a lease ended."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,13 +153,16 @@ class Leases:
         if not leases:
             return {}
         with self._database.statement() as connection:
-            rows = connection.execute(
-                update(jobs)
-                .where(_among(leases))
-                .values(lease_expires_at=events.now + self.duration)
-                .returning(jobs.c.id, _BUDGETED)
-            )
+            rows = connection.execute(self.renewal(_among(leases)).returning(jobs.c.id, _BUDGETED))
             return {row.id: row.budgeted for row in rows}
+
+    def renewal(self, held: ColumnElement[bool]) -> Update:
+        """The statement that renews the leases of some jobs; it may return columns of `jobs`."""
+        return (
+            update(expiries)
+            .where(expiries.c.job_id == jobs.c.id, expiries.c.token == jobs.c.lease_token, held)
+            .values(expires_at=events.now + self.duration)
+        )
 
     def held(self, leases: Sequence[Lease]) -> dict[str, bool]:
         """Says what `heartbeat` says, without renewing anything: it only reads."""
@@ -320,7 +328,7 @@ class Leases:
         with self._database.transaction() as connection:
             lost = (
                 select(jobs.c.id)
-                .where(jobs.c.state == JobState.RUNNING, jobs.c.lease_expires_at < events.now)
+                .where(jobs.c.state == JobState.RUNNING, events.now > EXPIRES_AT)
                 .with_for_update(skip_locked=True)
             )
             rows = connection.execute(
@@ -355,7 +363,30 @@ class Leases:
             )
         return [row.id for row in rows if row.state == JobState.QUEUED]
 
+    def forget_ended(self) -> None:
+        """Removes what is known of leases that ended an hour ago or earlier."""
+        theirs = and_(
+            jobs.c.id == expiries.c.job_id,
+            jobs.c.lease_token == expiries.c.token,
+            jobs.c.state == JobState.RUNNING,
+        )
+        with self._database.transaction() as connection:
+            connection.execute(
+                delete(expiries).where(
+                    expiries.c.expires_at < events.now - REMEMBERED,
+                    ~select(jobs.c.id).where(theirs).exists(),
+                )
+            )
 
+
+# Jobs that a program of 1.0.0rc1 claimed have no row of their own.
+EXPIRES_AT: Final = func.coalesce(
+    select(expiries.c.expires_at)
+    .where(expiries.c.job_id == jobs.c.id, expiries.c.token == jobs.c.lease_token)
+    .scalar_subquery(),
+    jobs.c.lease_expires_at,
+)
+"""When the lease of a running job ends."""
 _BUDGETED = (
     select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
 )

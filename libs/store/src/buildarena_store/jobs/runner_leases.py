@@ -11,13 +11,13 @@ from collections.abc import Collection, Mapping, Sequence
 from datetime import timedelta
 from typing import Final
 
-from sqlalchemy import ColumnElement, and_, func, literal_column, select, true, tuple_, update
+from sqlalchemy import ColumnElement, and_, func, literal_column, select, true, tuple_
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.job import Job
-from buildarena_store.jobs.leases import Lease, Leases
+from buildarena_store.jobs.leases import EXPIRES_AT, Lease, Leases
 from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, OTHERS_REFUSED, RUNNER
 from buildarena_store.rows import columns_of, value_of
 from buildarena_store.states import AttemptResult, JobState
@@ -59,7 +59,7 @@ class RunnerLeases:
         query = select(*_COLUMNS).where(
             jobs.c.state == JobState.RUNNING,
             jobs.c.lease_owner == owner,
-            jobs.c.lease_expires_at > events.now,
+            events.now < EXPIRES_AT,
         )
         with self._database.statement() as connection:
             row = connection.execute(query.limit(1)).first()
@@ -124,12 +124,8 @@ class RunnerLeases:
             )
             .exists()
         )
-        statement = (
-            update(jobs)
-            .where(_among(named), _begins(jobs.c.lease_owner, prefix), young)
-            .values(lease_expires_at=events.now + self._leases.duration)
-            .returning(jobs.c.id, jobs.c.lease_token)
-        )
+        held = and_(_among(named), _begins(jobs.c.lease_owner, prefix), young)
+        statement = self._leases.renewal(held).returning(jobs.c.id, jobs.c.lease_token)
         with self._database.statement() as connection:
             return {(row.id, row.lease_token) for row in connection.execute(statement)}
 
