@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from buildarena_api.app import MAX_CONNECTIONS
+from buildarena_pipeline.runtime.worker_process import CONNECTIONS_OF_FORKS, CONNECTIONS_OF_THREADS
+
 COSTS: Final = Path(__file__).with_name("costs.json")
 USED: Final = 0.6
 """Share of a processor that a part is planned for."""
@@ -23,6 +26,8 @@ DAY_S: Final = 86_400
 MEASURED_LEASE_S: Final = 10.0
 COMMANDS_PER_VALKEY: Final = 100_000
 """Commands a second that one Valkey, which has one thread for them, is trusted with."""
+POSTGRES_CONNECTIONS: Final = 500
+"""More than these want a pooler between processes and Postgres."""
 POSTGRES_CORES: Final = 32
 POSTGRES_LOG_MB_S: Final = 100.0
 """Above these one Postgres is not planned for: a machine's cores, and what replicas can follow."""
@@ -55,6 +60,7 @@ class Need:
         construct: Construct processes.
         simulators: Simulation workers of two trials at once.
         api: API processes, for the service's own sake; people's reading comes on top.
+        postgres_connections: Connections that all processes together may open.
         postgres_cores: Cores that Postgres uses.
         postgres_log_mb_s: Megabytes a second of its log.
         postgres_gb_day: Gigabytes a day that its tables grow.
@@ -67,6 +73,7 @@ class Need:
     construct: int
     simulators: int
     api: int
+    postgres_connections: int
     postgres_cores: float
     postgres_log_mb_s: float
     postgres_gb_day: float
@@ -77,6 +84,8 @@ class Need:
     def limits(self) -> list[str]:
         """Parts that one server no longer bears."""
         found = []
+        if self.postgres_connections > POSTGRES_CONNECTIONS:
+            found.append("Postgres' connections: a pooler")
         if self.postgres_cores > POSTGRES_CORES * USED:
             found.append("Postgres' processors")
         if self.postgres_log_mb_s > POSTGRES_LOG_MB_S * USED:
@@ -84,6 +93,18 @@ class Need:
         if self.valkey_share > USED:
             found.append("Valkey")
         return found
+
+
+def connections(*, api: int, construct: int, trials: int) -> int:
+    """Connections to Postgres that processes may open.
+
+    Args:
+        api: API processes.
+        construct: Construct processes.
+        trials: Trials that simulation workers run at once; each is a process.
+    """
+    forks = trials * 2 * CONNECTIONS_OF_FORKS
+    return api * MAX_CONNECTIONS + construct * CONNECTIONS_OF_THREADS + forks
 
 
 def need(load: Load, costs: dict[str, Any]) -> Need:
@@ -99,15 +120,21 @@ def need(load: Load, costs: dict[str, Any]) -> Need:
 
     jobs_s = turns_s / costs["turns_per_job"]
     trial_cores = turns_s * turn["mujoco worker cpu_ms"] * load.trial_factor / 1000
+    construct = max(
+        math.ceil(load.sessions / SESSIONS_PER_PROCESS),
+        math.ceil(per_s("construct worker cpu_ms") / 1000 / USED),
+    )
+    simulators = math.ceil(trial_cores / CORES_PER_SIMULATOR / USED)
+    api = max(1, math.ceil(per_s("api cpu_ms") / 1000 / USED))
     return Need(
         turns_s=turns_s,
         jobs_day=jobs_s * DAY_S,
-        construct=max(
-            math.ceil(load.sessions / SESSIONS_PER_PROCESS),
-            math.ceil(per_s("construct worker cpu_ms") / 1000 / USED),
+        construct=construct,
+        simulators=simulators,
+        api=api,
+        postgres_connections=connections(
+            api=api, construct=construct, trials=simulators * CORES_PER_SIMULATOR
         ),
-        simulators=math.ceil(trial_cores / CORES_PER_SIMULATOR / USED),
-        api=max(1, math.ceil(per_s("api cpu_ms") / 1000 / USED)),
         postgres_cores=per_s("postgres cpu_ms") / 1000,
         postgres_log_mb_s=per_s("postgres log bytes") / 1e6,
         postgres_gb_day=turns_s * turn["postgres stored bytes"] * DAY_S / 1e9,
@@ -136,6 +163,7 @@ def table(costs: dict[str, Any]) -> str:
         ("construct processes", [f"{one.construct:,}" for one in needs]),
         ("simulation workers (2 at once)", [f"{one.simulators:,}" for one in needs]),
         ("API processes", [f"{one.api:,}" for one in needs]),
+        ("Postgres, connections at most", [f"{one.postgres_connections:,}" for one in needs]),
         ("Postgres, cores used", [f"{one.postgres_cores:,.2f}" for one in needs]),
         ("Postgres, log MB/s", [f"{one.postgres_log_mb_s:,.2f}" for one in needs]),
         ("Postgres, growth GB/day", [f"{one.postgres_gb_day:,.2f}" for one in needs]),

@@ -1,10 +1,19 @@
 """The sizing model: more costs more, and the document says what the model says."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.sizing.sizing_model import COSTS, LOADS, Load, need, table
+from benchmarks.sizing.sizing_model import (
+    CORES_PER_SIMULATOR,
+    COSTS,
+    LOADS,
+    Load,
+    connections,
+    need,
+    table,
+)
 
 ROOT = Path(__file__).parents[2]
 
@@ -34,3 +43,22 @@ def test_slower_models_need_fewer_simulators_for_as_many_sessions() -> None:
     fast, slow = (need(Load(sessions=10_000, reply_s=reply_s), MEASURED) for reply_s in (5.0, 50.0))
     assert fast.simulators > 5 * slow.simulators
     assert fast.construct >= slow.construct
+
+
+def test_composes_postgres_takes_all_connections_that_its_hints_can_open() -> None:
+    compose = (ROOT / "docker-compose.yml").read_text()
+    (most,) = map(int, re.findall(r"max_connections=(\d+)", compose))
+    hints = [*compose.splitlines(), *(ROOT / "docs/deploying.md").read_text().splitlines()]
+    scales = [dict(re.findall(r"--scale ([a-z-]+)=(\d+)", hint)) for hint in hints]
+    assert any(scales)
+    for scale in scales:
+        asked = {"api": 1, "construct": 1, "simulate-mujoco": 1, "simulate-pybullet": 1}
+        asked |= {name: int(number) for name, number in scale.items()}
+        simulators = asked["simulate-mujoco"] + asked["simulate-pybullet"]
+        opened = connections(
+            api=asked["api"],
+            construct=asked["construct"],
+            trials=simulators * CORES_PER_SIMULATOR,
+        )
+        # Postgres keeps three for its superuser; commands, backups and checks take a few.
+        assert opened <= most - 3 - 20, scale

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import psycopg
 from alembic import command
 from alembic.config import Config
 from alembic.script import ScriptDirectory
@@ -83,16 +84,31 @@ def ping_after_idling(engine: Engine) -> None:
             raise DisconnectionError from error
 
 
-def _connect_args(url: str) -> dict[str, str | int]:
+def greet_servers(engine: Engine) -> None:
+    """Tells the server when to give up a connection that died, and finds out about poolers.
+
+    A pooler that hands out servers by the transaction, such as PgBouncer, invents the process id
+    that a connection begins with, takes no settings with it, and gives the next statement to
+    another server: prepared statements, which belong to one server, are left out there.
+    """
+    # What the URL asks for itself goes before.
+    ours = {} if "options" in engine.url.query else GIVEN_UP_THERE
+    limits = "".join(f", set_config('{name}', '{value}', false)" for name, value in ours.items())
+
+    @event.listens_for(engine, "connect")
+    def _greet(connection: psycopg.Connection, _: ConnectionPoolEntry) -> None:
+        with connection.cursor() as cursor:
+            cursor.execute(f"SELECT pg_backend_pid(){limits}".encode())
+            served_by, *_limits = cursor.fetchone() or (None,)
+        connection.commit()
+        if served_by != connection.info.backend_pid:
+            connection.prepare_threshold = None
+
+
+def _connect_args(url: str, name: str) -> dict[str, str | int]:
     """What connections are made with; what the URL itself asks for goes before ours."""
     asked = make_url(url).query
-    there = " ".join(f"-c {name}={value}" for name, value in GIVEN_UP_THERE.items())
-    ours: dict[str, str | int] = {
-        "connect_timeout": 5,
-        "application_name": "buildarena",
-        "options": there,
-        **GIVEN_UP,
-    }
+    ours: dict[str, str | int] = {"connect_timeout": 5, "application_name": name, **GIVEN_UP}
     return {name: value for name, value in ours.items() if name not in asked}
 
 
@@ -111,6 +127,7 @@ class Database:
         pool_size: Connections kept open.
         pool_timeout_s: How long one waits for a connection before it is refused.
         overflow: Further connections that may open for a moment; by default as many again.
+        name: What Postgres lists the connections as (``application_name``).
     """
 
     def __init__(
@@ -120,6 +137,7 @@ class Database:
         pool_size: int = 5,
         pool_timeout_s: float = 30.0,
         overflow: int | None = None,
+        name: str = "buildarena",
     ) -> None:
         self.url = url.replace("postgresql://", "postgresql+psycopg://", 1)
         self.engine: Engine = create_engine(
@@ -128,8 +146,9 @@ class Database:
             max_overflow=pool_size if overflow is None else overflow,
             pool_timeout=pool_timeout_s,
             pool_recycle=1800,
-            connect_args=_connect_args(self.url),
+            connect_args=_connect_args(self.url, name),
         )
+        greet_servers(self.engine)
         ping_after_idling(self.engine)
         self._autocommit = self.engine.execution_options(isolation_level="AUTOCOMMIT")
 

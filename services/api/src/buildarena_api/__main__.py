@@ -8,7 +8,7 @@ from importlib import import_module
 
 from sqlalchemy.exc import OperationalError
 
-from buildarena_api.app import create_app
+from buildarena_api.app import POOL_SIZE, create_app
 from buildarena_api.http.access import check_binding
 from buildarena_api.http.own_pool import POOL_TIMEOUT_S
 from buildarena_api.http.serving import serve
@@ -22,7 +22,6 @@ from buildarena_pipeline.runtime.settings import load_settings
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
-POOL_SIZE = 10
 SWITCH_S = 0.0001
 """How long a thread may keep the interpreter: a light question asks for it some twenty times, and
 waits so long each time while a heavy one is being answered."""
@@ -44,7 +43,9 @@ def main() -> None:
         check_binding(settings)
         tracing = Tracing("api", settings.otlp_endpoint)
         registry = load_registry(settings.models_file)
-        context = open_context(settings, pool_size=POOL_SIZE, pool_timeout_s=POOL_TIMEOUT_S)
+        context = open_context(
+            settings, pool_size=POOL_SIZE, pool_timeout_s=POOL_TIMEOUT_S, name="buildarena-api"
+        )
         context.store.database.require_schema()
     except (StartupError, SchemaVersionError, ValueError) as error:
         sys.exit(f"api: {error}")

@@ -37,7 +37,7 @@ from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
-from buildarena_api.probes import Probes
+from buildarena_api.probes import PROBERS, Probes
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
     archives,
@@ -72,10 +72,14 @@ from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.submission.submission import Submissions
 
+POOL_SIZE = 10
+"""Connections for ordinary requests."""
 WATCHERS = 3
 """Threads and connections for key checks and event streams."""
 EXPORTERS = 4
 """Threads and connections for exports and archives: as many as may go on at once, two of each."""
+MAX_CONNECTIONS = 2 * (POOL_SIZE + WATCHERS + EXPORTERS + PROBERS)
+"""Connections to Postgres that a process may open; half of them stay open."""
 ORDINARY = (
     verifications,
     sessions,

@@ -29,6 +29,9 @@ ARTIFACTS_FRESH_S: Final = 5.0
 VALUES_FRESH_S: Final = 10.0
 """Several scrapes within this time share one reading of the service's figures."""
 
+PROBERS: Final = 2
+"""Parts that ask the database."""
+
 T_co = TypeVar("T_co", covariant=True)
 
 
@@ -170,7 +173,7 @@ class Probes:
 
     def __init__(self, context: Context) -> None:
         settings = context.settings
-        self._pool = OwnPool(context, size=2, name="probing")
+        self._pool = OwnPool(context, size=PROBERS, name="probing")
         self._context = self._pool.context
         # With short time limits, which would be wrong for large artifacts.
         self._artifacts = ArtifactStore(

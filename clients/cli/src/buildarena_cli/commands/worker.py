@@ -159,10 +159,10 @@ def _database() -> Iterator[Database]:
     from buildarena_store import Database
 
     try:
-        url = load_settings().required_database_url()
+        url = load_settings().direct_database_url()
     except (StartupError, ValueError) as error:
         raise CommandError(str(error)) from error
-    database = Database(url)
+    database = Database(url, name="buildarena-command")
     try:
         yield database
     finally:

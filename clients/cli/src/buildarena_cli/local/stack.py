@@ -124,7 +124,8 @@ class Stack:
         _require_free_port(self.settings.host, self.settings.port)
         environment = self.environment = self._start_servers()
         self._tell("migrating the database")
-        database = Database(environment["BUILDARENA_DATABASE_URL"])
+        direct = self.settings.database_direct_url
+        database = Database(direct or environment["BUILDARENA_DATABASE_URL"])
         database.migrate()
         database.close()
         for program in programs(self._simulators):

@@ -32,6 +32,7 @@ def open_context(
     pool_size: int = 5,
     pool_timeout_s: float = 30.0,
     overflow: int | None = None,
+    name: str = "buildarena",
 ) -> Context:
     """Connects to what the settings name; nothing is contacted before it is used.
 
@@ -39,9 +40,10 @@ def open_context(
     """
     database = Database(
         settings.required_database_url(),
-        pool_size=pool_size,
+        pool_size=settings.database_connections or pool_size,
         pool_timeout_s=pool_timeout_s,
         overflow=overflow,
+        name=name,
     )
     store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
     return Context(

@@ -47,6 +47,7 @@ OWN_PATHS: Final = frozenset(
 """First parts of the API's and the dashboard's own paths; none can be a base path's."""
 SECRETS: Final = (
     "database_url",
+    "database_direct_url",
     "broker_url",
     "artifacts_url",
     "admin_key",
@@ -101,6 +102,22 @@ class Settings(BaseSettings):
     )
     database_url: Annotated[
         str | None, Field(description="Postgres to use instead of the embedded one")
+    ] = None
+    database_direct_url: Annotated[
+        str | None,
+        Field(
+            description="The same Postgres past a pooler such as PgBouncer, for migrations, "
+            "backups and collections; default BUILDARENA_DATABASE_URL"
+        ),
+    ] = None
+    database_connections: Annotated[
+        int | None,
+        Field(
+            description="Connections to Postgres that a process keeps for its work; it may open as "
+            "many again for a moment, and an API has 9 more",
+            ge=1,
+            le=100,
+        ),
     ] = None
     broker_url: Annotated[
         str | None, Field(description="Redis or Valkey to use instead of the embedded one")
@@ -315,6 +332,14 @@ class Settings(BaseSettings):
                 "or set it to postgresql://user:password@host:port/name"
             )
         return self.database_url
+
+    def direct_database_url(self) -> str:
+        """The database's URL past any pooler, for what needs one server for longer than a moment.
+
+        Raises:
+            ValueError: None was set.
+        """
+        return self.database_direct_url or self.required_database_url()
 
     def required_broker_url(self) -> str:
         """The broker's URL.

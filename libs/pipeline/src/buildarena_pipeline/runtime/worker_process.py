@@ -35,6 +35,8 @@ CONNECTIONS_OF_THREADS = 16
 """Connections of a process of many threads: its sessions keep their replies at the same time, and
 Postgres writes what comes together to its disk at once. All stay open, because a crowd that opens
 and closes further ones pays more for these than for what it writes."""
+CONNECTIONS_OF_FORKS = 2
+"""Connections that a process with one job at a time keeps; as many again open for a moment."""
 
 
 class SideWork(Protocol):
@@ -74,10 +76,13 @@ class _Runtime:
     """The connections, threads and handler of one process that does stages."""
 
     def __init__(self, spec: WorkerSpec, settings: Settings) -> None:
+        name = f"buildarena-{spec.kind}"
         if spec.pool == THREADS:
-            self.context = open_context(settings, pool_size=CONNECTIONS_OF_THREADS, overflow=0)
+            self.context = open_context(
+                settings, pool_size=CONNECTIONS_OF_THREADS, overflow=0, name=name
+            )
         else:
-            self.context = open_context(settings)
+            self.context = open_context(settings, pool_size=CONNECTIONS_OF_FORKS, name=name)
         self.tracing = Tracing(f"{spec.kind}-worker", settings.otlp_endpoint)
         self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
         self._spec = spec

@@ -36,7 +36,10 @@ class OwnPool:
     def __init__(self, context: Context, *, size: int, name: str) -> None:
         settings = context.settings
         database = Database(
-            settings.required_database_url(), pool_size=size, pool_timeout_s=POOL_TIMEOUT_S
+            settings.required_database_url(),
+            pool_size=size,
+            pool_timeout_s=POOL_TIMEOUT_S,
+            name=f"buildarena-api {name}",
         )
         store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
         self.context = replace(context, store=store, tasks=TaskCatalog(store.tasks))
