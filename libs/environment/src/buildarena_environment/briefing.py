@@ -86,7 +86,7 @@ def briefing(
         main=MAIN,
         assembly=ASSEMBLY,
         checks=_checks(task),
-        modules=modules_told(task.constraints, data_sheets=data_sheets),
+        modules=modules_told(task, data_sheets=data_sheets),
         **values,
     )
 
@@ -108,17 +108,20 @@ def worlds_told(worlds: int) -> str:
     )
 
 
-def modules_told(constraints: Constraints, *, data_sheets: bool) -> str:
+def modules_told(task: Task, *, data_sheets: bool) -> str:
     """What a builder reads about its modules: all of them, or how to look them up.
 
     Args:
-        constraints: The task's.
+        task: The task.
         data_sheets: Whether modules have their data with them, and the world's follow.
     """
+    constraints = task.constraints
     catalogue = catalogue_told(constraints, data_sheets=data_sheets)
     names = modules_named(constraints.modules)
     told = lookup_text(catalogue) if constraints.on_demand else modules_text(catalogue, names)
-    return f"{told}\n\n**World.** {world_text(catalogue, names)}" if data_sheets else told
+    if not data_sheets:
+        return told
+    return f"{told}\n\n**World.** {world_text(catalogue, names, task.unknowns)}"
 
 
 def catalogue_told(constraints: Constraints, *, data_sheets: bool) -> Catalogue:

@@ -171,7 +171,8 @@ class Verifier:
             *_usage_checks(job, host.usage),
             *reasons,
         ]
-        best = best_rollout(exact) if any(record.finished_at for record in exact) else None
+        done = any(record.finished_at for record in exact)
+        best = best_rollout(exact, session.task) if done else None
         varied: list[Check] = []
         for record, (machine, controls) in zip(exact, host.simulated, strict=False):
             checks += self._rollout_checks(job, record, machine, controls)
@@ -191,12 +192,19 @@ class Verifier:
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = bench_of(task_of(job, self._tasks), data_sheets=has_data_sheets(job.track_config))
-        repeated = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
+        repeated, tested = [], []
+        for call in calls:
+            repeated.append(bench.call(call.machine, call.tool, call.arguments))
+            if len(tested) < bench.tests:
+                tested.append(bench.submitted().copy())
         checks = [compare("calls", _feedback_of(calls), _feedback_of(repeated))]
         chosen = bench.result()
-        return checks + self._trial_checks(job, None if chosen is None else chosen[1])
+        return checks + self._trial_checks(job, None if chosen is None else chosen[1], tested)
 
-    def _trial_checks(self, job: Job, machine: Machine | None) -> list[Check]:
+    def _trial_checks(
+        self, job: Job, machine: Machine | None, tested: Sequence[Machine] = ()
+    ) -> list[Check]:
+        """What came of a machine, and of those in the test trials before."""
         checks = []
         records = self._store.rollouts.read(job.id)
         if machine is not None:
@@ -204,9 +212,11 @@ class Verifier:
                 broken = broken_constraint(task_of(job, self._tasks), machine)
                 kept = None if records else job.reason
                 checks.append(compare("reason", kept, None if broken is None else broken[0]))
-            for record in records:
-                if record.seed is None:
-                    checks += self._rollout_checks(job, record, machine, None)
+            exact = [record for record in records if record.seed is None]
+            tests = [record for record in exact if not record.final]
+            checks.append(compare("test trials", len(tests), len(tested)))
+            for record, tried in zip(exact, [*tested, machine], strict=False):
+                checks += self._rollout_checks(job, record, tried, None)
             if records:
                 checks += self._world_checks(job, records, machine, None)
         return checks + self._score_checks(job, machine, records)
@@ -220,7 +230,8 @@ class Verifier:
     ) -> list[Check]:
         """Whether the best machine was tried in as many varied worlds as the track says."""
         varied = varied_rollouts(records)
-        tried = best_rollout(records).trajectory_hash is not None
+        best = best_rollout(records, task_of(job, self._tasks))
+        tried = best.trajectory_hash is not None
         worlds = worlds_of(job.track_config) if tried else 0
         checks = [compare("worlds", len({record.seed for record in varied}), worlds)]
         for record in varied:
@@ -353,9 +364,10 @@ class Verifier:
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]
     ) -> list[Check]:
-        counted: JobScore | Score = failed_score(task_of(job, self._tasks), machine)
+        task = task_of(job, self._tasks)
+        counted: JobScore | Score = failed_score(task, machine)
         if any(record.finished_at for record in records):
-            counted = rollout_score(job, records)
+            counted = rollout_score(job, task, records)
         return [
             compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
         ]

@@ -46,6 +46,7 @@ MESSAGES = (
     "control",
     "control_again",
     "control_success",
+    "control_tested",
     "no_plan",
     "program_again",
     "go_on",

@@ -60,13 +60,14 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
         if not isinstance(played, _Round):
             return played
         records.append(played.record)
-        if played.record.success or final:
+        # A trial that counts is the last where a task has test trials.
+        if played.record.success or final or session.task.tests:
             break
         ended = _caught(partial(_report, session, played, number, loop))
         if ended is not None:
             return ended
     if records:
-        return Finished(best=best_rollout(records))
+        return Finished(best=best_rollout(records, session.task))
     assert failure is not None, "a loop has at least one round"  # noqa: S101 - ours
     return failure
 

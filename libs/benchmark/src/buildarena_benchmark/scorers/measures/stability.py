@@ -103,7 +103,11 @@ def _bound(
             for module in modules
         ]
     )
-    push = GRAVITY * max(scenario.drive_strength, 1.0) * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
+    push = (
+        GRAVITY
+        * max(scenario.drive_strength, 1.0)
+        * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
+    )
     gained = np.concatenate([[0.0], np.cumsum(push[1:] * np.diff(trajectory.time_s[: len(push)]))])
     spin = max((module.motor.speed for module in modules if module.motor), default=0.0)
     extent = start.max(axis=0) - start.min(axis=0)
