@@ -172,19 +172,12 @@ def _manage(client: Client, tool: str, arguments: Arguments) -> types.CallToolRe
     if tool == "open_session":
         opened = client.post("/v1/sessions", arguments)
         return _result(_opened(opened))
-    if tool == "test":
-        client.post(at("sessions", checked_id("job", arguments["session"]), "tests"), {})
-        return _result("The machine is being tried; get_result tells what was measured.")
-    if tool == "submit":
-        job = client.post(at("sessions", checked_id("job", arguments["session"]), "submit"), {})
+    if tool in ("test", "submit"):
+        way = "tests" if tool == "test" else tool
+        job = client.post(at("sessions", checked_id("job", arguments["session"]), way), {})
         return _result(_ended(job))
     if tool == "get_result":
-        session = checked_id("job", arguments["session"])
-        job = client.get(at("jobs", session))
-        if job["outcome"] is not None:
-            return _result(_ended(job))
-        tests = client.get(at("sessions", session))["tests"]
-        return _result("\n\n".join([_ended(job), *(_tested(test) for test in tests)]))
+        return _result(_so_far(client, checked_id("job", arguments["session"])))
     return _result(f"there is no tool {tool!r}", failed=True)
 
 
@@ -196,6 +189,14 @@ def _opened(session: Mapping[str, Any]) -> str:
             "tells what is built."
         )
     return "\n\n".join([*lines, session["briefing"]])
+
+
+def _so_far(client: Client, session: str) -> str:
+    job = client.get(at("jobs", session))
+    if job["outcome"] is not None:
+        return _ended(job)
+    tests = client.get(at("sessions", session))["tests"]
+    return "\n\n".join([_ended(job), *(_tested(test) for test in tests)])
 
 
 def _tested(test: Mapping[str, Any]) -> str:

@@ -134,9 +134,9 @@ class Environment:
         simulator: Name of the engine that tries machines.
         seed: Varies where machine and cargo start, as a fair repetition would, and draws what a
             family's task has drawn; None for the exact start, which the service has, and seed 0's.
-        rounds: How often a builder may submit; a successful trial ends the episode. Where a task has
-            test trials there is one submission more than those, whatever is given: the last one
-            counts, and nothing before ends the episode.
+        rounds: How often a builder may submit; a successful trial ends the episode. A task with
+            test trials has one submission more than those, whatever is given: the last one counts,
+            and nothing before ends the episode.
         limits: How long an episode may be.
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
         reference: The indicator that is worth 1; the task's reference where there is one.

@@ -192,7 +192,8 @@ class Verifier:
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = bench_of(task_of(job, self._tasks), data_sheets=has_data_sheets(job.track_config))
-        repeated, tested = [], []
+        repeated: list[ExternalCall] = []
+        tested: list[Machine] = []
         for call in calls:
             repeated.append(bench.call(call.machine, call.tool, call.arguments))
             if len(tested) < bench.tests:

@@ -88,11 +88,18 @@ def _trials(messages: Sequence[Message]) -> list[Seen]:
     """Programs whose trial was told, each with its figures."""
     seen = []
     for said, heard in pairwise(messages):
-        measured = _MEASURED.search(heard.text)
-        if said.role == "assistant" and heard.role == "user" and measured is not None:
-            figures = {name: float(value) for name, value in _FIGURE.findall(measured.group(1))}
+        figures = figures_of(heard.text)
+        if said.role == "assistant" and heard.role == "user" and figures:
             seen.append(Seen(program=json.loads(said.text), measured=figures))
     return seen
+
+
+def figures_of(text: str) -> dict[str, float]:
+    """The figures that a trial's result tells, by name; none in a text that tells of no trial."""
+    measured = _MEASURED.search(text)
+    if measured is None:
+        return {}
+    return {name: float(value) for name, value in _FIGURE.findall(measured.group(1))}
 
 
 def _first(pattern: re.Pattern[str], text: str) -> str:

@@ -29,6 +29,8 @@ _DRAG: Final = 0.3
 _FIRST_S: Final = 1.2
 """How long the first test trial pushes with all fans, seconds."""
 _BEGIN_S: Final = 0.5
+_NEAR: Final = 0.5
+"""Nothing is gained by coming nearer, units: what is told has three digits."""
 _STEP_S: Final = 0.002
 _LEAST_RATIO: Final = 1.35
 """Of push to weight: with less it hardly rises, with more its height hangs on hundredths."""
@@ -105,8 +107,11 @@ def _next(
     world = _fitted(rising[-1], _ranges(task.unknowns))
     keys = _enough(world, counts)
     count = sum(counts[key] for key in keys)
-    # What the model missed with the same fans is made up for by aiming as much elsewhere.
     same = [one for one in rising if one[0] == count]
+    nearest = min(same, key=lambda one: abs(one[2] - aim), default=None)
+    if nearest is not None and abs(nearest[2] - aim) <= _NEAR:
+        return keys, nearest[1]
+    # What the model missed with the same fans is made up for by aiming as much elsewhere.
     corrected = aim
     if same:
         predicted = _flight(world, count, same[-1][1])[0]
@@ -132,7 +137,7 @@ def _ranges(unknowns: Unknowns | None) -> Unknowns:
 
 
 def _fitted(tried: tuple[int, float, float, float], unknowns: Unknowns) -> _World:
-    """The world in which a trial would have gone as it did: the gravity whose top is at its time."""
+    """The world in which a trial would have gone as it did, by its rise and the time of its top."""
     count, hold_s, rise, top_s = tried
     low, high = unknowns.gravity or (_UNIT, _UNIT)
 
