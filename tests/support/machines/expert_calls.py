@@ -28,6 +28,12 @@ Call = dict[str, Any]
 def calls_of(task: str, seed: int = 0) -> list[Call]:
     """What builds and drives the expert's machine, call by call."""
     design = DESIGNS[task](seed)
+    answer = measured_for(design, task, seed) if design.steer else design.control or {}
+    return calls_with(design, answer)
+
+
+def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
+    """What builds a design, and does what its controller says."""
     calls = [
         call(name if design.assembly else MAIN, *action)
         for name, part in design.parts.items()
@@ -35,7 +41,6 @@ def calls_of(task: str, seed: int = 0) -> list[Call]:
     ]
     calls += [call(ASSEMBLY, *action) for action in design.assembly]
     whole = ASSEMBLY if design.assembly else MAIN
-    answer = _measured_for(design, task, seed) if design.steer else design.control or {}
     return calls + [call(whole, *action) for action in _control(answer)]
 
 
@@ -43,7 +48,7 @@ def call(machine: str, tool: str, arguments: Any) -> Call:
     return {"machine": machine, "tool": tool, "arguments": dict(arguments)}
 
 
-def _measured_for(design: Design, task: str, seed: int) -> Mapping[str, Any]:
+def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -> Mapping[str, Any]:
     """What the controller says once it has measured the world of a seed by its test trials."""
     assert design.steer is not None
     drawn = builtin_tasks()[task].drawn(seed)
@@ -59,7 +64,7 @@ def _measured_for(design: Design, task: str, seed: int) -> Mapping[str, Any]:
             KeyPress(time_s=press["time"], key=press["key"], hold_for_s=press["hold_for"])
             for press in program["control_sequence"]
         ]
-        trajectory = simulate(machine, drawn.scenario, "mujoco", controls=presses)
+        trajectory = simulate(machine, drawn.scenario, engine, controls=presses)
         told = score_text(drawn, score(drawn, machine, trajectory), trajectory)
         seen.append(Seen(program=program, measured=figures_of(told)))
     return design.steer(seen)

@@ -234,6 +234,10 @@ class TaskDocument(Document):
     ) -> Unknowns | None:
         scenario: Scenario | None = info.data.get("scenario")
         if unknowns is not None and scenario is not None:
+            if scenario.control.mode != "agent":
+                raise ValueError(
+                    "test trials need scenario.control.mode agent: keys are programmed"
+                )
             for end in (0, 1):
                 drawn_scenario(unknowns.at_end(end), scenario, seed=0)
         return unknowns
