@@ -41,7 +41,10 @@ export function TestTrials({ view }: { view: SessionView }) {
       <Accordion multiple variant="separated">
         {view.tests.map((test) => (
           <Accordion.Item key={test.number} value={String(test.number)}>
-            <Accordion.Control disabled={test.result === null} icon={test.result === null ? <Loader size="xs" /> : null}>
+            <Accordion.Control
+              disabled={test.result === null}
+              icon={test.result === null ? <Loader size="xs" /> : null}
+            >
               Test trial {test.number}: {test.result ?? "under way"}
             </Accordion.Control>
             <Accordion.Panel>
