@@ -46,6 +46,7 @@ MESSAGES = (
     "control",
     "control_again",
     "control_success",
+    "control_tests",
     "control_tested",
     "no_plan",
     "program_again",

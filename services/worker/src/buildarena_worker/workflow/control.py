@@ -66,6 +66,8 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         powered=_powered(machine),
         modules=driven_modules(session, machine),
     )
+    if task.tests:
+        opening += "\n\n" + pack.say("control_tests", tests=str(task.tests))
     dialogue = Dialogue(session, phase="control", opening=opening)
     controller = Role(name="controller", system=pack.roles["controller"])
     records: list[RolloutRecord] = []
