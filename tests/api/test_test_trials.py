@@ -24,8 +24,9 @@ def opened(api, **more) -> str:
     return answer.json()["id"]
 
 
-def act(api, session: str, tool: str, arguments: object):
-    answer = api.post(f"/v1/sessions/{session}/calls", json={"tool": tool, "arguments": arguments})
+def act(api, session: str, tool: str, arguments: object, **more: str):
+    body = {"tool": tool, "arguments": arguments, **more}
+    answer = api.post(f"/v1/sessions/{session}/calls", json=body)
     assert answer.json().get("ok"), answer.text
 
 
@@ -118,6 +119,23 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(api, 
     api.post(f"/v1/sessions/{session}/submit")
     work(context)
     assert api.get(f"/v1/jobs/{session}/trajectory").status_code == 200
+
+
+def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(api, context) -> None:
+    session = opened(api)
+    programmed(api, session, built(api, session).steer([]))
+    assert api.post(f"/v1/sessions/{session}/tests").status_code == 202
+    work(context)
+    act(api, session, "start", {}, machine="other")
+    for name, east in (("main", 0), ("other", 40)):
+        copied = {"machine_id": name, "init_shift": [east, 0, 0], "init_rotation": [0, 0, 0]}
+        act(api, session, "add_machine", copied, machine="assembly")
+    job = api.post(f"/v1/sessions/{session}/submit").json()
+    assert (job["outcome"], job["indicator"]) == ("construction_failed", 0.0), job
+    (check,) = context.store.verifications.request([session]).ids.values()
+    while verification_runner(context).process_one():
+        pass
+    assert context.store.verifications.get(check).verdict == "verified"
 
 
 def test_a_machine_that_breaks_a_rule_uses_up_no_test_trial(api) -> None:

@@ -20,6 +20,8 @@ from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_simulation import read_trajectory
 from buildarena_store import Job
+from buildarena_worker.builtin import expert
+from buildarena_worker.builtin.designs import risers
 from buildarena_worker.builtin.designs.risers import riser
 from buildarena_worker.wiring import verification_runner
 
@@ -94,6 +96,28 @@ def test_a_test_trial_counts_for_nothing_however_good_it_was(rollout) -> None:
     ]
     assert best_rollout(made, TASK).number == 5
     assert best_rollout(made, builtin_tasks()["transport-1"]).number == 0
+
+
+def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
+    context, submissions, monkeypatch
+) -> None:
+    """And a closed loop gives it no second set of test trials."""
+
+    def gives_up(bindings, counts, begin, seen):
+        return {} if len(seen) == 2 else risers_answer(bindings, counts, begin, seen)
+
+    risers_answer = risers._answer
+    monkeypatch.setattr(risers, "_answer", gives_up)
+    expert._design.cache_clear()
+    job = ended(context, submissions, workflow="builder", closed_loop={"rounds": 2})
+    assert (job.outcome, job.reason, job.indicator) == (
+        "construction_failed",
+        "control_invalid",
+        0.0,
+    )
+    assert len(context.store.rollouts.read(job.id)) == 2
+    assert verdict(context, job) == "verified"
+    expert._design.cache_clear()
 
 
 def test_rounds_of_a_closed_loop_give_no_further_trials(context, submissions) -> None:

@@ -203,8 +203,8 @@ def _tested(test: Mapping[str, Any]) -> str:
     if test["result"] is None:
         return f"Test trial {test['number']} is under way."
     rows = "\n".join(", ".join(f"{value:.2f}" for value in row) for row in test["trace"])
-    told = "Positions of what counts, each second (time, x, y, z):"
-    return f"Test trial {test['number']}: {test['result']}\n{told}\n{rows}"
+    heading = "Positions of what counts, each second (time, x, y, z):"
+    return f"Test trial {test['number']}: {test['result']}\n{heading}\n{rows}"
 
 
 def _ended(job: Mapping[str, Any]) -> str:

@@ -91,6 +91,24 @@ def briefing(
     )
 
 
+def trials_told(rounds: int, tests: int) -> str:
+    """What a builder reads of how often it may submit, in a sentence or two.
+
+    Args:
+        rounds: How often.
+        tests: Which of them are test trials: so many first ones.
+    """
+    if rounds == 1:
+        return "You submit once, and the machine has one trial."
+    each = f"You may submit {rounds} times, and the machine has one trial each time"
+    if tests:
+        return (
+            f"{each}: the first {tests} are test trials, and the last one counts, whatever came of "
+            "the others."
+        )
+    return f"{each}; the best one counts."
+
+
 def worlds_told(worlds: int) -> str:
     """What a builder reads of the varied worlds that its machine is scored in.
 

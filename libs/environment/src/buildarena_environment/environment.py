@@ -8,7 +8,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_benchmark import Task
-from buildarena_environment.briefing import briefing, catalogue_told
+from buildarena_environment.briefing import briefing, catalogue_told, trials_told
 from buildarena_environment.choices import checked_simulator, chosen_task, reference_of
 from buildarena_environment.errors import (
     EpisodeOverError,
@@ -35,14 +35,6 @@ if TYPE_CHECKING:
 
 DEFAULT_STEPS: Final = 2000
 """Steps that an episode may have unless it is given another limit."""
-ONCE: Final = "You submit once, and the machine has one trial."
-OFTEN: Final = (
-    "You may submit $rounds times, and the machine has one trial each time; the best one counts."
-)
-TESTED: Final = (
-    "You may submit $rounds times, and the machine has one trial each time: the first $tests are "
-    "test trials, and the last one counts, whatever came of the others."
-)
 LAST: Final = "That ends the episode."
 AGAIN: Final = "After each trial but the last you read what was measured and may build on."
 
@@ -196,17 +188,14 @@ class Environment:
     @property
     def observation(self) -> Observation:
         """What a builder has before its first step."""
-        guidelines = (
-            resources.files(__package__).joinpath("guidelines.md").read_text(encoding="utf-8")
-        )
+        file = resources.files(__package__).joinpath("guidelines.md")
+        guidelines = file.read_text(encoding="utf-8")
         text = briefing(
             self.task,
-            trials=ONCE if self.rounds == 1 else TESTED if self.task.tests else OFTEN,
+            trials=trials_told(self.rounds, self.task.tests),
             guidelines=guidelines,
             values={
                 "calls": f"{self.limits.steps:,}",
-                "rounds": str(self.rounds),
-                "tests": str(self.task.tests),
                 "after": LAST if self.rounds == 1 else AGAIN,
             },
             data_sheets=self.data_sheets,

@@ -22,7 +22,7 @@ from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.agents.workbench import bench_of
+from buildarena_pipeline.agents.workbench import bench_of, repeated
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import (
@@ -34,6 +34,7 @@ from buildarena_pipeline.catalog.tracks import (
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.scoring import (
     best_rollout,
+    has_counted,
     rollout_score,
     task_of,
     varied_rollouts,
@@ -171,8 +172,7 @@ class Verifier:
             *_usage_checks(job, host.usage),
             *reasons,
         ]
-        done = any(record.finished_at for record in exact)
-        best = best_rollout(exact, session.task) if done else None
+        best = best_rollout(exact, session.task) if has_counted(exact, session.task) else None
         varied: list[Check] = []
         for record, (machine, controls) in zip(exact, host.simulated, strict=False):
             checks += self._rollout_checks(job, record, machine, controls)
@@ -192,33 +192,28 @@ class Verifier:
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = bench_of(task_of(job, self._tasks), data_sheets=has_data_sheets(job.track_config))
-        repeated: list[ExternalCall] = []
-        tested: list[Machine] = []
-        for call in calls:
-            repeated.append(bench.call(call.machine, call.tool, call.arguments))
-            if len(tested) < bench.tests:
-                tested.append(bench.submitted().copy())
-        checks = [compare("calls", _feedback_of(calls), _feedback_of(repeated))]
-        chosen = bench.result()
-        return checks + self._trial_checks(job, None if chosen is None else chosen[1], tested)
+        made, tested = repeated(calls, bench)
+        checks = [compare("calls", _feedback_of(calls), _feedback_of(made))]
+        _, machine = bench.result() or ("", None)
+        return checks + self._trial_checks(job, machine, tested)
 
     def _trial_checks(
         self, job: Job, machine: Machine | None, tested: Sequence[Machine] = ()
     ) -> list[Check]:
         """What came of a machine, and of those in the test trials before."""
         checks = []
-        records = self._store.rollouts.read(job.id)
+        task, records = task_of(job, self._tasks), self._store.rollouts.read(job.id)
         if machine is not None:
             if job.outcome != Outcome.LIMIT:
-                broken = broken_constraint(task_of(job, self._tasks), machine)
-                kept = None if records else job.reason
+                broken = broken_constraint(task, machine)
+                kept = None if has_counted(records, task) else job.reason
                 checks.append(compare("reason", kept, None if broken is None else broken[0]))
             exact = [record for record in records if record.seed is None]
             tests = [record for record in exact if not record.final]
             checks.append(compare("test trials", len(tests), len(tested)))
             for record, tried in zip(exact, [*tested, machine], strict=False):
                 checks += self._rollout_checks(job, record, tried, None)
-            if records:
+            if has_counted(records, task):
                 checks += self._world_checks(job, records, machine, None)
         return checks + self._score_checks(job, machine, records)
 
@@ -231,8 +226,7 @@ class Verifier:
     ) -> list[Check]:
         """Whether the best machine was tried in as many varied worlds as the track says."""
         varied = varied_rollouts(records)
-        best = best_rollout(records, task_of(job, self._tasks))
-        tried = best.trajectory_hash is not None
+        tried = best_rollout(records, task_of(job, self._tasks)).trajectory_hash is not None
         worlds = worlds_of(job.track_config) if tried else 0
         checks = [compare("worlds", len({record.seed for record in varied}), worlds)]
         for record in varied:
@@ -367,7 +361,7 @@ class Verifier:
     ) -> list[Check]:
         task = task_of(job, self._tasks)
         counted: JobScore | Score = failed_score(task, machine)
-        if any(record.finished_at for record in records):
+        if has_counted(records, task):
             counted = rollout_score(job, task, records)
         return [
             compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED

@@ -42,16 +42,16 @@ class Unknowns(Document):
         ranges = {name: getattr(self, name) for name in NAMES}
         if not any(ranges.values()):
             raise ValueError(f"nothing is drawn: give a range for {', '.join(NAMES)}")
-        for name, given in ranges.items():
-            if given and given[0] >= given[1]:
-                raise ValueError(f"{name} is from {given[0]:g} to {given[1]:g}: no range")
+        for name, bounds in ranges.items():
+            if bounds and bounds[0] >= bounds[1]:
+                raise ValueError(f"{name} is from {bounds[0]:g} to {bounds[1]:g}: no range")
         return self
 
     def at_end(self, end: Literal[0, 1]) -> Self:
         """With ranges that have only their least number, or only their greatest."""
         ends = {name: getattr(self, name) for name in NAMES}
         return self.model_copy(
-            update={name: (given[end], given[end]) for name, given in ends.items() if given}
+            update={name: (bounds[end], bounds[end]) for name, bounds in ends.items() if bounds}
         )
 
 
@@ -62,10 +62,10 @@ def drawn_numbers(unknowns: Unknowns, seed: int) -> dict[str, float]:
     """What a seed draws, by name; each name has a draw of its own."""
     numbers = {}
     for name in NAMES:
-        given = getattr(unknowns, name)
-        if given is not None:
+        bounds = getattr(unknowns, name)
+        if bounds is not None:
             draw = Random(f"{name} {seed}")  # noqa: S311 - to be repeatable; the seed is the secret
-            numbers[name] = round(draw.uniform(*given), _DIGITS)
+            numbers[name] = round(draw.uniform(*bounds), _DIGITS)
     return numbers
 
 

@@ -50,8 +50,8 @@ def tests_told(tests: int) -> str:
         return "You submit once, and the machine has one trial."
     return (
         f"You have {tests} test trials: `test` has the machine tried as it stands, and the session "
-        "tells what was measured, and goes on. You submit once, and that trial counts, whatever "
-        "came of the others."
+        "tells what was measured, and goes on. You submit once, and the machine has one trial that "
+        "counts, whatever came of the others."
     )
 
 

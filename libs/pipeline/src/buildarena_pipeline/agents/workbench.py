@@ -9,7 +9,7 @@ from typing import Any, Final
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_environment import workbench as building
 from buildarena_environment.briefing import catalogue_told
-from buildarena_geometry import Accepted, Catalogue, Refused
+from buildarena_geometry import Accepted, Catalogue, Machine, Refused
 from buildarena_geometry.json_values import levels
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ExternalCall, clean
@@ -101,6 +101,26 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
         on_demand=task.constraints.on_demand,
         task=task,
     )
+
+
+def repeated(
+    calls: Sequence[ExternalCall], bench: Workbench
+) -> tuple[list[ExternalCall], list[Machine]]:
+    """Makes calls again.
+
+    Args:
+        calls: Those of a session.
+        bench: An empty workbench.
+
+    Returns:
+        The calls as they come out now, and the machines of the test trials as they stood then.
+    """
+    made, tried = list[ExternalCall](), list[Machine]()
+    for call in calls:
+        made.append(bench.call(call.machine, call.tool, call.arguments))
+        if len(tried) < bench.tests:
+            tried.append(bench.submitted().copy())
+    return made, tried
 
 
 def rebuild(calls: Sequence[ExternalCall], task: Task | None, *, data_sheets: bool) -> Workbench:

@@ -43,6 +43,11 @@ def drawn_for(job: Job, task: Task) -> Task:
     return task.drawn(job.draw if hidden and job.draw is not None else job.seed)
 
 
+def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:
+    """Whether a trial is done that may count: where a task has test trials, the one after them."""
+    return any(r.finished_at is not None and (r.final or not task.tests) for r in records)
+
+
 def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
     """The rollout that counts.
 

@@ -85,6 +85,7 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         if program is None:
             break
         session.machine = program.machine
+        session.tested = task.tests > 0
         last = attempt == attempts
         record = session.host.simulate(program.machine, program.presses, final=final and last)
         records.append(record)

@@ -53,6 +53,8 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
         played = _caught(partial(_one_round, session, workflow, final=final))
         if isinstance(played, Failed):
             failure = played
+            if session.tested:
+                return failure  # another round would begin with as many test trials again
             session.additions.append(
                 session.pack.say("round_failed", round=str(number), reason=failure.detail)
             )
