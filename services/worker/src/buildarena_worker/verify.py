@@ -15,7 +15,7 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from hashlib import sha256
-from typing import Any
+from typing import Any, cast
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.scorers.scorer import REFUTED
@@ -194,8 +194,8 @@ class Verifier:
         bench = bench_of(task_of(job, self._tasks), data_sheets=has_data_sheets(job.track_config))
         made, tested = repeated(calls, bench)
         checks = [compare("calls", _feedback_of(calls), _feedback_of(made))]
-        _, machine = bench.result() or ("", None)
-        return checks + self._trial_checks(job, machine, tested)
+        _, chosen = bench.result() or ("", None)
+        return checks + self._trial_checks(job, chosen, tested)
 
     def _trial_checks(
         self, job: Job, machine: Machine | None, tested: Sequence[Machine] = ()
@@ -263,8 +263,7 @@ class Verifier:
         checks = [compare(f"{name}: machine", record.machine_hash, built)]
         # Another machine moves otherwise, whoever simulates it.
         trial = record.number if built == record.machine_hash else None
-        task = task_of(job, self._tasks)
-        simulated: Repeated | None = None
+        task, simulated = task_of(job, self._tasks), cast("Repeated | None", None)
         try:
             if record.engine == BESIEGE:
                 trajectory = self._played(job, record, machine, task)
