@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from sqlalchemy import text
 from support.stages import work
 
 from buildarena_benchmark import builtin_tasks
@@ -15,6 +16,7 @@ from buildarena_worker.builtin.reading import figures_of
 from buildarena_worker.wiring import verification_runner
 
 TASK = builtin_tasks()["identify-1"]
+DRAW = 7_654_321_987_654
 OPEN = {"task": TASK.name, "agent": "me", "seed": 1, "simulator": "mujoco", "worlds": 0}
 
 
@@ -87,11 +89,15 @@ def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -
 
 def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(api, context) -> None:
     session = opened(api)
+    # A draw whose figures are no part of others that an answer may well have.
+    with context.store.database.transaction() as connection:
+        connection.execute(text("UPDATE jobs SET draw = :draw"), {"draw": DRAW})
     design = built(api, session)
     programmed(api, session, design.steer([]))
     api.post(f"/v1/sessions/{session}/tests")
     work(context)
     job = context.store.jobs.get(session)
+    assert job.draw == DRAW
     drawn = [str(number) for number in drawn_numbers(TASK.unknowns, job.draw).values()]
     secrets = [*drawn, str(job.draw)]
     for path in (
