@@ -4,7 +4,7 @@ from typing import Final
 
 KINDS: Final = ("support", "transport", "lift", "mechanisms", "flight")
 
-_FAMILIES: Final = {"budget": "support", "repair": "transport"}
+_FAMILIES: Final = {"budget": "support", "repair": "transport", "identify": "flight"}
 """What sort of machine a family asks for."""
 
 

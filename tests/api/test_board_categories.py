@@ -5,7 +5,7 @@ import pytest
 from buildarena_api.leaderboard.filters import _ranked_over
 from buildarena_benchmark import builtin_tasks, paper_tasks
 
-FAMILIES = {"budget-1", "repair-1"}
+FAMILIES = {"budget-1", "repair-1", "identify-1"}
 WORKSHOP = {*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"}
 
 

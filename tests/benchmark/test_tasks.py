@@ -38,7 +38,7 @@ HEADROOM = [
     *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
     *("flight-3", "lift-4", "mechanisms-7"),
 ]
-FAMILIES = ["budget-1", "repair-1"]
+FAMILIES = ["budget-1", "repair-1", "identify-1"]
 
 
 def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None:

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 
 import pytest
 
+from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
 
@@ -34,4 +35,4 @@ def test_an_honest_success_comes_first_then_the_larger_indicator(rollouts, best)
         rollout(number, success=success, indicator=indicator, flags=flags)
         for number, (success, indicator, flags) in enumerate(rollouts)
     ]
-    assert best_rollout(made).number == best
+    assert best_rollout(made, builtin_tasks()["transport-1"]).number == best

@@ -19,7 +19,7 @@ from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context, open_context
-from buildarena_pipeline.runtime.scoring import best_rollout
+from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Job
 from buildarena_worker.wiring import verifier
@@ -93,7 +93,7 @@ def _ended(context: Context, rig: Rig) -> list[Job]:
 
 def _check(context: Context, job: Job) -> None:
     """The score is the engine's of the same start; the kept files tell the whole story."""
-    record = best_rollout(context.store.rollouts.read(job.id))
+    record = best_rollout(context.store.rollouts.read(job.id), task_of(job, context.tasks))
     machine = _machine(context, record.machine_hash)
     task = builtin_tasks()[job.task]
     presses = None if record.controls is None else [KeyPress(**one) for one in record.controls]

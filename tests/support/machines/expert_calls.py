@@ -5,13 +5,18 @@ expert_calls` in this folder writes it, and the benchmark's references, again.
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import builtin_tasks, score
 from buildarena_environment import ASSEMBLY, MAIN, Environment
+from buildarena_environment.trials import score_text
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.builtin.designs.design import Design
+from buildarena_worker.builtin.designs.design import Design, Seen
+from buildarena_worker.builtin.reading import figures_of
 
 ROOT = Path(__file__).parents[3]
 DATA = ROOT / "tests/data/expert_calls.json"
@@ -23,6 +28,12 @@ Call = dict[str, Any]
 def calls_of(task: str, seed: int = 0) -> list[Call]:
     """What builds and drives the expert's machine, call by call."""
     design = DESIGNS[task](seed)
+    answer = measured_for(design, task, seed) if design.steer else design.control or {}
+    return calls_with(design, answer)
+
+
+def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
+    """What builds a design, and does what its controller says."""
     calls = [
         call(name if design.assembly else MAIN, *action)
         for name, part in design.parts.items()
@@ -30,21 +41,43 @@ def calls_of(task: str, seed: int = 0) -> list[Call]:
     ]
     calls += [call(ASSEMBLY, *action) for action in design.assembly]
     whole = ASSEMBLY if design.assembly else MAIN
-    return calls + [call(whole, *action) for action in _control(design)]
+    return calls + [call(whole, *action) for action in _control(answer)]
 
 
 def call(machine: str, tool: str, arguments: Any) -> Call:
     return {"machine": machine, "tool": tool, "arguments": dict(arguments)}
 
 
-def _control(design: Design) -> list[tuple[str, dict[str, Any]]]:
+def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -> Mapping[str, Any]:
+    """What the controller says once it has measured the world of a seed by its test trials."""
+    assert design.steer is not None
+    drawn = builtin_tasks()[task].drawn(seed)
+    machine = Machine(catalogue=drawn.constraints.catalogue)
+    actions = [action for part in design.parts.values() for action in part.actions]
+    bound = [a for a in _control(design.steer([])) if a[0].endswith("control_key")]
+    for name, arguments in [*actions, *bound]:
+        assert machine.act(name, dict(arguments)).ok
+    seen: list[Seen] = []
+    for _ in range(drawn.tests):
+        program = design.steer(seen)
+        presses = [
+            KeyPress(time_s=press["time"], key=press["key"], hold_for_s=press["hold_for"])
+            for press in program["control_sequence"]
+        ]
+        trajectory = simulate(machine, drawn.scenario, engine, controls=presses)
+        told = score_text(drawn, score(drawn, machine, trajectory), trajectory)
+        seen.append(Seen(program=program, measured=figures_of(told)))
+    return design.steer(seen)
+
+
+def _control(answer: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     actions: list[tuple[str, dict[str, Any]]] = []
-    for bound in (design.control or {}).get("control_config", ()):
+    for bound in answer.get("control_config", ()):
         for number, key in enumerate(bound["keys"]):
             tool = "add_control_key" if number else "change_control_key"
             told = {"block_id": bound["block"], "action": bound["action"], "new_key": key}
             actions.append((tool, told))
-    pressed = (design.control or {}).get("control_sequence", ())
+    pressed = answer.get("control_sequence", ())
     return actions + [("add_control_sequence", dict(press)) for press in pressed]
 
 

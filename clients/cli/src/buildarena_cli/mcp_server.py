@@ -123,6 +123,12 @@ def _tools(simulators: Sequence[Mapping[str, Any]]) -> list[types.Tool]:
             },
         ),
         types.Tool(
+            name="test",
+            description="Have the machine tried as it stands, where the task has test trials; "
+            "get_result tells what was measured, and the session goes on. It counts for nothing.",
+            input_schema=_object({"session": SESSION["session"]}, ["session"]),
+        ),
+        types.Tool(
             name="submit",
             description="End the building; the machine is simulated and scored.",
             input_schema=_object({"session": SESSION["session"]}, ["session"]),
@@ -166,11 +172,12 @@ def _manage(client: Client, tool: str, arguments: Arguments) -> types.CallToolRe
     if tool == "open_session":
         opened = client.post("/v1/sessions", arguments)
         return _result(_opened(opened))
-    if tool == "submit":
-        job = client.post(at("sessions", checked_id("job", arguments["session"]), "submit"), {})
+    if tool in ("test", "submit"):
+        way = "tests" if tool == "test" else tool
+        job = client.post(at("sessions", checked_id("job", arguments["session"]), way), {})
         return _result(_ended(job))
     if tool == "get_result":
-        return _result(_ended(client.get(at("jobs", checked_id("job", arguments["session"])))))
+        return _result(_so_far(client, checked_id("job", arguments["session"])))
     return _result(f"there is no tool {tool!r}", failed=True)
 
 
@@ -182,6 +189,22 @@ def _opened(session: Mapping[str, Any]) -> str:
             "tells what is built."
         )
     return "\n\n".join([*lines, session["briefing"]])
+
+
+def _so_far(client: Client, session: str) -> str:
+    job = client.get(at("jobs", session))
+    if job["outcome"] is not None:
+        return _ended(job)
+    tests = client.get(at("sessions", session))["tests"]
+    return "\n\n".join([_ended(job), *(_tested(test) for test in tests)])
+
+
+def _tested(test: Mapping[str, Any]) -> str:
+    if test["result"] is None:
+        return f"Test trial {test['number']} is under way."
+    rows = "\n".join(", ".join(f"{value:.2f}" for value in row) for row in test["trace"])
+    heading = "Positions of what counts, each second (time, x, y, z):"
+    return f"Test trial {test['number']}: {test['result']}\n{heading}\n{rows}"
 
 
 def _ended(job: Mapping[str, Any]) -> str:

@@ -201,6 +201,7 @@ class Client:
     open_session = _call(Api.open_session)
     session = _call(Api.session)
     call_tool = _call(Api.call_tool)
+    test_session = _call(Api.test_session)
     submit_session = _call(Api.submit_session)
     check_machine = _call(Api.check_machine)
     try_machine = _call(Api.try_machine)

@@ -19,7 +19,7 @@ from buildarena_environment import (
     Submission,
     Trial,
     Workbench,
-    best_trial,
+    counted_trial,
 )
 from buildarena_geometry import Machine
 from buildarena_inspect.errors import LogError
@@ -104,7 +104,7 @@ class Building:
     @property
     def trial(self) -> Trial | None:
         """The trial that counts so far."""
-        return best_trial(self.environment.trials) if self.environment.trials else None
+        return self.environment.counted
 
     @property
     def machine(self) -> Machine | None:
@@ -163,7 +163,7 @@ class Building:
         """
         state = replace(self.environment.state(), done=True)
         state = replace(state, trials=(*state.trials, trial))
-        if best_trial(state.trials) is trial:
+        if counted_trial(self.environment.task, state.trials) is trial:
             machines = {} if machine is None else {_name_of(machine): machine.logged}
             state = replace(state, machines=machines)
             self.calls = calls_of(machine) if handed_in else []

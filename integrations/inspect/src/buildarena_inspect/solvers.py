@@ -42,7 +42,7 @@ def react_builder() -> Solver:
             prompt=None,
             tools=building_tools(building),
             submit=AgentSubmit(tool=submit_tool(building), keep_in_messages=True),
-            attempts=AgentAttempts(building.conditions.rounds, _again),
+            attempts=AgentAttempts(building.environment.rounds, _again),
             on_continue=_Patience(building),
         )
         return await as_solver(agent)(state, generate)

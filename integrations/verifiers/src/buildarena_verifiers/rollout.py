@@ -6,7 +6,7 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_environment import Answer, Environment, NothingToSubmitError, best_trial, call
+from buildarena_environment import Answer, Environment, NothingToSubmitError, call, counted_trial
 from buildarena_environment.tools import SUBMIT
 from buildarena_geometry.json_texts import read_json
 from buildarena_verifiers.trial_runners import TrialRunner
@@ -62,7 +62,7 @@ class Seat:
             machine: Mapping[str, Any] | None = environment.submitted().to_document()
         except NothingToSubmitError:
             machine = None
-        trial = best_trial(environment.trials)
+        trial = counted_trial(environment.task, environment.trials)
         return {
             "task": state.task,
             "task_version": state.task_version,

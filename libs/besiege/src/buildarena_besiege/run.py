@@ -24,7 +24,7 @@ from buildarena_besiege.keys import (
 from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose, put_down
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
-from buildarena_simulation.constants import MAX_PARTS
+from buildarena_simulation.constants import GRAVITY, MAX_PARTS
 from buildarena_simulation.scenario import ReleasedPlacement, SpanPlacement
 
 if TYPE_CHECKING:
@@ -278,3 +278,5 @@ def _require_sayable(scenario: Scenario) -> None:
         raise MachineNotPlayableError("the game lets no machine go in the air: use another engine")
     if scenario.cargo is not None and scenario.cargo.at is not None:
         raise MachineNotPlayableError("the game's cargo falls onto the machine: use another engine")
+    if scenario.gravity != GRAVITY or scenario.drive_strength != 1:
+        raise MachineNotPlayableError("the game has one gravity and drives of one strength")

@@ -30,7 +30,7 @@ from buildarena_environment.rewards import REWARDS, Progress
 from buildarena_environment.snapshots import Snapshot
 from buildarena_environment.tools import ASSEMBLY, MAIN, tools_of_models
 from buildarena_environment.trial_pool import Evaluation, TrialPool
-from buildarena_environment.trials import Trial, best_trial, try_machine
+from buildarena_environment.trials import Trial, best_trial, counted_trial, try_machine
 from buildarena_environment.workbench import Workbench
 
 __all__ = [
@@ -60,6 +60,7 @@ __all__ = [
     "best_trial",
     "call",
     "call_text",
+    "counted_trial",
     "read_call",
     "references",
     "tools_of_models",

@@ -86,9 +86,27 @@ def briefing(
         main=MAIN,
         assembly=ASSEMBLY,
         checks=_checks(task),
-        modules=modules_told(task.constraints, data_sheets=data_sheets),
+        modules=modules_told(task, data_sheets=data_sheets),
         **values,
     )
+
+
+def trials_told(rounds: int, tests: int) -> str:
+    """What a builder reads of how often it may submit, in a sentence or two.
+
+    Args:
+        rounds: How often.
+        tests: Which of them are test trials: so many first ones.
+    """
+    if rounds == 1:
+        return "You submit once, and the machine has one trial."
+    each = f"You may submit {rounds} times, and the machine has one trial each time"
+    if tests:
+        return (
+            f"{each}: the first {tests} are test trials, and the last one counts, whatever came of "
+            "the others."
+        )
+    return f"{each}; the best one counts."
 
 
 def worlds_told(worlds: int) -> str:
@@ -108,17 +126,20 @@ def worlds_told(worlds: int) -> str:
     )
 
 
-def modules_told(constraints: Constraints, *, data_sheets: bool) -> str:
+def modules_told(task: Task, *, data_sheets: bool) -> str:
     """What a builder reads about its modules: all of them, or how to look them up.
 
     Args:
-        constraints: The task's.
+        task: The task.
         data_sheets: Whether modules have their data with them, and the world's follow.
     """
+    constraints = task.constraints
     catalogue = catalogue_told(constraints, data_sheets=data_sheets)
     names = modules_named(constraints.modules)
     told = lookup_text(catalogue) if constraints.on_demand else modules_text(catalogue, names)
-    return f"{told}\n\n**World.** {world_text(catalogue, names)}" if data_sheets else told
+    if not data_sheets:
+        return told
+    return f"{told}\n\n**World.** {world_text(catalogue, names, task.unknowns)}"
 
 
 def catalogue_told(constraints: Constraints, *, data_sheets: bool) -> Catalogue:

@@ -38,6 +38,12 @@ def checked_simulator(name: str) -> str:
     return require_engine(name)
 
 
+def is_builtin(task: Task) -> bool:
+    """Whether it is a built-in task, whatever a seed has drawn of it."""
+    known = builtin_tasks().get(task.name)
+    return known is not None and known.drawn(0) == task.drawn(0)
+
+
 def reference_of(task: Task, given: float | None = None, *, needed: bool = False) -> float:
     """The indicator that is worth 1.
 
@@ -54,7 +60,7 @@ def reference_of(task: Task, given: float | None = None, *, needed: bool = False
             raise ValueError(f"reference is {given}: it must be above 0")
         return given
     reference = references().get(task.name)
-    if reference is not None and builtin_tasks().get(task.name) == task.drawn(0):
+    if reference is not None and is_builtin(task):
         return reference
     if needed:
         raise ValueError(

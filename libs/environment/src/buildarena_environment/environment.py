@@ -8,7 +8,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_benchmark import Task
-from buildarena_environment.briefing import briefing, catalogue_told
+from buildarena_environment.briefing import briefing, catalogue_told, trials_told
 from buildarena_environment.choices import checked_simulator, chosen_task, reference_of
 from buildarena_environment.errors import (
     EpisodeOverError,
@@ -25,7 +25,7 @@ from buildarena_environment.rewards import (
 )
 from buildarena_environment.snapshots import Snapshot
 from buildarena_environment.tools import MAIN, tools_of_models
-from buildarena_environment.trials import Trial, Tries, best_trial, score_text, try_machine
+from buildarena_environment.trials import Trial, Tries, counted_trial, score_text, try_machine
 from buildarena_environment.workbench import Workbench
 from buildarena_geometry import Accepted, Cause, Machine, Refused, ToolDefinition
 from buildarena_simulation import DEFAULT_ENGINE
@@ -35,10 +35,6 @@ if TYPE_CHECKING:
 
 DEFAULT_STEPS: Final = 2000
 """Steps that an episode may have unless it is given another limit."""
-ONCE: Final = "You submit once, and the machine has one trial."
-OFTEN: Final = (
-    "You may submit $rounds times, and the machine has one trial each time; the best one counts."
-)
 LAST: Final = "That ends the episode."
 AGAIN: Final = "After each trial but the last you read what was measured and may build on."
 
@@ -130,7 +126,9 @@ class Environment:
         simulator: Name of the engine that tries machines.
         seed: Varies where machine and cargo start, as a fair repetition would, and draws what a
             family's task has drawn; None for the exact start, which the service has, and seed 0's.
-        rounds: How often a builder may submit; a successful trial ends the episode.
+        rounds: How often a builder may submit; a successful trial ends the episode. A task with
+            test trials has one submission more than those, whatever is given: the last one counts,
+            and nothing before ends the episode.
         limits: How long an episode may be.
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
         reference: The indicator that is worth 1; the task's reference where there is one.
@@ -161,7 +159,7 @@ class Environment:
         self.task = chosen_task(task).drawn(seed or 0)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
-        self.rounds = rounds
+        self.rounds = self.task.tests + 1 if self.task.tests else rounds
         self.limits = limits or Limits()
         self.weights = checked_weights(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(self.task, reference, needed="indicator" in self.weights)
@@ -190,16 +188,14 @@ class Environment:
     @property
     def observation(self) -> Observation:
         """What a builder has before its first step."""
-        guidelines = (
-            resources.files(__package__).joinpath("guidelines.md").read_text(encoding="utf-8")
-        )
+        file = resources.files(__package__).joinpath("guidelines.md")
+        guidelines = file.read_text(encoding="utf-8")
         text = briefing(
             self.task,
-            trials=ONCE if self.rounds == 1 else OFTEN,
+            trials=trials_told(self.rounds, self.task.tests),
             guidelines=guidelines,
             values={
                 "calls": f"{self.limits.steps:,}",
-                "rounds": str(self.rounds),
                 "after": LAST if self.rounds == 1 else AGAIN,
             },
             data_sheets=self.data_sheets,
@@ -224,6 +220,11 @@ class Environment:
     def trials(self) -> tuple[Trial, ...]:
         """The trials of this episode, in order."""
         return self._trials
+
+    @property
+    def counted(self) -> Trial | None:
+        """The trial that counts so far: the best, or the last where a task has test trials."""
+        return counted_trial(self.task, self._trials) if self._trials else None
 
     @property
     def reward(self) -> float:
@@ -321,7 +322,8 @@ class Environment:
             raise EpisodeOverError("the episode has ended: reset begins another")
         trial = self._tries(self.task, self.submitted(), self.simulator, seed=self.seed)
         self._trials = (*self._trials, trial)
-        self._done = trial.counts or len(self._trials) >= self.rounds
+        succeeded = trial.counts and not self.task.tests
+        self._done = succeeded or len(self._trials) >= self.rounds
         self._reward = self._worth()
         report = trial.detail or score_text(self.task, trial.score, trial.trajectory)
         return Submission(trial=trial, reward=self._reward, report=report, done=self._done)
@@ -393,5 +395,5 @@ class Environment:
             machine=None if result is None else result[1],
             changes=self._changes,
             refused=self._refused,
-            trial=best_trial(self._trials) if self._trials else None,
+            trial=self.counted,
         )

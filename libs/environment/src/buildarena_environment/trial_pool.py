@@ -13,6 +13,7 @@ from queue import SimpleQueue
 from typing import Any, Final, Self
 
 from buildarena_benchmark import Task, builtin_tasks, parse_task
+from buildarena_environment.choices import is_builtin
 from buildarena_environment.trials import Trial, try_machine
 from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
 from buildarena_geometry import DocumentError, KeyPress, Machine
@@ -236,9 +237,9 @@ _SEED: Final = "\n# seed "
 
 def text_of(task: Task) -> str:
     """A task as text: its name if it is a built-in one, otherwise its file; what draws it after."""
-    known = builtin_tasks().get(task.name) == task.drawn(0)
-    text = task.name if known else json.dumps(dict(task.as_document()))
-    return f"{text}{_SEED}{task.seed}" if task.seed else text
+    text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
+    drawn = task.seed or task.unknowns is not None
+    return f"{text}{_SEED}{task.seed}" if drawn else text
 
 
 @lru_cache(maxsize=TASKS_READ)

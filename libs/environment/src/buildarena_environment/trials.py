@@ -143,6 +143,11 @@ def best_trial(trials: Sequence[Trial]) -> Trial:
     return max(trials, key=lambda trial: (trial.counts, trial.score.success, trial.score.indicator))
 
 
+def counted_trial(task: Task, trials: Sequence[Trial]) -> Trial:
+    """The one that counts: the best, or the last where the others are test trials."""
+    return trials[-1] if task.tests else best_trial(trials)
+
+
 def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -> str:
     """A trial's score in words, for models: what was asked, what was measured, what happened.
 

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.structure.contacts import CARGO, PointForces
 from buildarena_simulation.structure.model import IntArray, Structure
 from buildarena_simulation.trajectory import Bearing
@@ -15,9 +14,11 @@ class BearingMeter:
     Args:
         structure: The machine.
         terrain_count: Number of terrain boxes.
+        gravity: Downward acceleration, units/s²: forces are multiples of what it makes of a mass.
     """
 
-    def __init__(self, structure: Structure, terrain_count: int) -> None:
+    def __init__(self, structure: Structure, terrain_count: int, *, gravity: float) -> None:
+        self._gravity = gravity
         self._surfaces = terrain_count + 1
         self._wheels = structure.wheels
         self._blocks = len(structure)
@@ -31,7 +32,7 @@ class BearingMeter:
             surface: (K,) as in `ContactForces`.
             forces: (K,) the forces on the blocks.
         """
-        up = forces.force[:, 2] / GRAVITY
+        up = forces.force[:, 2] / self._gravity
         fixed = (surface >= 0).nonzero()[0]
         on_surface = np.bincount(surface[fixed], up[fixed], minlength=self._surfaces)
         on_block = np.bincount(forces.block[fixed], up[fixed], minlength=self._blocks)

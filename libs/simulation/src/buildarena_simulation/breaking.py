@@ -52,8 +52,8 @@ class BreakingModel:
         structure = self._structure = world.structure
         self._field = world.field
         self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
-        self.bearing = BearingMeter(structure, len(world.terrain))
-        self._loads = LoadModel(structure, clusters, motion)
+        self.bearing = BearingMeter(structure, len(world.terrain), gravity=world.gravity)
+        self._loads = LoadModel(structure, clusters, motion, gravity=world.gravity)
         self._enter(clusters)
         self._interval_s, self._unseen_s, self._calm = interval_s, 0.0, False
         self._peaks = np.zeros((3, len(structure.members)))

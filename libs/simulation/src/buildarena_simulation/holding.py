@@ -135,7 +135,7 @@ class Holding:
         on = dict.fromkeys((WORLD, CARGO), 0.0)
         for hold, wrench in self._borne:
             if hold.other in on:
-                on[hold.other] += float(wrench[2]) / GRAVITY
+                on[hold.other] += float(wrench[2]) / self._world.gravity
         return on[WORLD], -on[CARGO]
 
     def _drop(self, k: int, what: str, time_s: float) -> None:

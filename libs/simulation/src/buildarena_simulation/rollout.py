@@ -9,7 +9,7 @@ import numpy as np
 
 from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.clearance import require_clear_start
-from buildarena_simulation.constants import DEFAULT_ENGINE, GRAVITY, SAMPLE_RATE_HZ
+from buildarena_simulation.constants import DEFAULT_ENGINE, SAMPLE_RATE_HZ
 from buildarena_simulation.control import (
     PRESSES,
     Bindings,
@@ -164,9 +164,10 @@ def simulate_structure(
         ground=True,
         terrain=scenario.terrain,
         cargo=start.cargo,
-        gravity=GRAVITY,
+        gravity=scenario.gravity,
+        drive_strength=scenario.drive_strength,
         substeps=substeps,
-        field=field_of(structure),
+        field=field_of(structure, drive_strength=scenario.drive_strength),
     )
     if seed is not None:
         controls, control = varied_presses(controls, scenario.control, seed)
@@ -185,7 +186,8 @@ def simulate_structure(
             simulation_version=SIMULATION_VERSION,
             settings={
                 **adapter.settings,
-                "gravity": GRAVITY,
+                "gravity": scenario.gravity,
+                **_unusual(scenario),
                 "effective_key_presses": effective_presses(bindings, controls),
                 PRESSES: written_presses(bindings, controls),
                 **({} if seed is None else {"seed": seed}),
@@ -199,6 +201,12 @@ def simulate_structure(
         raise SimulationError(f"{engine} failed: {error}") from error
     finally:
         adapter.close()
+
+
+def _unusual(scenario: Scenario) -> dict[str, float]:
+    """What is written down only where it is not as usual."""
+    strength = scenario.drive_strength
+    return {} if strength == 1 else {"drive_strength": strength}
 
 
 def _check_start(start: Start, scenario: Scenario, seed: int | None) -> None:

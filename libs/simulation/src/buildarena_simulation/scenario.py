@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 
 MAX_DURATION_S: Final = 600.0
 
@@ -22,6 +22,8 @@ Mass = Annotated[float, Field(ge=0.01, le=100_000)]
 Instant = Annotated[float, Field(ge=0, le=MAX_DURATION_S)]
 Speed = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
 Label = Annotated[str, Field(pattern=r"^[\w -]+$", min_length=1, max_length=40)]
+Gravity = Annotated[float, Field(ge=5, le=100)]
+Strength = Annotated[float, Field(ge=0.1, le=10)]
 BlockId = Annotated[str, Field(min_length=1, max_length=40)]
 
 
@@ -180,6 +182,10 @@ class Scenario(_Document):
         gates: Lines to be crossed, in order.
         marks: Places.
         clear_start: Whether a machine that overlaps terrain or cargo at the start is refused.
+        gravity: Downward acceleration, units/s². The unit of forces stays what holds up one mass
+            unit at the usual gravity: joints and drives are as strong as ever.
+        drive_strength: How strong drives are, as a share of their data: the torque of motors, the
+            force and torque of driven joints, the push of fans.
     """
 
     duration_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
@@ -193,6 +199,8 @@ class Scenario(_Document):
     gates: Annotated[tuple[Gate, ...], Field(max_length=64, exclude_if=_is_default)] = ()
     marks: Annotated[tuple[Mark, ...], Field(max_length=64, exclude_if=_is_default)] = ()
     clear_start: Annotated[bool, Field(exclude_if=_is_default)] = False
+    gravity: Annotated[Gravity, Field(exclude_if=lambda value: value == GRAVITY)] = GRAVITY
+    drive_strength: Annotated[Strength, Field(exclude_if=lambda value: value == 1)] = 1.0
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:

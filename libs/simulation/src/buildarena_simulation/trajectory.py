@@ -78,6 +78,7 @@ class Event:
 class Bearing:
     """Vertical forces of contacts and grips at T instants, each the mean over a moment, mass·g.
 
+    Here g is the scenario's gravity: a mass that rests weighs its own figure.
     Upwards is positive. K terrain boxes, W wheels. Arrays are read-only.
 
     Attributes:

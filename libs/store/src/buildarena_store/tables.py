@@ -62,6 +62,8 @@ jobs = Table(
     Column("track", Text, nullable=False),
     Column("track_config", JSONB, nullable=False),
     Column("seed", BigInteger, nullable=False),
+    # Draws what its builder is not told, so no answer has it; jobs of earlier releases have none.
+    Column("draw", BigInteger),
     Column("limits", JSONB, nullable=False, server_default=text("'{}'::jsonb")),
     # Whose it is: the API key that submitted it, and the sweep whose budget pays for it.
     Column("owner", Text),

@@ -228,7 +228,12 @@ class ConstructHandler:
         with self._store.database.transaction() as connection:
             self._store.results.attach(lease.job.id, made, connection=connection)
             queue = finish_or_vary(
-                self._store, lease, records, connection=connection, **_counts(session)
+                self._store,
+                lease,
+                records,
+                task=session.task,
+                connection=connection,
+                **_counts(session),
             )
         if queue is not None:
             self._queues.notify_one(queue, lease.job.id)

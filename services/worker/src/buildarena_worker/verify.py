@@ -15,14 +15,14 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from hashlib import sha256
-from typing import Any
+from typing import Any, cast
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.agents.workbench import bench_of
+from buildarena_pipeline.agents.workbench import bench_of, repeated
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import (
@@ -34,6 +34,7 @@ from buildarena_pipeline.catalog.tracks import (
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.scoring import (
     best_rollout,
+    has_counted,
     rollout_score,
     task_of,
     varied_rollouts,
@@ -171,7 +172,7 @@ class Verifier:
             *_usage_checks(job, host.usage),
             *reasons,
         ]
-        best = best_rollout(exact) if any(record.finished_at for record in exact) else None
+        best = best_rollout(exact, session.task) if has_counted(exact, session.task) else None
         varied: list[Check] = []
         for record, (machine, controls) in zip(exact, host.simulated, strict=False):
             checks += self._rollout_checks(job, record, machine, controls)
@@ -191,23 +192,28 @@ class Verifier:
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = bench_of(task_of(job, self._tasks), data_sheets=has_data_sheets(job.track_config))
-        repeated = [bench.call(call.machine, call.tool, call.arguments) for call in calls]
-        checks = [compare("calls", _feedback_of(calls), _feedback_of(repeated))]
-        chosen = bench.result()
-        return checks + self._trial_checks(job, None if chosen is None else chosen[1])
+        made, tested = repeated(calls, bench)
+        checks = [compare("calls", _feedback_of(calls), _feedback_of(made))]
+        _, chosen = bench.result() or ("", None)
+        return checks + self._trial_checks(job, chosen, tested)
 
-    def _trial_checks(self, job: Job, machine: Machine | None) -> list[Check]:
+    def _trial_checks(
+        self, job: Job, machine: Machine | None, tested: Sequence[Machine] = ()
+    ) -> list[Check]:
+        """What came of a machine, and of those in the test trials before."""
         checks = []
-        records = self._store.rollouts.read(job.id)
+        task, records = task_of(job, self._tasks), self._store.rollouts.read(job.id)
         if machine is not None:
             if job.outcome != Outcome.LIMIT:
-                broken = broken_constraint(task_of(job, self._tasks), machine)
-                kept = None if records else job.reason
+                broken = broken_constraint(task, machine)
+                kept = None if has_counted(records, task) else job.reason
                 checks.append(compare("reason", kept, None if broken is None else broken[0]))
-            for record in records:
-                if record.seed is None:
-                    checks += self._rollout_checks(job, record, machine, None)
-            if records:
+            exact = [record for record in records if record.seed is None]
+            tests = [record for record in exact if not record.final]
+            checks.append(compare("test trials", len(tests), len(tested)))
+            for record, tried in zip(exact, [*tested, machine], strict=False):
+                checks += self._rollout_checks(job, record, tried, None)
+            if has_counted(records, task):
                 checks += self._world_checks(job, records, machine, None)
         return checks + self._score_checks(job, machine, records)
 
@@ -220,7 +226,7 @@ class Verifier:
     ) -> list[Check]:
         """Whether the best machine was tried in as many varied worlds as the track says."""
         varied = varied_rollouts(records)
-        tried = best_rollout(records).trajectory_hash is not None
+        tried = best_rollout(records, task_of(job, self._tasks)).trajectory_hash is not None
         worlds = worlds_of(job.track_config) if tried else 0
         checks = [compare("worlds", len({record.seed for record in varied}), worlds)]
         for record in varied:
@@ -257,8 +263,7 @@ class Verifier:
         checks = [compare(f"{name}: machine", record.machine_hash, built)]
         # Another machine moves otherwise, whoever simulates it.
         trial = record.number if built == record.machine_hash else None
-        task = task_of(job, self._tasks)
-        simulated: Repeated | None = None
+        task, simulated = task_of(job, self._tasks), cast("Repeated | None", None)
         try:
             if record.engine == BESIEGE:
                 trajectory = self._played(job, record, machine, task)
@@ -353,9 +358,10 @@ class Verifier:
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]
     ) -> list[Check]:
-        counted: JobScore | Score = failed_score(task_of(job, self._tasks), machine)
-        if any(record.finished_at for record in records):
-            counted = rollout_score(job, records)
+        task = task_of(job, self._tasks)
+        counted: JobScore | Score = failed_score(task, machine)
+        if has_counted(records, task):
+            counted = rollout_score(job, task, records)
         return [
             compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
         ]

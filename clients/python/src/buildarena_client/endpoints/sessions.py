@@ -63,6 +63,10 @@ class Sessions(Sender):
         body = {"tool": tool, "arguments": dict(arguments or {}), "machine": machine}
         return cast("ToolOutcome", await self.post(at("sessions", session_id, "calls"), body))
 
+    async def test_session(self, session_id: str) -> JobView:
+        """Has the machine tried as it stands, where the task has test trials. Never sent twice."""
+        return cast("JobView", await self.post(at("sessions", session_id, "tests")))
+
     async def submit_session(self, session_id: str) -> JobView:
         """Ends a session; the machine is simulated and scored."""
         return cast("JobView", await self.post(at("sessions", session_id, "submit")))

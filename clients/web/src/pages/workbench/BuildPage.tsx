@@ -5,6 +5,7 @@ import { Answered } from "../../parts/States";
 import { Ended } from "./Ended";
 import { session as sessionQuery } from "./session";
 import { StartForm } from "./StartForm";
+import { isTested, TestTrials } from "./TestTrials";
 import { Workroom } from "./Workroom";
 
 const route = getRouteApi("/build");
@@ -16,11 +17,18 @@ export default function BuildPage() {
 }
 
 function Session({ id }: { id: string }) {
-  const query = useQuery({ ...sessionQuery(id), staleTime: Infinity });
+  const query = useQuery({
+    ...sessionQuery(id),
+    staleTime: Infinity,
+    refetchInterval: ({ state }) => (state.data !== undefined && isTested(state.data) ? 1000 : false),
+  });
   return (
     <Stack gap="md">
       <Answered query={query} rows={12}>
-        {(view) => (view.open ? <Workroom view={view} /> : <Ended view={view} />)}
+        {(view) => {
+          if (view.open) return <Workroom view={view} />;
+          return isTested(view) ? <TestTrials view={view} /> : <Ended view={view} />;
+        }}
       </Answered>
     </Stack>
   );

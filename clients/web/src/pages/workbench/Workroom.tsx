@@ -38,6 +38,7 @@ import {
   type Hand,
   type SessionView,
 } from "./session";
+import { TestTrials } from "./TestTrials";
 import { ToolsPanel } from "./ToolsPanel";
 
 const HandScene = lazy(() => import("../../scene/HandScene"));
@@ -77,6 +78,7 @@ export function Workroom({ view }: { view: SessionView }) {
           <Markdown text={task.data.statement.replace(HEADING, "")} />
         </Spoiler>
       )}
+      <TestTrials view={view} />
       <Machines hand={hand} view={view} several={(document.constraints?.max_sub_structures ?? 1) > 1} />
       <div className="hand-room">
         <Stack gap="xs">

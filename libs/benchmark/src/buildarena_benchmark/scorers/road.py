@@ -8,7 +8,12 @@ from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
-from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
+from buildarena_benchmark.scorers.measures.series import (
+    Series,
+    gravity_of,
+    rotations,
+    starting_block,
+)
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     FORCES_NOT_MEASURED,
@@ -23,7 +28,7 @@ from buildarena_benchmark.scorers.scorer import (
     undriven,
 )
 from buildarena_simulation import Scenario
-from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -147,7 +152,7 @@ def _ride(scoring: RoadScoring, trajectory: "Trajectory", path: Series, farthest
     assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
     height = trajectory.cargo_position[:, 2].astype(np.float64)
     pull = np.zeros(len(height))
-    pull[1:-1] = np.diff(height, 2) * SAMPLE_RATE_HZ**2 / GRAVITY
+    pull[1:-1] = np.diff(height, 2) * SAMPLE_RATE_HZ**2 / gravity_of(trajectory)
     before = np.maximum(np.arange(len(path)) - _MOVING_SAMPLES, 0)
     moved = np.linalg.norm(path[:, :2] - path[before, :2], axis=1)
     counts = (moved > _MOVING * _MOVING_SAMPLES / SAMPLE_RATE_HZ) & (

@@ -7,8 +7,10 @@ import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start, mass_of
+from buildarena_benchmark.scorers.measures.series import gravity_of
 from buildarena_benchmark.scorers.scorer import Deciding, Metric, Scorer, Verdict, rounded
 from buildarena_simulation import Scenario
+from buildarena_simulation.constants import GRAVITY
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -92,7 +94,8 @@ def thrust_to_weight(
     # Exact sums: they do not depend on the cannons' order.
     net = [math.fsum(component) for component in zip(*pushes, strict=True)]
     mass = mass_of(machine, trajectory, joined[0])
-    ratio = math.hypot(*net) / mass if mass > 0 else 0.0
+    weight = mass * (gravity_of(trajectory) / GRAVITY)
+    ratio = math.hypot(*net) / weight if weight > 0 else 0.0
     return ratio, {"heated_cannons": heated, "cold_cannons": len(pushes) - heated}
 
 

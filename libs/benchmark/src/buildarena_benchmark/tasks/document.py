@@ -20,6 +20,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from buildarena_benchmark.families.given import Beginning
+from buildarena_benchmark.families.unknowns import Unknowns, drawn_scenario
 from buildarena_benchmark.fields import Count, Document
 from buildarena_benchmark.scorers.registry import known_scorers, scoring_type
 from buildarena_geometry import (
@@ -206,6 +207,7 @@ class TaskDocument(Document):
     constraints: Constraints = Constraints()
     beginning: Annotated[Beginning | None, Field(exclude_if=lambda value: value is None)] = None
     scenario: Scenario
+    unknowns: Annotated[Unknowns | None, Field(exclude_if=lambda value: value is None)] = None
     scoring: scoring_type()  # type: ignore[valid-type]  # known when the registry is read
     indicator: Indicator
     difficulty: Difficulty | None = None
@@ -224,6 +226,21 @@ class TaskDocument(Document):
                 f"at most {MAX_BLOCK_SECONDS:,} are simulated"
             )
         return scenario
+
+    @field_validator("unknowns")
+    @classmethod
+    def _draws_can_be_simulated(
+        cls, unknowns: Unknowns | None, info: ValidationInfo
+    ) -> Unknowns | None:
+        scenario: Scenario | None = info.data.get("scenario")
+        if unknowns is not None and scenario is not None:
+            if scenario.control.mode != "agent":
+                raise ValueError(
+                    "test trials need scenario.control.mode agent: keys are programmed"
+                )
+            for end in (0, 1):
+                drawn_scenario(unknowns.at_end(end), scenario, seed=0)
+        return unknowns
 
     @field_validator("scoring")
     @classmethod

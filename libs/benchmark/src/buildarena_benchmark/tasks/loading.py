@@ -21,7 +21,7 @@ _HEADROOM: Final = (
     *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
     *("flight-3", "lift-4", "mechanisms-7"),
 )
-_FAMILIES: Final = ("budget-1", "repair-1")
+_FAMILIES: Final = ("budget-1", "repair-1", "identify-1")
 
 
 @cache

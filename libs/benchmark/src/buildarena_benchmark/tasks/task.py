@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
 from buildarena_benchmark.families.given import Beginning, given_machine
+from buildarena_benchmark.families.unknowns import Unknowns, drawn_scenario
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Scenario
@@ -35,7 +36,8 @@ class Task:
         indicator: The figure the task is ranked by.
         difficulty: Weight of each difficulty dimension, 1 to 3; empty if not stated.
         given: What builders begin with; None where they begin with nothing.
-        seed: What draws it; always 0 where nothing is drawn.
+        unknowns: Numbers of the scenario that are drawn and not told; None where all are told.
+        seed: What draws them; always 0 where nothing is drawn.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Task:
     indicator: Indicator
     difficulty: Mapping[str, int]
     beginning: Beginning | None = None
+    unknowns: Unknowns | None = None
     seed: int = 0
 
     @property
@@ -63,8 +66,19 @@ class Task:
         return self.scenario.control.mode
 
     def drawn(self, seed: int) -> Self:
-        """The task as a job of this seed has it; the same for all unless something is drawn."""
+        """The task as a job of this seed has it; the same for all unless something is drawn.
+
+        Where numbers are drawn that nobody is told, the scenario has them.
+        """
+        if self.unknowns is not None:
+            scenario = drawn_scenario(self.unknowns, self.scenario, seed)
+            return replace(self, seed=seed, scenario=scenario)
         return self if self.beginning is None else replace(self, seed=seed)
+
+    @property
+    def tests(self) -> int:
+        """Trials that a builder has before the one that counts; 0 where every trial counts."""
+        return 0 if self.unknowns is None else self.unknowns.tests
 
     def new_machine(self, catalogue: Catalogue) -> Machine:
         """What a builder begins with: an empty machine, or the one that is given."""
@@ -84,7 +98,11 @@ class Task:
                 part: getattr(self, part).model_dump(mode="json")
                 for part in ("constraints", "scenario", "scoring", "indicator")
             },
-            **({"beginning": self.beginning.model_dump(mode="json")} if self.beginning else {}),
+            **{
+                part: getattr(self, part).model_dump(mode="json")
+                for part in ("beginning", "unknowns")
+                if getattr(self, part) is not None
+            },
             "difficulty": dict(self.difficulty) or None,
         }
 
@@ -105,12 +123,14 @@ def task_of(document: TaskDocument) -> Task:
         indicator=document.indicator,
         difficulty=MappingProxyType(weights),
         beginning=document.beginning,
+        unknowns=document.unknowns,
     )
 
 
 def _version_of(document: TaskDocument) -> str:
     content = document.model_dump(
-        mode="json", include={"statement", "constraints", "beginning", "scenario", "scoring"}
+        mode="json",
+        include={"statement", "constraints", "beginning", "unknowns", "scenario", "scoring"},
     )
     del content["constraints"]["module_list"]
     if document.constraints.on_demand:

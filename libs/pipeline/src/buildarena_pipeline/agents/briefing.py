@@ -9,6 +9,7 @@ from typing import Final
 
 from buildarena_benchmark import Task
 from buildarena_environment import briefing as words_around
+from buildarena_pipeline.agents.trying import tests_told
 from buildarena_pipeline.agents.workbench import MAX_BYTES
 from buildarena_store.jobs.external_calls import IDLE_FOR
 
@@ -16,7 +17,6 @@ MAX_CALLS: Final = 2000
 """Calls a session may make."""
 MAX_SESSION_BYTES: Final = 8 << 20
 """What a session's arguments and feedback may have together: 4 kB for each of its calls."""
-TRIALS: Final = "You submit once, and the machine has one trial."
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,7 +57,7 @@ def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
     """
     return words_around.briefing(
         task,
-        trials=TRIALS,
+        trials=tests_told(task.tests),
         guidelines=f"{_guidelines()}\n{words_around.worlds_told(worlds)}",
         values={
             "calls": f"{LIMITS.calls:,}",
@@ -77,7 +77,7 @@ def briefing_digest(*, on_demand: bool = False, data_sheets: bool = True) -> str
         data_sheets: Whether it is told the numbers of modules and world.
     """
     return words_around.briefing_digest(
-        TRIALS, _guidelines(), on_demand=on_demand, data_sheets=data_sheets
+        tests_told(0), _guidelines(), on_demand=on_demand, data_sheets=data_sheets
     )
 
 

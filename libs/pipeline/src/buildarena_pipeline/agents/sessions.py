@@ -11,6 +11,7 @@ from typing import Any, Literal
 from cachetools import LRUCache
 
 from buildarena_benchmark import Task, ValidationIssue
+from buildarena_environment import MAIN
 from buildarena_geometry import Machine
 from buildarena_pipeline.agents.briefing import (
     MAX_CALLS,
@@ -19,7 +20,8 @@ from buildarena_pipeline.agents.briefing import (
     briefing_digest,
 )
 from buildarena_pipeline.agents.submission import chosen_task, submit_machine
-from buildarena_pipeline.agents.workbench import Workbench, check_arguments, rebuild
+from buildarena_pipeline.agents.trying import TriedOnce, request_test, trials_of
+from buildarena_pipeline.agents.workbench import TEST, Workbench, check_arguments, rebuild
 from buildarena_pipeline.catalog.tracks import (
     EXTERNAL_WORKFLOW,
     external_track,
@@ -28,6 +30,7 @@ from buildarena_pipeline.catalog.tracks import (
 )
 from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.scoring import drawn_for, task_of
 from buildarena_pipeline.runtime.simulators.known import (
     simulation_version,
     worlds_here,
@@ -85,6 +88,8 @@ class SessionState:
         calls: Calls made.
         size: Bytes of all arguments and feedback.
         open: Whether it takes calls.
+        tests: Its test trials, those under way included.
+        most_tests: Test trials that it may have.
     """
 
     job: Job
@@ -92,6 +97,8 @@ class SessionState:
     calls: int
     size: int
     open: bool
+    tests: Sequence[TriedOnce]
+    most_tests: int
 
 
 class ExternalSessions:
@@ -201,6 +208,8 @@ class ExternalSessions:
         with self._context.store.database.transaction() as connection:
             lease = self._open_lease(job_id, connection)
             count = lease.job.actions
+            if tool.lower() == TEST:
+                raise SessionClosedError(f"{TEST} is no tool: test trials are asked for apart")
             if count >= MAX_CALLS:
                 raise SessionClosedError(
                     f"session {job_id} has made {MAX_CALLS} calls, the most it may make: submit it"
@@ -235,6 +244,7 @@ class ExternalSessions:
             bench = self._benches.pop((job_id, len(calls)), None)
         if bench is None:
             bench = self._rebuilt(calls, job)
+        task = self._task(job)
         # A call in between works on a workbench of its own, so this one stays as it is.
         machines = {name: machine.copy() for name, machine in bench.machines.items()}
         state = SessionState(
@@ -243,9 +253,33 @@ class ExternalSessions:
             calls=len(calls),
             size=bench.size,
             open=job.state == JobState.RUNNING and job.queue == EXTERNAL_QUEUE,
+            tests=trials_of(self._context, job_id, task) if task and task.tests else (),
+            most_tests=task.tests if task else 0,
         )
         self._keep_bench(job_id, len(calls), bench)
         return state
+
+    def test(self, job_id: str) -> Job:
+        """Has the machine tried as it stands; the session goes on once it was.
+
+        Raises:
+            SessionClosedError: The session is not open.
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
+            NoTestError: There is no test trial, none is left, or the machine breaks a rule.
+        """
+        context = self._context
+        with context.store.database.transaction() as connection:
+            lease = self._open_lease(job_id, connection)
+            count = lease.job.actions
+            calls = context.store.external_calls.read(job_id, connection=connection)
+            bench = self._rebuilt(calls, lease.job)
+            name, machine = bench.result() or (MAIN, bench.submitted())
+            task = task_of(lease.job, context.tasks)
+            done = bench.call(name, TEST, {})
+            context.store.external_calls.append(lease, count, done, connection=connection)
+            _, queue = request_test(context, lease, task, machine, connection=connection)
+        context.queues.announce(queue, [job_id])
+        return context.store.jobs.get(job_id)
 
     def submit(self, job_id: str) -> Job:
         """Ends the session: the machine is checked and goes to the simulator.
@@ -274,6 +308,8 @@ class ExternalSessions:
             except UnknownIdError as error:
                 raise UnknownIdError("session", job_id) from error
             state = job.outcome or f"{job.stage} {job.state}"
+            if job.outcome is None and job.queue.startswith("simulate."):
+                state += ": its machine is being tried"
             raise SessionClosedError(f"session {job_id} is not open: it is {state}")
         return lease
 
@@ -292,7 +328,7 @@ class ExternalSessions:
 
     def _task(self, job: Job) -> Task | None:
         task = self._context.tasks.exact(job.task, job.task_version)
-        return None if task is None else task.drawn(job.seed)
+        return None if task is None else drawn_for(job, task)
 
     def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
         with self._lock:

@@ -84,7 +84,8 @@ def submit_machine(
         context.store.results.finish(lease, score, connection=connection, refusals=refusals)
         return None
     engine = str(job.track_config["simulator"])
-    request = RolloutRequest(number=0, final=True, engine=engine, machine_hash=stored.hash)
+    number = len(context.store.rollouts.read(job.id))
+    request = RolloutRequest(number=number, final=True, engine=engine, machine_hash=stored.hash)
     context.store.rollouts.request(job.id, request, connection=connection)
     queue = simulate_queue(engine)
     context.store.leases.queue_again(

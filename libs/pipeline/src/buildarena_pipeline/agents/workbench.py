@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 from buildarena_benchmark import Task, ValidationIssue
 from buildarena_environment import workbench as building
 from buildarena_environment.briefing import catalogue_told
-from buildarena_geometry import Catalogue, Refused
+from buildarena_geometry import Accepted, Catalogue, Machine, Refused
 from buildarena_geometry.json_values import levels
 from buildarena_pipeline.errors import SubmissionError
 from buildarena_store import ExternalCall, clean
 
+TEST: Final = "test_trial"
+"""What stands in a session's calls for a test trial of its machine."""
+TESTED: Final = "The machine is tried as it stands; the session tells what was measured."
 MAX_DEPTH = 20
 MAX_BYTES = 64 << 10
 """What the arguments of one call may have as JSON; real ones have some hundred bytes."""
@@ -24,6 +27,8 @@ class Workbench(building.Workbench):
 
     Attributes:
         size: Bytes of all arguments and feedback so far.
+        tests: Test trials so far.
+        most_tests: Test trials that the task has.
     """
 
     def __init__(
@@ -35,11 +40,19 @@ class Workbench(building.Workbench):
     ) -> None:
         super().__init__(catalogue, on_demand=on_demand, task=task)
         self.size = 0
+        self.tests = 0
+        self.most_tests = 0 if task is None else task.tests
 
     def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
-        """Carries out an action and returns its result; no argument makes it raise."""
+        """Carries out an action and returns its result; no argument makes it raise.
+
+        `TEST` names no action: it says that the machine was tried as it stood then.
+        """
         tool, arguments = clean(tool), clean(arguments)
-        outcome = self.act(machine, tool, arguments)
+        tried = tool == TEST and self.tests < self.most_tests
+        self.tests += tried
+        told = Accepted(changed=(), render=lambda: TESTED)
+        outcome = told if tried else self.act(machine, tool, arguments)
         self.size += _size(tool) + _size(arguments) + len(outcome.text.encode())
         return ExternalCall(
             machine=machine,
@@ -88,6 +101,26 @@ def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
         on_demand=task.constraints.on_demand,
         task=task,
     )
+
+
+def repeated(
+    calls: Sequence[ExternalCall], bench: Workbench
+) -> tuple[list[ExternalCall], list[Machine]]:
+    """Makes calls again.
+
+    Args:
+        calls: Those of a session.
+        bench: An empty workbench.
+
+    Returns:
+        The calls as they come out now, and the machines of the test trials as they stood then.
+    """
+    made, tried = list[ExternalCall](), list[Machine]()
+    for call in calls:
+        made.append(bench.call(call.machine, call.tool, call.arguments))
+        if len(tried) < bench.tests:
+            tried.append(bench.submitted().copy())
+    return made, tried
 
 
 def rebuild(calls: Sequence[ExternalCall], task: Task | None, *, data_sheets: bool) -> Workbench:

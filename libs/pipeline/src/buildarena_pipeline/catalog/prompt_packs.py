@@ -46,6 +46,8 @@ MESSAGES = (
     "control",
     "control_again",
     "control_success",
+    "control_tests",
+    "control_tested",
     "no_plan",
     "program_again",
     "go_on",

@@ -11,7 +11,7 @@ from buildarena_environment import ASSEMBLY
 from buildarena_environment.tools import OBJECTION
 from buildarena_geometry import Catalogue, Machine, RefusalClass
 from buildarena_geometry.modules.sets import modules_of_action, smallest_set
-from buildarena_pipeline.agents.workbench import Workbench
+from buildarena_pipeline.agents.workbench import TEST, Workbench
 from buildarena_pipeline.replays.chapters import (
     Chapter,
     Kind,
@@ -87,6 +87,8 @@ def _replay_of_calls(turns: Sequence[Turn], task: Task | None) -> Replay:
             kind: Kind = "assembly" if name == ASSEMBLY else "sub_structure"
             chapters[name] = Chapter(name=name, kind=kind, machine=bench.machine(name))
         for action in turn["actions"]:
+            if action["name"] == TEST and action["ok"]:
+                continue
             if _is_refused_by_session(action, task):
                 chapters[name].steps.append(refused_step(turn["index"], action))
                 continue

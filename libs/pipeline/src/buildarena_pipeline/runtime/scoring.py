@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from buildarena_benchmark import Task, failed_score
+from buildarena_benchmark.families.unknowns import drawn_numbers
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS
 from buildarena_geometry import DOCUMENT_VERSION, Machine
@@ -29,16 +30,34 @@ def task_of(job: Job, catalogue: TaskCatalog) -> Task:
             f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
             reason="task_changed",
         )
-    return task.drawn(job.seed)
+    return drawn_for(job, task)
 
 
-def best_rollout(records: Sequence[RolloutRecord]) -> RolloutRecord:
+def drawn_for(job: Job, task: Task) -> Task:
+    """A task as a job has it.
+
+    What its builder is not told is drawn by a number that the job keeps to itself: a seed is chosen
+    by who submits, and other jobs have it too.
+    """
+    hidden = task.unknowns is not None and job.draw is not None
+    return task.drawn(job.draw if hidden and job.draw is not None else job.seed)
+
+
+def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:
+    """Whether a trial is done that may count: where a task has test trials, the one after them."""
+    return any(r.finished_at is not None and (r.final or not task.tests) for r in records)
+
+
+def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
     """The rollout that counts.
 
-    Of those in the exact world a success before none, one that no flag disqualifies before others,
+    Where a task has test trials it is the last, which is none. Otherwise, of those in the exact
+    world a success before none, one that no flag disqualifies before others,
     then the larger indicator, then the first.
     """
     done = [r for r in records if r.finished_at is not None and r.seed is None]
+    if task.tests:
+        return max(done, key=lambda r: (r.final, r.number))
     return max(
         done,
         key=lambda r: (
@@ -55,14 +74,15 @@ def varied_rollouts(records: Sequence[RolloutRecord]) -> Sequence[RolloutRecord]
     return [record for record in records if record.seed is not None]
 
 
-def rollout_score(job: Job, records: Sequence[RolloutRecord]) -> JobScore:
+def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> JobScore:
     """The score of a job.
 
     Args:
         job: The job.
+        task: Its task, as the job has it.
         records: All its rollouts: those in varied worlds are of the best one's machine.
     """
-    record = best_rollout(records)
+    record = best_rollout(records, task)
     success = bool(record.success)
     return JobScore(
         outcome=Outcome.SUCCESS if success else Outcome.UNSUCCESSFUL,
@@ -70,7 +90,7 @@ def rollout_score(job: Job, records: Sequence[RolloutRecord]) -> JobScore:
         indicator=float(record.indicator or 0.0),
         metrics={**(record.metrics or {}), **_robustness(varied_rollouts(records))},
         flags=record.flags or (),
-        manifest=job_manifest(job, record),
+        manifest=job_manifest(job, task, record),
     )
 
 
@@ -115,12 +135,15 @@ def failure_score(
         flags=failed.flags,
         reason=reason,
         detail=detail,
-        manifest=job_manifest(job, None),
+        manifest=job_manifest(job, task, None),
     )
 
 
-def job_manifest(job: Job, record: RolloutRecord | None) -> Mapping[str, Any]:
-    """Versions of everything that can change the score, and hashes of what it was made from."""
+def job_manifest(job: Job, task: Task, record: RolloutRecord | None) -> Mapping[str, Any]:
+    """Versions of everything that can change the score, and hashes of what it was made from.
+
+    What was drawn and not told is in it: the job has ended, so nobody gains by it.
+    """
     manifest: dict[str, Any] = {
         "buildarena": __version__,
         "geometry": geometry_version,
@@ -130,6 +153,8 @@ def job_manifest(job: Job, record: RolloutRecord | None) -> Mapping[str, Any]:
         "track": dict(job.track_config),
         "seed": job.seed,
     }
+    if task.unknowns is not None:
+        manifest["drawn"] = drawn_numbers(task.unknowns, task.seed)
     if record is not None:
         manifest["simulator"] = dict(record.versions or {})
         manifest["machine"] = record.machine_hash

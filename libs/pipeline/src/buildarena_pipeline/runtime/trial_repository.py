@@ -15,6 +15,7 @@ from typing import Any
 from buildarena_benchmark import Score, Task, failed_score, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.catalog.tasks import TaskCatalog
+from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import Notifier
@@ -25,7 +26,7 @@ from buildarena_pipeline.runtime.worlds import finish_or_vary
 from buildarena_simulation import Trajectory, write_trajectory
 from buildarena_store import ArtifactInfo, ArtifactStore, Job, Lease, RolloutRecord, Stage, Store
 from buildarena_store.jobs.audits import is_unproved, runner_key
-from buildarena_store.states import CONSTRUCT_QUEUE
+from buildarena_store.states import CONSTRUCT_QUEUE, EXTERNAL_QUEUE
 
 SCORED = ("success", "indicator", "metrics", "flags")
 MADE = (*SCORED, "trajectory_hash", "trace", "versions", "annotations", "runner", "audited")
@@ -207,9 +208,16 @@ class TrialRepository:
                 job.id, request.number, connection=connection, **values
             )
             queue: str | None = CONSTRUCT_QUEUE
-            if request.final:
+            external = job.track_config.get("workflow") == EXTERNAL_WORKFLOW
+            if external and not request.final:
+                store.leases.queue_again(
+                    lease, stage=Stage.CONSTRUCT, queue=EXTERNAL_QUEUE, connection=connection
+                )
+                store.external_calls.go_on(job.id, connection=connection)
+                queue = None
+            elif request.final:
                 records = [completed if r.number == completed.number else r for r in due.records]
-                queue = finish_or_vary(store, lease, records, connection=connection)
+                queue = finish_or_vary(store, lease, records, task=due.task, connection=connection)
             else:
                 store.leases.queue_again(
                     lease, stage=Stage.CONSTRUCT, queue=CONSTRUCT_QUEUE, connection=connection

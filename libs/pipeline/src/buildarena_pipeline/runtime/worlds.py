@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection
 
+from buildarena_benchmark import Task
 from buildarena_pipeline.catalog.tracks import worlds_of
 from buildarena_pipeline.runtime.scoring import best_rollout, rollout_score, varied_rollouts
 from buildarena_store import Lease, RolloutRecord, RolloutRequest, Stage, Store
@@ -27,6 +28,7 @@ def finish_or_vary(
     lease: Lease,
     records: Sequence[RolloutRecord],
     *,
+    task: Task,
     connection: Connection,
     **values: Any,
 ) -> str | None:
@@ -36,6 +38,7 @@ def finish_or_vary(
         store: Where jobs and rollouts are.
         lease: The lease under which the last trial was done; it ends.
         records: All rollouts of the job, as they are now.
+        task: The job's task, as the job has it.
         connection: The transaction.
         values: Further columns of the job.
 
@@ -45,14 +48,14 @@ def finish_or_vary(
     Raises:
         StaleLeaseError: The lease is over; the transaction must be undone.
     """
-    best = best_rollout(records)
+    best = best_rollout(records, task)
     varied = varied_rollouts(records)
     # What no engine can take in the exact world it takes in none.
     worlds = worlds_of(lease.job.track_config) if best.trajectory_hash else 0
     if len(varied) < worlds:
         _request(store, lease.job.id, best, len(records), worlds, connection=connection)
     elif all(record.finished_at for record in varied):
-        score = rollout_score(lease.job, records)
+        score = rollout_score(lease.job, task, records)
         store.results.finish(lease, score, connection=connection, **values)
         return None
     queue = simulate_queue(best.engine)

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
@@ -44,6 +45,7 @@ class World:
         terrain: Fixed boxes.
         cargo: The cargo, if there is one.
         gravity: Downward acceleration, units/s².
+        drive_strength: As in `Scenario`; `field` has it already.
         substeps: Into how many each usual step of the engine is divided.
         field: What the blocks exert by themselves; None where none does.
     """
@@ -53,8 +55,19 @@ class World:
     terrain: tuple[TerrainBox, ...]
     cargo: CargoBox | None
     gravity: float
+    drive_strength: float = 1.0
     substeps: int = 1
     field: ForceField | None = None
+
+    @property
+    def force_unit(self) -> float:
+        """Mass·unit/s² in a unit of the modules' forces, whatever the gravity is."""
+        return GRAVITY
+
+    @property
+    def drive_unit(self) -> float:
+        """The same for what drives joints."""
+        return GRAVITY * self.drive_strength
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,6 +1,6 @@
 """What the blocks of a running trial exert by themselves, from their motion and the keys."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -145,9 +145,15 @@ class ForceField:
         return np.asarray(GRAVITY * np.clip(stiffness * below - damping * climb, 0.0, most))
 
 
-def field_of(structure: Structure) -> ForceField | None:
-    """What a structure's blocks exert by themselves; None where none does."""
+def field_of(structure: Structure, *, drive_strength: float = 1.0) -> ForceField | None:
+    """What a structure's blocks exert by themselves; None where none does.
+
+    Args:
+        structure: The machine.
+        drive_strength: Share of their data with which fans push.
+    """
     table = own_forces_of(structure)
+    table = replace(table, push=table.push * drive_strength)
     grips = any(part.module.grip for part in structure.parts)
     exerted = len(table) or len(structure.ropes.springs) or grips
     return ForceField(table, structure.ropes) if exerted else None

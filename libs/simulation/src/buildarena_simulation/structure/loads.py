@@ -42,10 +42,19 @@ class LoadModel:
         structure: The machine.
         clusters: Its clusters at the start.
         motion: Their motion at the start.
+        gravity: Downward acceleration, units/s².
     """
 
-    def __init__(self, structure: Structure, clusters: Clusters, motion: Motion) -> None:
+    def __init__(
+        self,
+        structure: Structure,
+        clusters: Clusters,
+        motion: Motion,
+        *,
+        gravity: float = GRAVITY,
+    ) -> None:
         self._structure = structure
+        self._weights = structure.masses * (gravity / GRAVITY)
         self._stiffness = StiffnessModel(structure)
         self._wrenches = np.zeros((len(structure), 6))
         self.holds: BoolArray = np.ones(len(structure.members), dtype=bool)
@@ -177,7 +186,7 @@ class LoadModel:
             forces.block, np.concatenate([forces.force, moments], axis=1), len(structure)
         )
         world /= GRAVITY
-        world[:, 2] -= structure.masses
+        world[:, 2] -= self._weights
         to_root = self._root_rotation.transpose(0, 2, 1)
         return turned_wrenches(to_root[clusters.cluster_of], world)
 

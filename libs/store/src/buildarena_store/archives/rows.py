@@ -115,6 +115,7 @@ class JobRow(_Row):
     track: Line
     track_config: JsonObject
     seed: Count
+    draw: Count | None = None
     limits: dict[Word, Annotated[Figure, Field(gt=0)] | Annotated[int, Field(gt=0)]]
     owner: str | None
     payer: str | None

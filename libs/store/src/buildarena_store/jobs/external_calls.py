@@ -69,6 +69,19 @@ class ExternalCalls:
         )
         return bool(opened)
 
+    def go_on(self, job_id: str, *, connection: Connection) -> None:
+        """Gives a session whose machine was tried back to its agent, under a lease of its own."""
+        transition(
+            jobs.c.id == job_id,
+            jobs.c.queue == EXTERNAL_QUEUE,
+            to=JobState.RUNNING,
+            allowed_from={JobState.QUEUED},
+            connection=connection,
+            lease_owner=EXTERNAL_QUEUE,
+            lease_token=jobs.c.lease_token + 1,
+            available_at=events.now,
+        )
+
     def lease(self, job_id: str, *, connection: Connection) -> Lease | None:
         """The agent's lease on its open session, locked until the transaction ends."""
         row = connection.execute(

@@ -73,7 +73,10 @@ class NewJob:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A job as the database has it. Times are in UTC; names are those of the columns."""
+    """A job as the database has it. Times are in UTC; names are those of the columns.
+
+    `draw` draws what its builder is not told: no answer may have it while the job is under way.
+    """
 
     id: str
     task: str
@@ -84,6 +87,7 @@ class Job:
     track: str
     track_config: Mapping[str, Any]
     seed: int
+    draw: int | None
     limits: Mapping[str, Any]
     owner: str | None
     payer: str | None

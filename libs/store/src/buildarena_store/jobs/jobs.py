@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from random import SystemRandom
+from typing import Any, Final
 
 from sqlalchemy import ColumnElement, Connection, any_, exists, select, text, update
 from sqlalchemy.dialects.postgresql import insert
@@ -218,6 +219,10 @@ class Jobs:
         )
 
 
+DRAWS: Final = 2**53
+"""Draws are below: JSON holds them as they are."""
+
+
 def _new_row(job: NewJob) -> dict[str, Any]:
     key = job.key
     return {
@@ -230,6 +235,7 @@ def _new_row(job: NewJob) -> dict[str, Any]:
         "track": key.track,
         "track_config": dict(job.track_config),
         "seed": key.seed,
+        "draw": SystemRandom().randrange(DRAWS),
         "limits": dict(job.limits),
         "owner": job.owner,
         "payer": job.payer,

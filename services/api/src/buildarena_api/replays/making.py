@@ -18,6 +18,7 @@ from buildarena_pipeline.replays.chapters import Replay
 from buildarena_pipeline.replays.from_document import replay_of_document
 from buildarena_pipeline.replays.from_turns import NO_BUILDING, replay_of_turns
 from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.scoring import drawn_for
 from buildarena_pipeline.turns import Transcripts
 from buildarena_store import Job
 
@@ -75,7 +76,7 @@ class Replays:
 
     def _task(self, job: Job) -> Task | None:
         task = self._tasks.exact(job.task, job.task_version)
-        return None if task is None else task.drawn(job.seed)
+        return None if task is None else drawn_for(job, task)
 
     def _goes_on(self, kept: Mapping[str, str], turns: Turns) -> bool:
         """Whether the session built on since its machine was kept."""

@@ -25,6 +25,7 @@ from buildarena_api.schemas import (
     JobPage,
     JobView,
 )
+from buildarena_api.withholding import require_told
 from buildarena_benchmark import ValidationIssue
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_pipeline.catalog.models import ModelRegistry
@@ -250,7 +251,9 @@ def list_artifacts(job_id: str, context: ContextDep) -> list[JobFileView]:
 )
 def get_artifact_by_name(job_id: str, name: str, context: ContextDep) -> Response:
     """An artifact of a job; its ETag is the SHA-256 of its bytes."""
-    context.store.jobs.get(job_id)
+    job = context.store.jobs.get(job_id)
+    if name.startswith("trajectory-"):
+        require_told(context, job)
     found = [file for file in context.store.jobs.files(job_id) if file.name == name]
     if not found:
         raise ProblemError(404, f"job {job_id} has no {name!r}")

@@ -17,6 +17,7 @@ from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError
 from buildarena_environment.tools import building_tools
 from buildarena_pipeline.agents.briefing import LIMITS
 from buildarena_pipeline.agents.sessions import SessionClosedError
+from buildarena_pipeline.agents.trying import NoTestError
 from buildarena_pipeline.catalog.specs import Name, Seed, Worlds
 from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import DEFAULT_ENGINE
@@ -90,6 +91,18 @@ class SessionOpened(BaseModel):
     calls: int = Field(description="Calls made so far; more than 0 if it was open already")
 
 
+class TestTrialView(BaseModel):
+    """A test trial: what was measured is told, and counts for nothing."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    number: int = Field(description="Which one it is, from 1")
+    result: str | None = Field(description="What was measured, in words; null while it is tried")
+    trace: list[list[float]] = Field(
+        description="Where what counts was, each second: time (s), and x, y, z (units)"
+    )
+
+
 class SessionView(BaseModel):
     """A session and what stands on its workbench."""
 
@@ -102,6 +115,8 @@ class SessionView(BaseModel):
     limits: LimitsView
     calls: int = Field(description="Calls made so far")
     bytes: int = Field(description="Bytes of all arguments and answers so far")
+    tests: list[TestTrialView] = Field(description="Its test trials so far, in order")
+    most_tests: int = Field(description="Test trials that it may have; 0 for most tasks")
 
 
 class ToolCall(BaseModel):
@@ -186,6 +201,8 @@ def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
         limits=LimitsView.model_validate(LIMITS),
         calls=state.calls,
         bytes=state.size,
+        tests=[TestTrialView.model_validate(test) for test in state.tests],
+        most_tests=state.most_tests,
     )
 
 
@@ -202,6 +219,21 @@ def call_tool(
     except SessionClosedError as error:
         raise ProblemError(409, str(error)) from error
     return ToolOutcome.model_validate(done)
+
+
+@router.post("/{session_id}/tests", status_code=202, responses=problem_responses(404, 409, 503))
+def test_session(
+    session_id: str, sessions: ExternalDep, context: ContextDep, caller: CallerDep
+) -> JobView:
+    """Has the machine tried as it stands, where the task has test trials; the session goes on then.
+
+    What was measured stands in the session (`tests`) once it is open again. It counts for nothing.
+    """
+    _require_own(session_id, context, caller)
+    try:
+        return JobView.of(sessions.test(session_id))
+    except (SessionClosedError, NothingToSubmitError, NoTestError) as error:
+        raise ProblemError(409, str(error)) from error
 
 
 @router.post("/{session_id}/submit", status_code=202, responses=problem_responses(404, 409, 503))

@@ -16,6 +16,7 @@ from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import weighs
 from buildarena_api.scenes import SceneView, scene_view
+from buildarena_api.withholding import require_told
 from buildarena_geometry import DocumentError, Machine
 from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import TrajectoryFormatError
@@ -96,6 +97,7 @@ def show_scene(
 
 
 def _trajectory_hash(context: Context, job: Job, number: int) -> str:
+    require_told(context, job)
     digest = context.store.jobs.artifacts(job.id).get(f"trajectory-{number}")
     if digest is None:
         raise ProblemError(404, f"job {job.id} has no trajectory-{number} yet")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from buildarena_environment.tools import LOOKUPS
-from buildarena_worker.session.messages import Request
+from buildarena_worker.builtin.designs.design import Seen
+from buildarena_worker.session.messages import Message, Request
 
 _ROLE = re.compile(r"^# Role: (\S+)", re.MULTILINE)
 _TASK = re.compile(r"^# Task: (\S+)", re.MULTILINE)
@@ -14,6 +18,8 @@ _PART = re.compile(r"^## (?:Sub-structure|Refinement of): (.+)$", re.MULTILINE)
 _ASSEMBLY = re.compile(r"^## Assembly$", re.MULTILINE)
 _REFINEMENT = re.compile(r"^## Refinement of: ", re.MULTILINE)
 _STEP = re.compile(r"^\[guidance\] (\d+)\. ", re.MULTILINE)
+_MEASURED = re.compile(r"Measured: (.*?)\.(?: |$)", re.MULTILINE)
+_FIGURE = re.compile(r"(\w+) (-?[\d.]+(?:e[+-]?\d+)?)(?=,|$)")
 _BUILDER = re.compile(r"^\[builder\] ", re.MULTILINE)
 
 
@@ -33,6 +39,7 @@ class Situation:
         has_drawing: Whether it works from a drawing.
         builder_turns: Replies of the builder that this role has read.
         last_text: What was said last.
+        trials: The trials that this role programmed, and what it was told of each.
     """
 
     role: str
@@ -46,6 +53,7 @@ class Situation:
     has_drawing: bool
     builder_turns: int
     last_text: str
+    trials: Sequence[Seen]
 
 
 def read_situation(request: Request) -> Situation:
@@ -72,7 +80,26 @@ def read_situation(request: Request) -> Situation:
         has_drawing="Drawing of " in opening,
         builder_turns=sum(len(_BUILDER.findall(text)) for text in received),
         last_text=request.messages[-1].text if request.messages else "",
+        trials=_trials(request.messages),
     )
+
+
+def _trials(messages: Sequence[Message]) -> list[Seen]:
+    """Programs whose trial was told, each with its figures."""
+    seen = []
+    for said, heard in pairwise(messages):
+        figures = figures_of(heard.text)
+        if said.role == "assistant" and heard.role == "user" and figures:
+            seen.append(Seen(program=json.loads(said.text), measured=figures))
+    return seen
+
+
+def figures_of(text: str) -> dict[str, float]:
+    """The figures that a trial's result tells, by name; none in a text that tells of no trial."""
+    measured = _MEASURED.search(text)
+    if measured is None:
+        return {}
+    return {name: float(value) for name, value in _FIGURE.findall(measured.group(1))}
 
 
 def _first(pattern: re.Pattern[str], text: str) -> str:

@@ -44,6 +44,7 @@ class Session:
     Attributes:
         additions: What follows the task's statement: varied worlds, an example, results of rounds.
         machine: What is being built.
+        tested: Whether a test trial of the task is used up.
         plan: What the plan says of the whole machine, "" without one.
     """
 
@@ -68,6 +69,7 @@ class Session:
         self.additions = [worlds_told(worlds)] if worlds else []
         self.machine: Machine | None = None
         self.plan = ""
+        self.tested = False
         self._model_config = model_config
         self._on_turn = on_turn
 

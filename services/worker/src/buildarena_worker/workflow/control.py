@@ -42,6 +42,8 @@ class _ProgramError(ValueError):
 def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     """Lets the controller drive the machine in up to three attempts.
 
+    Where a task has test trials it has those, and the attempt after them ends the job.
+
     Args:
         session: The session.
         machine: What is to be driven.
@@ -64,25 +66,32 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         powered=_powered(machine),
         modules=driven_modules(session, machine),
     )
+    if task.tests:
+        opening += "\n\n" + pack.say("control_tests", tests=str(task.tests))
     dialogue = Dialogue(session, phase="control", opening=opening)
     controller = Role(name="controller", system=pack.roles["controller"])
     records: list[RolloutRecord] = []
-    for attempt in range(1, ATTEMPTS + 1):
+    attempts = task.tests + 1 if task.tests else ATTEMPTS
+    final = final or task.tests > 0
+    for attempt in range(1, attempts + 1):
         try:
-            program = _program(dialogue, controller, machine, session, keeps=_succeeded(records))
+            program = _program(
+                dialogue, controller, machine, session, keeps=not task.tests and _succeeded(records)
+            )
         except _ProgramError as error:
-            if not records:
+            if not records or task.tests:
                 raise ConstructionFailedError("control_invalid", str(error)) from error
             break
         if program is None:
             break
         session.machine = program.machine
-        last = attempt == ATTEMPTS
+        session.tested = task.tests > 0
+        last = attempt == attempts
         record = session.host.simulate(program.machine, program.presses, final=final and last)
         records.append(record)
         if not last:
             dialogue.remark(controller, _outcome(session, record, attempt))
-    return best_rollout(records)
+    return best_rollout(records, task)
 
 
 def _succeeded(records: Sequence[RolloutRecord]) -> bool:
@@ -92,10 +101,12 @@ def _succeeded(records: Sequence[RolloutRecord]) -> bool:
 def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
     """What the controller reads after a trial: how it went, and whether to improve or to keep."""
     frame = "control_success" if _succeeded([record]) else "control_again"
+    tests = session.task.tests
     return session.pack.say(
-        frame,
+        "control_tested" if tests else frame,
         trial=str(attempt),
-        trials=str(ATTEMPTS),
+        trials=str(tests or ATTEMPTS),
+        left=str(tests - attempt),
         trajectory=rendered_trace(record.trace or ()),
         result=session.told(record),
     )
@@ -111,7 +122,7 @@ def driven_modules(session: Session, machine: Machine) -> str:
     ]
     lines = [f"- {module_text(module, session.catalogue)}" for module in driven]
     if session.data_sheets and lines:
-        lines.append(f"\n{units_text(session.catalogue)}")
+        lines.append(f"\n{units_text(session.catalogue, session.task.unknowns)}")
     return "\n".join(lines) or "(none)"
 
 

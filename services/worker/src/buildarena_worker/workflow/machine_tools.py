@@ -90,7 +90,7 @@ def lookups(task: Task) -> list[ToolDefinition]:
 
 def modules_of(session: Session) -> str:
     """What models read about the modules of a session's task: all, or how to look them up."""
-    return modules_told(session.task.constraints, data_sheets=session.data_sheets)
+    return modules_told(session.task, data_sheets=session.data_sheets)
 
 
 def planned_modules(session: Session, plan: str) -> str:
@@ -105,7 +105,7 @@ def planned_modules(session: Session, plan: str) -> str:
         return modules_of(session)
     named = _named_in(plan, task)
     others = [module_in_short(catalogue[name]) for name in connectors_of(task) if name not in named]
-    units = [f"\n{units_text(catalogue)}"] if session.data_sheets else []
+    units = [f"\n{units_text(catalogue, session.task.unknowns)}"] if session.data_sheets else []
     return "\n".join([modules_text(catalogue, named), *others, *units])
 
 

@@ -53,6 +53,8 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
         played = _caught(partial(_one_round, session, workflow, final=final))
         if isinstance(played, Failed):
             failure = played
+            if session.tested:
+                return failure  # another round would begin with as many test trials again
             session.additions.append(
                 session.pack.say("round_failed", round=str(number), reason=failure.detail)
             )
@@ -60,13 +62,14 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
         if not isinstance(played, _Round):
             return played
         records.append(played.record)
-        if played.record.success or final:
+        # A trial that counts is the last where a task has test trials.
+        if played.record.success or final or session.task.tests:
             break
         ended = _caught(partial(_report, session, played, number, loop))
         if ended is not None:
             return ended
     if records:
-        return Finished(best=best_rollout(records))
+        return Finished(best=best_rollout(records, session.task))
     assert failure is not None, "a loop has at least one round"  # noqa: S101 - ours
     return failure
 

@@ -7,7 +7,6 @@ import numpy as np
 from buildarena_benchmark.scorers.measures.commands import presses_of
 from buildarena_benchmark.scorers.measures.components import masses_of_blocks
 from buildarena_benchmark.scorers.measures.series import Series, release_speed
-from buildarena_simulation.constants import GRAVITY
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Machine
@@ -33,7 +32,7 @@ def gains_energy(
     is not known, and it does not.
 
     Args:
-        scenario: Gives the speed at the release.
+        scenario: Gives gravity, and the speed at the release.
         machine: The machine.
         trajectory: The trial.
         samples: How many samples are looked at, from the first on.
@@ -41,34 +40,34 @@ def gains_energy(
     known = set(trajectory.block_ids) == set(machine.blocks)
     if not known or samples <= LASTING or _is_driven(scenario, machine, trajectory):
         return False
-    time_s = trajectory.time_s[:samples]
+    time_s, gravity = trajectory.time_s[:samples], scenario.gravity
     masses = masses_of_blocks(machine, trajectory)
     positions = trajectory.positions[:samples].astype(np.float64)
     whole = float(masses.sum())
-    energy = _energies(time_s, positions) @ masses
-    released = whole * release_speed(scenario) ** 2 / 2 + GRAVITY * float(
+    energy = _energies(time_s, positions, gravity) @ masses
+    released = whole * release_speed(scenario) ** 2 / 2 + gravity * float(
         positions[0, :, 2] @ masses
     )
     brought = np.zeros(samples - 1)
     if trajectory.cargo_position is not None and trajectory.cargo_mass is not None:
         cargo = trajectory.cargo_mass[:samples]
         path = trajectory.cargo_position[:samples].astype(np.float64)
-        each = _energies(time_s, path[:, None])[:, 0]
+        each = _energies(time_s, path[:, None], gravity)[:, 0]
         energy = energy + cargo[1:] * each
-        released += GRAVITY * float(path[0, 2]) * float(cargo[0])
+        released += gravity * float(path[0, 2]) * float(cargo[0])
         brought = np.cumsum(np.diff(cargo) * each)
         whole += float(cargo[0])
-    most = (released + brought) * (1.0 + SHARE) + RISE * GRAVITY * whole
+    most = (released + brought) * (1.0 + SHARE) + RISE * gravity * whole
     beyond = energy > most
     runs = np.convolve(beyond.astype(int), np.ones(LASTING, dtype=int))
     return bool((runs >= LASTING).any())
 
 
-def _energies(time_s: Series, positions: Series) -> Series:
+def _energies(time_s: Series, positions: Series, gravity: float) -> Series:
     """Energy per mass of points in each step, (T - 1, N), units²/s²."""
     speed = np.diff(positions, axis=0) / np.diff(time_s)[:, None, None]
     middle = (positions[1:, :, 2] + positions[:-1, :, 2]) / 2
-    return np.asarray((speed**2).sum(axis=2) / 2 + GRAVITY * middle)
+    return np.asarray((speed**2).sum(axis=2) / 2 + gravity * middle)
 
 
 def _is_driven(scenario: "Scenario", machine: "Machine", trajectory: "Trajectory") -> bool:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.scorers.measures.commands import held, presses_of
 from buildarena_benchmark.scorers.measures.components import Mask
+from buildarena_benchmark.scorers.measures.series import gravity_of
 from buildarena_geometry.modules.solids import Cylinder
-from buildarena_simulation.constants import GRAVITY
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, KeyPress, Machine
@@ -21,8 +21,8 @@ SLACK: Final = 0.5
 ERROR: Final = 0.05
 """Share by which wheels that bounce and slip may have carried a machine farther than measured."""
 
-_COASTING: Final = 0.5 * GRAVITY
-"""How fast the speed that a wheel gave fades once it turns slower, units/s²: somewhat less than
+_COASTING: Final = 0.5
+"""How fast the speed that a wheel gave fades once it turns slower, g: somewhat less than
 the tyres' friction brakes, so that a skid at the end of a drive counts."""
 
 MOTOR_MARGIN: Final = 1.05
@@ -161,9 +161,9 @@ def _rolling(
     along = (moved * ahead).sum(axis=1)
     rolled = np.where(touches, np.clip(turn, *(limits * steps_s)) * radius, 0.0)
     credit = np.zeros(len(along))
-    speed = 0.0
+    speed, fading = 0.0, _COASTING * gravity_of(trajectory)
     for k, step_s in enumerate(steps_s):
-        coasted = np.copysign(max(abs(speed) - _COASTING * step_s, 0.0) * step_s, speed)
+        coasted = np.copysign(max(abs(speed) - fading * step_s, 0.0) * step_s, speed)
         low, high = min(rolled[k], coasted, 0.0), max(rolled[k], coasted, 0.0)
         credit[k] = min(max(along[k], low), high)
         speed = credit[k] / step_s

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import ReleasedPlacement
 
 if TYPE_CHECKING:
@@ -28,6 +29,11 @@ def release_speed(scenario: "Scenario") -> float:
     if not isinstance(placement, ReleasedPlacement):
         return 0.0
     return float(np.linalg.norm(placement.velocity))
+
+
+def gravity_of(trajectory: "Trajectory") -> float:
+    """Downward acceleration in a trial, units/s²; the usual one where no simulator of ours ran."""
+    return float(trajectory.settings.get("gravity", GRAVITY))
 
 
 def speeds(time_s: Series, positions: Series) -> Series:

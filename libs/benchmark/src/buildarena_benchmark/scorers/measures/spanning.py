@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.scorers.measures.components import groups_of, spans_of
 from buildarena_benchmark.scorers.measures.outline import extents
-from buildarena_simulation.constants import GRAVITY
+from buildarena_benchmark.scorers.measures.series import gravity_of
 from buildarena_simulation.scenario import SpanPlacement
 
 if TYPE_CHECKING:
@@ -223,5 +223,5 @@ def _needed(trajectory: "Trajectory", until: int) -> float:
     assert trajectory.cargo_mass is not None  # noqa: S101
     step = float(np.median(np.diff(trajectory.time_s)))
     height = trajectory.cargo_position[:until, 2].astype(np.float64)
-    lift = np.diff(height, 2) / (step * step * GRAVITY)
+    lift = np.diff(height, 2) / (step * step * gravity_of(trajectory))
     return float((trajectory.cargo_mass[1 : until - 1] * (1.0 + lift)).sum())

@@ -62,19 +62,20 @@ def is_unstable(
     bound = _bound(scenario, machine, trajectory, masses * members)
     steps = np.diff(trajectory.time_s[:samples])
     weights = (masses * members)[1:] * members[:-1]
-    energies = [_energies(np.where(members[:, :, None], positions, 0.0), steps, weights)]
+    g = scenario.gravity
+    energies = [_energies(np.where(members[:, :, None], positions, 0.0), steps, weights, g)]
     if cargo is not None:
         path = cargo[:samples].astype(np.float64)[:, None]
-        energies.append(_energies(path, steps, np.ones((samples - 1, 1))))
+        energies.append(_energies(path, steps, np.ones((samples - 1, 1)), g))
     return any(_lasts(energy > bound) for energy in energies) or gains_energy(
         scenario, machine, trajectory, samples
     )
 
 
-def _energies(positions: Series, steps: Series, weights: Series) -> Series:
+def _energies(positions: Series, steps: Series, weights: Series, gravity: float) -> Series:
     """Mean energy per mass in each step, (T - 1,), units²/s²; of K points weighed (T - 1, K)."""
     speed = np.diff(positions, axis=0) / steps[:, None, None]
-    each = 0.5 * (speed**2).sum(axis=2) + GRAVITY * positions[1:, :, 2]
+    each = 0.5 * (speed**2).sum(axis=2) + gravity * positions[1:, :, 2]
     return np.asarray((each * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9))
 
 
@@ -94,7 +95,7 @@ def _bound(
     height = max([0.0, float(start[:, 2].max()), *tops])
     if trajectory.cargo_position is not None:
         height = max(height, float(trajectory.cargo_position[0, 2]))
-    fall = np.sqrt(2.0 * GRAVITY * height) + release_speed(scenario)
+    fall = np.sqrt(2.0 * scenario.gravity * height) + release_speed(scenario)
     modules = [machine.blocks[block].module for block in trajectory.block_ids]
     thrusts = np.array(
         [
@@ -102,7 +103,11 @@ def _bound(
             for module in modules
         ]
     )
-    push = GRAVITY * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
+    push = (
+        GRAVITY
+        * max(scenario.drive_strength, 1.0)
+        * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
+    )
     gained = np.concatenate([[0.0], np.cumsum(push[1:] * np.diff(trajectory.time_s[: len(push)]))])
     spin = max((module.motor.speed for module in modules if module.motor), default=0.0)
     extent = start.max(axis=0) - start.min(axis=0)

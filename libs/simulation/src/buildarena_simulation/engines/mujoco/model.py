@@ -94,7 +94,8 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         structure=world.structure,
         clusters=state.clusters,
         axes=state.axes,
-        gravity=world.gravity,
+        force_unit=world.force_unit,
+        drive_unit=world.drive_unit,
         servo_slip=settings.servo_slip,
     )
     lines = [

@@ -53,14 +53,16 @@ class JointText:
         structure: The machine.
         clusters: Its clusters.
         axes: (C, 3, 3) machine_from_principal.
-        gravity: Downward acceleration, units/s².
+        force_unit: Mass·unit/s² in a unit of the modules' forces.
+        drive_unit: The same for what drives joints.
         servo_slip: How far off its target a wheel's motor reaches its torque limit, rad/s.
     """
 
     structure: Structure
     clusters: Clusters
     axes: FloatArray
-    gravity: float
+    force_unit: float
+    drive_unit: float
     servo_slip: float
 
     def joints(self, c: int) -> Iterator[str]:
@@ -103,12 +105,12 @@ class JointText:
         for c in driven_clusters(structure, clusters):
             part = structure.parts[clusters.seated[c]]
             drive = None if part.module.joint is None else part.module.joint.drive
-            name, most = f"hinge {c}", structure.torques[clusters.seated[c]] * self.gravity
+            name, most = f"hinge {c}", structure.torques[clusters.seated[c]] * self.drive_unit
             if drive is None:
                 kv = most / self.servo_slip
                 yield tag("velocity", name=name, joint=name, kv=kv, forcerange=(-most, most))
                 continue
-            most = drive.force * self.gravity
+            most = drive.force * self.drive_unit
             if drive.kind == "speed":
                 kv = most / _SERVO_SLIP
                 yield tag("velocity", name=name, joint=name, kv=kv, forcerange=(-most, most))
@@ -159,7 +161,7 @@ class JointText:
             "stiffness": joint.stiffness,
             "damping": joint.damping,
         }
-        return {name: amount * self.gravity for name, amount in amounts.items() if amount}
+        return {name: amount * self.force_unit for name, amount in amounts.items() if amount}
 
     def _tied(self, name: str, other: str, ratio: float) -> str:
         return tag(

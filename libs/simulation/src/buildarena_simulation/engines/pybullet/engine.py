@@ -271,7 +271,7 @@ class PyBulletEngine:
             articulation=None if simple else articulation,
             wheel_signs=np.where(clusters.seated_is_outer[hinged], 1.0, -1.0),
             wheel_places=np.array(places, dtype=np.int64),
-            wheel_torques=structure.torques[clusters.seated[hinged]] * self._world.gravity,
+            wheel_torques=structure.torques[clusters.seated[hinged]] * self._world.drive_unit,
         )
 
     def _load(self, inside: tuple[int, ...], motion: Motion) -> int:

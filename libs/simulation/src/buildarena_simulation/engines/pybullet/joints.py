@@ -179,7 +179,7 @@ class Articulation:
             self._drives[place[block]] = _Drive(
                 link=self.links[c],
                 sign=sign_of(self.clusters, c),
-                force=float(most) * self.world.gravity,
+                force=float(most) * self.world.drive_unit,
                 holds_place=drive is not None and drive.kind == "position",
             )
 
@@ -189,11 +189,11 @@ class Articulation:
     def _rest(self, c: int, link: int) -> None:
         """Friction, or spring and damper, of a joint with one number for its place."""
         joint = self.structure.parts[self.clusters.seated[c]].module.joint
-        friction = 0.0 if joint is None else joint.friction * self.world.gravity
+        friction = 0.0 if joint is None else joint.friction * self.world.force_unit
         self._motor(link, pybullet.VELOCITY_CONTROL, targetVelocity=0.0, force=friction)
         if joint is not None and (joint.stiffness or joint.damping):
             self._spring(
-                link, joint.stiffness * self.world.gravity, joint.damping * self.world.gravity
+                link, joint.stiffness * self.world.force_unit, joint.damping * self.world.force_unit
             )
 
     def _spring(self, link: int, stiffness: float, damping: float) -> None:
@@ -209,7 +209,7 @@ class Articulation:
 
     def _start_ball(self, c: int, link: int, place: FloatArray, rate: FloatArray) -> None:
         joint = self.structure.parts[self.clusters.seated[c]].module.joint
-        friction = 0.0 if joint is None else joint.friction * self.world.gravity
+        friction = 0.0 if joint is None else joint.friction * self.world.force_unit
         turn = quaternion_of(self.axes[c].T @ rotation_of(place) @ self.axes[c])
         pybullet.resetJointStateMultiDof(
             self.body,

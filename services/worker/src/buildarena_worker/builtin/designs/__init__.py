@@ -12,6 +12,7 @@ from buildarena_worker.builtin.designs import (
     bridges,
     flyers,
     repairs,
+    risers,
     rockets,
     rovers,
     vehicles,
@@ -44,6 +45,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "mechanisms-7": arms.loaded_lift,
     "budget-1": lambda seed: bridges.light_beam(seed, gap=10),
     "repair-1": repairs.repaired_car,
+    "identify-1": risers.riser,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +26,19 @@ class PartDesign:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """A trial that the controller has seen.
+
+    Attributes:
+        program: Its answer.
+        measured: What it was told then: figures by name.
+    """
+
+    program: Mapping[str, Any]
+    measured: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
     """A whole machine.
 
@@ -34,9 +47,11 @@ class Design:
         parts: Sub-structures by name, in building order.
         assembly: Actions that put several sub-structures together.
         control: The controller's answer, for tasks that are driven.
+        steer: What it answers after the trials it has seen, where that depends on them.
     """
 
     overall: str
     parts: Mapping[str, PartDesign]
     assembly: Sequence[Action] = ()
     control: Mapping[str, Any] | None = None
+    steer: Callable[[Sequence[Seen]], Mapping[str, Any]] | None = None

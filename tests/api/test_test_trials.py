@@ -1,0 +1,194 @@
+"""Test trials of external agents and people: a session's machine is tried, and it goes on."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from sqlalchemy import text
+from support.stages import work
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.families.unknowns import drawn_numbers
+from buildarena_worker.builtin.designs.design import Seen
+from buildarena_worker.builtin.designs.risers import riser
+from buildarena_worker.builtin.reading import figures_of
+from buildarena_worker.wiring import verification_runner
+
+TASK = builtin_tasks()["identify-1"]
+DRAW = 7_654_321_987_654
+OPEN = {"task": TASK.name, "agent": "me", "seed": 1, "simulator": "mujoco", "worlds": 0}
+
+
+def opened(api, **more) -> str:
+    answer = api.post("/v1/sessions", json={**OPEN, **more})
+    assert answer.status_code == 201, answer.text
+    return answer.json()["id"]
+
+
+def act(api, session: str, tool: str, arguments: object, **more: str):
+    body = {"tool": tool, "arguments": arguments, **more}
+    answer = api.post(f"/v1/sessions/{session}/calls", json=body)
+    assert answer.json().get("ok"), answer.text
+
+
+def built(api, session: str):
+    design = riser(1)
+    for tool, arguments in design.parts["riser"].actions:
+        act(api, session, tool, dict(arguments))
+    for bound in design.steer([])["control_config"]:
+        for key in bound["keys"]:
+            told = {"block_id": bound["block"], "action": bound["action"], "new_key": key}
+            act(api, session, "change_control_key", told)
+    return design
+
+
+def programmed(api, session: str, program) -> None:
+    act(api, session, "reset_control_sequence", {})
+    for press in program["control_sequence"]:
+        act(api, session, "add_control_sequence", press)
+
+
+def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -> None:
+    session = opened(api)
+    design, seen = built(api, session), []
+    for number in range(1, TASK.tests + 1):
+        program = design.steer(seen)
+        programmed(api, session, program)
+        asked = api.post(f"/v1/sessions/{session}/tests")
+        assert asked.status_code == 202, asked.text
+        early = api.post(f"/v1/sessions/{session}/submit")
+        assert early.status_code == 409
+        assert "its machine is being tried" in early.json()["detail"]
+        work(context)
+        view = api.get(f"/v1/sessions/{session}").json()
+        assert view["open"]
+        assert (len(view["tests"]), view["most_tests"]) == (number, TASK.tests)
+        told = view["tests"][-1]
+        assert told["trace"]
+        seen.append(Seen(program=program, measured=figures_of(told["result"])))
+    more = api.post(f"/v1/sessions/{session}/tests")
+    assert (more.status_code, more.json()["detail"]) == (
+        409,
+        "all 5 test trials are used up: submit",
+    )
+    programmed(api, session, design.steer(seen))
+    assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
+    work(context)
+    job = api.get(f"/v1/jobs/{session}").json()
+    assert (job["outcome"], job["manifest"]["rollout"]) == ("success", 5)
+    assert job["manifest"]["drawn"] == drawn_numbers(
+        TASK.unknowns, context.store.jobs.get(session).draw
+    )
+    assert api.get(f"/v1/jobs/{session}/replay").json()["exact"]
+    (check,) = context.store.verifications.request([session]).ids.values()
+    while verification_runner(context).process_one():
+        pass
+    assert context.store.verifications.get(check).verdict == "verified"
+
+
+def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(api, context) -> None:
+    session = opened(api)
+    # A draw whose figures are no part of others that an answer may well have.
+    with context.store.database.transaction() as connection:
+        connection.execute(text("UPDATE jobs SET draw = :draw"), {"draw": DRAW})
+    design = built(api, session)
+    programmed(api, session, design.steer([]))
+    api.post(f"/v1/sessions/{session}/tests")
+    work(context)
+    job = context.store.jobs.get(session)
+    assert job.draw == DRAW
+    drawn = [str(number) for number in drawn_numbers(TASK.unknowns, job.draw).values()]
+    secrets = [*drawn, str(job.draw)]
+    for path in (
+        f"/v1/sessions/{session}",
+        f"/v1/jobs/{session}",
+        "/v1/jobs",
+        f"/v1/jobs/{session}/transcript",
+        f"/v1/jobs/{session}/replay",
+        f"/v1/jobs/{session}/scene",
+        f"/v1/jobs/{session}/machine",
+        f"/v1/tasks/{TASK.name}",
+        "/v1/tasks",
+    ):
+        answer = api.get(path)
+        assert answer.status_code == 200, (path, answer.text)
+        for secret in secrets:
+            assert secret not in answer.text, (path, secret)
+    for path in (
+        f"/v1/jobs/{session}/trajectory",
+        f"/v1/jobs/{session}/artifacts/trajectory-0",
+    ):
+        answer = api.get(path)
+        assert answer.status_code == 404, path
+        assert "once it has ended" in answer.json()["detail"]
+    api.post(f"/v1/sessions/{session}/submit")
+    work(context)
+    assert api.get(f"/v1/jobs/{session}/trajectory").status_code == 200
+
+
+def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(api, context) -> None:
+    session = opened(api)
+    programmed(api, session, built(api, session).steer([]))
+    assert api.post(f"/v1/sessions/{session}/tests").status_code == 202
+    work(context)
+    act(api, session, "start", {}, machine="other")
+    for name, east in (("main", 0), ("other", 40)):
+        copied = {"machine_id": name, "init_shift": [east, 0, 0], "init_rotation": [0, 0, 0]}
+        act(api, session, "add_machine", copied, machine="assembly")
+    job = api.post(f"/v1/sessions/{session}/submit").json()
+    assert (job["outcome"], job["indicator"]) == ("construction_failed", 0.0), job
+    (check,) = context.store.verifications.request([session]).ids.values()
+    while verification_runner(context).process_one():
+        pass
+    assert context.store.verifications.get(check).verdict == "verified"
+
+
+def test_a_machine_that_breaks_a_rule_uses_up_no_test_trial(api) -> None:
+    session = opened(api)
+    assert api.post(f"/v1/sessions/{session}/tests").status_code == 409
+    act(api, session, "start", {})
+    answer = api.post(f"/v1/sessions/{session}/tests")
+    assert answer.status_code == 409
+    assert "would not be tried" in answer.json()["detail"]
+    view = api.get(f"/v1/sessions/{session}").json()
+    assert (view["tests"], view["open"], view["calls"]) == ([], True, 1)
+
+
+@pytest.mark.parametrize("task", ["support-1", "repair-1"])
+def test_other_tasks_have_none(api, task) -> None:
+    session = opened(api, task=task)
+    act(api, session, "get_machine_summary" if task == "repair-1" else "start", {})
+    answer = api.post(f"/v1/sessions/{session}/tests")
+    assert answer.status_code == 409
+    assert "has no test trials" in answer.json()["detail"]
+    assert api.get(f"/v1/sessions/{session}").json()["most_tests"] == 0
+
+
+def test_a_call_that_only_says_so_is_no_test_trial(api) -> None:
+    session = opened(api)
+    for name in ("test_trial", "Test_Trial"):
+        answer = api.post(f"/v1/sessions/{session}/calls", json={"tool": name, "arguments": {}})
+        assert answer.status_code == 409
+
+
+def test_machines_from_files_have_a_world_of_their_own_each_time(api, context) -> None:
+    """So that a file is no further test trial of anybody's session."""
+    session = opened(api)
+    design = built(api, session)
+    programmed(api, session, design.steer([]))
+    machine = api.get(f"/v1/sessions/{session}")
+    assert machine.status_code == 200
+    api.post(f"/v1/sessions/{session}/submit")
+    document = json.dumps(api.get(f"/v1/jobs/{session}/machine").json()).encode()
+    asked = {"task": TASK.name, "simulator": "mujoco", "seed": 1}
+    tried = api.post(
+        "/v1/machines/trials",
+        params=asked,
+        content=document,
+        headers={"content-type": "application/octet-stream"},
+    )
+    assert tried.status_code in (201, 202), tried.text
+    work(context)
+    first, second = (api.get(f"/v1/jobs/{i}").json() for i in (session, tried.json()["id"]))
+    assert first["manifest"]["drawn"] != second["manifest"]["drawn"]

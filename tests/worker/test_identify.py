@@ -1,0 +1,168 @@
+"""Tasks with numbers that are not told: test trials, then the one that counts, in every session."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+
+import pytest
+from support.machines.expert_calls import calls_with, measured_for, played
+from support.stages import work
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.families.unknowns import drawn_numbers
+from buildarena_environment import Environment
+from buildarena_environment.briefing import briefing
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.runtime.context import Context
+from buildarena_pipeline.runtime.scoring import best_rollout, task_of
+from buildarena_pipeline.submission.submission import Submissions
+from buildarena_simulation import read_trajectory
+from buildarena_store import Job
+from buildarena_worker.builtin import expert
+from buildarena_worker.builtin.designs import risers
+from buildarena_worker.builtin.designs.risers import riser
+from buildarena_worker.wiring import verification_runner
+
+TASK = builtin_tasks()["identify-1"]
+SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "2")))
+WORLDS = 12
+
+
+def ended(context: Context, submissions: Submissions, **spec: object) -> Job:
+    asked = {"task": TASK.name, "model": "builtin/expert", "simulator": "mujoco", "worlds": 0}
+    job, _ = submissions.submit_job(JobSpec(**{**asked, **spec}))
+    work(context)
+    return context.store.jobs.get(job.id)
+
+
+def verdict(context: Context, job: Job) -> str | None:
+    (check,) = context.store.verifications.request([job.id]).ids.values()
+    runner = verification_runner(context)
+    while runner.process_one():
+        pass
+    return context.store.verifications.get(check).verdict
+
+
+@pytest.mark.parametrize("workflow", ["five-role", "builder"])
+def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
+    context, submissions, workflow
+) -> None:
+    job = ended(context, submissions, workflow=workflow)
+    assert job.outcome == "success", (job.outcome, job.detail)
+    records = context.store.rollouts.read(job.id)
+    assert [record.final for record in records] == [False] * 5 + [True]
+    assert job.indicator == records[5].indicator
+    assert job.metrics["rise"] == pytest.approx(60, abs=2)
+    assert job.manifest["rollout"] == 5
+    task = task_of(job, context.tasks)
+    assert job.manifest["drawn"] == drawn_numbers(TASK.unknowns, job.draw)
+    assert job.manifest["drawn"]["gravity"] == task.scenario.gravity
+    trajectory = read_trajectory(context.artifacts.get(records[5].trajectory_hash))
+    assert trajectory.settings["gravity"] == task.scenario.gravity
+    assert verdict(context, job) == "verified"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
+    design = riser(seed)
+    answer = measured_for(design, TASK.name, seed, engine)
+    environment = Environment(TASK, simulator=engine, seed=None)
+    environment.task = TASK.drawn(seed)
+    played(environment, calls_with(design, answer))
+    trial = environment.submit().trial
+    assert trial.counts, trial.score
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+def test_what_passes_in_one_world_fails_in_nearly_all_others(engine) -> None:
+    """No machine and no schedule is good for all: the world must be found out."""
+    design = riser(0)
+    calls = calls_with(design, measured_for(design, TASK.name, 0, engine))
+    passed = []
+    for seed in range(WORLDS):
+        environment = played(Environment(TASK, simulator=engine), calls)
+        environment.task = TASK.drawn(seed)
+        passed.append(environment.submit().trial.counts)
+    assert passed[0]
+    assert sum(passed) <= 2
+
+
+def test_a_test_trial_counts_for_nothing_however_good_it_was(rollout) -> None:
+    made = [
+        replace(rollout(k, success=k < 5, indicator=1.0 - k / 10), final=k == 5) for k in range(6)
+    ]
+    assert best_rollout(made, TASK).number == 5
+    assert best_rollout(made, builtin_tasks()["transport-1"]).number == 0
+
+
+def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
+    context, submissions, monkeypatch
+) -> None:
+    """And a closed loop gives it no second set of test trials."""
+
+    def gives_up(bindings, counts, begin, seen):
+        return {} if len(seen) == 2 else risers_answer(bindings, counts, begin, seen)
+
+    risers_answer = risers._answer
+    monkeypatch.setattr(risers, "_answer", gives_up)
+    expert._design.cache_clear()
+    job = ended(context, submissions, workflow="builder", closed_loop={"rounds": 2})
+    assert (job.outcome, job.reason, job.indicator) == (
+        "construction_failed",
+        "control_invalid",
+        0.0,
+    )
+    assert len(context.store.rollouts.read(job.id)) == 2
+    assert verdict(context, job) == "verified"
+    expert._design.cache_clear()
+
+
+def test_rounds_of_a_closed_loop_give_no_further_trials(context, submissions) -> None:
+    job = ended(
+        context, submissions, model="builtin/random", workflow="builder", closed_loop={"rounds": 3}
+    )
+    assert len(context.store.rollouts.read(job.id)) <= TASK.tests + 1
+
+
+def test_varied_worlds_keep_what_was_drawn(context, submissions) -> None:
+    job = ended(context, submissions, worlds=3)
+    records = context.store.rollouts.read(job.id)
+    varied = [record for record in records if record.seed is not None]
+    assert len(varied) == 3
+    drawn = job.manifest["drawn"]
+    for record in varied:
+        trajectory = read_trajectory(context.artifacts.get(record.trajectory_hash))
+        assert trajectory.settings["gravity"] == drawn["gravity"]
+        assert trajectory.settings.get("drive_strength", 1.0) == drawn["drive_strength"]
+        assert trajectory.cargo_mass[-1] == pytest.approx(drawn["cargo_mass"])
+    assert verdict(context, job) == "verified"
+
+
+def test_each_job_has_a_draw_of_its_own_that_its_seed_does_not_tell(context, submissions) -> None:
+    jobs = [
+        submissions.submit_job(JobSpec(task=TASK.name, model=model, seed=3))[0]
+        for model in ("builtin/expert", "builtin/random", "builtin/idle")
+    ]
+    tasks = [task_of(context.store.jobs.get(job.id), context.tasks) for job in jobs]
+    worlds = {(task.scenario.gravity, task.scenario.drive_strength) for task in tasks}
+    assert len(worlds) == 3
+    assert TASK.drawn(3).scenario.gravity not in {gravity for gravity, _ in worlds}
+
+
+def test_no_word_of_a_session_differs_by_the_draw(play) -> None:
+    told = [
+        briefing(TASK.drawn(draw), trials="", guidelines="", values={}, data_sheets=sheets)
+        for draw in (1, 2)
+        for sheets in (True, False)
+    ]
+    assert told[:2] == told[2:]
+    assert "Gravity is drawn and not told" in told[0]
+    assert "Gravity is 32.81" not in told[0]
+    session = play("builtin/expert", task=TASK.name, seed=4)
+    texts = json.dumps([turn.text for turn in session.session.transcript.turns])
+    for number in drawn_numbers(TASK.unknowns, 4).values():
+        assert f"{number}" not in texts
+        assert f"{number}" not in session.session.statement
