@@ -211,7 +211,9 @@ def test_heartbeats_change_a_narrow_row_and_no_index(context, add, cost) -> None
     # The claims, and the costs.
     assert after["jobs"][0] - before["jobs"][0] <= 2 * len(held)
     (all_before, hot_before), (all_after, hot_after) = before["leases"], after["leases"]
-    assert hot_after - hot_before == all_after - all_before >= 1000
+    assert all_after - all_before >= 1000
+    # A snapshot of somebody else, such as autovacuum's, keeps old versions of rows for a moment.
+    assert hot_after - hot_before >= 0.99 * (all_after - all_before)
     assert (ask(context, WRITTEN)[0] - written) / heartbeats < 900
 
 

@@ -50,8 +50,8 @@ def opened_stores(data: Path | None, *, new: bool = False) -> Iterator[Stores]:
     try:
         settings = load_settings() if data is None else load_settings(data=data)
         with ExitStack() as stack:
-            given = settings.database_direct_url or settings.database_url
-            url = given or _embedded(settings.data.absolute(), stack, new=new)
+            url = settings.database_direct_url or settings.database_url
+            url = url or _embedded(settings.data.absolute(), stack, new=new)
             database = Database(url, name="buildarena-command")
             stack.callback(database.close)
             artifacts = ArtifactStore(settings.artifacts_location, settings.artifact_options)

@@ -4,7 +4,7 @@ import sqlalchemy as sa
 from alembic import op
 
 revision = "2026_11_24_draws"
-down_revision = "2026_11_23_worlds"
+down_revision = "2026_11_24_leases"
 branch_labels = None
 depends_on = None
 

@@ -22,8 +22,8 @@ def upgrade() -> None:
         ),
         sa.PrimaryKeyConstraint("job_id", name=op.f("pk_leases")),
     )
-    # Room in each page for the next version of its rows; pages that are looked at clean themselves.
-    op.execute("ALTER TABLE leases SET (fillfactor = 40)")
+    # Room in each page for ten versions of its rows; pages that are looked at clean themselves.
+    op.execute("ALTER TABLE leases SET (fillfactor = 10)")
 
 
 def downgrade() -> None:
