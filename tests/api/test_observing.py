@@ -11,7 +11,7 @@ from support.jobs import claim, execute, journal_entry, report_worker
 from support.servers.live_api import api_client
 from support.servers.stacks import wait_until
 
-from buildarena_api.probes import ARTIFACTS_FRESH_S
+from buildarena_api.http.probes import ARTIFACTS_FRESH_S
 from buildarena_store import Usage
 
 

@@ -13,7 +13,7 @@ from support.servers.hushed_proxy import HushedProxy, hushed_proxy
 from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
 
-from buildarena_api.probes import PATIENCE_S, PartFailedError, Probe
+from buildarena_api.http.probes import PATIENCE_S, PartFailedError, Probe
 from buildarena_pipeline.runtime.settings import Settings
 
 METRICS = "a-secret-for-metrics-alone-of-some-length"

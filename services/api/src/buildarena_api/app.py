@@ -32,12 +32,12 @@ from buildarena_api.http.outer_address import (
 )
 from buildarena_api.http.overload import OverloadMiddleware
 from buildarena_api.http.own_pool import OwnPool
+from buildarena_api.http.probes import PROBERS, Probes
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
-from buildarena_api.probes import PROBERS, Probes
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
     archives,

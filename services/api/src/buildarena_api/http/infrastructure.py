@@ -14,7 +14,7 @@ from prometheus_client.registry import Collector
 from sqlalchemy import Engine
 from sqlalchemy.pool import QueuePool
 
-from buildarena_api.probes import Probes
+from buildarena_api.http.probes import Probes
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
 from buildarena_store import WorkerCounts

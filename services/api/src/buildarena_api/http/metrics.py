@@ -14,7 +14,7 @@ from prometheus_client.core import (
 from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
-from buildarena_api.probes import PartFailedError, Probes
+from buildarena_api.http.probes import PartFailedError, Probes
 from buildarena_store import STAGE_SECONDS, MetricValues, Outcome, Stage
 from buildarena_store.metrics import StageTimes
 from buildarena_store.states import AttemptResult

@@ -10,7 +10,7 @@ from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.probes import PartFailedError, Probes
+from buildarena_api.http.probes import PartFailedError, Probes
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
 from buildarena_store import SchemaVersionError, WorkerCounts

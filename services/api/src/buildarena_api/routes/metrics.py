@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from buildarena_api.http.metrics import ServiceMetrics
-from buildarena_api.probes import Probes
+from buildarena_api.http.probes import Probes
 
 router = APIRouter(prefix="/v1", tags=["health"])
 
