@@ -7,6 +7,8 @@ from datetime import UTC, datetime, timedelta
 import pytest
 from sqlalchemy import event, text
 
+from buildarena_pipeline.runtime.worker_process import worker_id
+
 RUNNER = "runner@key_1/"
 
 
@@ -80,3 +82,14 @@ def test_a_key_has_so_many_names_and_touches_no_others(store, report) -> None:
     store.workers.trim(RUNNER, most=3)
     ids = {worker.id for worker in store.workers.page(limit=100)}
     assert ids == {f"{RUNNER}{number}" for number in (6, 7, 8)} | {"runner@key_2/x"}
+
+
+def test_workers_that_are_killed_under_the_same_number_are_all_counted_as_lost(
+    store, report
+) -> None:
+    killed = [worker_id("simulate") for _ in range(5)]
+    for name in killed:
+        report(name)
+        silence(store, name)
+    report(worker_id("simulate"))
+    assert store.workers.counts().lost == {"simulate": 5}

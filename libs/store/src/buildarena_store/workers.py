@@ -27,7 +27,7 @@ class WorkerInfo:
     """A worker process.
 
     Attributes:
-        id: ``kind@host:pid``.
+        id: ``kind@host:pid-nonce``: a process that takes another's place has a name of its own.
         kind: ``construct`` or ``simulate``.
         queues: Queues it serves.
         host: Its machine.

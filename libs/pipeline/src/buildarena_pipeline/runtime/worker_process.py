@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import secrets
 import signal
 import socket
 import sys
@@ -72,6 +73,15 @@ class WorkerSpec:
     versions: Mapping[str, Any]
 
 
+def worker_id(kind: str) -> str:
+    """A name for this process that none before it had: in containers all have the same number.
+
+    Args:
+        kind: Of the worker, for example ``construct``.
+    """
+    return f"{kind}@{socket.gethostname()}:{os.getpid()}-{secrets.token_hex(3)}"
+
+
 class _Runtime:
     """The connections, threads and handler of one process that does stages."""
 
@@ -84,7 +94,7 @@ class _Runtime:
         else:
             self.context = open_context(settings, pool_size=CONNECTIONS_OF_FORKS, name=name)
         self.tracing = Tracing(f"{spec.kind}-worker", settings.otlp_endpoint)
-        self.id = f"{spec.kind}@{socket.gethostname()}:{os.getpid()}"
+        self.id = worker_id(spec.kind)
         self._spec = spec
         self._stopping = threading.Lock()
         self.keeper = LeaseKeeper(self.context.store.leases, self.report)

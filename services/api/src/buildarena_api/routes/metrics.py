@@ -7,6 +7,7 @@ from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from buildarena_api.http.metrics import ServiceMetrics
 from buildarena_api.http.probes import Probes
+from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(prefix="/v1", tags=["health"])
 
@@ -14,7 +15,8 @@ router = APIRouter(prefix="/v1", tags=["health"])
 @router.get(
     "/metrics",
     response_class=Response,
-    responses={200: {"content": {"text/plain": {}}}},
+    # Where a key of the database's is used, which is then asked for it.
+    responses={200: {"content": {"text/plain": {}}}, **problem_responses(503)},
 )
 async def show_metrics(request: Request) -> Response:
     """Figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests.

@@ -23,7 +23,7 @@ class WorkerView(BaseModel):
     id: str = Field(
         description="KIND@HOST:PID beside the database, runner@KEY/NAME where it reaches only the "
         "API",
-        examples=["simulate@lab3:4711", "runner@key_0a1b2c3d4e5f60718293/lab4-4711"],
+        examples=["simulate@lab3:4711-9f2c41", "runner@key_0a1b2c3d4e5f60718293/lab4-4711"],
     )
     kind: str = Field(examples=["simulate"])
     queues: list[str] = Field(examples=[["simulate.mujoco"]])
