@@ -36,7 +36,7 @@ def test_a_longer_lease_costs_postgres_less_and_changes_no_turn() -> None:
     assert long.turns_s == short.turns_s
     assert long.postgres_log_mb_s < short.postgres_log_mb_s / 2
     assert "Postgres' log" in short.limits
-    assert long.limits == []
+    assert long.limits == ["Postgres' connections: a pooler"]
 
 
 def test_slower_models_need_fewer_simulators_for_as_many_sessions() -> None:
