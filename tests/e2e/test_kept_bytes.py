@@ -4,10 +4,11 @@ from pathlib import Path
 
 import pytest
 from starlette.testclient import TestClient
+from support.servers.stacks import wait_until
 from support.stages import work
 
 from buildarena_api.app import create_app
-from buildarena_api.routes import health
+from buildarena_api.http import probes
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime import trial_repository
@@ -67,7 +68,7 @@ def test_a_failing_store_delays_jobs_and_loses_none(context, submissions, folder
 def test_health_says_that_the_store_fails_and_that_it_works_again(
     context, folder, monkeypatch
 ) -> None:
-    monkeypatch.setattr(health, "PROBE_EVERY_S", 0.0)
+    monkeypatch.setattr(probes, "ARTIFACTS_FRESH_S", 0.0)
     with TestClient(create_app(context, load_registry()), base_url="http://127.0.0.1") as api:
 
         def check() -> dict[str, object]:
@@ -76,12 +77,12 @@ def test_health_says_that_the_store_fails_and_that_it_works_again(
             ]
             return found
 
-        assert check()["ok"]
+        wait_until(lambda: check()["ok"], 20, "it works")
         break_store(folder)
-        assert not check()["ok"]
+        wait_until(lambda: not check()["ok"], 20, "it is known to fail")
         assert "artifacts can't be written" in check()["detail"]
         mend_store(folder)
-        assert check()["ok"]
+        wait_until(lambda: check()["ok"], 20, "it is known to work again")
     assert not list((folder / "probe").iterdir())
 
 

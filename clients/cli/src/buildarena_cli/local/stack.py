@@ -41,7 +41,11 @@ from buildarena_store.accounts.keys import new_secret
 KEYS = ("admin_key", "previous_admin_key", "metrics_key")
 """Settings that are keys: no process gets them where none are asked for."""
 READY_WITHIN_S = 60.0
-MEMORY_EVERY_S = 0.5
+NOTED_EVERY_S = 0.5
+CLOSELY_S = 180.0
+"""How long memory is measured each time: a demo's whole life."""
+MEMORY_EVERY_S = 10.0
+"""How often later: the kernel walks all pages of all processes for it."""
 LOCK_ATTEMPTS = 5
 LOCK_AGAIN_S = 0.05
 
@@ -71,6 +75,7 @@ class Stack:
         self.url = f"http://{settings.host}:{settings.port}"
         self.supervisor = Supervisor(stop_within_s=settings.stop_grace_s)
         self.peak_memory_bytes = 0
+        self._noted: dict[str, Any] = {}
         self._tell = tell
         self._simulators = installed_engines() if simulators is None else simulators
         self._lock: IO[str] | None = None
@@ -252,8 +257,12 @@ class Stack:
         )
 
     def _watch_memory(self) -> None:
-        while not self._stopped.wait(MEMORY_EVERY_S):
-            self.peak_memory_bytes = max(self.peak_memory_bytes, tree_memory_bytes())
+        begun_at = measured_at = time.monotonic()
+        while not self._stopped.wait(NOTED_EVERY_S):
+            now = time.monotonic()
+            if now - begun_at < CLOSELY_S or now - measured_at >= MEMORY_EVERY_S:
+                measured_at = now
+                self.peak_memory_bytes = max(self.peak_memory_bytes, tree_memory_bytes())
             self._write_run()
 
     def _write_run(self) -> None:
@@ -269,10 +278,13 @@ class Stack:
             "peak_memory_bytes": self.peak_memory_bytes,
             "stop_grace_s": self.settings.stop_grace_s,
         }
+        if run == self._noted:
+            return
         target = self.settings.data.absolute() / RUN
         partial = target.with_suffix(".partial")
         partial.write_text(json.dumps(run))
         partial.replace(target)
+        self._noted = run
 
 
 def _without_files(environment: Mapping[str, str]) -> dict[str, str]:
