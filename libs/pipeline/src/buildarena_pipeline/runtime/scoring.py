@@ -39,8 +39,8 @@ def drawn_for(job: Job, task: Task) -> Task:
     What its builder is not told is drawn by a number that the job keeps to itself: a seed is chosen
     by who submits, and other jobs have it too.
     """
-    hidden = task.unknowns is not None and job.draw is not None
-    return task.drawn(job.draw if hidden and job.draw is not None else job.seed)
+    hidden = None if task.unknowns is None else job.draw
+    return task.drawn(job.seed if hidden is None else hidden)
 
 
 def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:

@@ -79,8 +79,8 @@ def open_objects(
 
 def _client_options(location: str, options: Mapping[str, str], timeout_s: float) -> ClientConfig:
     """Time limits, beside what the environment says of connections, which they would hide."""
-    prefix = "AWS_" if location.startswith(("s3://", "s3a://")) else ""
-    known = {f"{prefix}{name.upper()}": name for name in CLIENT_OPTIONS}
+    is_s3 = location.startswith(("s3://", "s3a://"))
+    known = {f"AWS_{name.upper()}": name for name in CLIENT_OPTIONS} if is_s3 else {}
     given = {**os.environ, **options}
     return cast(
         "ClientConfig",

@@ -370,12 +370,10 @@ class Leases:
             jobs.c.lease_token == expiries.c.token,
             jobs.c.state == JobState.RUNNING,
         )
-        with self._database.transaction() as connection:
+        ended = expiries.c.expires_at < events.now - REMEMBERED
+        with self._database.statement() as connection:
             connection.execute(
-                delete(expiries).where(
-                    expiries.c.expires_at < events.now - REMEMBERED,
-                    ~select(jobs.c.id).where(theirs).exists(),
-                )
+                delete(expiries).where(ended, ~select(jobs.c.id).where(theirs).exists())
             )
 
 
