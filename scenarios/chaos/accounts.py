@@ -124,7 +124,7 @@ def pick_ups(database: Database, strikes: Sequence[Strike]) -> list[PickUp]:
 
 
 def _pid(worker: str) -> int:
-    """The process of a worker: its id ends with it, a runner's with the slot behind it."""
-    found = re.search(r"([0-9]+)(?:\.[0-9]+)?$", worker)
+    """The process of a worker: ``kind@host:pid-nonce``, or a runner's ``host-pid.slot``."""
+    found = re.search(r":([0-9]+)-[0-9a-f]+$|-([0-9]+)(?:\.[0-9]+)?$", worker)
     assert found is not None, worker
-    return int(found[1])
+    return int(found[1] or found[2])

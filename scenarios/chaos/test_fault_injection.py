@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -133,9 +133,11 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
     rng = random.Random(SEED)
     jobs = JOBS if way == "database" else max(4, JOBS // 5)
     cheap, dear = jobs - jobs // 4, jobs // 4
-    with serving_stack(folder, way) as (stack, simulator):
+    with (
+        serving_stack(folder, way) as (stack, simulator),
+        closing(Database(stack.environment["BUILDARENA_DATABASE_URL"])) as database,
+    ):
         environment, logs = stack.environment, stack.logs
-        database = Database(environment["BUILDARENA_DATABASE_URL"])
         with (
             httpx.Client(base_url=stack.url, timeout=30) as client,
             skewed_worker(environment, logs / "skewed.log", "buildarena_worker"),
@@ -169,7 +171,6 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
         with database.transaction() as connection:
             query = "SELECT seed, model, requests, indicator FROM jobs ORDER BY model, seed"
             rows = connection.exec_driver_sql(query).all()
-        database.close()
     times = [pick_up.seconds for pick_up in picked_up]
     figures = {
         "jobs": len(rows),
