@@ -115,18 +115,32 @@ def logs(
             places[name] = _print_new(file, places[name], f"{name:<{width}}  " if width else "")
 
 
-def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+def doctor(
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+    *,
+    prometheus: Annotated[
+        str | None,
+        typer.Option(
+            "--prometheus",
+            envvar="BUILDARENA_PROMETHEUS_URL",
+            help="Also say which alerts fire: where Prometheus is.",
+        ),
+    ] = None,
+) -> None:
     """Show what is wrong with the service and what to do.
 
     The exit code is 1 when anything is wrong.
     """
-    from buildarena_cli.client import HEALTH, Client
+    from buildarena_cli.alerts import firing_alerts
+    from buildarena_cli.client import Client
 
     client = Client(url)
-    health: dict[str, Any] = client.get(HEALTH)
+    health = _health_at(url, advice="see its log: docs/runbook.md, BuildArenaApiDown")
+    alerts = firing_alerts(prometheus) if prometheus else []
     peak = _peak_memory_bytes(client.url)
     if as_json:
-        print_json({**health, "peak_memory_bytes": peak})
+        print_json({**health, "alerts": list(map(asdict, alerts)), "peak_memory_bytes": peak})
     else:
         say(f"BuildArena at {client.url}: {health['status']}")
         rows = [
@@ -136,24 +150,31 @@ def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
         if peak is not None:
             shown = f"{peak / MEBIBYTE:,.0f} MiB at the peak, all processes"
             rows.append(("ok", "memory", shown))
+        rows += [("!!", alert.name, alert.summary) for alert in alerts]
         print_table(columns("is", "check", "finding"), rows)
         for check in health["checks"]:
             if check["advice"]:
                 say(f"{check['name']}: {check['advice']}")
-    if health["status"] != "ok":
+        for name, runbook in {alert.name: alert.runbook for alert in alerts}.items():
+            say(f"{name}: {runbook}")
+    if health["status"] != "ok" or any(alert.severity != "info" for alert in alerts):
         raise typer.Exit(FAILED)
 
 
-def _health(run: Run) -> dict[str, Any]:
+def _health_at(url: str, *, advice: str) -> dict[str, Any]:
     from buildarena_cli.client import HEALTH, Client, UnreachableError
 
     try:
-        health: dict[str, Any] = Client(run.url).get(HEALTH)
+        health: dict[str, Any] = Client(url).get(HEALTH)
     except UnreachableError:
-        advice = "`buildarena logs api` says why" if run.ready else "it is starting"
         api = {"name": "API", "ok": False, "detail": "does not answer", "advice": advice}
         return {"status": "down", "checks": [api]}
     return health
+
+
+def _health(run: Run) -> dict[str, Any]:
+    advice = "`buildarena logs api` says why" if run.ready else "it is starting"
+    return _health_at(run.url, advice=advice)
 
 
 def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFacts]) -> None:

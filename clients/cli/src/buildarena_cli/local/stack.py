@@ -37,6 +37,7 @@ from buildarena_pipeline.runtime.simulators.installed import installed_engines
 from buildarena_pipeline.secret_files import SUFFIX
 from buildarena_store import Database
 from buildarena_store.accounts.keys import new_secret
+from buildarena_store.states import CONSTRUCT_QUEUE
 
 KEYS = ("admin_key", "previous_admin_key", "metrics_key")
 """Settings that are keys: no process gets them where none are asked for."""
@@ -304,9 +305,10 @@ def _locked(lock: IO[str]) -> None:
 
 
 def _concerns(check: str, served: set[str]) -> bool:
-    """Disk space is worth a warning only, and so are simulators that were not asked for."""
-    queue = check.removeprefix("workers of ")
-    return check != "disk" and (not queue.startswith("simulate.") or queue in served)
+    """Whether a check is of a part that this stack starts: a simulator may be another's."""
+    if check.startswith("workers of simulate."):
+        return check.removeprefix("workers of ") in served
+    return check in {"database", "broker", "artifacts", f"workers of {CONSTRUCT_QUEUE}"}
 
 
 def _require_free_port(host: str, port: int) -> None:

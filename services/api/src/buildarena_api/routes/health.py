@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Final, Literal
 
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, Field
@@ -13,14 +14,18 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.probes import PartFailedError, Probes
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import configured_simulators
-from buildarena_store import SchemaVersionError, WorkerCounts
-from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_store import MetricValues, SchemaVersionError, WorkerCounts
+from buildarena_store.states import CONSTRUCT_QUEUE, Audit, SweepState, simulate_queue
 
 # No turn is waited for: an answer takes neither a thread nor a connection.
 router = APIRouter(prefix="/v1", tags=["health"])
 
-LOW_DISK_BYTES = 1_000_000_000
-CLOCK_TOLERANCE_S = 5.0
+# Wrong is what deploy/monitoring/prometheus/alerts.yml calls wrong; a test compares them.
+LOW_DISK_BYTES: Final = 1_000_000_000
+LOW_DISK_SHARE: Final = 0.1
+LONG_WAIT_S: Final = 3600.0
+FEW_LOST: Final = 3
+CLOCK_TOLERANCE_S: Final = 5.0
 
 
 class Check(BaseModel):
@@ -50,13 +55,16 @@ async def health(context: ContextDep, request: Request, response: Response) -> H
     jobs can't be accepted.
     """
     probes: Probes = request.app.state.probes
-    await probes.renew(probes.database, probes.broker, probes.artifacts)
+    await probes.renew(probes.database, probes.broker, probes.artifacts, probes.values)
     database, counts = _database(probes)
     checks = [database, _broker(probes), _artifacts(probes), _disk(context)]
     if counts is None:
         response.status_code = 503
         return Health(status="down", checks=checks)
-    checks += [*_workers(context, counts), _clocks(counts)]
+    figures = probes.values.latest() if probes.values.works else None
+    checks += [*_workers(context, counts, figures), _lost(counts), _clocks(counts)]
+    if figures is not None:
+        checks += [_waiting(figures), _audits(figures), _budgets(figures)]
     return Health(status="ok" if all(c.ok for c in checks) else "degraded", checks=checks)
 
 
@@ -99,20 +107,62 @@ def _artifacts(probes: Probes) -> Check:
     return Check(name="artifacts", ok=True, detail="can be written and read")
 
 
-def _workers(context: Context, counts: WorkerCounts) -> list[Check]:
-    checks = []
-    simulators = configured_simulators(context.settings)
-    for queue in [CONSTRUCT_QUEUE, *map(simulate_queue, simulators)]:
-        serving = counts.serving.get(queue, 0)
-        checks.append(
-            Check(
-                name=f"workers of {queue}",
-                ok=serving > 0,
-                detail=f"{serving} alive",
-                advice="" if serving else f"start a worker for the queue {queue}",
-            )
-        )
-    return checks
+def _workers(
+    context: Context, counts: WorkerCounts, figures: MetricValues | None
+) -> Iterator[Check]:
+    """Each queue that has workers or should have: those of our simulators, and where jobs wait."""
+    waiting = {each.queue: each for each in figures.queues if each.jobs} if figures else {}
+    ours = [CONSTRUCT_QUEUE, *map(simulate_queue, configured_simulators(context.settings))]
+    for queue in dict.fromkeys([*ours, *sorted({*counts.serving, *waiting})]):
+        serving, depth = counts.serving.get(queue, 0), waiting.get(queue)
+        detail = f"{serving} alive" + (f"; {depth.jobs} jobs wait" if depth else "")
+        advice = "" if serving else f"start a worker for the queue {queue}"
+        yield Check(name=f"workers of {queue}", ok=not advice, detail=detail, advice=advice)
+
+
+def _waiting(figures: MetricValues) -> Check:
+    oldest = max(figures.queues, key=lambda depth: depth.oldest_s, default=None)
+    if oldest is None or oldest.oldest_s < 1:
+        return Check(name="waiting", ok=True, detail="no job")
+    long = oldest.oldest_s > LONG_WAIT_S
+    return Check(
+        name="waiting",
+        ok=not long,
+        detail=f"the oldest job for {_duration(oldest.oldest_s)}, in {oldest.queue}",
+        advice=f"start more workers for the queue {oldest.queue}" if long else "",
+    )
+
+
+def _duration(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes else f"{seconds:.0f} s"
+
+
+def _lost(counts: WorkerCounts) -> Check:
+    many = max(counts.lost.values(), default=0) > FEW_LOST
+    lost = [f"{number} of {kind}" for kind, number in sorted(counts.lost.items()) if number]
+    return Check(
+        name="silent workers",
+        ok=not many,
+        detail=f"{', '.join(lost) or 'none'} within the last hour",
+        advice="see why they ended: memory, machines, too short a time to stop" if many else "",
+    )
+
+
+def _audits(figures: MetricValues) -> Check:
+    waiting = figures.audits.get(Audit.REQUIRED, 0)
+    return Check(name="audits", ok=True, detail=f"{waiting} jobs wait for their verification")
+
+
+def _budgets(figures: MetricValues) -> Check:
+    """Not wrong, but somebody waits: an alert of the least severity."""
+    waiting = figures.sweeps.get(SweepState.BUDGET_EXHAUSTED, 0)
+    return Check(
+        name="budgets",
+        ok=True,
+        detail=f"{waiting} sweeps wait for a larger one",
+        advice="see `buildarena sweep list`, then resume or cancel them" if waiting else "",
+    )
 
 
 def _clocks(counts: WorkerCounts) -> Check:
@@ -133,10 +183,12 @@ def _clocks(counts: WorkerCounts) -> Check:
 def _disk(context: Context) -> Check:
     folder = context.settings.artifact_folder
     existing = next(path for path in (folder, *folder.parents) if path.exists())
-    free = shutil.disk_usage(Path(existing)).free
+    disk = shutil.disk_usage(Path(existing))
+    share = disk.free / disk.total
+    low = disk.free < LOW_DISK_BYTES or share < LOW_DISK_SHARE
     return Check(
         name="disk",
-        ok=free > LOW_DISK_BYTES,
-        detail=f"{free / 1e9:.1f} GB free",
-        advice="" if free > LOW_DISK_BYTES else f"free some space under {existing}",
+        ok=not low,
+        detail=f"{disk.free / 1e9:.1f} GB free, {share:.0%}",
+        advice=f"free some space under {existing}" if low else "",
     )
