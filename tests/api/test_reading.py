@@ -4,7 +4,9 @@ from pathlib import Path
 
 import pytest
 from support.jobs import claim, finish, report_worker
+from support.servers.stacks import wait_until
 
+from buildarena_api.routes.health import FEW_LOST
 from buildarena_benchmark import builtin_tasks
 
 GOLDEN = Path(__file__).parent.parent / "data" / "openapi.json"
@@ -72,6 +74,41 @@ def test_health_tells_which_workers_are_missing(api, context) -> None:
     report_worker(context, "w", "construct")
     checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
     assert checks["workers of construct"]["ok"]
+
+
+def test_health_names_what_waits_and_who_fell_silent(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0]})
+    for number in range(FEW_LOST + 1):
+        report_worker(context, f"w{number}", "construct")
+    with context.store.database.transaction() as connection:
+        connection.exec_driver_sql("UPDATE workers SET seen_at = seen_at - interval '2 minutes'")
+        connection.exec_driver_sql("UPDATE jobs SET available_at = now() - interval '61 minutes'")
+
+    def checks() -> dict[str, dict]:
+        return {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
+
+    wait_until(lambda: not checks()["waiting"]["ok"], 30, "the figures are read again")
+    assert checks()["workers of construct"]["detail"] == "0 alive; 1 waiting"
+    assert checks()["waiting"]["detail"] == "the oldest job for 61 min, in construct"
+    assert checks()["waiting"]["advice"] == "start more workers for the queue construct"
+    assert checks()["silent workers"]["detail"] == "4 of construct within the last hour"
+    assert not checks()["silent workers"]["ok"]
+
+
+def test_a_budget_that_is_used_up_is_told_and_not_wrong(api, context, sweep) -> None:
+    sweep_id = api.post("/v1/sweeps", json={**sweep, "seeds": [0]}).json()["id"]
+    with context.store.database.transaction() as connection:
+        connection.exec_driver_sql(
+            "UPDATE sweeps SET state = 'budget_exhausted' WHERE id = %s", (sweep_id,)
+        )
+
+    def budgets() -> dict:
+        (check,) = [c for c in api.get("/v1/health").json()["checks"] if c["name"] == "budgets"]
+        return check
+
+    wait_until(lambda: budgets()["advice"], 30, "the figures are read again")
+    assert budgets()["ok"]
+    assert budgets()["detail"] == "1 sweeps wait for a larger one"
 
 
 def test_the_contract_is_the_one_that_clients_know(api) -> None:

@@ -123,7 +123,7 @@ def operator(tmp_path_factory) -> Iterator[Operator]:
 def submitted(operator: Operator, **sweep: object) -> str:
     answer = httpx.post(
         f"{operator.stack.url}/v1/sweeps",
-        json={"tasks": ["support-1"], "simulator": "mujoco", "worlds": 1, **sweep},
+        json={"tasks": ["support-1"], "simulator": "mujoco", "worlds": 1, "samples": 1, **sweep},
     )
     assert answer.status_code == 202, answer.text
     return str(answer.json()["id"])
@@ -133,7 +133,8 @@ def test_jobs_that_no_worker_serves(operator) -> None:
     alert = "BuildArenaNoWorkers"
     sweep = submitted(operator, models=["builtin/expert"])
     queue = operator.is_told(alert)["queue"]
-    assert re.search(rf"!! +workers of {queue} +0 alive; 1 jobs wait", operator.doctor())
+    shown = operator.doctor()
+    assert re.search(rf"!! +workers of {queue} +0 alive; 1 waiting", shown), shown
     assert alert in operator.doctor()
     words = operator.words(alert, "Do", "buildarena worker start", QUEUE=queue)
     with ExitStack() as stack:

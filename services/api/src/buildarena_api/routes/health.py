@@ -115,7 +115,7 @@ def _workers(
     ours = [CONSTRUCT_QUEUE, *map(simulate_queue, configured_simulators(context.settings))]
     for queue in dict.fromkeys([*ours, *sorted({*counts.serving, *waiting})]):
         serving, depth = counts.serving.get(queue, 0), waiting.get(queue)
-        detail = f"{serving} alive" + (f"; {depth.jobs} jobs wait" if depth else "")
+        detail = f"{serving} alive" + (f"; {depth.jobs} waiting" if depth else "")
         advice = "" if serving else f"start a worker for the queue {queue}"
         yield Check(name=f"workers of {queue}", ok=not advice, detail=detail, advice=advice)
 
