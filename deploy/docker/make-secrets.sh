@@ -36,5 +36,5 @@ login reader | keep database_url_reader
 printf 'redis://:%s@valkey:6379/0' "$(cat "$folder/valkey_password")" | keep broker_url
 printf '{"identities": [{"name": "buildarena", "credentials": [{"accessKey": "%s", "secretKey": "%s"}], "actions": ["Admin", "Read", "Write", "List"]}]}' \
     "$(cat "$folder/s3_access_key")" "$(cat "$folder/s3_secret_key")" | keep s3_config
-keep receivers.yml <"$(dirname "$0")/../monitoring/alertmanager/receivers.yml"
-echo "secrets are in $folder; the operator's key is $folder/admin_key; alerts go to whom $folder/receivers.yml names"
+cat "$(dirname "$0")/../monitoring/alertmanager/receivers.yml" | keep receivers
+echo "secrets are in $folder; the operator's key is $folder/admin_key; alerts go to whom $folder/receivers names"

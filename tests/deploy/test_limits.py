@@ -260,12 +260,12 @@ def test_digests_are_written_wherever_an_image_is_named(pin, tmp_path) -> None:
             foreign |= set(re.findall(r"image: (\S+)", text))
         recipe = (tmp_path / "deploy/docker/Dockerfile").read_text()
         foreign |= set(re.findall(r"^ARG \w+_IMAGE=(\S+)", recipe, re.MULTILINE))
-        assert len(foreign) == 8, foreign
+        assert len(foreign) == 9, foreign
         for image in foreign:
             tagged, _, digest = image.partition("@")
             assert digest == digest_of(tagged, time)
         explained = (tmp_path / ".env.example").read_text()
-        assert explained.count("@sha256:") == 8
+        assert explained.count("@sha256:") == 9
 
 
 def test_a_registry_that_does_not_answer_changes_nothing(pin, tmp_path) -> None:

@@ -23,7 +23,8 @@ from buildarena_cli.local import free_port
 MONITORING = Path(__file__).resolve().parents[3] / "deploy" / "monitoring"
 PROMETHEUS = shutil.which("prometheus")
 ALERTMANAGER = shutil.which("prometheus-alertmanager")
-RUNBOOK = "https://arena.example/runbook"
+SITE = {"SITE": "arena.example", "HTTPS_PORT": "443", "BASE_PATH": "/lab"}
+RUNBOOK = "https://arena.example:443/lab/runbook"
 
 needs_prometheus = pytest.mark.skipif(
     PROMETHEUS is None, reason="it needs Prometheus: install the Debian packages prometheus"
@@ -166,7 +167,7 @@ def _hooks(receiver: Receiver) -> Iterator[str]:
 
 @contextmanager
 def _running(words: Sequence[str], log: Path) -> Iterator[None]:
-    environment = {**os.environ, "BUILDARENA_RUNBOOK_URL": RUNBOOK}
+    environment = {**os.environ, **{f"BUILDARENA_{name}": value for name, value in SITE.items()}}
     with (
         log.open("wb") as out,
         subprocess.Popen(words, stdout=out, stderr=out, env=environment) as process,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from typing import Any, Final
+from http.client import HTTPException
 from urllib.request import urlopen
 
 from buildarena_cli.errors import CommandError
@@ -47,9 +48,10 @@ def firing_alerts(url: str) -> list[Alert]:
     url = url.rstrip("/")
     try:
         with urlopen(f"{url}/api/v1/alerts", timeout=TIMEOUT_S) as answer:  # noqa: S310 - checked
-            told = json.load(answer)["data"]["alerts"]
-        alerts = [_alert(each) for each in told if each["state"] == "firing"]
-    except OSError as error:
+            document = json.load(answer)
+        listed = document["data"]["alerts"]
+        alerts = [_alert(each) for each in listed if each["state"] == "firing"]
+    except (OSError, HTTPException) as error:
         raise CommandError(f"Prometheus at {url} can't be asked: {error}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise CommandError(f"what answers at {url} is not Prometheus") from error
@@ -63,8 +65,8 @@ def firing_alerts(url: str) -> list[Alert]:
     return sorted(ours, key=lambda each: (grades.index(each.severity), each.name, each.summary))
 
 
-def _alert(told: dict[str, Any]) -> Alert:
-    labels, annotations = told["labels"], told["annotations"]
+def _alert(document: dict[str, Any]) -> Alert:
+    labels, annotations = document["labels"], document["annotations"]
     return Alert(
         name=labels["alertname"],
         severity=labels.get("severity", ""),

@@ -18,6 +18,7 @@ from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
 
 if TYPE_CHECKING:
+    from buildarena_cli.alerts import Alert
     from buildarena_cli.local.service import ProcessFacts, Run
 
 MEBIBYTE = 1024 * 1024
@@ -132,13 +133,12 @@ def doctor(
 
     The exit code is 1 when anything is wrong.
     """
-    from buildarena_cli.alerts import firing_alerts
     from buildarena_cli.client import Client
 
     client = Client(url)
     health = _health_at(url, advice="see its log: docs/runbook.md, BuildArenaApiDown")
-    alerts = firing_alerts(prometheus) if prometheus else []
-    peak = _peak_memory_bytes(client.url)
+    alerts = _firing(prometheus) if prometheus else []
+    peak = _peak_memory_bytes(client.url) if health["status"] != "down" else None
     if as_json:
         print_json({**health, "alerts": list(map(asdict, alerts)), "peak_memory_bytes": peak})
     else:
@@ -159,6 +159,12 @@ def doctor(
             say(f"{name}: {runbook}")
     if health["status"] != "ok" or any(alert.severity != "info" for alert in alerts):
         raise typer.Exit(FAILED)
+
+
+def _firing(prometheus: str) -> list[Alert]:
+    from buildarena_cli.alerts import firing_alerts
+
+    return firing_alerts(prometheus)
 
 
 def _health_at(url: str, *, advice: str) -> dict[str, Any]:
