@@ -4,7 +4,7 @@
 # images' registries, by the Docker client; FILES are those that name images.
 set -euo pipefail
 docker=${DOCKER:-docker}
-images=$(grep -hoE '((POSTGRES|VALKEY|S3|PROMETHEUS|GRAFANA|COLLECTOR|PYTHON|CADDY)_IMAGE(:-|=)|^ +image: )[a-z0-9./-]+:[A-Za-z0-9._-]+' "$@" |
+images=$(grep -hoE '((POSTGRES|VALKEY|S3|PROMETHEUS|ALERTMANAGER|GRAFANA|COLLECTOR|PYTHON|CADDY)_IMAGE(:-|=)|^ +image: )[a-z0-9./-]+:[A-Za-z0-9._-]+' "$@" |
     sed -E 's/^.*(:-|=| )//' | grep -v '^buildarena/' | sort -u)
 for image in $images; do
     digest=$("$docker" buildx imagetools inspect "$image" --format '{{.Manifest.Digest}}')

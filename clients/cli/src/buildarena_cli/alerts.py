@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any, Final
 from http.client import HTTPException
+from typing import Any, Final
 from urllib.request import urlopen
 
 from buildarena_cli.errors import CommandError
