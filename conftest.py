@@ -16,6 +16,7 @@ from fastapi.dependencies import models as dependencies
 from redis import Redis
 from sqlalchemy import create_engine, text
 from support import blas_kernels  # noqa: F401 - before numpy is imported
+from support.clients import one_trust  # noqa: F401 - before clients are made
 from support.long_tests import LONG
 from support.player import Player
 from support.servers.databases import empty

@@ -103,6 +103,7 @@ def test_every_lane_is_one_of_the_limits(weights) -> None:
         assert isinstance(getattr(limits, weighed(weights, path).lane), ConcurrencyLimit)
 
 
+@pytest.mark.samples(5)
 @pytest.mark.parametrize("limit", LIMITS)
 def test_no_spelling_of_many_rows_is_light(api, weights, submissions, limit) -> None:
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=150))
@@ -323,7 +324,7 @@ def statements(context):
     event.remove(engine, "before_cursor_execute", note)
 
 
-@pytest.mark.samples(6)
+@pytest.mark.samples(3)
 @pytest.mark.parametrize("kind", ["", "/figures", "/compare", "/agreement", "/manifest"])
 @pytest.mark.parametrize("name", INVENTED)
 @pytest.mark.usefixtures("board")

@@ -90,6 +90,7 @@ def test_ranges_are_numbers(api, bad) -> None:
     assert api.get("/v1/jobs", params={"indicator_min": bad}).status_code == 422
 
 
+@pytest.mark.samples(6)
 @pytest.mark.parametrize(
     ("text", "count"),
     [
@@ -138,6 +139,7 @@ def test_a_cursor_of_another_order_is_refused(api) -> None:
         assert "another order" in answer.json()["detail"]
 
 
+@pytest.mark.samples(6)
 @pytest.mark.parametrize(
     ("sort", "wrong"),
     [

@@ -57,6 +57,7 @@ def ups(url: str) -> dict[str, float]:
     }
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("part", ["database", "broker"])
 def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part, monkeypatch) -> None:
     with service_behind(context, part, monkeypatch) as (url, proxy):

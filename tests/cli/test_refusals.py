@@ -17,6 +17,7 @@ def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
         assert word in line
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("command", ["up", "demo"])
 def test_a_taken_port(tmp_path, command) -> None:
     with socket.socket() as taken:
@@ -29,6 +30,7 @@ def test_a_taken_port(tmp_path, command) -> None:
     assert named == []
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("command", ["up", "demo"])
 def test_an_unwritable_data_folder(tmp_path, command) -> None:
     (tmp_path / "file").write_text("in the way")
@@ -56,6 +58,7 @@ def test_a_port_that_is_no_port() -> None:
     assert_refused(done, "BUILDARENA_PORT", "99999")
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     ("text", "says"),
     [("tasks: [", "not valid YAML"), ("- 1", "must be a mapping"), (None, "No such")],
@@ -69,6 +72,7 @@ def test_a_bad_sweep_file(tmp_path, text, says) -> None:
     assert says in done.stderr
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("words", [["fly"], ["job"], ["job", "show"], ["leaderboard", "--fast"]])
 def test_wrong_words_end_with_code_2(words) -> None:
     assert piped(*words).returncode == 2
@@ -80,7 +84,9 @@ def test_help_names_every_command() -> None:
         assert command in text
 
 
-def test_a_worker_refuses_a_foreign_schema(database_url, broker_url) -> None:
+@pytest.mark.samples(1)
+@pytest.mark.parametrize("module", ["buildarena_worker", "buildarena_api"])
+def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) -> None:
     from buildarena_store import Database
     from buildarena_store.database import expected_schema
 
@@ -92,21 +98,20 @@ def test_a_worker_refuses_a_foreign_schema(database_url, broker_url) -> None:
 
     stamp("2026_11_22_annotations")
     try:
-        for module in ("buildarena_worker", "buildarena_api"):
-            done = subprocess.run(
-                [sys.executable, "-m", module],
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=60,
-                env={
-                    **os.environ,
-                    "BUILDARENA_DATABASE_URL": database_url,
-                    "BUILDARENA_BROKER_URL": broker_url,
-                },
-            )
-            assert done.returncode == 1
-            assert "schema 2026_11_22_annotations" in done.stderr
+        done = subprocess.run(
+            [sys.executable, "-m", module],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+            env={
+                **os.environ,
+                "BUILDARENA_DATABASE_URL": database_url,
+                "BUILDARENA_BROKER_URL": broker_url,
+            },
+        )
+        assert done.returncode == 1
+        assert "schema 2026_11_22_annotations" in done.stderr
     finally:
         stamp(expected_schema())
         database.close()

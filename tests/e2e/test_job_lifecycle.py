@@ -9,6 +9,7 @@ from pathlib import Path
 
 import httpx
 import pytest
+from support.clients.commands import run_cli
 from support.servers.stacks import finished, results, running_stack, wait_until
 
 SWEEP = {
@@ -22,7 +23,7 @@ pytestmark = pytest.mark.xdist_group("road")
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
 
-def run_cli(url: str, *words: str) -> subprocess.CompletedProcess[str]:
+def run_process(url: str, *words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [BUILDARENA, *words, "--url", url], capture_output=True, text=True, check=False, timeout=120
     )
@@ -34,7 +35,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, obje
     with running_stack(tmp_path_factory.mktemp("undisturbed")) as stack:
         file = stack.settings.data / "sweep.yaml"
         file.write_text(json.dumps(SWEEP))
-        ran = run_cli(stack.url, "sweep", "run", str(file), "--json")
+        ran = run_process(stack.url, "sweep", "run", str(file), "--json")
         assert ran.returncode == 0, ran.stderr
         sweep_id = json.loads(ran.stdout)["id"]
         with httpx.Client(base_url=stack.url) as client:
@@ -44,6 +45,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, obje
 
 
 def _look_with_the_command_line(url: str, sweep_id: str, job_id: str) -> None:
+    """Commands that only ask take no process of their own: its start takes longer than they."""
     status = json.loads(run_cli(url, "sweep", "status", sweep_id, "--json").stdout)
     assert status["state"] == "done"
     board = json.loads(run_cli(url, "leaderboard", "--json").stdout)

@@ -32,6 +32,17 @@ def test_it_stays_warm_between_questions(process) -> None:
     assert process.ask(["pid"]) == pid
 
 
+def test_it_outlives_the_thread_that_asked_first(process) -> None:
+    """A service's threads come and go."""
+    pids: list[int] = []
+    for _ in range(2):
+        thread = threading.Thread(target=lambda: pids.append(process.ask(["pid"])))
+        thread.start()
+        thread.join()
+        time.sleep(0.2)
+    assert pids == [process.ask(["pid"])] * 2
+
+
 def test_one_that_dies_is_started_again(process) -> None:
     first = process.ask(["pid"])
     with pytest.raises(ProcessEndedError, match="of work ended with code -9") as raised:

@@ -129,6 +129,7 @@ def test_a_fault_keeps_its_evidence_and_is_tried_again(context, do_next) -> None
     assert ended(context, job).success is not None
 
 
+@pytest.mark.samples(3)
 @pytest.mark.parametrize(
     ("error", "ending"),
     [

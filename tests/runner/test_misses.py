@@ -38,6 +38,7 @@ def offered(caller: Caller) -> bool:
     return caller.ask("POST", "/leases", json=caller.about(wait_s=1)).status_code == 200
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("how", ["fault", "hand back", "lost"])
 def test_a_key_that_misses_a_trial_again_and_again_counts_once(context, keys, how) -> None:
     job = waiting(context)

@@ -25,6 +25,7 @@ def test_the_expert_leaves_room_above_it(engine, tasks, seed) -> None:
     assert result.indicator == pytest.approx(LOAD / machine.mass, abs=1e-5)
 
 
+@pytest.mark.samples(2)
 @slow_on_pybullet
 @pytest.mark.parametrize(
     ("columns", "height"), [((0,), 5), ((-2, 2), 5), ((-1, 0, 1), 5), ((-3, 3), 5)]
@@ -38,6 +39,7 @@ def test_what_the_gaps_floor_bears_is_not_carried_by_a_light_bridge(
     assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.samples(2)
 @slow_on_pybullet
 @pytest.mark.parametrize(("columns", "height"), [((0,), 4), ((-2, 2), 4), ((-1, 1), 3), ((), 0)])
 def test_a_bridge_that_gives_way_earns_nothing_by_its_debris(
@@ -48,6 +50,7 @@ def test_a_bridge_that_gives_way_earns_nothing_by_its_debris(
     assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.samples(2)
 @slow_on_pybullet
 @pytest.mark.parametrize(
     "machine",

@@ -180,6 +180,7 @@ def test_a_wheel_rolls_without_slip(engine) -> None:
     assert speed == pytest.approx(WHEEL_SPEED * 1.0, rel=0.02)
 
 
+@pytest.mark.samples(3)
 @pytest.mark.parametrize("mass", [5.0, 50.0, 500.0, 1500.0])
 def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine, mass) -> None:
     scenario = Scenario(

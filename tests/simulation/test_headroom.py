@@ -33,6 +33,7 @@ def test_what_the_gaps_floor_bears_is_no_long_bridge(engine, tasks, task, gap, b
     assert result.metrics["load_per_mass"] == 0.0
 
 
+@pytest.mark.samples(1)
 @slow_on_pybullet
 @pytest.mark.parametrize(("overlap", "depth"), [(8, 1), (6, 2)])
 def test_debris_that_lies_on_the_floor_takes_nothing_back(engine, tasks, overlap, depth) -> None:
@@ -110,6 +111,7 @@ def _arm(*presses: tuple[float, str, float]) -> Machine:
     return drafted(swinging_arm(0), presses)
 
 
+@pytest.mark.samples(2)
 @slow_on_pybullet
 @pytest.mark.parametrize(
     "presses",
@@ -208,6 +210,7 @@ def _stepping(*presses: tuple[float, str, float]) -> Machine:
     return drafted(stepping_hoverer(0), presses)
 
 
+@pytest.mark.samples(2)
 @slow_on_pybullet
 @pytest.mark.parametrize("mast", ["below", "aside", "hanging", "legs"])
 def test_a_mast_that_is_lifted_a_little_holds_no_height(engine, tasks, mast) -> None:

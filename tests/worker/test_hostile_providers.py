@@ -45,6 +45,7 @@ def lose(context, job_id: str) -> None:
         )
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("how", ["hang", "drip"])
 @pytest.mark.parametrize("end", [cancel, lose])
 def test_a_request_ends_with_its_lease(context, tmp_path, how, end) -> None:

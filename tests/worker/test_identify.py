@@ -27,7 +27,6 @@ from buildarena_worker.wiring import verification_runner
 
 TASK = builtin_tasks()["identify-1"]
 SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "2")))
-WORLDS = 12
 
 
 def ended(context: Context, submissions: Submissions, **spec: object) -> Job:
@@ -45,6 +44,7 @@ def verdict(context: Context, job: Job) -> str | None:
     return context.store.verifications.get(check).verdict
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("workflow", ["five-role", "builder"])
 def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
     context, submissions, workflow
@@ -64,6 +64,7 @@ def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
     assert verdict(context, job) == "verified"
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
@@ -76,13 +77,15 @@ def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
     assert trial.counts, trial.score
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
-def test_what_passes_in_one_world_fails_in_nearly_all_others(engine) -> None:
+@pytest.mark.parametrize("worlds", [4, pytest.param(12, marks=pytest.mark.slow)])
+def test_what_passes_in_one_world_fails_in_nearly_all_others(engine, worlds) -> None:
     """No machine and no schedule is good for all: the world must be found out."""
     design = riser(0)
     calls = calls_with(design, measured_for(design, TASK.name, 0, engine))
     passed = []
-    for seed in range(WORLDS):
+    for seed in range(worlds):
         environment = played(Environment(TASK, simulator=engine), calls)
         environment.task = TASK.drawn(seed)
         passed.append(environment.submit().trial.counts)
@@ -127,6 +130,7 @@ def test_rounds_of_a_closed_loop_give_no_further_trials(context, submissions) ->
     assert len(context.store.rollouts.read(job.id)) <= TASK.tests + 1
 
 
+@pytest.mark.slow
 def test_varied_worlds_keep_what_was_drawn(context, submissions) -> None:
     job = ended(context, submissions, worlds=3)
     records = context.store.rollouts.read(job.id)

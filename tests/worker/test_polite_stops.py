@@ -116,6 +116,7 @@ def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
     assert context.store.jobs.get(job).faults == 0
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_asked_to_stop_waits_for_its_reply(context, settings, tmp_path) -> None:
     with ProviderStandIn(latency_s=1.5) as model:
         file = models_file(tmp_path, {"good": model})

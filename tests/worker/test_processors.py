@@ -78,7 +78,7 @@ def test_a_result_of_other_kernels_is_verified_with_them(context, job) -> None:
     assert "rollout 0: trajectory" not in failed(context, job)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @several
 @pytest.mark.parametrize("there", [None, "a cloud"])
 def test_a_result_that_names_no_processor_is_tried_with_all_kernels(context, job, there) -> None:

@@ -1,5 +1,11 @@
-"""The API in the test's process: over real HTTP in a thread, or called as a function."""
+"""The API in the test's process: over real HTTP in a thread, or called as a function.
 
+FastAPI prepares an app's routes at its first request, which takes a quarter of a second. No route
+says of which app it is, so that all apps of a test process share those of the first.
+"""
+
+import asyncio
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -8,6 +14,8 @@ from typing import Any
 
 import structlog
 import uvicorn
+from fastapi import FastAPI
+from fastapi.routing import _IncludedRouter
 from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
@@ -17,6 +25,44 @@ from buildarena_pipeline.runtime.context import Context, open_context
 
 LOOPBACK = "http://127.0.0.1"
 """What a client in the test's process calls the API: a service without keys has no other name."""
+ROUTES: list[_IncludedRouter] = []
+"""Those of the first app."""
+TICK_S = 0.01
+"""How often a server looks whether it shall end; uvicorn's own waits a tenth of a second, twice."""
+
+
+def app_of(context: Context) -> FastAPI:
+    """The application, with routes that may have been used before."""
+    app = create_app(context, load_registry())
+    routes = app.router.routes
+    own = [number for number, route in enumerate(routes) if isinstance(route, _IncludedRouter)]
+    if not ROUTES:
+        ROUTES.extend(routes[number] for number in own)
+    for number, route in zip(own, ROUTES, strict=True):
+        routes[number] = route
+    return app
+
+
+class PromptServer(uvicorn.Server):
+    """Ends as soon as it is told to."""
+
+    async def main_loop(self) -> None:
+        tick = 0
+        while not await self.on_tick(tick):
+            tick += 1
+            await asyncio.sleep(TICK_S)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        del sockets
+        for server in self.servers:
+            server.close()
+        for connection in list(self.server_state.connections):
+            connection.shutdown()
+        while self.server_state.connections or self.server_state.tasks:  # noqa: ASYNC110
+            await asyncio.sleep(TICK_S)
+        for server in self.servers:
+            await server.wait_closed()
+        await self.lifespan.shutdown()
 
 
 @contextmanager
@@ -31,7 +77,7 @@ def changed(context: Context, **settings: Any) -> Iterator[Context]:
 
 def api_client(context: Context, **options: Any) -> TestClient:
     """Calls the API of a context as a function."""
-    return TestClient(create_app(context, load_registry()), base_url=LOOPBACK, **options)
+    return TestClient(app_of(context), base_url=LOOPBACK, **options)
 
 
 @contextmanager
@@ -43,13 +89,13 @@ def live_api(context: Context) -> Iterator[str]:
     structlog.configure(logger_factory=structlog.ReturnLoggerFactory())
     port = free_port()
     config = uvicorn.Config(
-        create_app(context, load_registry()),
+        app_of(context),
         host="127.0.0.1",
         port=port,
         log_config=None,
         proxy_headers=False,
     )
-    server = uvicorn.Server(config)
+    server = PromptServer(config)
     thread = threading.Thread(target=server.run)
     thread.start()
     while not server.started:

@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Final
@@ -60,6 +61,8 @@ class WarmProcess:
         self._processes = multiprocessing.get_context("spawn")
         # A process is started whole or not at all before another thread may end it.
         self._changing = threading.RLock()
+        # On Linux a child is signalled when the thread that started it ends: this one never does.
+        self._starter = ThreadPoolExecutor(1, thread_name_prefix=f"{name} starter")
         self._running: tuple[BaseProcess, Connection] | None = None
 
     @property
@@ -84,7 +87,7 @@ class WarmProcess:
                 name=self._name,
                 daemon=True,
             )
-            process.start()
+            self._starter.submit(process.start).result()
             theirs.close()
             self._running = process, pipe
             return pipe
