@@ -12,6 +12,7 @@ from buildarena_cli.errors import CommandError
 
 WATCHDOG: Final = "BuildArenaWatchdog"
 """Always fires; where it does not, Prometheus does not evaluate our rules."""
+OURS: Final = "BuildArena"
 TIMEOUT_S: Final = 10.0
 
 
@@ -61,7 +62,7 @@ def firing_alerts(url: str) -> list[Alert]:
             "deploy/monitoring/prometheus/alerts.yml"
         )
     grades = ("critical", "warning", "info")
-    ours = (each for each in alerts if each.severity in grades and each.name.startswith("Build"))
+    ours = (each for each in alerts if each.severity in grades and each.name.startswith(OURS))
     return sorted(ours, key=lambda each: (grades.index(each.severity), each.name, each.summary))
 
 

@@ -136,7 +136,7 @@ def doctor(
     from buildarena_cli.client import Client
 
     client = Client(url)
-    health = _health_at(url, advice="see its log: docs/runbook.md, BuildArenaApiDown")
+    health = _health_at(url)
     alerts = _firing(prometheus) if prometheus else []
     peak = _peak_memory_bytes(client.url) if health["status"] != "down" else None
     if as_json:
@@ -167,13 +167,15 @@ def _firing(prometheus: str) -> list[Alert]:
     return firing_alerts(prometheus)
 
 
-def _health_at(url: str, *, advice: str) -> dict[str, Any]:
+def _health_at(url: str, *, advice: str | None = None) -> dict[str, Any]:
+    """The service's health; without an answer, that with this advice, or the client's."""
     from buildarena_cli.client import HEALTH, Client, UnreachableError
 
     try:
         health: dict[str, Any] = Client(url).get(HEALTH)
-    except UnreachableError:
-        api = {"name": "API", "ok": False, "detail": "does not answer", "advice": advice}
+    except UnreachableError as error:
+        does_not = {"name": "API", "ok": False, "detail": "does not answer"}
+        api = {**does_not, "advice": advice or str(error)}
         return {"status": "down", "checks": [api]}
     return health
 

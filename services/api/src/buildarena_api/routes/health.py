@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -61,7 +62,7 @@ async def health(context: ContextDep, request: Request, response: Response) -> H
     if counts is None:
         response.status_code = 503
         return Health(status="down", checks=checks)
-    figures = probes.values.latest() if probes.values.works else None
+    figures = _figures(probes)
     checks += [*_workers(context, counts, figures), _lost(counts), _clocks(counts)]
     if figures is not None:
         checks += [_waiting(figures), _audits(figures), _budgets(figures)]
@@ -79,6 +80,12 @@ def _database(probes: Probes) -> tuple[Check, WorkerCounts | None]:
             advice = "look at Postgres' log, disk and locks; it accepts connections"
         return Check(name="database", ok=False, detail=str(error), advice=advice), None
     return Check(name="database", ok=True, detail="reachable, schema as expected"), counts
+
+
+def _figures(probes: Probes) -> MetricValues | None:
+    with contextlib.suppress(PartFailedError):
+        return probes.values.latest()
+    return None
 
 
 def _broker(probes: Probes) -> Check:
