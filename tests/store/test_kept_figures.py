@@ -27,7 +27,7 @@ def counted(context) -> object:
 
 def as_said(figures) -> object:
     return (
-        sorted((j.state, j.stage, j.outcome, j.reason, j.jobs) for j in figures.jobs),
+        sorted((j.state, j.stage, j.outcome, j.reason, j.jobs) for j in figures.jobs if j.jobs),
         sorted((queue.queue, queue.jobs) for queue in figures.queues),
         sorted(
             (m.model, m.requests, m.input_tokens, m.output_tokens, round(m.cost_usd, 6))

@@ -12,7 +12,8 @@ from sqlalchemy import Connection, func, select, text
 
 from buildarena_store import events
 from buildarena_store.database import Database
-from buildarena_store.states import Audit, JobState, Verdict
+from buildarena_store.server_figures import ServerFigures, read_server
+from buildarena_store.states import Audit, JobState, SweepState, Verdict
 from buildarena_store.tables import jobs, sweeps
 
 GATHER_LOCK: Final = 0x636F756E74  # "count": one process at a time adds changes to the counts
@@ -22,7 +23,7 @@ STAGE_SECONDS = (0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600, 180
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JobCount:
-    """How many jobs are in one place; fields are those of a job, empty where they are null."""
+    """How many jobs are, or once were, in one place; fields are a job's, empty where null."""
 
     state: str
     stage: str
@@ -49,6 +50,11 @@ class ModelUse:
     input_tokens: int
     output_tokens: int
     cost_usd: float
+
+    @classmethod
+    def none(cls, model: str) -> ModelUse:
+        """Of a model that was not asked yet."""
+        return cls(model=model, requests=0, input_tokens=0, output_tokens=0, cost_usd=0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,6 +92,7 @@ class MetricValues:
         running: Jobs that are worked on, by queue.
         verifications: Ended verifications by verdict.
         audits: Jobs by where their audit stands; those that need none are left out.
+        server: The Postgres server's own.
     """
 
     jobs: Sequence[JobCount]
@@ -96,6 +103,7 @@ class MetricValues:
     running: dict[str, int]
     verifications: dict[str, int]
     audits: dict[str, int]
+    server: ServerFigures
 
 
 class Metrics:
@@ -119,6 +127,7 @@ class Metrics:
                 running=_running(connection),
                 verifications=_by_state(kept, "verifications", Verdict),
                 audits=_by_state(kept, "audits", Audit),
+                server=read_server(connection),
             )
 
     def gather(self) -> None:
@@ -173,7 +182,6 @@ def _jobs(kept: _Stored) -> list[JobCount]:
     return [
         JobCount(state=state, stage=stage, outcome=outcome, reason=reason, jobs=number)
         for (state, stage, outcome, reason), number in counts.items()
-        if number
     ]
 
 
@@ -227,7 +235,8 @@ def _by_state(kept: _Stored, kind: str, states: type[StrEnum]) -> dict[str, int]
 
 def _sweeps(connection: Connection) -> dict[str, int]:
     query = select(sweeps.c.state, func.count().label("sweeps")).group_by(sweeps.c.state)
-    return {row.state: row.sweeps for row in connection.execute(query)}
+    found = {row.state: row.sweeps for row in connection.execute(query)}
+    return {str(state): 0 for state in SweepState} | found
 
 
 def _running(connection: Connection) -> dict[str, int]:

@@ -68,6 +68,8 @@ jobs = Table(
     # Whose it is: the API key that submitted it, and the sweep whose budget pays for it.
     Column("owner", Text),
     Column("payer", Text),
+    # The span of its submission, which everything done for it is a part of.
+    Column("traceparent", Text),
     # Where it is.
     Column("stage", Text, nullable=False),
     Column("queue", Text, nullable=False),

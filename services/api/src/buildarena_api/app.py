@@ -70,6 +70,7 @@ from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
+from buildarena_pipeline.runtime.simulators.known import configured_simulators
 from buildarena_pipeline.submission.submission import Submissions
 
 POOL_SIZE = 10
@@ -148,7 +149,11 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
     app.state.probes = probes
-    app.state.metrics = ServiceMetrics(probes)
+    app.state.metrics = ServiceMetrics(
+        probes,
+        simulators=configured_simulators(context.settings),
+        models=[model.name for model in registry.models.values()],
+    )
     app.state.context = context
     app.state.metrics.registry.register(
         InfrastructureMetrics(

@@ -11,6 +11,7 @@ from buildarena_pipeline.agents.submission import chosen_task, submit_machine
 from buildarena_pipeline.catalog.tracks import file_track
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.known import simulation_version
+from buildarena_pipeline.runtime.tracing import current_traceparent
 from buildarena_store import Job, JobKey, NewJob
 from buildarena_store.jobs.files import require_room
 from buildarena_store.jobs.job import configuration_hash
@@ -62,7 +63,12 @@ def request_trial(
         seed=seed,
     )
     new = NewJob(
-        key=key, model=name, model_config=config, track_config=track.as_config(), owner=owner
+        key=key,
+        model=name,
+        model_config=config,
+        track_config=track.as_config(),
+        owner=owner,
+        traceparent=current_traceparent(),
     )
     queue = None
     with context.store.lifecycle.submission() as connection:

@@ -36,6 +36,7 @@ from buildarena_pipeline.runtime.simulators.known import (
     worlds_here,
     worlds_issues,
 )
+from buildarena_pipeline.runtime.tracing import current_traceparent
 from buildarena_pipeline.transcript import Transcript
 from buildarena_pipeline.turns import turn_of_call
 from buildarena_store import (
@@ -176,6 +177,7 @@ class ExternalSessions:
             model_config=config,
             track_config=track.as_config(),
             owner=owner,
+            traceparent=current_traceparent(),
         )
         # Refused inside the transaction, so that nothing of it stays.
         with self._context.store.database.transaction() as connection:

@@ -7,6 +7,7 @@ import time
 from typing import Protocol
 
 import structlog
+from opentelemetry.trace import SpanKind
 from sqlalchemy.exc import OperationalError
 
 from buildarena_pipeline.errors import PermanentError, TransientError
@@ -151,7 +152,12 @@ class JobRunner:
             self._keeper.keeping(lease) as active,
         ):
             try:
-                with span(lease.job.stage, job=lease.job.id, token=lease.token):
+                with span(
+                    lease.job.stage,
+                    {"buildarena.job": lease.job.id, "buildarena.token": lease.token},
+                    parent=lease.job.traceparent,
+                    kind=SpanKind.CONSUMER,
+                ):
                     self._handler(active)
             except StaleLeaseError:
                 bound.warning("lease_over")

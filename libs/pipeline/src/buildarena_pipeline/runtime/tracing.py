@@ -1,25 +1,33 @@
 """Traces by OpenTelemetry, when an endpoint is configured; otherwise spans cost next to nothing.
 
-All spans of one job are one trace, whichever processes made them: its id is made from the job's.
+A submission's request is the root, or continues its caller's trace. The job keeps that span as a
+W3C ``traceparent``, and whatever is done for the job, in whichever process, is a child of it.
 """
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import Final
 
 from opentelemetry import trace
 from opentelemetry.context import Context
-from opentelemetry.trace import NonRecordingSpan, SpanContext, Status, StatusCode, TraceFlags
+from opentelemetry.trace import Span, SpanKind, Status, StatusCode
+from opentelemetry.trace.propagation.tracecontext import TraceContextTextMapPropagator
 
-from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline import __version__
+from buildarena_pipeline.errors import PermanentError, StartupError, TransientError
 
 Attribute = str | int | float | bool
 
+TRACEPARENT: Final = "traceparent"
+ERROR_TYPE: Final = "error.type"
+# Only this: baggage of strangers is not passed on.
+_PROPAGATOR: Final = TraceContextTextMapPropagator()
+
 
 class Tracing:
-    """Sends spans to a collector.
+    """Sends spans to a collector; OTEL_TRACES_SAMPLER says which, all by default.
 
     Args:
         service: The process' name in traces, for example ``api``.
@@ -45,7 +53,9 @@ class Tracing:
                 "install buildarena-pipeline[tracing]"
             ) from error
         provider = TracerProvider(
-            resource=Resource.create({"service.name": f"buildarena-{service}"})
+            resource=Resource.create(
+                {"service.name": f"buildarena-{service}", "service.version": __version__}
+            )
         )
         exporter = OTLPSpanExporter(endpoint=endpoint.rstrip("/") + "/v1/traces")
         provider.add_span_processor(BatchSpanProcessor(exporter))
@@ -59,40 +69,62 @@ class Tracing:
 
 
 @contextmanager
-def span(name: str, *, job: str | None = None, **attributes: Attribute) -> Iterator[None]:
-    """A span around the block.
+def span(
+    name: str,
+    attributes: Mapping[str, Attribute],
+    *,
+    parent: str | None = None,
+    kind: SpanKind = SpanKind.INTERNAL,
+) -> Iterator[Span]:
+    """A span around the block, which fails when an exception leaves it.
 
     Args:
         name: What is done.
-        job: Id of the job it is done for, whose trace it then belongs to.
-        attributes: What is known of it.
+        attributes: What is known of it before.
+        parent: The ``traceparent`` of the span that it is a part of, which may be another process';
+            one that can't be read counts as none, and None stands for the span around the block.
+        kind: Its part in an exchange between processes.
     """
     tracer = trace.get_tracer("buildarena")
-    known = {f"buildarena.{key}": value for key, value in attributes.items()}
-    if job is not None:
-        known["buildarena.job"] = job
-    parent = None if job is None else _trace_of(job)
+    around = None if parent is None else _PROPAGATOR.extract({TRACEPARENT: parent}, Context())
     with tracer.start_as_current_span(
         name,
-        context=parent,
-        attributes=known,
+        context=around,
+        kind=kind,
+        attributes=attributes,
         record_exception=False,
         set_status_on_exception=False,
     ) as current:
         try:
-            yield
+            yield current
         except Exception as error:
             # The class alone: messages may hold what a model or a person wrote.
-            current.set_status(Status(StatusCode.ERROR, type(error).__name__))
+            reason = named = type(error).__name__
+            if isinstance(error, TransientError | PermanentError):
+                reason = error.reason
+            mark_failed(current, reason, named)
             raise
 
 
-def _trace_of(job_id: str) -> Context:
-    digest = hashlib.sha256(job_id.encode()).digest()
-    parent = SpanContext(
-        trace_id=int.from_bytes(digest[:16], "big"),
-        span_id=int.from_bytes(digest[16:24], "big"),
-        is_remote=True,
-        trace_flags=TraceFlags(TraceFlags.SAMPLED),
-    )
-    return trace.set_span_in_context(NonRecordingSpan(parent))
+def mark_failed(failed: Span, kind: str, description: str | None = None) -> None:
+    """Marks a span as failed.
+
+    Args:
+        failed: The span.
+        kind: The class of the failure, one of few.
+        description: More of it, without what a model or a person wrote.
+    """
+    failed.set_attribute(ERROR_TYPE, kind)
+    failed.set_status(Status(StatusCode.ERROR, description))
+
+
+def note(event: str, attributes: Mapping[str, Attribute]) -> None:
+    """Notes in the span around it that something happened at this moment."""
+    trace.get_current_span().add_event(event, attributes)
+
+
+def current_traceparent() -> str | None:
+    """The span around it as a W3C ``traceparent``; None outside of any."""
+    carrier: dict[str, str] = {}
+    _PROPAGATOR.inject(carrier)
+    return carrier.get(TRACEPARENT)

@@ -21,6 +21,7 @@ from buildarena_pipeline.runtime.simulators.known import (
     worlds_here,
     worlds_issues,
 )
+from buildarena_pipeline.runtime.tracing import current_traceparent
 from buildarena_pipeline.submission.estimates import SweepEstimate, estimate
 from buildarena_store import Job, JobKey, NewJob, NewSweep, Sweep
 from buildarena_store.ids import content_hash, new_id
@@ -74,7 +75,8 @@ class Submissions:
             SubmissionError: Something of it is unknown; nothing was stored.
         """
         new = self._plan(spec, {"task": spec.task}, {"model": spec.model}, [spec.seed])
-        own = [replace(job, owner=owner) for job in new]
+        traceparent = current_traceparent()
+        own = [replace(job, owner=owner, traceparent=traceparent) for job in new]
         with self._context.store.lifecycle.submission() as connection:
             added = self._context.store.jobs.add(own, connection=connection)
             add_claim(own[0].key.job_id, owner, connection=connection)
@@ -113,7 +115,8 @@ class Submissions:
             request_hash=spec_hash(spec),
             jobs_hash=jobs_hash,
         )
-        own = [replace(job, owner=owner, payer=sweep.id) for job in new]
+        traceparent = current_traceparent()
+        own = [replace(job, owner=owner, payer=sweep.id, traceparent=traceparent) for job in new]
         limits = None if spec.budget is None else spec.budget.as_limits()
         store = self._context.store
         before, added = None, 0

@@ -33,6 +33,8 @@ FORMAT: Final = 1
 """Rises with every change that older programs can't read."""
 OF_JOBS: Final = (attempts, journal, external_calls, rollouts, job_artifacts)
 """Tables whose rows belong to one job."""
+NOT_OF_JOBS: Final = (jobs.c.traceparent,)
+"""Columns that mean nothing to another service."""
 CHUNK: Final = 500
 
 
@@ -81,10 +83,11 @@ def _write_rows(archive: zipfile.ZipFile, connection: Connection, sweep_id: str)
         **of_jobs,
     }
     for table, condition in conditions.items():
-        query = select(table).where(condition).order_by(*table.primary_key.columns)
+        columns = [column for column in table.c if column not in NOT_OF_JOBS]
+        query = select(*columns).where(condition).order_by(*table.primary_key.columns)
         with archive.open(f"rows/{table.name}.jsonl", "w") as member:
             for row in connection.execution_options(yield_per=CHUNK).execute(query):
-                values = {column.name: _plain(getattr(row, column.name)) for column in table.c}
+                values = {column.name: _plain(getattr(row, column.name)) for column in columns}
                 member.write(json.dumps(values, ensure_ascii=False).encode() + b"\n")
 
 

@@ -60,6 +60,7 @@ class NewJob:
         limits: Token, request, cost and time limits of its session, part of that hash too.
         owner: Id of the API key that submits it, if any.
         payer: Id of the sweep whose budget pays for it, if any.
+        traceparent: The span of its submission, by W3C's Trace Context, if there is one.
     """
 
     key: JobKey
@@ -69,6 +70,7 @@ class NewJob:
     limits: Mapping[str, Any] = field(default_factory=dict)
     owner: str | None = None
     payer: str | None = None
+    traceparent: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,6 +93,7 @@ class Job:
     limits: Mapping[str, Any]
     owner: str | None
     payer: str | None
+    traceparent: str | None
     stage: str
     queue: str
     state: str

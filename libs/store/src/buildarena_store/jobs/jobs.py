@@ -58,6 +58,7 @@ class Jobs:
             connection=connection,
             owner=wanted.owner,
             payer=wanted.payer,
+            traceparent=wanted.traceparent,
             **REOPENED,
         )
 
@@ -239,6 +240,7 @@ def _new_row(job: NewJob) -> dict[str, Any]:
         "limits": dict(job.limits),
         "owner": job.owner,
         "payer": job.payer,
+        "traceparent": job.traceparent,
         "stage": Stage.CONSTRUCT,
         "queue": CONSTRUCT_QUEUE,
         "state": JobState.QUEUED,

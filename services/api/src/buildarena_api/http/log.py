@@ -5,18 +5,20 @@ from __future__ import annotations
 import re
 import secrets
 import time
+from contextlib import AbstractContextManager, nullcontext
 
 import structlog
+from opentelemetry.trace import INVALID_SPAN, Span, SpanKind
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.metrics import ServiceMetrics
-from buildarena_pipeline.runtime.tracing import span
+from buildarena_pipeline.runtime.tracing import TRACEPARENT, mark_failed, span
 
 REQUEST_ID = "X-Request-ID"
 GOOD_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
 QUIET = ("/v1/health", "/v1/metrics")
-"""Asked for all the time by machines: not worth a line each."""
+"""Asked for all the time by machines: not worth a line or a span each."""
 
 log = structlog.get_logger(__name__)
 
@@ -38,7 +40,8 @@ class RequestLog:
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
-        given = Headers(scope=scope).get(REQUEST_ID, "")
+        headers = Headers(scope=scope)
+        given = headers.get(REQUEST_ID, "")
         request_id = given if GOOD_ID.fullmatch(given) else secrets.token_hex(8)
         status = 500
         started = time.perf_counter()
@@ -50,18 +53,18 @@ class RequestLog:
                 MutableHeaders(scope=message)[REQUEST_ID] = request_id
             await send(message)
 
-        method = scope["method"]
         with (
             structlog.contextvars.bound_contextvars(request_id=request_id),
-            span("http request", method=method, path=scope["path"], request_id=request_id),
+            _request_span(scope, headers.get(TRACEPARENT), request_id) as current,
         ):
             try:
                 await self._app(scope, receive, noting_send)
             finally:
                 self._note(scope, status, time.perf_counter() - started)
+                _describe(current, scope, status)
 
     def _note(self, scope: Scope, status: int, seconds: float) -> None:
-        route = getattr(scope.get("route"), "path", "none")
+        route = _route(scope) or "none"
         self._metrics.http_seconds.labels(route, scope["method"], str(status)).observe(seconds)
         if scope["path"] not in QUIET:
             caller = scope.get("state", {}).get("caller")
@@ -73,3 +76,33 @@ class RequestLog:
                 seconds=round(seconds, 4),
                 key=None if caller is None else caller.key_id,
             )
+
+
+def _request_span(
+    scope: Scope, traceparent: str | None, request_id: str
+) -> AbstractContextManager[Span]:
+    """A span that continues the caller's trace, if it has one; none for what machines poll."""
+    if scope["path"] in QUIET:
+        return nullcontext(INVALID_SPAN)
+    known = {
+        "http.request.method": scope["method"],
+        "url.path": scope["path"],
+        "url.scheme": scope["scheme"],
+        "buildarena.request_id": request_id,
+    }
+    return span("HTTP", known, parent=traceparent, kind=SpanKind.SERVER)
+
+
+def _describe(current: Span, scope: Scope, status: int) -> None:
+    route = _route(scope)
+    if route is not None:
+        current.update_name(f"{scope['method']} {route}")
+        current.set_attribute("http.route", route)
+    current.set_attribute("http.response.status_code", status)
+    if status >= 500:  # noqa: PLR2004 - HTTP's errors of the server
+        mark_failed(current, str(status))
+
+
+def _route(scope: Scope) -> str | None:
+    path: str | None = getattr(scope.get("route"), "path", None)
+    return path

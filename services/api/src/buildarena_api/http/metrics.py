@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import platform
+from collections.abc import Collection, Iterable
+from typing import Final
 
-from prometheus_client import CollectorRegistry, Histogram
+from prometheus_client import CollectorRegistry, Histogram, Info
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -15,9 +17,20 @@ from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
 
 from buildarena_api.http.probes import PartFailedError, Probes
+from buildarena_api.http.server_metrics import server_metrics
+from buildarena_pipeline import __version__
 from buildarena_store import STAGE_SECONDS, MetricValues, Outcome, Stage
-from buildarena_store.metrics import StageTimes
-from buildarena_store.states import AttemptResult
+from buildarena_store.metrics import ModelUse, QueueDepth, StageTimes
+from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, simulate_queue
+
+# Rates need a counter's zero, and alerts a gauge's: one that begins at its first event hides it.
+PLACES: Final = tuple(
+    (str(state), str(stage), str(outcome))
+    for state in JobState
+    for stage in Stage
+    for outcome in (Outcome if state == JobState.DONE else ("",))
+)
+"""States, stages and outcomes that jobs may have together."""
 
 
 class ServiceMetrics(Collector):
@@ -25,12 +38,20 @@ class ServiceMetrics(Collector):
 
     Args:
         probes: What the service stands on.
+        simulators: Those that have jobs whether or not there is one now.
+        models: Those that jobs can name.
     """
 
-    def __init__(self, probes: Probes) -> None:
+    def __init__(
+        self, probes: Probes, *, simulators: Collection[str], models: Collection[str]
+    ) -> None:
         self._probes = probes
+        self._queues = (CONSTRUCT_QUEUE, *map(simulate_queue, simulators))
+        self._models = models
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
+        build = Info("buildarena_build", "The program that answers.", registry=self.registry)
+        build.info({"version": __version__, "python": platform.python_version()})
         self.http_seconds = Histogram(
             "buildarena_http_request_seconds",
             "Time to the end of an answer, by route, method and status.",
@@ -50,14 +71,15 @@ class ServiceMetrics(Collector):
         except PartFailedError:
             return
         yield from _job_metrics(figures)
-        yield from _queue_metrics(figures)
-        yield from _model_metrics(figures)
+        yield from _queue_metrics(figures, self._queues)
+        yield from _model_metrics(figures, self._models)
         yield _stage_metric(figures)
         yield from _audit_metrics(figures)
+        yield from server_metrics(figures.server)
         workers = GaugeMetricFamily(
             "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
         )
-        for kind, alive in sorted(counts.alive.items()):
+        for kind, alive in sorted({**dict.fromkeys(Stage, 0), **counts.alive}.items()):
             workers.add_metric([kind], alive)
         yield workers
 
@@ -71,7 +93,7 @@ def _job_metrics(figures: MetricValues) -> Iterable[Metric]:
     errors = GaugeMetricFamily(
         "buildarena_errored_jobs", "Jobs that ended as errored, by class.", labels=["reason"]
     )
-    counts: dict[tuple[str, str, str], int] = {}
+    counts = dict.fromkeys(PLACES, 0)
     for count in figures.jobs:
         key = (count.state, count.stage, count.outcome)
         counts[key] = counts.get(key, 0) + count.jobs
@@ -89,27 +111,28 @@ def _job_metrics(figures: MetricValues) -> Iterable[Metric]:
     return jobs, errors, sweeps
 
 
-def _queue_metrics(figures: MetricValues) -> Iterable[Metric]:
+def _queue_metrics(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
     depth = GaugeMetricFamily("buildarena_queue_jobs", "Jobs that wait.", labels=["queue"])
     oldest = GaugeMetricFamily(
         "buildarena_queue_oldest_seconds",
         "How long the longest waiting job has waited.",
         labels=["queue"],
     )
-    for queue in figures.queues:
-        depth.add_metric([queue.queue], queue.jobs)
-        oldest.add_metric([queue.queue], queue.oldest_s)
+    waiting = {name: QueueDepth(queue=name, jobs=0, oldest_s=0.0) for name in known}
+    for name, queue in sorted((waiting | {each.queue: each for each in figures.queues}).items()):
+        depth.add_metric([name], queue.jobs)
+        oldest.add_metric([name], queue.oldest_s)
     running = GaugeMetricFamily(
         "buildarena_queue_running",
         "Jobs that a worker is at, by the queue it took them from.",
         labels=["queue"],
     )
-    for name, number in sorted(figures.running.items()):
+    for name, number in sorted((dict.fromkeys(known, 0) | figures.running).items()):
         running.add_metric([name], number)
     return depth, oldest, running
 
 
-def _model_metrics(figures: MetricValues) -> Iterable[Metric]:
+def _model_metrics(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
     requests = CounterMetricFamily(
         "buildarena_model_requests", "Model requests answered.", labels=["model"]
     )
@@ -119,7 +142,8 @@ def _model_metrics(figures: MetricValues) -> Iterable[Metric]:
     cost = CounterMetricFamily(
         "buildarena_model_cost_usd", "US dollars spent on model requests.", labels=["model"]
     )
-    for use in figures.models:
+    none = {name: ModelUse.none(name) for name in known}
+    for use in (none | {each.model: each for each in figures.models}).values():
         requests.add_metric([use.model], use.requests)
         tokens.add_metric([use.model, "input"], use.input_tokens)
         tokens.add_metric([use.model, "output"], use.output_tokens)
@@ -149,7 +173,6 @@ def _stage_metric(figures: MetricValues) -> Metric:
         "How long attempts took, by stage and how they ended.",
         labels=["stage", "result"],
     )
-    # Rates need a counter's zero: one that begins at its first event hides it.
     none = {
         (stage, result): StageTimes.none(stage, result)
         for stage in Stage

@@ -12,6 +12,7 @@ from buildarena_api.runners.checking import shared_checker
 from buildarena_api.runners.views import Fault, NamedFile, Outcome
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
+from buildarena_pipeline.runtime.tracing import span
 from buildarena_pipeline.runtime.trial_checks import (
     OutcomeRefusedError,
     checked_versions,
@@ -62,7 +63,14 @@ class Outcomes:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
                 self._uploads.drop(named)
                 raise ProblemError(422, str(error)) from error
-            self._trials.complete(lease, due, outcome)
+            known = {
+                "buildarena.job": lease.job.id,
+                "buildarena.token": lease.token,
+                "buildarena.runner": lease.owner,
+                "buildarena.wall_s": outcome.wall_s,
+            }
+            with span("score", known, parent=lease.job.traceparent):
+                self._trials.complete(lease, due, outcome)
 
         return self._ended(named, prefix, AttemptResult.DONE, end)
 

@@ -18,6 +18,7 @@ import structlog
 from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
 from buildarena_pipeline.catalog.prices import price_usd
 from buildarena_pipeline.errors import PermanentError, TransientError
+from buildarena_pipeline.runtime.tracing import ERROR_TYPE, note
 from buildarena_pipeline.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_store import Usage
 from buildarena_store.jobs.journal import GARBAGE, OUT_OF_TIME
@@ -122,6 +123,7 @@ class ProviderClient:
                 wait_s = self._policy.wait_s(attempts, headers, self._rng)
                 if options.active is not None and options.active.draining:
                     raise asyncio.CancelledError from error  # it would be sent after the stop
+                note("retry", {ERROR_TYPE: failure.value, "buildarena.wait_s": wait_s})
                 log.info("model_retry", model=self._entry.name, attempts=attempts, wait_s=wait_s)
                 await asyncio.sleep(wait_s)
             else:

@@ -15,7 +15,6 @@ from typing import Any, Protocol
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.errors import TransientError
 from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_pipeline.runtime.tracing import span
 from buildarena_simulation import Trajectory
 from buildarena_store import Journal, JournalEntry, RolloutRecord, StaleLeaseError, Usage, clean
 from buildarena_store.jobs.journal import OUT_OF_TIME
@@ -23,6 +22,7 @@ from buildarena_worker.session.budget_guard import BudgetGuard, require_open
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.messages import Completion, ModelClient, Request
 from buildarena_worker.session.request_options import RequestOptions
+from buildarena_worker.session.request_spans import PlaceOfRequest, request_span
 from buildarena_worker.session.results import Diverged, SessionEnded, Superseded, Suspended
 from buildarena_worker.session.spending import Spending
 
@@ -233,14 +233,13 @@ class LiveHost:
         """The model's reply as the journal has it; it waits first after unreadable ones."""
         sequence = self._replay.sequence
         request_hash = request.hash  # a walk through the whole conversation, which wants a place
-        with (
-            span("model request", stage=phase, role=role, sequence=sequence),
-            self._gate.released(),
-        ):
+        with self._gate.released():
             waited_s = self._wait(failures)
             require_open(self._active)
             self._budget.reserve(request)
-            completion = self._completion(request, waited_s)
+            completion = self._completion(
+                request, waited_s, PlaceOfRequest(phase=phase, role=role, sequence=sequence)
+            )
             latency_s = waited_s + completion.latency_s
             if completion.finish == OUT_OF_TIME:
                 latency_s = self._replay.spending.to_the_end(latency_s)
@@ -269,11 +268,13 @@ class LiveHost:
         self._active.wait(wait_s)
         return wait_s
 
-    def _completion(self, request: Request, waited_s: float) -> Completion:
+    def _completion(self, request: Request, waited_s: float, place: PlaceOfRequest) -> Completion:
         left_s = self._replay.spending.seconds_left - waited_s
         options = RequestOptions(within_s=left_s, active=self._active, owner=self._owner)
         try:
-            completion = self._client.complete(request, options)
+            with request_span(request, place) as answered:
+                completion = self._client.complete(request, options)
+                answered(completion)
         except CancelledError:
             if self._active.lost and options.sent.is_set():
                 self._budget.charge_lost(self._budget.sent(request))

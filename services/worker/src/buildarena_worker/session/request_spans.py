@@ -1,0 +1,83 @@
+"""Spans of model requests, in the words of OpenTelemetry's GenAI conventions.
+
+They say who was asked, what it used and how it ended, and nothing that was said.
+
+Source: OpenTelemetry, Semantic conventions for generative AI, client spans.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Final
+
+from opentelemetry.trace import SpanKind
+
+from buildarena_pipeline.runtime.tracing import Attribute, mark_failed, span
+from buildarena_worker.session.messages import Completion, Request
+
+PROVIDERS: Final[Mapping[str, str]] = {
+    "google": "gcp.gemini",
+    "mistral": "mistral_ai",
+    "xai": "x_ai",
+}
+"""What the conventions call providers that our registry calls otherwise."""
+USUAL_ENDS: Final = frozenset({"stop", "length", "tool_call"})
+"""How replies end that are what was asked for; others are failures of the request."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlaceOfRequest:
+    """Where in its session a request is made.
+
+    Attributes:
+        phase: The session's phase.
+        role: Who asks.
+        sequence: Its place in the journal, from 0.
+    """
+
+    phase: str
+    role: str
+    sequence: int
+
+
+@contextmanager
+def request_span(request: Request, place: PlaceOfRequest) -> Iterator[Callable[[Completion], None]]:
+    """A span around a request with all its tries.
+
+    Args:
+        request: What is asked.
+        place: Where in the session.
+
+    Yields:
+        What is told the reply.
+    """
+    config = request.model_config
+    model, provider = str(config["model"]), str(config["provider"])
+    known: dict[str, Attribute] = {
+        "gen_ai.operation.name": "chat",
+        "gen_ai.provider.name": PROVIDERS.get(provider, provider),
+        "gen_ai.request.model": model,
+        "buildarena.model": str(config["name"]),
+        "buildarena.phase": place.phase,
+        "buildarena.role": place.role,
+        "buildarena.sequence": place.sequence,
+    }
+    with span(f"chat {model}", known, kind=SpanKind.CLIENT) as current:
+
+        def answered(completion: Completion) -> None:
+            usage = completion.usage
+            current.set_attribute("gen_ai.usage.input_tokens", usage.input_tokens)
+            current.set_attribute("gen_ai.usage.output_tokens", usage.output_tokens)
+            current.set_attribute("gen_ai.usage.cache_read.input_tokens", usage.cached_tokens)
+            current.set_attribute("gen_ai.usage.reasoning.output_tokens", usage.reasoning_tokens)
+            current.set_attribute("gen_ai.response.finish_reasons", [completion.finish])
+            current.set_attribute("buildarena.cost_usd", float(usage.cost_usd))
+            current.set_attribute("buildarena.tries", completion.attempts)
+            if completion.provider_request_id is not None:
+                current.set_attribute("gen_ai.response.id", completion.provider_request_id)
+            if completion.finish not in USUAL_ENDS:
+                mark_failed(current, completion.finish)
+
+        yield answered
