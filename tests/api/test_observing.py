@@ -1,17 +1,21 @@
 """Metrics, the request log and health: what an operator sees."""
 
 import json
+import platform
 import shutil
+import time
 from datetime import UTC, datetime, timedelta
 
 import pytest
 import structlog
 from prometheus_client.parser import text_string_to_metric_families
+from sqlalchemy import text
 from support.jobs import claim, execute, journal_entry, report_worker
 from support.servers.live_api import api_client
 from support.servers.stacks import wait_until
 
 from buildarena_api.http.probes import ARTIFACTS_FRESH_S
+from buildarena_pipeline import __version__
 from buildarena_store import Usage
 
 
@@ -34,12 +38,12 @@ def test_metrics_say_what_the_jobs_say(api, context, sweep) -> None:
     queued = {"state": "queued", "stage": "construct", "outcome": ""}
     assert (queued, 2.0) in found["buildarena_jobs"]
     assert found["buildarena_errored_jobs"] == [({"reason": "missing_key"}, 1.0)]
-    assert found["buildarena_queue_jobs"] == [({"queue": "construct"}, 2.0)]
+    assert ({"queue": "construct"}, 2.0) in found["buildarena_queue_jobs"]
     assert found["buildarena_queue_oldest_seconds"][0][1] >= 0
     model = {"model": "builtin/idle"}
-    assert found["buildarena_model_requests_total"] == [(model, 1.0)]
+    assert (model, 1.0) in found["buildarena_model_requests_total"]
     assert ({**model, "direction": "input"}, 70.0) in found["buildarena_model_tokens_total"]
-    assert found["buildarena_sweeps"] == [({"state": "active"}, 1.0)]
+    assert ({"state": "active"}, 1.0) in found["buildarena_sweeps"]
     held = {"stage": "construct", "result": "fault"}
     assert (held, 1.0) in found["buildarena_stage_seconds_count"]
     assert ({**held, "le": "+Inf"}, 1.0) in found["buildarena_stage_seconds_bucket"]
@@ -148,9 +152,71 @@ def test_metrics_notice_an_artifact_store_that_fails(api, context) -> None:
 
 def test_metrics_say_how_many_jobs_are_at_hand_in_each_queue(api, context, sweep) -> None:
     api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
-    assert "buildarena_queue_running" not in samples(api)
     for _ in range(2):
         claim(context)
     # Another process has read nothing yet.
     with api_client(context) as other:
-        assert samples(other)["buildarena_queue_running"] == [({"queue": "construct"}, 2)]
+        assert ({"queue": "construct"}, 2) in samples(other)["buildarena_queue_running"]
+
+
+def test_what_is_zero_is_said_from_the_start(api) -> None:
+    found = {
+        (name, *sorted(labels.values())): value
+        for name, all_labels in samples(api).items()
+        for labels, value in all_labels
+    }
+    for series in (
+        ("buildarena_jobs", "", "construct", "queued"),
+        ("buildarena_jobs", "done", "errored", "simulate"),
+        ("buildarena_sweeps", "budget_exhausted"),
+        ("buildarena_queue_jobs", "simulate.mujoco"),
+        ("buildarena_queue_oldest_seconds", "construct"),
+        ("buildarena_queue_running", "construct"),
+        ("buildarena_workers", "simulate"),
+        ("buildarena_model_requests_total", "openai/gpt-5"),
+        ("buildarena_model_tokens_total", "input", "openai/gpt-5"),
+        ("buildarena_model_cost_usd_total", "openai/gpt-5"),
+        ("buildarena_stage_seconds_count", "lost", "simulate"),
+        ("buildarena_verifications_total", "refuted"),
+        ("buildarena_http_responses_total", "500"),
+        ("buildarena_postgres_connections", "idle in transaction"),
+    ):
+        assert found[series] == 0, series
+
+
+def test_a_reason_that_no_job_has_any_more_is_zero(api, context, sweep) -> None:
+    api.post("/v1/sweeps", json=sweep)
+    job = claim(context)
+    context.store.leases.give_up(job, "no key", reason="missing_key")
+    api.post(f"/v1/jobs/{job.job.id}/retry")
+    assert samples(api)["buildarena_errored_jobs"] == [({"reason": "missing_key"}, 0.0)]
+
+
+def test_metrics_say_which_program_answers(api) -> None:
+    (build,) = samples(api)["buildarena_build_info"]
+    assert build == ({"version": __version__, "python": platform.python_version()}, 1.0)
+
+
+def test_responses_are_counted_by_status(api) -> None:
+    api.get("/v1/jobs/job_x")
+    assert ({"status": "404"}, 1.0) in samples(api)["buildarena_http_responses_total"]
+
+
+def test_metrics_say_how_the_database_is(api, context) -> None:
+    with context.store.database.engine.connect() as connection:
+        connection.execute(text("SELECT 1"))  # and no commit
+        time.sleep(0.2)
+        found = samples(api)
+    assert found["buildarena_postgres_size_bytes"][0][1] > 1e6
+    connections = {labels["state"]: n for labels, n in found["buildarena_postgres_connections"]}
+    assert connections["idle in transaction"] >= 1
+    ((_, used),) = found["buildarena_postgres_server_connections"]
+    ((_, most),) = found["buildarena_postgres_server_connections_limit"]
+    assert sum(connections.values()) <= used + 5
+    assert used < most
+    ((_, open_s),) = found["buildarena_postgres_oldest_transaction_seconds"]
+    assert 0.1 < open_s < 60
+    assert "jobs" in {labels["table"] for labels, _ in found["buildarena_postgres_dead_rows"]}
+    ended = {labels["result"]: n for labels, n in found["buildarena_postgres_transactions_total"]}
+    assert ended["committed"] > 0
+    assert found["buildarena_postgres_deadlocks_total"][0][1] >= 0

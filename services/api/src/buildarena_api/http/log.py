@@ -66,6 +66,7 @@ class RequestLog:
     def _note(self, scope: Scope, status: int, seconds: float) -> None:
         route = _route(scope) or "none"
         self._metrics.http_seconds.labels(route, scope["method"], str(status)).observe(seconds)
+        self._metrics.responses.labels(str(status)).inc()
         if scope["path"] not in QUIET:
             caller = scope.get("state", {}).get("caller")
             log.info(

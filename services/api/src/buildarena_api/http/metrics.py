@@ -6,7 +6,7 @@ import platform
 from collections.abc import Collection, Iterable
 from typing import Final
 
-from prometheus_client import CollectorRegistry, Histogram, Info
+from prometheus_client import CollectorRegistry, Counter, Histogram, Info
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -31,6 +31,12 @@ PLACES: Final = tuple(
     for outcome in (Outcome if state == JobState.DONE else ("",))
 )
 """States, stages and outcomes that jobs may have together."""
+STATUSES: Final = (
+    *(200, 201, 202, 204, 304),
+    *(400, 401, 403, 404, 405, 408, 409, 413, 422, 429),
+    *(500, 503),
+)
+"""What the API usually answers."""
 
 
 class ServiceMetrics(Collector):
@@ -58,6 +64,14 @@ class ServiceMetrics(Collector):
             ["route", "method", "status"],
             registry=self.registry,
         )
+        self.responses = Counter(
+            "buildarena_http_responses",
+            "Answers by status, whatever their route.",
+            ["status"],
+            registry=self.registry,
+        )
+        for status in STATUSES:
+            self.responses.labels(str(status))
         self.registry.register(self)
 
     def describe(self) -> Iterable[Metric]:
@@ -79,7 +93,7 @@ class ServiceMetrics(Collector):
         workers = GaugeMetricFamily(
             "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
         )
-        for kind, alive in sorted({**dict.fromkeys(Stage, 0), **counts.alive}.items()):
+        for kind, alive in sorted({**{str(stage): 0 for stage in Stage}, **counts.alive}.items()):
             workers.add_metric([kind], alive)
         yield workers
 

@@ -12,7 +12,7 @@ from buildarena_api.runners.checking import shared_checker
 from buildarena_api.runners.views import Fault, NamedFile, Outcome
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
-from buildarena_pipeline.runtime.tracing import span
+from buildarena_pipeline.runtime.tracing import Attribute, span
 from buildarena_pipeline.runtime.trial_checks import (
     OutcomeRefusedError,
     checked_versions,
@@ -63,7 +63,7 @@ class Outcomes:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
                 self._uploads.drop(named)
                 raise ProblemError(422, str(error)) from error
-            known = {
+            known: dict[str, Attribute] = {
                 "buildarena.job": lease.job.id,
                 "buildarena.token": lease.token,
                 "buildarena.runner": lease.owner,
