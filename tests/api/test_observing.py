@@ -179,7 +179,7 @@ def test_what_is_zero_is_said_from_the_start(api) -> None:
         ("buildarena_stage_seconds_count", "lost", "simulate"),
         ("buildarena_verifications_total", "refuted"),
         ("buildarena_http_responses_total", "500"),
-        ("buildarena_postgres_connections", "idle in transaction"),
+        ("buildarena_postgres_connections", "idle in transaction (aborted)"),
     ):
         assert found[series] == 0, series
 

@@ -1,25 +1,32 @@
-"""Traces arrive at a collector, and a job's spans are one trace."""
+"""Traces arrive at a collector, whole or not at all."""
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
-import threading
-from http.server import BaseHTTPRequestHandler, HTTPServer
 
-from opentelemetry.proto.collector.trace.v1.trace_service_pb2 import ExportTraceServiceRequest
+import pytest
+from support.servers.collector import collector
+from support.spans import recorded
+
+from buildarena_pipeline.errors import TransientError
+from buildarena_pipeline.runtime.tracing import current_traceparent, span
 
 PROGRAM = """
 import sys
-from buildarena_pipeline.runtime.tracing import Tracing, span
+from buildarena_pipeline.runtime.tracing import Tracing, current_traceparent, span
 
 tracing = Tracing("test", sys.argv[1])
-for stage in ("construct", "simulate"):
-    with span(stage, job="job_1"):
-        with span("model request", role="builder"):
-            pass
+for number in range(40):
+    with span("submission", {}):
+        kept = current_traceparent()
+    for stage in ("construct", "simulate"):
+        with span(stage, {"buildarena.job": f"job_{number}"}, parent=kept):
+            with span("inside", {}):
+                pass
 try:
-    with span("construct", job="job_2"):
+    with span("alone", {}):
         raise ValueError("what a model wrote")
 except ValueError:
     pass
@@ -27,45 +34,62 @@ tracing.close()
 """
 
 
-class Collector(BaseHTTPRequestHandler):
-    def do_POST(self) -> None:
-        body = self.rfile.read(int(self.headers["Content-Length"]))
-        if self.headers.get("Content-Encoding") == "gzip":
-            import gzip
-
-            body = gzip.decompress(body)
-        self.server.requests.append((self.path, ExportTraceServiceRequest.FromString(body)))
-        self.send_response(200)
-        self.end_headers()
-
-    def log_message(self, *_: object) -> None:
-        """Says nothing."""
-
-
-def test_a_jobs_spans_are_one_trace_at_the_collector() -> None:
-    server = HTTPServer(("127.0.0.1", 0), Collector)
-    server.requests = []
-    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-    thread.start()
-    try:
-        url = f"http://127.0.0.1:{server.server_port}"
+def sent(**environment: str):
+    """What the program sends, and where to."""
+    with collector() as kept:
         # A process of its own: a tracer provider is set once in a process.
-        subprocess.run([sys.executable, "-c", PROGRAM, url], check=True, timeout=60)
-    finally:
-        server.shutdown()
-        thread.join()
-        server.server_close()
-    assert {path for path, _ in server.requests} == {"/v1/traces"}
-    spans = [
-        span
-        for _, request in server.requests
-        for resource in request.resource_spans
-        for scope in resource.scope_spans
-        for span in scope.spans
-    ]
-    assert len(spans) == 5
-    traces = {span.trace_id for span in spans}
-    assert len(traces) == 2, "two jobs, two traces"
-    assert "what a model wrote" not in str(server.requests)
-    failed = [span for span in spans if span.status.message == "ValueError"]
-    assert [span.name for span in failed] == ["construct"]
+        subprocess.run(
+            [sys.executable, "-c", PROGRAM, kept.url],
+            check=True,
+            timeout=60,
+            env={**os.environ, **environment},
+        )
+    return kept
+
+
+def test_all_that_is_done_for_a_submission_is_one_trace_at_the_collector() -> None:
+    kept = sent()
+    assert kept.paths == {"/v1/traces"}
+    spans = [one for service, one in kept.spans() if service == "buildarena-test"]
+    assert len(spans) == 40 * 5 + 1
+    assert len({one.trace_id for one in spans}) == 41
+    roots = [one for one in spans if not one.parent_span_id]
+    assert {one.name for one in roots} == {"submission", "alone"}
+    assert "what a model wrote" not in str(kept.requests)
+    failed = [one for one in spans if one.status.message == "ValueError"]
+    assert [one.name for one in failed] == ["alone"]
+
+
+@pytest.mark.parametrize("sampler", ["parentbased_traceidratio", "traceidratio"])
+def test_a_sampled_trace_is_whole(sampler) -> None:
+    kept = sent(OTEL_TRACES_SAMPLER=sampler, OTEL_TRACES_SAMPLER_ARG="0.5")
+    sizes: dict[bytes, int] = {}
+    for _, one in kept.spans():
+        if one.name != "alone":
+            sizes[one.trace_id] = sizes.get(one.trace_id, 0) + 1
+    assert 5 < len(sizes) < 35
+    assert set(sizes.values()) == {5}
+
+
+def test_no_trace_is_kept_where_none_is_sampled() -> None:
+    assert sent(OTEL_TRACES_SAMPLER="always_off").spans() == []
+
+
+def test_a_fault_of_ours_is_named_by_its_reason() -> None:
+    with recorded() as spans, pytest.raises(TransientError), span("construct", {}):
+        raise TransientError("key sk-1 was refused", reason="provider_outage")
+    (one,) = spans.all()
+    assert one.attributes["error.type"] == "provider_outage"
+    assert "sk-1" not in one.to_json()
+
+
+@pytest.mark.parametrize("parent", ["", "00-zz", "00-" + "0" * 32 + "-" + "0" * 16 + "-01"])
+def test_a_parent_that_can_not_be_read_is_none(parent) -> None:
+    with recorded() as spans, span("outside", {}), span("inside", {}, parent=parent):
+        pass
+    assert spans.named("inside")[0].parent is None
+
+
+def test_what_is_not_traced_has_no_context() -> None:
+    with span("construct", {}):
+        assert current_traceparent() is None

@@ -1,0 +1,254 @@
+"""One trace from a submission to its score: the real API and the real stages."""
+
+from __future__ import annotations
+
+import httpx
+import pytest
+from opentelemetry.sdk.trace import ReadableSpan
+from opentelemetry.sdk.trace.sampling import ALWAYS_OFF
+from opentelemetry.semconv._incubating.attributes import gen_ai_attributes as gen_ai
+from opentelemetry.semconv.attributes import error_attributes, http_attributes
+from opentelemetry.trace import SpanKind, StatusCode
+from support.jobs import claim, expire_leases
+from support.providers.stand_in import ProviderStandIn
+from support.servers.collector import collector
+from support.servers.construct_threads import crew
+from support.servers.live_api import api_client, live_api
+from support.servers.runner_rig import slot
+from support.servers.stacks import finished, running_stack
+from support.spans import Spans, recorded
+from support.stages import work
+
+from buildarena_pipeline.runtime.tracing import current_traceparent, span
+
+JOB = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
+TRACE, CALLER = "4bf92f3577b34da6a3ce929d0e0e4736", "00f067aa0ba902b7"
+STAGES = ("construct", "simulate")
+
+
+def sampled(flag: str = "01") -> dict[str, str]:
+    return {"traceparent": f"00-{TRACE}-{CALLER}-{flag}"}
+
+
+def submitted(context, path: str = "/v1/jobs", headers=None, **spec: object) -> dict:
+    with api_client(context) as api:
+        answer = api.post(
+            path, json={**JOB, **spec} if path == "/v1/jobs" else spec, headers=headers
+        )
+    assert answer.status_code == 202, answer.text
+    return answer.json()
+
+
+def trace_of(one: ReadableSpan) -> str:
+    return f"{one.context.trace_id:032x}"
+
+
+def request_of(spans: Spans, route: str) -> ReadableSpan:
+    """The newest span of a request that was posted."""
+    return spans.named(f"POST {route}")[-1]
+
+
+def assert_children(of: ReadableSpan, children: list[ReadableSpan]) -> None:
+    assert children
+    for child in children:
+        assert child.parent is not None
+        assert child.parent.span_id == of.context.span_id
+        assert child.context.trace_id == of.context.trace_id
+
+
+def test_a_job_is_one_trace_from_its_submission_on(context) -> None:
+    with recorded() as spans:
+        job = submitted(context)
+        work(context)
+    root = request_of(spans, "/v1/jobs")
+    assert root.parent is None
+    assert root.kind == SpanKind.SERVER
+    assert root.attributes[http_attributes.HTTP_RESPONSE_STATUS_CODE] == 202
+    stages = spans.named(*STAGES)
+    assert [one.name for one in stages] == list(STAGES)
+    assert_children(root, stages)
+    assert {one.attributes["buildarena.job"] for one in stages} == {job["id"]}
+    assert {trace_of(one) for one in spans.all()} == {trace_of(root)}
+    assert context.store.jobs.get(job["id"]).outcome == "success"
+
+
+def test_model_requests_follow_the_genai_conventions(context) -> None:
+    with recorded() as spans:
+        job = submitted(context)
+        work(context)
+    (stage,) = spans.named("construct")
+    chats = spans.named("chat expert")
+    assert_children(stage, chats)
+    entries = context.store.journal.read(job["id"])
+    assert len(chats) == len(entries)
+    for one, entry in zip(chats, entries, strict=True):
+        assert one.kind == SpanKind.CLIENT
+        assert one.attributes[gen_ai.GEN_AI_OPERATION_NAME] == "chat"
+        assert one.attributes[gen_ai.GEN_AI_PROVIDER_NAME] == "builtin"
+        assert one.attributes[gen_ai.GEN_AI_REQUEST_MODEL] == "expert"
+        assert one.attributes[gen_ai.GEN_AI_USAGE_INPUT_TOKENS] == entry.usage.input_tokens
+        assert one.attributes[gen_ai.GEN_AI_USAGE_OUTPUT_TOKENS] == entry.usage.output_tokens
+        assert one.attributes[gen_ai.GEN_AI_RESPONSE_FINISH_REASONS] == (entry.reply["finish"],)
+        assert one.status.status_code == StatusCode.UNSET
+    said = " ".join(one.to_json() for one in spans.all())
+    task = context.tasks.newest()["support-1"]
+    assert task.statement[:40] not in said
+    for entry in entries:
+        if len(entry.reply["text"]) > 20:
+            assert entry.reply["text"][:20] not in said
+
+
+def test_a_caller_s_trace_goes_on(context) -> None:
+    with recorded() as spans:
+        submitted(context, headers=sampled())
+        work(context)
+    root = request_of(spans, "/v1/jobs")
+    assert f"{root.parent.span_id:016x}" == CALLER
+    assert {trace_of(one) for one in spans.all()} == {TRACE}
+    assert_children(root, spans.named(*STAGES))
+
+
+def test_a_caller_that_is_not_sampled_is_followed(context) -> None:
+    with recorded() as spans:
+        job = submitted(context, headers=sampled("00"))
+        work(context)
+    assert spans.all() == []
+    # Another process decides the same.
+    kept = context.store.jobs.get(job["id"]).traceparent
+    assert kept.startswith(f"00-{TRACE}-")
+    assert kept.endswith("-00")
+
+
+def test_what_the_api_does_not_sample_no_worker_records(context) -> None:
+    with recorded(ALWAYS_OFF):
+        submitted(context)
+    with recorded() as spans:
+        work(context)
+    assert spans.all() == []
+
+
+def test_jobs_of_a_sweep_are_children_of_its_submission(context) -> None:
+    sweep = {"tasks": ["support-1", "lift-1"], "models": ["builtin/idle"], "seeds": [0, 1]}
+    with recorded() as spans:
+        submitted(context, "/v1/sweeps", **sweep)
+        work(context)
+    root, stages = request_of(spans, "/v1/sweeps"), spans.named(*STAGES)
+    assert len({one.attributes["buildarena.job"] for one in stages}) == 4
+    assert_children(root, stages)
+
+
+def test_a_retried_job_stays_in_its_trace(context, monkeypatch) -> None:
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    with recorded() as spans:
+        job = submitted(context, model="openai/gpt-4o")
+        work(context)
+        with api_client(context) as api:
+            assert api.post(f"/v1/jobs/{job['id']}/retry").status_code == 202
+        work(context)
+    stages = spans.named("construct")
+    assert len(stages) == 2
+    assert_children(request_of(spans, "/v1/jobs"), stages)
+    for one in stages:
+        assert one.status.status_code == StatusCode.ERROR
+        assert one.attributes[error_attributes.ERROR_TYPE] == "missing_key"
+    assert trace_of(request_of(spans, "/v1/jobs/{job_id}/retry")) != trace_of(stages[0])
+
+
+@pytest.mark.parametrize("end", ["handed back", "lost"])
+def test_a_job_that_changes_its_worker_stays_in_its_trace(context, end) -> None:
+    with recorded() as spans:
+        submitted(context)
+        lease = claim(context)
+        if end == "lost":
+            expire_leases(context)
+            context.store.leases.recover()
+        else:
+            context.store.leases.hand_back(lease)
+        work(context)
+    stages = spans.named(*STAGES)
+    assert [one.name for one in stages] == list(STAGES)
+    assert stages[0].attributes["buildarena.token"] == 2
+    assert_children(request_of(spans, "/v1/jobs"), stages)
+
+
+def test_a_job_that_is_wanted_again_moves_to_the_trace_of_who_wants_it(context) -> None:
+    with recorded() as spans:
+        job = submitted(context)
+        with api_client(context) as api:
+            assert api.post(f"/v1/jobs/{job['id']}/cancel").is_success
+        submitted(context)
+        submitted(context)  # was there before, and changes nothing
+        work(context)
+    asked = spans.named("POST /v1/jobs")
+    assert len(asked) == 3
+    assert_children(asked[1], spans.named(*STAGES))
+
+
+def test_a_request_that_fails_says_how(context, tmp_path) -> None:
+    faults = {0: "429", 1: None, 2: "garbage", 3: "401"}
+    with (
+        ProviderStandIn(fault=lambda number: faults.get(number, "401")) as bad,
+        crew(context, tmp_path, bad=bad) as workers,
+        recorded() as spans,
+    ):
+        with span("submission", {}):
+            job_id, kept = workers.submit("bad"), current_traceparent()
+        workers.ended(job_id)
+    assert context.store.jobs.get(job_id).traceparent == kept
+    first, second, third = spans.named("chat expert")
+    assert [event.name for event in first.events] == ["retry"]
+    assert first.events[0].attributes[error_attributes.ERROR_TYPE] == "outage"
+    assert first.attributes[gen_ai.GEN_AI_USAGE_INPUT_TOKENS] > 0
+    assert error_attributes.ERROR_TYPE not in first.attributes
+    assert second.attributes[error_attributes.ERROR_TYPE] == "garbage"
+    assert third.attributes[error_attributes.ERROR_TYPE] == "bad_credentials"
+    for one in (second, third):
+        assert one.status.status_code == StatusCode.ERROR
+    assert "stand-in says no" not in " ".join(one.to_json() for one in spans.all())
+
+
+@pytest.mark.parametrize("path", ["/v1/health", "/v1/metrics"])
+def test_what_machines_poll_is_not_traced(context, path) -> None:
+    with recorded() as spans, api_client(context) as api:
+        api.get(path, headers=sampled())
+        api.get("/v1/models", headers={"traceparent": "nonsense"})
+    (one,) = spans.all()
+    assert one.name == "GET /v1/models"
+    assert one.parent is None
+
+
+def test_a_runner_s_trial_is_scored_in_its_job_s_trace(context) -> None:
+    with recorded() as spans:
+        submitted(context)
+        work(context, queues=("construct",))
+        with live_api(context) as url, slot(url, None) as runner:
+            assert runner.do_next(10.0)
+    (one,) = spans.named("score")
+    assert_children(request_of(spans, "/v1/jobs"), [one])
+
+
+@pytest.mark.slow
+def test_all_processes_send_one_trace(tmp_path, monkeypatch) -> None:
+    sweep = {"tasks": ["support-1"], "models": ["builtin/expert"], "seeds": [0, 1]}
+    with collector() as kept:
+        monkeypatch.setenv("BUILDARENA_OTLP_ENDPOINT", kept.url)
+        with (
+            running_stack(tmp_path, otlp_endpoint=kept.url) as stack,
+            httpx.Client(base_url=stack.url) as client,
+        ):
+            answer = client.post(
+                "/v1/sweeps", json={**sweep, "simulator": "mujoco"}, headers=sampled()
+            )
+            finished(client, answer.json()["id"])
+    ours = [(service, one) for service, one in kept.spans() if one.trace_id.hex() == TRACE]
+    services = {service for service, _ in ours}
+    assert services == {
+        "buildarena-api",
+        "buildarena-construct-worker",
+        "buildarena-simulate-worker",
+    }
+    (root,) = [one for _, one in ours if one.parent_span_id.hex() == CALLER]
+    stages = [one for _, one in ours if one.name in STAGES]
+    assert len(stages) == 4
+    assert {one.parent_span_id for one in stages} == {root.span_id}
+    assert not [one for _, one in kept.spans() if "health" in one.name]
