@@ -144,6 +144,8 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         lifespan=lifespan,
         docs_url="/docs",
         redoc_url=None,
+        # `RequestLog` makes the spans: FastAPI's have queries, and the messages of exceptions.
+        telemetry={"tracing": False, "metrics": False, "logs": False},
         # Short names for the functions of generated clients.
         generate_unique_id_function=lambda route: route.name,
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
