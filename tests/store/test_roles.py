@@ -21,6 +21,7 @@ from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Database, tables
 from buildarena_store.rights import ROLES
 from buildarena_store.roles import OWNER, RoleError, make_roles
+from buildarena_store.server_figures import HIDDEN
 from buildarena_store.states import CONSTRUCT_QUEUE, Verdict, simulate_queue
 from buildarena_worker.wiring import verifier
 
@@ -266,3 +267,13 @@ def test_logins_that_are_none_are_refused(context, role, url, message) -> None:
 def test_two_roles_need_two_logins(context, logins) -> None:
     with pytest.raises(RoleError, match="login of its own"):
         make_roles(context.store.database, {"api": logins["api"], OWNER: logins["api"]})
+
+
+def test_the_api_s_login_sees_the_server_s_figures_and_which_it_does_not(contexts) -> None:
+    with contexts["simulate"].store.database.transaction() as connection:
+        connection.execute(text("SELECT 1"))
+        server = contexts["api"].store.metrics.read().server
+    assert server.size_bytes > 0
+    assert server.connections[HIDDEN] >= 1
+    assert 0 < server.server_connections < server.server_connections_limit
+    assert server.dead_rows.keys() >= {"jobs", "journal"}
