@@ -12,6 +12,7 @@ from sqlalchemy import (
     Numeric,
     Table,
     Text,
+    text,
 )
 from sqlalchemy.dialects.postgresql import JSONB
 
@@ -44,6 +45,8 @@ board_cells = Table(
     Column("newest", DateTime(timezone=True)),
     Column("tallies", JSON, nullable=False),
     Column("figures", LargeBinary, nullable=False),
+    # Read for boards of a period alone.
+    Column("details", LargeBinary, nullable=False, server_default=text("''")),
     *_snapshot(),
 )
 

@@ -39,7 +39,15 @@ from buildarena_benchmark.leaderboard.published import (
     published_rows,
 )
 from buildarena_benchmark.leaderboard.standings import TestCache
-from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tallied
+from buildarena_benchmark.leaderboard.tallies import (
+    UNKNOWN_TOKENS,
+    Details,
+    Tally,
+    Total,
+    tallied,
+    tally_between,
+    total_of,
+)
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
@@ -55,6 +63,7 @@ __all__ = [
     "CellName",
     "ChosenCells",
     "Comparison",
+    "Details",
     "EndedJob",
     "FailureRow",
     "OverallRow",
@@ -81,4 +90,6 @@ __all__ = [
     "summarise",
     "summarise_tallies",
     "tallied",
+    "tally_between",
+    "total_of",
 ]

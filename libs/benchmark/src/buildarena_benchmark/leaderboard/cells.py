@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from hashlib import blake2b
+from itertools import chain
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.flags import ScoringPolicy, is_censored, is_disqualified, is_left_out
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
-from buildarena_benchmark.leaderboard.tallies import UNKNOWN_TOKENS, Tally, Total, tallied
+from buildarena_benchmark.leaderboard.tallies import Tally, Total, tallied, total_of
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_benchmark.statistics import (
@@ -213,11 +214,11 @@ def summarise_tallies(
         parts_mean=_mean_total(tally.parts for tally in counted),
         requests_mean=_mean_total(tally.requests for tally in counted),
         input_tokens_mean=_mean_total(tally.input_tokens for tally in counted),
-        output_tokens_mean=_mean_total(_output_tokens(tally) for tally in counted),
+        output_tokens_mean=_mean_total(total_of(tally.output_tokens) for tally in counted),
         cost_usd_mean=_mean(costs),
-        cost_per_success_usd=cost_per_success(
-            [*costs.tolist(), *[None] * (number - len(costs))], successes
-        ),
+        cost_per_success_usd=cost_per_success(costs.tolist(), successes)
+        if len(costs) == number
+        else None,
         invalid_action_rate=refused / actions if actions else None,
         pass_at=_pass_chances(pass_at_k, figures[:, 0]),
         pass_all=_pass_chances(pass_hat_k, figures[:, 0]),
@@ -298,14 +299,9 @@ def _known_costs(counted: Sequence[Tally]) -> NDArray[np.float64]:
     return known
 
 
-def _output_tokens(tally: Tally) -> Total:
-    known = tally.output_tokens[tally.output_tokens != UNKNOWN_TOKENS]
-    return Total(known=len(known), sum=int(known.sum()))
-
-
 def _sum(parts: Iterable[NDArray[np.float64]]) -> float:
     """The exact sum of shares: whatever their order."""
-    return math.fsum(share for part in parts for share in part.tolist())
+    return math.fsum(chain.from_iterable(part.tolist() for part in parts))
 
 
 def _mean(values: NDArray[np.float64]) -> float | None:

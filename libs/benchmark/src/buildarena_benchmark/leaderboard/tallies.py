@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from datetime import datetime
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
 from typing import Final
 
 import numpy as np
@@ -18,7 +18,10 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 UNKNOWN_TOKENS: Final = -1
-"""An unknown number of tokens, in arrays."""
+"""An unknown number of tokens, requests or parts, in arrays."""
+EPOCH: Final = datetime(2000, 1, 1, tzinfo=UTC)
+"""From when `Details.finished_us` counts."""
+_MICROSECOND: Final = timedelta(microseconds=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +93,65 @@ class Tally:
     def scored(self) -> bool:
         """Whether its trials count in averages."""
         return self.outcome in SCORED and not self.unverified
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Details:
+    """What each trial of a tally adds to its totals, so that those of a period can be had.
+
+    Attributes:
+        finished_us: (N,) int64, when it ended, in microseconds after `EPOCH`.
+        requests: (N,) int64, model requests; -1 where unknown.
+        input_tokens: (N,) int64, tokens sent; -1 where unknown.
+        parts: (N,) int64, parts of its machine; -1 where unknown.
+        actions: (N,) int64, actions, refused ones included.
+        refused_actions: (N,) int64, refused actions.
+        refusals: (N,) int64 for each refusal class: refused actions.
+    """
+
+    finished_us: Integers
+    requests: Integers
+    input_tokens: Integers
+    parts: Integers
+    actions: Integers
+    refused_actions: Integers
+    refusals: Mapping[str, Integers]
+
+
+def tally_between(
+    tally: Tally, details: Details, since: datetime | None, until: datetime | None
+) -> Tally:
+    """The same of the trials that ended in a period: at `since` or later and before `until`."""
+    inside = np.ones(tally.number, bool)
+    if since is not None:
+        inside &= details.finished_us >= (since - EPOCH) // _MICROSECOND
+    if until is not None:
+        inside &= details.finished_us < (until - EPOCH) // _MICROSECOND
+    if inside.all():
+        return tally
+    finished = details.finished_us[inside]
+    refusals = {name: int(times[inside].sum()) for name, times in details.refusals.items()}
+    return replace(
+        tally,
+        indicators=tally.indicators[inside],
+        shares=tally.shares[inside],
+        gained=tally.gained[inside],
+        costs_usd=tally.costs_usd[inside],
+        output_tokens=tally.output_tokens[inside],
+        requests=total_of(details.requests[inside]),
+        input_tokens=total_of(details.input_tokens[inside]),
+        parts=total_of(details.parts[inside]),
+        actions=int(details.actions[inside].sum()),
+        refused_actions=int(details.refused_actions[inside].sum()),
+        refusals={name: times for name, times in refusals.items() if times},
+        newest=EPOCH + int(finished.max()) * _MICROSECOND if len(finished) else None,
+    )
+
+
+def total_of(values: Integers) -> Total:
+    """The sum of those that are known."""
+    known = values[values != UNKNOWN_TOKENS]
+    return Total(known=len(known), sum=int(known.sum()))
 
 
 Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool, bool]

@@ -152,6 +152,9 @@ def _mean_product(values: NDArray[np.float64], k: int) -> float | None:
     number = len(values)
     if not 1 <= k <= number:
         return None
+    ones = int(np.count_nonzero(values == 1.0))
+    if ones + int(np.count_nonzero(values == 0.0)) == number:
+        return float(math.comb(ones, k)) / math.comb(number, k)
     # The coefficients of the product of (1 + value x) are sums of products; many values are equal.
     sums = [1.0]
     for value, times in zip(*np.unique(values, return_counts=True), strict=True):

@@ -32,7 +32,13 @@ from sqlalchemy import (
 from sqlalchemy.dialects.postgresql import insert
 from sqlalchemy.types import UserDefinedType
 
-from buildarena_store.boards.tallying import CellRecord, stored_tallies, tallies_of, tally_jobs
+from buildarena_store.boards.packing import (
+    pack_details,
+    pack_tallies,
+    unpack_details,
+    unpack_tallies,
+)
+from buildarena_store.boards.tallying import CellRecord, tally_jobs
 from buildarena_store.boards.trials import RANKED, CellId, TrialFilter
 from buildarena_store.database import Database
 from buildarena_store.derived_tables import board_cells, board_state
@@ -40,7 +46,7 @@ from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
 from buildarena_store.tables import board_changes, jobs, tasks
 
-FORMAT: Final = 3
+FORMAT: Final = 4
 """Of rows; programs of different formats may use one database at once."""
 FILL_LOCK: Final = 0x63656C6C73  # "cells": of processes that find none, one makes them
 MAX_STORED_AT_ONCE: Final = 50
@@ -101,27 +107,32 @@ class BoardCells:
         state = mark or self._settled()
         with self._reading() as connection:
             now, task_versions, changed = _look(connection, state)
-            fresh = _kept(connection, changed, with_tallies=True)
+            fresh = _kept(connection, changed, tallies=True)
             made = _made(connection, sorted(changed - {record.id for record in fresh}))
-            kept = [] if mark else _kept(connection, None, with_tallies=False)
+            kept = [] if mark else _kept(connection, None)
         if made:
             self._keep(made, now, settled=True)
         known = {record.id for record in (*fresh, *made)}
         whole = [record for record in kept if record.id not in known and record.jobs]
         return CellFeed(
             mark=now,
-            cells=[*whole, *fresh, *made],
+            cells=[*whole, *fresh, *(record.without_details() for record in made)],
             whole=mark is None,
             task_versions=task_versions,
         )
 
-    def read(self, ids: Collection[CellId]) -> Iterator[CellRecord]:
-        """Cells with their tallies, as of the last feed or later."""
+    def read(self, ids: Collection[CellId], *, details: bool = False) -> Iterator[CellRecord]:
+        """Cells with their tallies, as of the last feed or later.
+
+        Args:
+            ids: Which.
+            details: Also what the tallies' totals are made of.
+        """
         ordered = sorted(ids)
         for start in range(0, len(ordered), MAX_STORED_AT_ONCE):
             with self._database.statement() as connection:
                 some = ordered[start : start + MAX_STORED_AT_ONCE]
-                found = _kept(connection, some, with_tallies=True, only_fresh=False)
+                found = _kept(connection, some, tallies=True, details=details, only_fresh=False)
             yield from found
 
     def of(self, wanted: TrialFilter) -> list[CellRecord]:
@@ -233,15 +244,18 @@ def _kept(
     connection: Connection,
     ids: Collection[CellId] | None,
     *,
-    with_tallies: bool,
+    tallies: bool = False,
+    details: bool = False,
     only_fresh: bool = True,
 ) -> list[CellRecord]:
     """Rows of cells; of some that changed, only those that were made after the change."""
     key = [board_cells.c[name] for name in CellId._fields]
     columns = [*key, board_cells.c.model, board_cells.c.decoding, board_cells.c.jobs]
     columns += [board_cells.c.newest]
-    if with_tallies:
+    if tallies:
         columns += [board_cells.c.tallies, board_cells.c.figures]
+    if details:
+        columns.append(board_cells.c.details)
     query = select(*columns).where(board_cells.c.format == FORMAT)
     if ids is not None:
         if not ids:
@@ -260,7 +274,8 @@ def _kept(
             decoding=row.decoding,
             jobs=row.jobs,
             newest=row.newest,
-            tallies=tallies_of(row.tallies, row.figures) if with_tallies else (),
+            tallies=unpack_tallies(row.tallies, row.figures) if tallies else (),
+            details=unpack_details(row.tallies, row.details) if details else (),
         )
         for row in connection.execute(query)
     ]
@@ -294,7 +309,7 @@ def _server(connection: Connection) -> str:
 
 
 def _row(record: CellRecord, mark: Mark) -> dict[str, Any]:
-    tallies, figures = stored_tallies(record.tallies)
+    tallies, figures = pack_tallies(record.tallies)
     return {
         "format": FORMAT,
         **record.id._asdict(),
@@ -304,6 +319,7 @@ def _row(record: CellRecord, mark: Mark) -> dict[str, Any]:
         "newest": record.newest,
         "tallies": tallies,
         "figures": figures,
+        "details": pack_details(record.details),
         **_columns(mark),
     }
 

@@ -229,7 +229,15 @@ class Shown:
     def _part(self) -> Mapping[CellId, CellRecord]:
         """Cells of just the jobs that were asked for."""
         if self._made is None:
-            self._made = {record.id: record for record in self.store.of(self.asked.filter())}
+            wanted = self.asked.filter()
+            if wanted.sweeps is None:
+                ids = [CellId(self.asked.track, *key) for key in self.heads]
+                kept = self.store.read(ids, details=True)
+                parts = (record.between(wanted.since, wanted.until) for record in kept)
+                records = [record for record in parts if record.jobs]
+            else:
+                records = self.store.of(wanted)
+            self._made = {record.id: record for record in records}
         return self._made
 
 
