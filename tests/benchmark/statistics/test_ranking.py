@@ -9,6 +9,7 @@ from scipy.stats import rankdata
 
 from buildarena_benchmark.statistics import (
     PairTests,
+    Sample,
     adjusted,
     combined,
     mean_ranks,
@@ -60,7 +61,9 @@ def trials_of(successes: list[int], trials: int) -> list[np.ndarray]:
 
 def ranked(successes: list[int], trials: int, tasks: int = 1):
     row = trials_of(successes, trials)
-    tests = combined([pair_tests(list(combinations(row, 2)))] * tasks)
+    tests = combined(
+        [pair_tests(list(combinations([Sample.of(trials) for trials in row], 2)))] * tasks
+    )
     rates = np.array([[count / trials for count in successes]] * tasks)
     return rank_models((rates, rates), tests, adjusted([tests])[0])
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark.statistics import (
     Ranking,
+    Sample,
     adjusted,
     combined,
     mean_interval,
@@ -132,7 +133,9 @@ def board(
 
 def rankings(made: Board) -> list[Ranking]:
     """The ranking on each task and, last, over all: what a leaderboard claims."""
-    tests = [pair_tests(list(combinations(row, 2))) for row in made]
+    tests = [
+        pair_tests(list(combinations([Sample.of(trials) for trials in row], 2))) for row in made
+    ]
     every = [*tests, combined(tests)]
     tables = [*([row] for row in made), made]
     return [

@@ -19,6 +19,7 @@ from buildarena_benchmark.leaderboard.tallies import Tally, Total, tallied, tota
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_benchmark.statistics import (
+    Sample,
     cost_per_success,
     exact_interval,
     expert_scores,
@@ -70,9 +71,8 @@ class Cell:
         reasons: Counted trials that failed, by reason.
         refusals: Refused actions by refusal class.
         newest: When the last of its jobs ended.
-        figures: (N, 2) float64, success (or its share) and indicator of each counted trial,
-            sorted.
-        figures_hash: Hash of them: cells with the same one are the same to all tests of pairs.
+        sample: Success (or its share) and indicator of each counted trial, for tests of pairs.
+        figures_hash: Hash of the same: cells with the same one are the same to all tests of pairs.
     """
 
     task: str
@@ -117,7 +117,7 @@ class Cell:
     reasons: Mapping[str, int]
     refusals: Mapping[str, int]
     newest: datetime | None
-    figures: NDArray[np.float64] = field(repr=False, compare=False)
+    sample: Sample = field(repr=False, compare=False)
     figures_hash: bytes = field(repr=False, compare=False)
 
 
@@ -226,7 +226,7 @@ def summarise_tallies(
         reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
         refusals=_counts(item for tally in counted for item in tally.refusals.items()),
         newest=max((tally.newest for tally in tallies if tally.newest), default=None),
-        figures=figures,
+        sample=Sample.of(figures),
         figures_hash=blake2b(figures.tobytes(), digest_size=16).digest(),
     )
 

@@ -14,10 +14,10 @@ from itertools import combinations
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from buildarena_benchmark.statistics import (
     Ranking,
+    Sample,
     adjusted,
     combined,
     exact_interval,
@@ -87,9 +87,10 @@ def published_overall() -> tuple[Sequence[str], Ranking]:
     return models, rank_models((success, indicator), tests, adjusted([tests])[0])
 
 
-def _trials(row: PublishedRow) -> NDArray[np.float64]:
-    """The trials behind the counts: (N, 1) float64, 1 for a success."""
-    return (np.arange(row.trials) < row.successes).astype(float)[:, None]
+def _trials(row: PublishedRow) -> Sample:
+    """The trials behind the counts, by success alone."""
+    success = (np.arange(row.trials) < row.successes).astype(float)
+    return Sample.of(np.stack([success, success], axis=1))
 
 
 def _row(line: Mapping[str, str]) -> PublishedRow:

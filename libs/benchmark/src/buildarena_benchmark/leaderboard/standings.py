@@ -134,7 +134,7 @@ class TestCache:
         names = [(a.figures_hash, b.figures_hash) for a, b in pairs]
         results = [self._known(name) for name in names]
         missing = [place for place, test in enumerate(results) if test is None]
-        made = pair_tests([(pairs[i][0].figures, pairs[i][1].figures) for i in missing])
+        made = pair_tests([(pairs[i][0].sample, pairs[i][1].sample) for i in missing])
         for place, *test in zip(
             missing,
             made.z.tolist(),

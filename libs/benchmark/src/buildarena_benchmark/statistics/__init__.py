@@ -14,7 +14,7 @@ from buildarena_benchmark.statistics.comparisons import (
 )
 from buildarena_benchmark.statistics.economy import TokenBin, cost_per_success, token_bins
 from buildarena_benchmark.statistics.means import MIN_SUCCESSES, mean_interval
-from buildarena_benchmark.statistics.permutation import PairTests, pair_tests
+from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
 from buildarena_benchmark.statistics.power import (
     BoardPower,
     board_power,
@@ -43,6 +43,7 @@ __all__ = [
     "PairTests",
     "PairedTest",
     "Ranking",
+    "Sample",
     "TokenBin",
     "adjusted",
     "agreement",

@@ -36,6 +36,41 @@ NEAR: Final = 1 / 128
 """How near they are, as a share of the range of the model's indicators."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Sample:
+    """One model's trials on one task as tests take them: equal ones together.
+
+    Of more than `MANY` distinct trials, those of one success and of indicators in one step of
+    `NEAR` count at the mean of their indicators.
+
+    Attributes:
+        figures: (D, 2) float64: success and indicator of distinct trials.
+        times: (D,) float64: how many trials are like each.
+    """
+
+    figures: Floats
+    times: Floats
+
+    @staticmethod
+    def of(trials: Floats) -> Sample:
+        """The sample of trials, (N, 2) float64: success, or its share, and indicator."""
+        ordered = trials[np.lexsort(trials.T)]
+        first = np.ones(len(ordered), bool)
+        first[1:] = np.any(ordered[1:] != ordered[:-1], axis=1)
+        times = np.diff(np.append(np.flatnonzero(first), len(ordered))).astype(np.float64)
+        sample = Sample(figures=ordered[first], times=times)
+        return sample._near_together() if len(times) > MANY else sample
+
+    def _near_together(self) -> Sample:
+        success, indicator = self.figures.T
+        away = indicator - indicator.min()
+        step = np.floor(away / max(away.max(), np.finfo(float).tiny) / NEAR)
+        _, place = np.unique(np.stack([success, step]), axis=1, return_inverse=True)
+        times = np.bincount(place, self.times).astype(np.float64)
+        means = [np.bincount(place, self.times * figure) / times for figure in self.figures.T]
+        return Sample(figures=np.stack(means, axis=1), times=times)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairTests:
     """Tests of P pairs of models on one task.
@@ -52,81 +87,42 @@ class PairTests:
     informative: NDArray[np.bool_]
 
 
-def pair_tests(pairs: Sequence[tuple[Floats, Floats]]) -> PairTests:
+def pair_tests(pairs: Sequence[tuple[Sample, Sample]]) -> PairTests:
     """Tests each pair's first model against its second on one task.
 
     The exact distribution is approximated by its double saddlepoint, with a continuity correction
     of half the widest gap between weights. As the test is of models that are alike in everything,
     and models may differ in spread alone, the means must differ by Welch's statistic too.
 
-    What is found of a pair does not depend on the other pairs. Of a model with more than `MANY`
-    distinct trials, those of one success and of indicators in one step of `NEAR` count at the mean
-    of their indicators.
+    What is found of a pair does not depend on the other pairs.
 
     Args:
-        pairs: For each pair the trials of both, each (n, 2) float64: success and indicator.
+        pairs: For each pair the trials of both.
 
     Source:
         J. Robinson, J. R. Stat. Soc. B 44 (1982) 91; I. M. Skovgaard, J. Appl. Probab. 24 (1987)
         875; B. L. Welch, Biometrika 34 (1947) 28.
     """
     results = np.zeros((3, len(pairs)))
-    distinct: dict[int, _Sample] = {}
-    samples = [tuple(_sample(side, distinct) for side in pair) for pair in pairs]
-    for width, places in _by_width(samples).items():
+    for width, places in _by_width(pairs).items():
         step = max(1, MAX_TABLE // width)
         for start in range(0, len(places), step):
             some = places[start : start + step]
-            results[:, some] = _tested([(samples[i][0], samples[i][1]) for i in some], width)
+            results[:, some] = _tested([pairs[i] for i in some], width)
     return PairTests(z=results[0], p_value=results[1], informative=results[2].astype(bool))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Sample:
-    """One model's trials, equal ones together, and of very many near ones.
-
-    Attributes:
-        figures: (D, 2) float64: distinct trials.
-        times: (D,) float64: how many trials are like each.
-    """
-
-    figures: Floats
-    times: Floats
-
-
-def _sample(trials: Floats, known: dict[int, _Sample]) -> _Sample:
-    # A model's trials are in many pairs; the caller keeps them, so that no other has their id.
-    if id(trials) not in known:
-        ordered = trials[np.lexsort(trials.T)]
-        first = np.ones(len(ordered), bool)
-        first[1:] = np.any(ordered[1:] != ordered[:-1], axis=1)
-        times = np.diff(np.append(np.flatnonzero(first), len(ordered))).astype(np.float64)
-        sample = _Sample(figures=ordered[first], times=times)
-        known[id(trials)] = _near_together(sample) if len(times) > MANY else sample
-    return known[id(trials)]
-
-
-def _near_together(sample: _Sample) -> _Sample:
-    success, indicator = sample.figures.T
-    away = indicator - indicator.min()
-    step = np.floor(away / max(away.max(), np.finfo(float).tiny) / NEAR)
-    _, place = np.unique(np.stack([success, step]), axis=1, return_inverse=True)
-    times = np.bincount(place, sample.times).astype(np.float64)
-    means = [np.bincount(place, sample.times * figure) / times for figure in sample.figures.T]
-    return _Sample(figures=np.stack(means, axis=1), times=times)
-
-
-def _by_width(samples: Sequence[tuple[_Sample, ...]]) -> dict[int, list[int]]:
+def _by_width(pairs: Sequence[tuple[Sample, Sample]]) -> dict[int, list[int]]:
     """Places of pairs by the width of their table; a width follows from the pair alone."""
     by_width: dict[int, list[int]] = {}
-    for place, pair in enumerate(samples):
-        length = max(1, sum(len(side.times) for side in pair))
+    for place, (first, second) in enumerate(pairs):
+        length = max(1, len(first.times) + len(second.times))
         step = max(MIN_STEP, 1 << max(0, length.bit_length() - 4))
         by_width.setdefault(-(-length // step) * step, []).append(place)
     return by_width
 
 
-def _tested(pairs: Sequence[tuple[_Sample, _Sample]], width: int) -> Floats:
+def _tested(pairs: Sequence[tuple[Sample, Sample]], width: int) -> Floats:
     """Evidence, p-value and whether anything varies: (3, P) float64."""
     from scipy.special import ndtr, ndtri
 
@@ -166,7 +162,7 @@ class _Weights:
     varies: NDArray[np.bool_]
 
     @staticmethod
-    def of(pairs: Sequence[tuple[_Sample, _Sample]], width: int) -> _Weights:
+    def of(pairs: Sequence[tuple[Sample, Sample]], width: int) -> _Weights:
         figures = np.zeros((2, len(pairs), width))
         first, second = np.zeros((len(pairs), width)), np.zeros((len(pairs), width))
         for number, (left, right) in enumerate(pairs):

@@ -130,7 +130,7 @@ class Sweeps:
                 jobs_hash=sweep.jobs_hash,
             )
         )
-        members = select(literal(sweep.id), func.unnest(bound_texts(job_ids)))
+        members = select(literal(sweep.id), func.unnest(bound_texts(sorted(job_ids))))
         connection.execute(insert(sweep_jobs).from_select(["sweep_id", "job_id"], members))
         events.record_sweep(connection, sweep.id, "submitted", {"jobs": len(job_ids)})
 

@@ -1,0 +1,23 @@
+"""job ids: what makes a job unique is in its id already, and one index less is written for each."""
+
+from alembic import op
+
+revision = "2026_11_24_job_ids"
+down_revision = "2026_11_24_board_details"
+branch_labels = None
+depends_on = None
+
+KEY = ["task", "task_version", "model_hash", "track", "seed"]
+UNIQUE = "uq_jobs_" + "_".join(KEY)
+
+
+def upgrade() -> None:
+    op.drop_constraint(UNIQUE, "jobs")
+    op.drop_index("ix_jobs_board", "jobs")
+    op.create_index("ix_jobs_board", "jobs", ["track", "task", "model_hash", "model"])
+
+
+def downgrade() -> None:
+    op.drop_index("ix_jobs_board", "jobs")
+    op.create_index("ix_jobs_board", "jobs", ["track", "task", "model"])
+    op.create_unique_constraint(UNIQUE, "jobs", KEY)
