@@ -24,6 +24,7 @@ from buildarena_benchmark.leaderboard import (
 from buildarena_benchmark.leaderboard.cells import PASS_K
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.statistics import (
+    Sample,
     cost_per_success,
     exact_interval,
     mean_interval,
@@ -132,7 +133,7 @@ def plain_summary(
         reasons=dict(sorted(Counter(t.reason for t in counted if t.reason).items())),
         refusals=_refusals(counted),
         newest=max((t.finished_at for t in trials if t.finished_at), default=None),
-        figures=figures[np.lexsort(figures.T)],
+        sample=Sample.of(figures),
         figures_hash=figures[np.lexsort(figures.T)].tobytes(),
     )
 

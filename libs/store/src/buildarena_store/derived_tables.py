@@ -7,11 +7,13 @@ from sqlalchemy import (
     BigInteger,
     Column,
     DateTime,
+    Index,
     Integer,
     LargeBinary,
     Numeric,
     Table,
     Text,
+    literal_column,
     text,
 )
 from sqlalchemy.dialects.postgresql import JSONB
@@ -73,6 +75,8 @@ figures = Table(
     Column("key", JSONB, primary_key=True),
     *_amounts(),
 )
+# A sweep's begin with its id.
+Index("ix_figures_first", figures.c.key.op("->>")(literal_column("0")))
 figure_changes = Table(
     "figure_changes",
     metadata,

@@ -150,6 +150,7 @@ _STORED: Final = text(
     """
     SELECT kind, key, sum(a) AS a, sum(b) AS b, sum(c) AS c, sum(d) AS d
     FROM (SELECT * FROM figures UNION ALL SELECT * FROM figure_changes) AS both_kinds
+    WHERE kind NOT IN ('sweep_jobs', 'sweep_use', 'sweep_lost')
     GROUP BY kind, key ORDER BY kind, key
     """
 )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from decimal import Decimal
-from typing import Any
+from typing import Any, Final
 
-from sqlalchemy import Connection, func, literal, select
+from sqlalchemy import Connection, Row, func, literal, select, text
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
@@ -194,43 +195,16 @@ class Sweeps:
             return [value_of(Sweep, row) for row in connection.execute(query)]
 
     def progress(self, sweep_id: str) -> SweepProgress:
-        """Counts a sweep's jobs by where they are, and what they cost."""
-        query = (
-            select(
-                jobs.c.state,
-                jobs.c.stage,
-                jobs.c.outcome,
-                func.count().label("jobs"),
-                func.sum(jobs.c.cost_usd).label("cost_usd"),
-                func.sum(jobs.c.requests).label("requests"),
-                func.sum(jobs.c.lost_requests).label("lost_requests"),
-                func.sum(jobs.c.input_tokens).label("input_tokens"),
-                func.sum(jobs.c.output_tokens).label("output_tokens"),
-            )
-            .join(sweep_jobs, sweep_jobs.c.job_id == jobs.c.id)
-            .where(sweep_jobs.c.sweep_id == sweep_id)
-            .group_by(jobs.c.state, jobs.c.stage, jobs.c.outcome)
-        )
-        with self._database.transaction() as connection:
-            rows = connection.execute(query).all()
-        stages: dict[str, int] = {}
-        outcomes: dict[str, int] = {}
-        for row in rows:
-            if row.state == JobState.DONE:
-                outcomes[row.outcome] = outcomes.get(row.outcome, 0) + row.jobs
-            else:
-                name = f"{row.stage} {row.state}"
-                stages[name] = stages.get(name, 0) + row.jobs
-        return SweepProgress(
-            total=sum(row.jobs for row in rows),
-            stages=stages,
-            outcomes=outcomes,
-            cost_usd=sum((row.cost_usd for row in rows), Decimal()),
-            requests=int(sum(row.requests for row in rows)),
-            lost_requests=int(sum(row.lost_requests for row in rows)),
-            input_tokens=int(sum(row.input_tokens for row in rows)),
-            output_tokens=int(sum(row.output_tokens for row in rows)),
-        )
+        """Where a sweep's jobs are, and what they cost."""
+        return self.progress_of([sweep_id])[sweep_id]
+
+    def progress_of(self, ids: Sequence[str]) -> dict[str, SweepProgress]:
+        """The same of several sweeps, by id: figures that triggers keep."""
+        amounts: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids}
+        with self._database.statement() as connection:
+            for row in connection.execute(_FIGURES, {"ids": list(ids)}):
+                amounts[row.sweep].append(row)
+        return {id_: _progress(rows) for id_, rows in amounts.items()}
 
     def troubles(self, sweep_id: str, *, limit: int) -> list[Trouble]:
         """Attempts at the sweep's jobs that faults ended or whose worker was lost, newest first.
@@ -281,4 +255,40 @@ class Sweeps:
             return [row.job_id for row in connection.execute(query)]
 
 
+def _progress(rows: Sequence[Row[Any]]) -> SweepProgress:
+    stages: Counter[str] = Counter()
+    outcomes: Counter[str] = Counter()
+    used, lost = [Decimal()] * 4, 0
+    for row in rows:
+        if row.kind == "sweep_use":
+            used = [row.a, row.b, row.c, row.d]
+        elif row.kind == "sweep_lost":
+            lost = int(row.a)
+        elif row.a:
+            _, state, stage, outcome = row.key
+            if state == JobState.DONE:
+                outcomes[outcome] += int(row.a)
+            else:
+                stages[f"{stage} {state}"] += int(row.a)
+    requests, input_tokens, output_tokens, cost_usd = used
+    return SweepProgress(
+        total=stages.total() + outcomes.total(),
+        stages=stages,
+        outcomes=outcomes,
+        cost_usd=Decimal(cost_usd),
+        requests=int(requests),
+        lost_requests=lost,
+        input_tokens=int(input_tokens),
+        output_tokens=int(output_tokens),
+    )
+
+
 _COLUMNS = columns_of(Sweep, sweeps)
+_FIGURES: Final = text(
+    """
+    SELECT kind, key, key ->> 0 AS sweep, sum(a) AS a, sum(b) AS b, sum(c) AS c, sum(d) AS d
+    FROM (SELECT * FROM figures UNION ALL SELECT * FROM figure_changes) AS both_kinds
+    WHERE key ->> 0 = ANY(:ids) AND kind IN ('sweep_jobs', 'sweep_use', 'sweep_lost')
+    GROUP BY kind, key ORDER BY kind, key
+    """
+)

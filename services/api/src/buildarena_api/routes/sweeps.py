@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Header, Query, Response
@@ -27,7 +28,7 @@ from buildarena_pipeline.catalog.specs import Budget, SweepSpec
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.submission.submission import spec_hash
-from buildarena_store import Sweep, SweepState
+from buildarena_store import Sweep, SweepProgress, SweepState
 from buildarena_store.states import CONSTRUCT_QUEUE
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
@@ -174,7 +175,6 @@ def list_sweeps(
     id_prefix: IdPrefix = None,
 ) -> SweepPage:
     """Lists sweeps, newest first."""
-    last_event = context.store.events.settled()
     found = context.store.sweeps.page(
         limit=limit,
         after=None if cursor is None else cursors.decode(cursor),
@@ -182,7 +182,7 @@ def list_sweeps(
     )
     more = len(found) == limit
     return SweepPage(
-        sweeps=[_view(context, sweep, last_event) for sweep in found],
+        sweeps=_views(context, found),
         next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
     )
 
@@ -204,21 +204,30 @@ def sweep_troubles(sweep_id: str, context: ContextDep) -> list[TroubleView]:
     return [TroubleView.model_validate(trouble) for trouble in found]
 
 
-def _view(context: Context, sweep: Sweep, last_event: int | None = None) -> SweepView:
-    if last_event is None:
-        # Read before the progress, which then holds all that it says.
-        last_event = context.store.events.settled()
-    progress = context.store.sweeps.progress(sweep.id)
+def _view(context: Context, sweep: Sweep) -> SweepView:
+    return _views(context, [sweep])[0]
+
+
+def _views(context: Context, found: Sequence[Sweep]) -> list[SweepView]:
+    # Read before the progress, which then holds all that it says.
+    last_event = context.store.events.settled()
+    progress = context.store.sweeps.progress_of([sweep.id for sweep in found])
+    return [
+        SweepView(
+            id=sweep.id,
+            name=sweep.name,
+            state=_state(sweep, progress[sweep.id]),
+            owner=sweep.owner,
+            created_at=sweep.created_at,
+            spec=dict(sweep.spec),
+            budget=BudgetView.of(context.store.budgets.get(sweep.id)),
+            progress=ProgressView.of(progress[sweep.id]),
+            last_event=last_event,
+        )
+        for sweep in found
+    ]
+
+
+def _state(sweep: Sweep, progress: SweepProgress) -> Any:
     ended = sweep.state == SweepState.ACTIVE and progress.done == progress.total
-    state: Any = DONE if ended else sweep.state
-    return SweepView(
-        id=sweep.id,
-        name=sweep.name,
-        state=state,
-        owner=sweep.owner,
-        created_at=sweep.created_at,
-        spec=dict(sweep.spec),
-        budget=BudgetView.of(context.store.budgets.get(sweep.id)),
-        progress=ProgressView.of(progress),
-        last_event=last_event,
-    )
+    return DONE if ended else sweep.state
