@@ -88,7 +88,7 @@ def test_help_names_every_command() -> None:
 @pytest.mark.parametrize("module", ["buildarena_worker", "buildarena_api"])
 def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) -> None:
     from buildarena_store import Database
-    from buildarena_store.database import expected_schema
+    from buildarena_store.database import SCHEMA
 
     database = Database(database_url)
 
@@ -113,5 +113,5 @@ def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) ->
         assert done.returncode == 1
         assert "schema 2026_11_22_annotations" in done.stderr
     finally:
-        stamp(expected_schema())
+        stamp(SCHEMA)
         database.close()

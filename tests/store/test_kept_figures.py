@@ -1,12 +1,15 @@
 """Counts that triggers keep are those that counting finds, and the benchmark's database is real."""
 
 import random
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from benchmarks.scale.filling import TRACKS, Amount, fill
 from sqlalchemy import delete, func, select, text, update
 
-from buildarena_store import STAGE_SECONDS, TrialFilter
+from buildarena_store import STAGE_SECONDS, NewSweep, TrialFilter
 from buildarena_store.derived_tables import figure_changes
 from buildarena_store.jobs.pages import JobFilter, Order
 from buildarena_store.tables import attempts, jobs, sweep_jobs
@@ -37,6 +40,26 @@ def as_said(figures) -> object:
     )
 
 
+def require_progress(context) -> None:
+    """The progress of every sweep is that which its jobs, counted one by one, come to."""
+    query = select(sweep_jobs.c.sweep_id, jobs).join(jobs, jobs.c.id == sweep_jobs.c.job_id)
+    members: dict[str, list] = {sweep.id: [] for sweep in context.store.sweeps.page(limit=100)}
+    with context.store.database.statement() as connection:
+        for row in connection.execute(query):
+            members[row.sweep_id].append(row)
+    assert members
+    for sweep_id, progress in context.store.sweeps.progress_of(list(members)).items():
+        rows = members[sweep_id]
+        ended = [row for row in rows if row.state == "done"]
+        assert progress.total == len(rows)
+        assert progress.outcomes == Counter(row.outcome for row in ended)
+        assert progress.stages == Counter(
+            f"{row.stage} {row.state}" for row in rows if row.state != "done"
+        )
+        for name in ("requests", "lost_requests", "input_tokens", "output_tokens", "cost_usd"):
+            assert getattr(progress, name) == sum(getattr(row, name) for row in rows), name
+
+
 def test_kept_counts_are_those_that_counting_finds(filled) -> None:
     store, rng = filled.store, random.Random(1)
     for step in range(25):
@@ -49,7 +72,9 @@ def test_kept_counts_are_those_that_counting_finds(filled) -> None:
                 values = {"state": "queued", "outcome": None, "queue": "simulate.mujoco"}
                 connection.execute(update(jobs).where(some).values(**values))
             elif step % 5 == 2:
-                connection.execute(update(jobs).where(some).values(cost_usd=1.5, requests=step))
+                connection.execute(
+                    update(jobs).where(some).values(cost_usd=1.5, requests=step, lost_requests=step)
+                )
             elif step % 5 == 3:
                 gone = connection.execute(select(jobs.c.id).where(some)).scalars().all()
                 for table in (attempts, sweep_jobs):
@@ -65,12 +90,67 @@ def test_kept_counts_are_those_that_counting_finds(filled) -> None:
                 store.leases.give_up(lease, "gone", reason="lost_worker")
         if step % 4 == 0:
             store.metrics.read()
+    require_progress(filled)
     kept = as_said(store.metrics.read())
     with store.database.transaction() as connection:
         # Attempts that were taken out have been counted.
         connection.execute(text("CREATE TEMP TABLE stages AS SELECT * FROM figures"))
     jobs_now, queues, models, _ = counted(filled)
     assert kept[:3] == (jobs_now, queues, models)
+
+
+def test_a_job_that_moves_while_a_sweep_takes_it_in_is_counted_once(filled) -> None:
+    """Whichever of the two began first, and whichever ends first."""
+    store = filled.store
+    with store.database.statement() as connection:
+        first, second = connection.execute(
+            select(jobs.c.id).where(jobs.c.state == "queued").order_by(jobs.c.id).limit(2)
+        ).scalars()
+
+    def move(job_id, connection) -> None:
+        done = {"state": "done", "outcome": "limit", "requests": 7}
+        connection.execute(update(jobs).where(jobs.c.id == job_id).values(**done))
+
+    def take_in(name) -> None:
+        with store.lifecycle.submission() as connection:
+            store.sweeps.add(
+                NewSweep(id=name, name=name, spec={}), [first, second], connection=connection
+            )
+
+    with ThreadPoolExecutor(1) as pool:
+        with store.database.transaction() as moving:
+            move(first, moving)
+            taking = pool.submit(take_in, "sweep_later")
+            wait_until_blocked(store)
+        taking.result()
+        require_progress(filled)
+        with store.lifecycle.submission() as connection:
+            store.sweeps.add(
+                NewSweep(id="sweep_first", name="first", spec={}),
+                [first, second],
+                connection=connection,
+            )
+
+            def move_alone() -> None:
+                with store.database.transaction() as own:
+                    move(second, own)
+
+            moving = pool.submit(move_alone)
+            wait_until_blocked(store)
+        moving.result()
+    require_progress(filled)
+    assert store.sweeps.progress("sweep_first").outcomes == {"limit": 2}
+
+
+def wait_until_blocked(store) -> None:
+    """Until another transaction waits for a lock."""
+    waiting = text("SELECT count(*) FROM pg_locks WHERE NOT granted")
+    for _ in range(500):
+        with store.database.statement() as connection:
+            if connection.execute(waiting).scalar():
+                return
+        time.sleep(0.02)
+    raise AssertionError("nobody waits")
 
 
 def test_attempts_are_counted_by_how_long_they_took(filled) -> None:

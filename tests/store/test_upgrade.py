@@ -16,9 +16,10 @@ from buildarena_pipeline.catalog.specs import Budget
 from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import ArtifactStore, SweepState
-from buildarena_store.database import Database, alembic_config
+from buildarena_store.database import Database
 from buildarena_store.ids import new_id
 from buildarena_store.jobs.job import JobKey, configuration_hash
+from buildarena_store.migrating import alembic_config
 from buildarena_worker.wiring import verifier
 
 BEFORE = Path(__file__).parents[1] / "data" / "store" / "before-states"

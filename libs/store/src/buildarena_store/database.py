@@ -6,12 +6,8 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import psycopg
-from alembic import command
-from alembic.config import Config
-from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url, text
 from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import DisconnectionError, OperationalError
@@ -36,31 +32,10 @@ GIVEN_UP_THERE = {
     "tcp_user_timeout": 20_000,
 }
 """When the server does: a machine that is gone holds the locks of its transactions until then."""
-MIGRATIONS = Path(__file__).parent / "migrations"
-"""The Alembic chain."""
+SCHEMA = "2026_11_24_sweep_figures"
+"""The newest revision of the migrations: what this code was written for. Said here, so that a
+process that starts need not read them all."""
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
-
-
-def alembic_config(url: str) -> Config:
-    """The Alembic settings for a database, without any ini file."""
-    config = Config()
-    config.set_main_option("script_location", str(MIGRATIONS))
-    config.attributes["url"] = url
-    return config
-
-
-def expected_schema() -> str:
-    """The newest revision of the chain: what this code was written for."""
-    head = ScriptDirectory.from_config(alembic_config("")).get_current_head()
-    if head is None:
-        raise SchemaVersionError(f"no migrations in {MIGRATIONS}")
-    return head
-
-
-def known_schemas() -> frozenset[str]:
-    """All revisions of the chain: this program can bring a database of each to the newest."""
-    script = ScriptDirectory.from_config(alembic_config(""))
-    return frozenset(revision.revision for revision in script.walk_revisions())
 
 
 def ping_after_idling(engine: Engine) -> None:
@@ -182,16 +157,18 @@ class Database:
         Returns:
             The revision the database has now.
         """
+        from buildarena_store.migrating import migrate_to_newest
+
         with self.engine.connect() as connection:
             connection.execute(text("SELECT pg_advisory_lock(:key)"), {"key": MIGRATION_LOCK})
             try:
-                command.upgrade(alembic_config(self.url), "head")
+                migrate_to_newest(self.url)
                 with self.engine.begin() as owner:
                     grant_rights(owner)
             finally:
                 connection.execute(text("SELECT pg_advisory_unlock(:key)"), {"key": MIGRATION_LOCK})
                 connection.rollback()
-        return expected_schema()
+        return SCHEMA
 
     def schema(self) -> str | None:
         """The revision the database has, or None when it was never migrated."""
@@ -207,9 +184,12 @@ class Database:
         Raises:
             SchemaVersionError: It does not; the message says what to do.
         """
-        found, wanted = self.schema(), expected_schema()
-        if found == wanted:
+        found = self.schema()
+        if found == SCHEMA:
             return
+        # Alembic is loaded by those who migrate, and where something is to be explained.
+        from buildarena_store.migrating import known_schemas
+
         known = known_schemas()
         if found is not None and found not in known and self._compatible_since() in known:
             return
@@ -217,7 +197,7 @@ class Database:
         if found is not None and found not in known:
             advice = "it is of a later version, which this one does not work with: upgrade"
         raise SchemaVersionError(
-            f"the database has schema {found or 'none'}, this program needs {wanted}: {advice}"
+            f"the database has schema {found or 'none'}, this program needs {SCHEMA}: {advice}"
         )
 
     def _compatible_since(self) -> str | None:

@@ -16,7 +16,7 @@ from buildarena_cli.backups.place import DUMP, LIST, BackupPlace, Manifest
 from buildarena_cli.backups.programs import run_program
 from buildarena_cli.errors import CommandError
 from buildarena_store import ArtifactStore, Database
-from buildarena_store.database import known_schemas
+from buildarena_store.migrating import known_schemas
 from buildarena_store.tables import job_artifacts
 
 

@@ -33,7 +33,7 @@ from buildarena_store.archives.rows import (
 )
 from buildarena_store.archives.writing import CHUNK, FORMAT
 from buildarena_store.artifacts import ArtifactStore
-from buildarena_store.database import Database, expected_schema
+from buildarena_store.database import SCHEMA, Database
 from buildarena_store.errors import NameTakenError
 from buildarena_store.ids import content_hash
 from buildarena_store.jobs.audits import require_audits
@@ -119,10 +119,10 @@ def read_archive(
 
 def _manifest(members: Members) -> ManifestFile:
     manifest = members.manifest(ManifestFile)
-    if manifest.format != FORMAT or manifest.schema_version != expected_schema():
+    if manifest.format != FORMAT or manifest.schema_version != SCHEMA:
         raise ArchiveError(
             f"the archive has format {manifest.format} and schema {manifest.schema_version}; this "
-            f"program reads {FORMAT} and {expected_schema()}: use BuildArena {manifest.buildarena}"
+            f"program reads {FORMAT} and {SCHEMA}: use BuildArena {manifest.buildarena}"
         )
     return manifest
 

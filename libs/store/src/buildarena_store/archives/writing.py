@@ -13,7 +13,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, Table, func, select, text
 
 from buildarena_store.artifacts import ArtifactStore
-from buildarena_store.database import Database, expected_schema
+from buildarena_store.database import SCHEMA, Database
 from buildarena_store.jobs.histories import Histories
 from buildarena_store.sweeps.sweeps import Sweeps
 from buildarena_store.tables import (
@@ -61,7 +61,7 @@ def write_archive(database: Database, store: ArtifactStore, sweep_id: str, targe
             archive.writestr(f"artifacts/{digest}", store.get(digest))
         manifest = {
             "format": FORMAT,
-            "schema": expected_schema(),
+            "schema": SCHEMA,
             "buildarena": version("buildarena-store"),
             "sweep": sweep_id,
             "written_at": datetime.now(UTC).isoformat(),

@@ -50,6 +50,9 @@ ENDED_ONLY: Final[frozenset[Sort]] = frozenset({"finished", "indicator"})
 """What only jobs that have ended have."""
 MAX_SORTED: Final = 40_000
 """Jobs that are sorted for a page; of more, the first are found along the order's index."""
+BEGINNING: Final = 10_000
+"""Jobs of an order that are looked through first for those with a flag: to count all that have it,
+each must be read."""
 _ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
 """What can stand in an id."""
 NULLABLE: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "cost"})
@@ -129,33 +132,103 @@ def read_page(
         after: What the last job of the page before is sorted by, and its id.
         limit: Rows at most.
     """
-    conditions = _conditions(connection, wanted)
-    if order.by in ENDED_ONLY and wanted.equals.get("state", JobState.DONE) not in {
-        JobState.DONE,
-        None,
-    }:
+    conditions = _conditions(wanted)
+    place = _Place(order, after)
+    if wanted.text is None:
+        return _read(connection, wanted, conditions, place, limit)
+    # One way after another: all at once they have no index in common.
+    ids = {
+        row.id
+        for way in _ways_to_hold(connection, wanted.text)
+        for row in _read(connection, wanted, [*conditions, way], place, limit)
+    }
+    return _read_few(
+        connection, [jobs.c.id == func.any(bound_texts(sorted(ids)))], order, None, limit
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a page begins: behind a job, by what it is sorted by and its id, or at the front."""
+
+    order: Order
+    after: tuple[SortValue, str] | None
+
+    @property
+    def has_figure(self) -> bool:
+        """Whether jobs that have the figure are still to come."""
+        return self.after is None or self.after[0] is not None
+
+    def behind(self) -> list[ColumnElement[bool]]:
+        """What is behind it and has the figure."""
+        found: list[ColumnElement[bool]] = []
+        if self.after is not None and self.after[0] is not None:
+            found.append(_behind(self.order, *self.after))
+        if self.order.by in NULLABLE:
+            found.append(_COLUMNS[self.order.by].is_not(None))
+        return found
+
+    def rest(self) -> list[ColumnElement[bool]]:
+        """What is behind it and lacks the figure."""
+        found: list[ColumnElement[bool]] = [_COLUMNS[self.order.by].is_(None)]
+        if self.after is not None and self.after[0] is None:
+            found.append(_further(self.order, jobs.c.id, self.after[1]))
+        return found
+
+
+def _read(
+    connection: Connection,
+    wanted: JobFilter,
+    conditions: Sequence[ColumnElement[bool]],
+    place: _Place,
+    limit: int,
+) -> list[Row[Any]]:
+    """As `read_page`, with the conditions that the filter comes to."""
+    order = place.order
+    ended = wanted.equals.get("state") in {JobState.DONE, None}
+    if order.by in ENDED_ONLY and not ended:
         # None of them has such a figure.
-        by_id = select(*JOB_COLUMNS).where(*conditions)
-        if after is not None:
-            by_id = by_id.where(_further(order, jobs.c.id, after[1]))
-        in_order = jobs.c.id.desc() if order.descending else jobs.c.id.asc()
-        return list(connection.execute(by_id.order_by(in_order).limit(limit)))
+        return _read_by_id(connection, conditions, place, limit)
+    if wanted.flag is not None and place.has_figure and order.by != "cost":
+        found = _read_beginning(connection, conditions, place, limit)
+        if len(found) == limit:
+            return found
     if conditions and _are_few(connection, wanted, conditions):
-        return _read_few(connection, conditions, order, after, limit)
-    found: list[Row[Any]] = []
-    if after is None or after[0] is not None:
-        some: list[ColumnElement[bool]] = []
-        if after is not None:
-            some.append(_behind(order, *after))
-        if order.by in NULLABLE:
-            some.append(_COLUMNS[order.by].is_not(None))
-        found = _read_along(connection, wanted, [*conditions, *some], order, limit)
+        return _read_few(connection, conditions, order, place.after, limit)
+    found = []
+    if place.has_figure:
+        found = _read_along(connection, wanted, [*conditions, *place.behind()], order, limit)
     if order.by in NULLABLE and len(found) < limit:
-        rest: list[ColumnElement[bool]] = [_COLUMNS[order.by].is_(None)]
-        if after is not None and after[0] is None:
-            rest.append(_further(order, jobs.c.id, after[1]))
-        found += _read_along(connection, wanted, [*conditions, *rest], order, limit - len(found))
+        rest = [*conditions, *place.rest()]
+        found += _read_along(connection, wanted, rest, order, limit - len(found))
     return found
+
+
+def _read_by_id(
+    connection: Connection,
+    conditions: Sequence[ColumnElement[bool]],
+    place: _Place,
+    limit: int,
+) -> list[Any]:
+    query = select(*JOB_COLUMNS).where(*conditions)
+    if place.after is not None:
+        query = query.where(_further(place.order, jobs.c.id, place.after[1]))
+    in_order = jobs.c.id.desc() if place.order.descending else jobs.c.id.asc()
+    return list(connection.execute(query.order_by(in_order).limit(limit)))
+
+
+def _read_beginning(
+    connection: Connection,
+    conditions: Sequence[ColumnElement[bool]],
+    place: _Place,
+    limit: int,
+) -> list[Any]:
+    """The first jobs of a page, as far as they are at the beginning of the order."""
+    order = place.order
+    columns = [c.desc() if order.descending else c.asc() for c in (_COLUMNS[order.by], jobs.c.id)]
+    first = select(jobs.c.id).where(*place.behind()).order_by(*columns).limit(BEGINNING).subquery()
+    query = select(*JOB_COLUMNS).join(first, first.c.id == jobs.c.id).where(*conditions)
+    return list(connection.execute(query.order_by(*columns).limit(limit)))
 
 
 def _read_along(
@@ -188,7 +261,7 @@ def _are_few(
     Along an order's index they might be the very last; the database expects them anywhere.
     """
     some = select(jobs.c.id).where(*conditions)
-    if wanted.sweep_id is not None:
+    if wanted.sweep_id is not None and wanted.text is None:
         some = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
     counted = some.limit(MAX_SORTED + 1).subquery()
     number = connection.execute(select(func.count()).select_from(counted)).scalar_one()
@@ -238,7 +311,8 @@ def distinct_values(column: ColumnElement[Any]) -> TextClause:
     )
 
 
-def _conditions(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
+def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
+    """What a filter comes to, but for its text."""
     found = [jobs.c[name] == value for name, value in wanted.equals.items() if value is not None]
     if wanted.sweep_id is not None:
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
@@ -259,8 +333,6 @@ def _conditions(connection: Connection, wanted: JobFilter) -> list[ColumnElement
     if _means_ended(wanted):
         # Said so that an order's index of ended jobs alone can serve.
         found.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
-    if wanted.text is not None:
-        found.append(_holds_text(connection, wanted.text))
     return found
 
 
@@ -272,8 +344,8 @@ def _means_ended(wanted: JobFilter) -> bool:
     )
 
 
-def _holds_text(connection: Connection, wanted: str) -> ColumnElement[bool]:
-    """Whether a text stands in id, task, model, reason or detail, in any case.
+def _ways_to_hold(connection: Connection, wanted: str) -> list[ColumnElement[bool]]:
+    """In which ways a text can stand in id, task, model, reason or detail, in any case.
 
     Tasks, models and reasons are few: those with the text are found first.
     """
@@ -289,7 +361,7 @@ def _holds_text(connection: Connection, wanted: str) -> ColumnElement[bool]:
         some = connection.execute(ids).scalars().all()
         few = len(some) <= MAX_SORTED
         ways.append(jobs.c.id == func.any(bound_texts(some)) if few else held_in)
-    return or_(*ways)
+    return ways
 
 
 def _behind(order: Order, value: SortValue, id_: str) -> ColumnElement[bool]:

@@ -18,13 +18,14 @@ def _of_members(table: str, members: str, times: int) -> str:
     """Adds what some memberships come to, times 1 or -1, to a table of figures."""
     source = f"FROM {members} AS member JOIN jobs ON jobs.id = member.job_id GROUP BY 2"
     use = ", ".join(f"{times} * sum({name})" for name in USE)
+    lost = f"{times} * sum(lost_requests), 0, 0, 0"
     return f"""
     INSERT INTO {table} {COLUMNS}
     SELECT 'sweep_jobs', sweep_place(sweep_id, jobs), {times} * count(*), 0, 0, 0 {source};
     INSERT INTO {table} {COLUMNS}
     SELECT 'sweep_use', jsonb_build_array(sweep_id), {use} {source};
     INSERT INTO {table} {COLUMNS}
-    SELECT 'sweep_lost', jsonb_build_array(sweep_id), {times} * sum(lost_requests), 0, 0, 0 {source};
+    SELECT 'sweep_lost', jsonb_build_array(sweep_id), {lost} {source};
     """
 
 

@@ -1,0 +1,31 @@
+"""The chain of migrations, by Alembic."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+from alembic import command
+from alembic.config import Config
+from alembic.script import ScriptDirectory
+
+MIGRATIONS: Final = Path(__file__).parent / "migrations"
+
+
+def alembic_config(url: str) -> Config:
+    """The Alembic settings for a database, without any ini file."""
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    config.attributes["url"] = url
+    return config
+
+
+def migrate_to_newest(url: str) -> None:
+    """Brings a database to the newest revision."""
+    command.upgrade(alembic_config(url), "head")
+
+
+def known_schemas() -> frozenset[str]:
+    """All revisions of the chain: this program can bring a database of each to the newest."""
+    script = ScriptDirectory.from_config(alembic_config(""))
+    return frozenset(revision.revision for revision in script.walk_revisions())
