@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import hypergeom
 
-from buildarena_benchmark.statistics import pair_tests
+from buildarena_benchmark.statistics import PairTests, Sample, pair_tests, permutation
+
+
+def evidence(pairs) -> PairTests:
+    """The tests of pairs of models, each given by its trials."""
+    return pair_tests([(Sample.of(first), Sample.of(second)) for first, second in pairs])
 
 
 def counts(first: tuple[int, int], second: tuple[int, int], value: float = 300.0):
@@ -40,10 +45,10 @@ def dealt(pooled: np.ndarray, number: int) -> float:
 def test_counts_alone_give_fishers_p_value_from_above(first, second) -> None:
     (won, of), (lost, among) = first, second
     exact = 2 * float(hypergeom.sf(won - 1, of + among, won + lost, of))
-    found = pair_tests([counts(first, second)])
+    found = evidence([counts(first, second)])
     assert exact * 0.98 <= found.p_value[0] <= 3 * exact
     assert found.z[0] > 0
-    turned = pair_tests([counts(second, first)])
+    turned = evidence([counts(second, first)])
     assert turned.p_value[0] == pytest.approx(found.p_value[0])
     assert turned.z[0] == pytest.approx(-found.z[0])
 
@@ -53,7 +58,7 @@ def test_p_values_are_those_of_dealing_every_label_from_above(seed) -> None:
     rng = np.random.default_rng(seed)
     won = (rng.random(16) < [*[0.9] * 8, *[0.3] * 8]).astype(float)
     pooled = np.column_stack([won, won * rng.lognormal(5, 0.8, 16)])
-    found = float(pair_tests([(pooled[:8], pooled[8:])]).p_value[0])
+    found = float(evidence([(pooled[:8], pooled[8:])]).p_value[0])
     exact = min(1.0, dealt(pooled, 8))
     assert exact * 0.95 <= found
     # Sixteen trials make wide gaps, and the correction of half a gap is large.
@@ -66,27 +71,27 @@ def test_pairs_are_tested_alike_alone_and_among_others() -> None:
         tuple(np.column_stack([w, w * 9.0]) for w in (rng.random((2, n)) < 0.5).astype(float))
         for n in (5, 64, 200)
     ]
-    together = pair_tests(pairs)
+    together = evidence(pairs)
     for number, pair in enumerate(pairs):
-        alone = pair_tests([pair])
+        alone = evidence([pair])
         assert alone.p_value[0] == pytest.approx(together.p_value[number], rel=1e-6)
-    assert len(pair_tests([]).p_value) == 0
+    assert len(evidence([]).p_value) == 0
 
 
 def test_where_nothing_varies_nothing_is_said() -> None:
-    found = pair_tests([counts((0, 64), (0, 64)), counts((64, 64), (64, 64))])
+    found = evidence([counts((0, 64), (0, 64)), counts((64, 64), (64, 64))])
     assert found.p_value.tolist() == [1.0, 1.0]
     assert found.z.tolist() == [0.0, 0.0]
     assert not found.informative.any()
     # Digits that differ by rounding are no difference.
     same = np.column_stack([np.ones(64), np.full(64, 0.1 + 0.2)])
     other = np.column_stack([np.ones(64), np.full(64, 0.3)])
-    assert pair_tests([(same, other)]).p_value[0] == 1.0
+    assert evidence([(same, other)]).p_value[0] == 1.0
 
 
 @pytest.mark.parametrize("trials", [1, 2, 3])
 def test_very_few_trials_say_nothing_apart(trials) -> None:
-    found = pair_tests([counts((trials, trials), (0, trials))])
+    found = evidence([counts((trials, trials), (0, trials))])
     assert found.p_value[0] > 0.05
 
 
@@ -97,8 +102,8 @@ def test_a_scale_of_the_indicator_changes_nothing() -> None:
         for w in (rng.random((2, 40)) < [[0.7], [0.4]]).astype(float)
     )
     scaled = [(first * [1, 1e-6], second * [1, 1e-6]), (first * [1, 1e9], second * [1, 1e9])]
-    p_value = pair_tests([(first, second)]).p_value[0]
-    assert pair_tests(scaled).p_value == pytest.approx([p_value, p_value], rel=1e-6)
+    p_value = evidence([(first, second)]).p_value[0]
+    assert evidence(scaled).p_value == pytest.approx([p_value, p_value], rel=1e-6)
 
 
 def test_models_of_equal_means_and_unequal_spread_are_not_told_apart() -> None:
@@ -110,5 +115,38 @@ def test_models_of_equal_means_and_unequal_spread_are_not_told_apart() -> None:
             np.column_stack([np.ones(n), rng.normal(300, spread, n)])
             for n, spread in ((16, 100), (256, 10))
         )
-        wrong += pair_tests([pair]).p_value[0] <= 0.01
+        wrong += evidence([pair]).p_value[0] <= 0.01
     assert wrong <= 12
+
+
+SHAPES = {
+    "exponential": lambda rng, n: rng.exponential(1.0, n),
+    "normal": lambda rng, n: rng.normal(100, 20, n),
+    "heavy": lambda rng, n: rng.lognormal(3, 1, n),
+    "two designs": lambda rng, n: np.where(
+        rng.random(n) < 0.5, rng.normal(10, 1, n), rng.normal(500, 30, n)
+    ),
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("trials", [600, 2000])
+def test_near_trials_together_say_what_each_says(monkeypatch, shape, trials) -> None:
+    rng = np.random.default_rng(1)
+
+    def model() -> np.ndarray:
+        won = rng.random(trials) < rng.uniform(0.45, 0.55)
+        share = np.where(won, rng.integers(1, 5, trials), 0) / 4
+        indicator = SHAPES[shape](rng, trials) * rng.uniform(0.95, 1.05)
+        return np.column_stack([share, np.where(won, indicator, 0.0)])
+
+    models = [model() for _ in range(6)]
+    near = [Sample.of(model) for model in models]
+    for sample, each in zip(near, models, strict=True):
+        assert sample.times @ sample.figures == pytest.approx(each.sum(axis=0))
+        assert len(sample.times) < trials / 2
+    together = pair_tests(list(combinations(near, 2)))
+    monkeypatch.setattr(permutation, "MANY", trials)
+    apart = evidence(combinations(models, 2))
+    assert np.abs(together.z - apart.z).max() < 0.005
+    assert np.abs(together.z - apart.z).max() > 0

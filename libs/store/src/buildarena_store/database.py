@@ -36,6 +36,7 @@ SCHEMA = "2026_11_24_sweep_figures"
 """The newest revision of the migrations: what this code was written for. Said here, so that a
 process that starts need not read them all."""
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
+LOCK_PAUSE_S = 0.2
 
 
 def ping_after_idling(engine: Engine) -> None:
@@ -159,15 +160,18 @@ class Database:
         """
         from buildarena_store.migrating import migrate_to_newest
 
-        with self.engine.connect() as connection:
-            connection.execute(text("SELECT pg_advisory_lock(:key)"), {"key": MIGRATION_LOCK})
+        # Indexes that are made while others write wait for every transaction, so whoever has the
+        # lock, or waits for it, is in none.
+        with self.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+            lock = text("SELECT pg_try_advisory_lock(:key)")
+            while not connection.execute(lock, {"key": MIGRATION_LOCK}).scalar():
+                time.sleep(LOCK_PAUSE_S)
             try:
                 migrate_to_newest(self.url)
                 with self.engine.begin() as owner:
                     grant_rights(owner)
             finally:
                 connection.execute(text("SELECT pg_advisory_unlock(:key)"), {"key": MIGRATION_LOCK})
-                connection.rollback()
         return SCHEMA
 
     def schema(self) -> str | None:

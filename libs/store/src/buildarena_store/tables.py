@@ -124,7 +124,7 @@ Index(
     postgresql_where=(jobs.c.state == JobState.QUEUED) & (jobs.c.faults > 0),
 )
 Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
-Index("ix_jobs_board", jobs.c.track, jobs.c.task, jobs.c.model_hash, jobs.c.model)
+Index("ix_jobs_cell", jobs.c.track, jobs.c.task, jobs.c.model_hash, jobs.c.model)
 # One for each order of lists, and for what lists are narrowed down by.
 # As the server writes it back, blanks and all: the check of the migrations compares texts.
 COST_OR_NULL = text(

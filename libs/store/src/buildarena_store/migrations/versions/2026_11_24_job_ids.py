@@ -3,7 +3,7 @@
 from alembic import op
 
 revision = "2026_11_24_job_ids"
-down_revision = "2026_11_24_board_details"
+down_revision = "2026_11_24_job_cells"
 branch_labels = None
 depends_on = None
 
@@ -13,11 +13,7 @@ UNIQUE = "uq_jobs_" + "_".join(KEY)
 
 def upgrade() -> None:
     op.drop_constraint(UNIQUE, "jobs")
-    op.drop_index("ix_jobs_board", "jobs")
-    op.create_index("ix_jobs_board", "jobs", ["track", "task", "model_hash", "model"])
 
 
 def downgrade() -> None:
-    op.drop_index("ix_jobs_board", "jobs")
-    op.create_index("ix_jobs_board", "jobs", ["track", "task", "model"])
     op.create_unique_constraint(UNIQUE, "jobs", KEY)
