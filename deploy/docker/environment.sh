@@ -11,9 +11,6 @@ export UV_LINK_MODE=copy UV_PYTHON_DOWNLOADS=never UV_NATIVE_TLS=1 UV_COMPILE_BY
 unset PYTHONDONTWRITEBYTECODE
 uv() { /mnt/source/.venv/bin/uv --quiet "$@"; }
 
-# Of these large ones we load a part: only that is compiled, when it is imported.
-large='alembic|anthropic|celery|fontTools|genai_prices|google|kombu|matplotlib|mcp|numpy|opentelemetry|PIL|pydantic_ai|redis|scipy|sqlalchemy'
-
 case $what in
 requirements)
     began=$(date +%s)
@@ -26,7 +23,7 @@ parts)
     mapfile -t parts < <("$python" "$recipe/siblings.py" "buildarena-$name")
     [ "${#parts[@]}" -gt 0 ]
     uv pip install --python "$python" --no-index --find-links /mnt/wheels --no-deps "${parts[@]}"
-    "$python" -m compileall -q -x "site-packages/($large)/" "$environment"/lib/python3*/site-packages || true
+    # Which also compiles what is loaded, and no more: half of the libraries' sources never are.
     "$python" "$recipe/imports.py"
     ;;
 esac
