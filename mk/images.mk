@@ -1,4 +1,7 @@
-.PHONY: lock-images pin-images
+.PHONY: images lock-images pin-images
+
+images: $(STAMP) ## Builds the images of the services; dist/images has what is in each and how it was made
+	@$(BIN)/python mk/images.py dist/images
 
 LOCKS := deploy/docker/locks
 LOCK_IMAGE := bash mk/uv.sh pip compile --quiet --universal --generate-hashes --no-annotate -c requirements.lock \

@@ -21,9 +21,14 @@ LOADED = 1
 def is_aligned(path: Path) -> bool:
     """Whether a library can be mapped: strip misplaces segments of some that auditwheel has moved."""
     data = path.read_bytes()
-    start, (size, count) = struct.unpack_from("<Q", data, 32)[0], struct.unpack_from("<HH", data, 54)
+    start, (size, count) = (
+        struct.unpack_from("<Q", data, 32)[0],
+        struct.unpack_from("<HH", data, 54),
+    )
     for i in range(count):
-        kind, _, offset, address, *_, align = struct.unpack_from("<IIQQQQQQ", data, start + i * size)
+        kind, _, offset, address, *_, align = struct.unpack_from(
+            "<IIQQQQQQ", data, start + i * size
+        )
         if kind == LOADED and align and (offset - address) % align:
             return False
     return True
@@ -53,7 +58,9 @@ for line in (MOUNTED / "recipe/trimmed.txt").read_text().splitlines():
         else:
             path.unlink(missing_ok=True)
 began = float(sys.argv[1])
-added = [p for p in SITE.rglob("*") if p.is_file() and not p.is_symlink() and p.stat().st_ctime >= began]
+added = [
+    p for p in SITE.rglob("*") if p.is_file() and not p.is_symlink() and p.stat().st_ctime >= began
+]
 for path in added:
     if ".so" in path.suffixes and path.read_bytes()[:5] == b"\x7fELF\x02":
         strip(path)

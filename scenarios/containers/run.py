@@ -22,7 +22,6 @@ from typing import Any
 
 import httpx
 from scenarios.containers.engine import (
-    BASES,
     ROOT,
     TARGETS,
     Engine,
@@ -43,6 +42,16 @@ SWEEP = {
 }
 SMALL = {**SWEEP, "name": "upgrade", "tasks": ["support-3", "transport-2"], "samples": 10}
 PORTS = {"first": (18443, 18080), "second": (19443, 19080)}
+LARGEST_MB = {
+    "api": 400,
+    "construct": 480,
+    "simulate-pybullet": 400,
+    "simulate-mujoco": 400,
+    "tools": 560,
+    "proxy": 60,
+    "all but proxy": 900,
+}
+"""What images may take; construct workers have both engines, to verify with, and the providers."""
 LONG_RUNNING = (
     "postgres",
     "valkey",
@@ -65,6 +74,7 @@ class Run:
         stack.callback(subprocess.run, ["git", "worktree", "prune"], cwd=ROOT, check=False)
         stack.callback(shutil.rmtree, self.folder, ignore_errors=True)
         self.figures: dict[str, Any] = {}
+        self.tag = ""
         self.random = random.Random(18)
 
     @contextmanager
@@ -90,11 +100,11 @@ class Run:
                 "BUILDARENA_VERSION": version,
                 "BUILDARENA_HTTPS_PORT": f"127.0.0.1:{https}",
                 "BUILDARENA_HTTP_PORT": f"127.0.0.1:{http}",
-                "POSTGRES_IMAGE": "buildarena-base/postgres:test",
-                "VALKEY_IMAGE": "buildarena-base/valkey:test",
-                "CADDY_IMAGE": "buildarena-base/caddy:test",
-                "PYTHON_IMAGE": "buildarena-base/python:test",
-                "S3_IMAGE": "buildarena-base/s3:test",
+                "POSTGRES_IMAGE": f"buildarena-base/postgres:{self.tag}",
+                "VALKEY_IMAGE": f"buildarena-base/valkey:{self.tag}",
+                "CADDY_IMAGE": f"buildarena-base/caddy:{self.tag}",
+                "PYTHON_IMAGE": f"buildarena-base/python:{self.tag}",
+                "S3_IMAGE": f"buildarena-base/s3:{self.tag}",
                 **environment,
             },
         )
@@ -108,16 +118,8 @@ class Run:
 
 def build(run: Run) -> None:
     with run.step("base images"):
-        docker = {"DOCKER": run.engine.docker}
-        command(["bash", "scenarios/containers/bases/make.sh", "test"], **docker)
-        if not run.keep:
-            run.stack.callback(
-                run.engine.run,
-                "rmi",
-                "--force",
-                *(f"buildarena-base/{b}:test" for b in BASES),
-                check=False,
-            )
+        run.tag, there = run.engine.bases()
+        run.figures["base images were there"] = there
     previous = run.folder / "previous"
     with run.step("images of the commit before"):
         subprocess.run(
@@ -125,17 +127,21 @@ def build(run: Run) -> None:
             cwd=ROOT,
             check=True,
         )
-        run.engine.build(previous, "previous", "test")
+        run.figures["build_s of the commit before"] = run.engine.build(
+            previous, "previous", run.tag
+        )
     with run.step("images of this commit"):
-        run.engine.build(ROOT, "current", "test")
+        run.figures["build_s"] = run.engine.build(ROOT, "current", run.tag)
     versions = ("previous", "current")
     if not run.keep:
         names = [f"buildarena/{target}:{version}" for target in TARGETS for version in versions]
         run.stack.callback(run.engine.run, "rmi", "--force", *names, check=False)
-    base = run.engine.megabytes("buildarena-base/python:test")
-    run.figures["image_mb"] = {
-        target: round(run.engine.megabytes(f"buildarena/{target}:current")) for target in TARGETS
-    } | {"python base of all but proxy": round(base)}
+    named = {target: f"buildarena/{target}:current" for target in TARGETS}
+    sizes = {target: round(run.engine.megabytes(image)) for target, image in named.items()}
+    five = [image for target, image in named.items() if target != "proxy"]
+    sizes["all but proxy"] = round(run.engine.megabytes(*five))
+    run.figures["image_mb"] = sizes
+    assert not {n: mb for n, mb in sizes.items() if mb > LARGEST_MB[n]}, sizes
 
 
 def first_job(run: Run) -> tuple[Project, Service]:

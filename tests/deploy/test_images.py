@@ -88,6 +88,50 @@ def test_images_of_ours_run_as_an_ordinary_user() -> None:
         assert users[-1:] == ["10001:10001"], _target(service)
 
 
+def test_images_share_the_layers_of_what_all_need() -> None:
+    parents = {
+        stage: base
+        for base, stage in re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
+    }
+    for target in {_target(service) for service in OURS.values()} - {"proxy"}:
+        line = [target]
+        while line[-1] in parents:
+            line.append(parents[line[-1]])
+        assert line[-3:] == ["shared", "runtime", "scratch"], line
+    assert parents["proxy"] == "scratch"
+    assert "RUN" not in DOCKERFILE.split("FROM scratch AS proxy")[1], "it has no shell"
+
+
+def test_an_engine_is_only_where_something_is_simulated() -> None:
+    engines = {"mujoco", "pybullet"}
+    for lock in (ROOT / "deploy/docker/locks").glob("*.lock"):
+        found = set(re.findall(r"^([a-z]+)==", lock.read_text(), re.MULTILINE)) & engines
+        simulated = {"construct": engines, "build": set()}
+        wanted = {name.removeprefix("simulate-") for name in [lock.stem] if "simulate" in name}
+        assert found == simulated.get(lock.stem, wanted), lock.name
+
+
+def test_nothing_is_trimmed_that_a_source_names() -> None:
+    lines = (ROOT / "deploy/docker/trimmed.txt").read_text().splitlines()
+    trimmed = {line for line in lines if not line.startswith("#")}
+    assert "trimmed.txt" in (ROOT / "docs/deploying.md").read_text()
+    for path in (
+        *ROOT.glob("libs/*/src"),
+        *ROOT.glob("services/*/src"),
+        *ROOT.glob("clients/*/src"),
+    ):
+        for source in path.rglob("*.py"):
+            named = re.findall(
+                r"^ *(?:import|from) ([a-z][\w.]+)(?: import (\w+))?",
+                source.read_text(),
+                re.MULTILINE,
+            )
+            for module, name in named:
+                found = Path(*module.split("."), name)
+                kept = [found, *found.parents]
+                assert not [p for each in kept for p in trimmed if each.match(p)], (source, module)
+
+
 def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
     targets = set(re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE, re.MULTILINE))
     assert {_target(service) for service in OURS.values()} <= targets

@@ -77,14 +77,15 @@ def test_each_service_that_stays_says_whether_it_works(name) -> None:
         return
     if default(service["image"]).startswith("buildarena/"):
         stage = default(service["image"]).removeprefix("buildarena/").split(":")[0]
-        parent = re.search(rf"^FROM (\S+) AS {stage}$", DOCKERFILE, re.MULTILINE)[1]
-        checks = [
-            body
-            for found, body in re.findall(
+        recipes = dict(
+            re.findall(
                 r"^FROM \S+ AS (\S+)\n(.*?)(?=^FROM |\Z)", DOCKERFILE, re.MULTILINE | re.DOTALL
             )
-            if found in {stage, parent} and "HEALTHCHECK" in body
-        ]
+        )
+        checks = []
+        while stage in recipes and not checks:
+            checks = [recipes[stage]] if "HEALTHCHECK" in recipes[stage] else []
+            stage = re.search(rf"^FROM (\S+) AS {stage}$", DOCKERFILE, re.MULTILINE)[1]
         assert len(checks) == 1, name
         assert "socket" not in checks[0]
     else:
@@ -99,7 +100,8 @@ def test_checks_go_as_far_as_a_user_does() -> None:
     proxied = re.search(r"AS proxy\n.*?HEALTHCHECK.*?(CMD .*?)\n", DOCKERFILE, re.DOTALL)[1]
     (port,) = re.findall(r"127\.0\.0\.1:(\d+)", proxied)
     own = re.search(
-        rf"^http://127\.0\.0\.1:{port} \{{\n\tbind 127\.0\.0\.1\n\treverse_proxy api",
+        rf"^http://127\.0\.0\.1:{port} \{{\n\tbind 127\.0\.0\.1\n\treverse_proxy api:8321\n"
+        r"\trewrite \* \{\$BUILDARENA_BASE_PATH\}/v1/health\n",
         CADDYFILE,
         re.MULTILINE,
     )
