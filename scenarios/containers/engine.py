@@ -27,7 +27,8 @@ def say(line: str) -> None:
 
 def require_programs() -> None:
     """Stops with what to install, when something is missing."""
-    missing = sorted(package for name, package in NEEDED.items() if shutil.which(name) is None)
+    had = {"docker-compose"} if _composer()[0] == "docker" else set()
+    missing = sorted({p for name, p in NEEDED.items() if shutil.which(name) is None} - had)
     if os.geteuid() != 0:
         sys.exit("make test-containers needs root: it runs a Docker engine and makes base images")
     if missing:
@@ -41,6 +42,7 @@ class Engine:
 
     def __init__(self, stack: ExitStack) -> None:
         self.docker = _client()
+        self.composer = _composer()
         if self._answers():
             return
         folder = Path(tempfile.mkdtemp(prefix="buildarena-docker-"))
@@ -128,7 +130,7 @@ class Project:
 
     def compose(self, *words: str, check: bool = True, **environment: str) -> str:
         return command(
-            ["docker-compose", "--project-name", self.name, *words],
+            [*self.engine.composer, "--project-name", self.name, *words],
             check=check,
             **{**self.environment, **environment},
         )
@@ -179,6 +181,12 @@ def _client() -> str:
     plugin = subprocess.run(["docker", "buildx", "version"], capture_output=True, check=False)
     old = Path("/usr/bin/docker")
     return str(old) if plugin.returncode and old.exists() else "docker"
+
+
+def _composer() -> list[str]:
+    """Compose 2 where Docker's client has it, or 1, which Debian has."""
+    plugin = subprocess.run(["docker", "compose", "version"], capture_output=True, check=False)
+    return ["docker-compose"] if plugin.returncode else ["docker", "compose"]
 
 
 def command(words: Sequence[str], *, check: bool = True, **environment: str) -> str:

@@ -9,6 +9,7 @@ verifies every job there. At the end nothing is left.
 import argparse
 import json
 import random
+import shlex
 import shutil
 import signal
 import subprocess
@@ -32,6 +33,7 @@ from scenarios.containers.engine import (
 )
 from scenarios.containers.inspecting import check_confinement, check_no_secrets
 from scenarios.containers.service import Service
+from support.documents.code_blocks import shown_in
 
 SWEEP = {
     "name": "containers",
@@ -42,6 +44,8 @@ SWEEP = {
 }
 SMALL = {**SWEEP, "name": "upgrade", "tasks": ["support-3", "transport-2"], "samples": 10}
 PORTS = {"first": (18443, 18080), "second": (19443, 19080)}
+BACKUPS = "batest-backups"
+"""The volume that outlives the projects."""
 LARGEST_MB = {
     "api": 400,
     "construct": 480,
@@ -98,8 +102,9 @@ class Run:
             {
                 "COMPOSE_FILE": str(secrets / "docker-compose.yml"),
                 "BUILDARENA_VERSION": version,
-                "BUILDARENA_HTTPS_PORT": f"127.0.0.1:{https}",
-                "BUILDARENA_HTTP_PORT": f"127.0.0.1:{http}",
+                "BUILDARENA_HTTPS_PORT": str(https),
+                "BUILDARENA_HTTP_PORT": str(http),
+                "BUILDARENA_BACKUPS": BACKUPS,
                 "POSTGRES_IMAGE": f"buildarena-base/postgres:{self.tag}",
                 "VALKEY_IMAGE": f"buildarena-base/valkey:{self.tag}",
                 "CADDY_IMAGE": f"buildarena-base/caddy:{self.tag}",
@@ -145,6 +150,8 @@ def build(run: Run) -> None:
 
 
 def first_job(run: Run) -> tuple[Project, Service]:
+    run.engine.run("volume", "create", BACKUPS)
+    run.stack.callback(run.engine.run, "volume", "rm", "--force", BACKUPS, check=False)
     project = run.project("first", "previous")
     with run.step("up to the first job's end"):
         began = time.monotonic()
@@ -182,7 +189,7 @@ def look_from_outside(run: Run, service: Service) -> None:
         assert bare.get("/v1/sweeps", headers={"Authorization": "Bearer wrong"}).status_code == 401
         plain = httpx.get(f"http://localhost:{PORTS['first'][1]}/v1/health")
         assert plain.status_code in {301, 308}, plain
-        assert plain.headers["location"].startswith("https://")
+        assert plain.headers["location"] == f"{service.url}/v1/health", plain.headers
         page = service.ask("GET", "/", headers={"Accept": "text/html"})
         assert "<!doctype html>" in page.text.lower()
         assert "strict-transport-security" in page.headers
@@ -260,10 +267,6 @@ def restore_elsewhere(run: Run, project: Project) -> tuple[Project, Service]:
         run.figures["backup"] = {
             k: v for k, v in json.loads(said[said.index("{") :]).items() if "artifact" in k
         }
-        volume = f"{project.name}_backups"
-        kept = run.folder / "backups"
-        mounted = run.engine.json("volume", "inspect", volume)[0]["Mountpoint"]
-        shutil.copytree(mounted, kept)
     with run.step("destroy"):
         project.destroy()
         assert not project.left(), project.left()
@@ -273,16 +276,21 @@ def restore_elsewhere(run: Run, project: Project) -> tuple[Project, Service]:
         BUILDARENA_ARTIFACTS_URL="s3://buildarena",
         BUILDARENA_S3_ENDPOINT="http://s3:9000",
         BUILDARENA_S3_ALLOW_HTTP="true",
+        COMPOSE_PROFILES="s3",
     )
     with run.step("restore elsewhere, into S3"):
-        other.compose("--profile", "s3", "up", "--detach", "--no-build", "postgres", "valkey", "s3")
-        other.wait_healthy(["postgres", "valkey", "s3"])
-        other.compose("--profile", "tools", "create", "--no-build", "tools")
-        mounted = run.engine.json("volume", "inspect", f"{other.name}_backups")[0]["Mountpoint"]
-        shutil.copytree(run.folder / "backups", mounted, dirs_exist_ok=True)
-        other.compose("run", "--rm", "--no-deps", "roles")
-        other.compose("run", "--rm", "--no-deps", "tools", "restore", "/backups")
-        other.compose("up", "--detach", "--no-build")
+        # The store first, as the document has it; then its lines, word for word.
+        other.compose("up", "--detach", "s3")
+        other.wait_healthy(["s3"])
+        (shown,) = [
+            block.code
+            for block in shown_in(ROOT / "docs/deploying.md")
+            if "restore /backups" in block.code
+        ]
+        for line in shown.splitlines():
+            docker, compose, *words = shlex.split(line, comments=True)
+            assert (docker, compose) == ("docker", "compose"), line
+            other.compose(*words)
         key = run.secrets_of("second")["admin_key"]
         service = Service(other, PORTS["second"][0], key, run.folder)
         service.wait_up()
