@@ -12,7 +12,14 @@ from pathlib import Path
 
 import pytest
 import yaml
-from support.documents.manifests import KUBERNETES, OVERLAYS, needs_kubectl, of_kind, pods, rendered
+from support.documents.manifests import (
+    KUBERNETES,
+    OVERLAYS,
+    config_of,
+    needs_kubectl,
+    pods,
+    rendered,
+)
 
 from buildarena_environment.processes import ALLOCATOR
 from buildarena_store.rights import ROLES
@@ -38,6 +45,9 @@ ROLE_OF = {
     "simulate-pybullet": "simulate",
     "migrate": OWNER,
     "tools": OWNER,
+    "backup": OWNER,
+    "gc": OWNER,
+    "pack": OWNER,
 }
 """Whose database URL a service mounts; `roles` alone has the superuser's."""
 SMALLEST_PREFIX = 24
@@ -153,12 +163,12 @@ def test_nobody_kills_a_worker_before_its_time() -> None:
         assert default(SERVICES[name]["environment"][stopping]) == "60"
         assert SERVICES[name]["stop_grace_period"] == f"${{{stopping}:-60}}s", name
     base = KUBERNETES / "base"
-    config = yaml.safe_load((base / "config.yaml").read_text())
+    (grace,) = re.findall(rf"^{stopping}=(\d+)$", (base / "config.env").read_text(), re.MULTILINE)
     for name in workers:
         documents = yaml.safe_load_all((base / f"{name}.yaml").read_text())
         (pod,) = (one["spec"]["template"] for one in documents if one["kind"] == "Deployment")
         given = pod["spec"]["terminationGracePeriodSeconds"]
-        assert given >= float(config["data"][stopping]), name
+        assert given >= float(grace), name
 
 
 def test_the_api_trusts_the_proxys_address_and_no_other() -> None:
@@ -212,7 +222,7 @@ def test_pods_sign_in_as_their_own_roles_and_ask_more_than_a_port(overlay) -> No
 @needs_kubectl
 @in_each_overlay
 def test_no_wide_network_is_trusted(overlay) -> None:
-    (config,) = of_kind(rendered(overlay), "ConfigMap").values()
+    config = config_of(rendered(overlay))
     trusted = config["data"]["BUILDARENA_TRUSTED_PROXIES"]
     for network in filter(None, trusted.split(",")):
         assert ip_network(network).prefixlen >= SMALLEST_PREFIX, network
