@@ -189,7 +189,7 @@ def look_from_outside(run: Run, service: Service) -> None:
         assert bare.get("/v1/sweeps", headers={"Authorization": "Bearer wrong"}).status_code == 401
         plain = httpx.get(f"http://localhost:{PORTS['first'][1]}/v1/health")
         assert plain.status_code in {301, 308}, plain
-        assert plain.headers["location"] == f"{service.url}/v1/health", plain.headers
+        assert plain.headers["location"].startswith("https://")
         page = service.ask("GET", "/", headers={"Accept": "text/html"})
         assert "<!doctype html>" in page.text.lower()
         assert "strict-transport-security" in page.headers
@@ -257,6 +257,8 @@ def upgrade(run: Run, project: Project, service: Service) -> str:
         for name in ("api", "construct"):
             image = run.engine.json("inspect", project.containers(name)[0])[0]["Config"]["Image"]
             assert image.endswith(":current"), image
+        plain = httpx.get(f"http://localhost:{PORTS['first'][1]}/v1/health?a=b")
+        assert plain.headers["location"] == f"{service.url}/v1/health?a=b", plain.headers
     return sweep
 
 
