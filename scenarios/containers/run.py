@@ -41,8 +41,16 @@ SWEEP = {
     "models": ["builtin/expert", "builtin/idle"],
     "samples": 20,
     "simulator": "mujoco",
+    "worlds": 0,
 }
-SMALL = {**SWEEP, "name": "upgrade", "tasks": ["support-3", "transport-2"], "samples": 10}
+"""One trial a job; the smaller sweep has those in varied worlds too."""
+SMALL = {
+    **SWEEP,
+    "name": "upgrade",
+    "tasks": ["support-3", "transport-2"],
+    "samples": 10,
+    "worlds": 4,
+}
 PORTS = {"first": (18443, 18080), "second": (19443, 19080)}
 BACKUPS = "batest-backups"
 """The volume that outlives the projects."""
