@@ -121,6 +121,7 @@ class Run:
                 **environment,
             },
         )
+        project.destroy()  # what a run that was killed has left
         self.stack.callback(project.destroy)
         return project
 
@@ -158,9 +159,10 @@ def build(run: Run) -> None:
 
 
 def first_job(run: Run) -> tuple[Project, Service]:
+    project = run.project("first", "previous")
+    run.engine.run("volume", "rm", "--force", BACKUPS)
     run.engine.run("volume", "create", BACKUPS)
     run.stack.callback(run.engine.run, "volume", "rm", "--force", BACKUPS, check=False)
-    project = run.project("first", "previous")
     with run.step("up to the first job's end"):
         began = time.monotonic()
         project.compose("up", "--detach", "--no-build")
