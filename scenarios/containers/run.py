@@ -48,7 +48,7 @@ SMALL = {
     **SWEEP,
     "name": "upgrade",
     "tasks": ["support-3", "transport-2"],
-    "samples": 10,
+    "samples": 4,
     "worlds": 4,
 }
 PORTS = {"first": (18443, 18080), "second": (19443, 19080)}
