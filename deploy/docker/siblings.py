@@ -1,11 +1,11 @@
-"""Prints one of our distributions and all of ours that it needs, as their wheels in /wheels say."""
+"""Prints one of our distributions and all of ours that it needs, as their wheels say."""
 
 import re
 import sys
 import zipfile
 from pathlib import Path
 
-WHEELS = Path("/wheels")
+WHEELS = Path("/mnt/wheels")
 
 
 def needs(name: str) -> list[str]:

@@ -1,5 +1,6 @@
 """The Docker engine and Compose, as commands; and everything they made, gone at the end."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -15,6 +16,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[2]
 TARGETS = ("api", "construct", "simulate-pybullet", "simulate-mujoco", "tools", "proxy")
 BASES = ("python", "postgres", "valkey", "caddy", "s3")
+KEPT = "12GB"
+"""Of what an engine of our own has built, how much stays for the next run."""
 NEEDED = {"docker": "docker.io", "docker-compose": "docker-compose", "debootstrap": "debootstrap"}
 
 
@@ -24,7 +27,8 @@ def say(line: str) -> None:
 
 def require_programs() -> None:
     """Stops with what to install, when something is missing."""
-    missing = sorted(package for name, package in NEEDED.items() if shutil.which(name) is None)
+    had = {"docker-compose"} if _composer()[0] == "docker" else set()
+    missing = sorted({p for name, p in NEEDED.items() if shutil.which(name) is None} - had)
     if os.geteuid() != 0:
         sys.exit("make test-containers needs root: it runs a Docker engine and makes base images")
     if missing:
@@ -38,13 +42,16 @@ class Engine:
 
     def __init__(self, stack: ExitStack) -> None:
         self.docker = _client()
+        self.composer = _composer()
         if self._answers():
             return
         folder = Path(tempfile.mkdtemp(prefix="buildarena-docker-"))
         stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        # What it has built stays for the next run: base images, and steps that are the same.
+        data = ROOT / ".buildarena" / "docker"
         log = (folder / "dockerd.log").open("wb")
         stack.callback(log.close)
-        words = ["dockerd", "--data-root", str(folder / "data"), "--exec-root", str(folder / "run")]
+        words = ["dockerd", "--data-root", str(data), "--exec-root", str(folder / "run")]
         process = subprocess.Popen(
             [*words, "--pidfile", str(folder / "pid")], stdout=log, stderr=log
         )
@@ -56,6 +63,7 @@ class Engine:
                 said = (folder / "dockerd.log").read_text()[-2000:]
                 sys.exit(f"the Docker engine did not start:\n{said}")
             time.sleep(0.5)
+        stack.callback(self.run, "builder", "prune", "--force", "--keep-storage", KEPT)
         say("started a Docker engine of our own")
 
     def run(self, *words: str, check: bool = True, **environment: str) -> str:
@@ -68,6 +76,25 @@ class Engine:
     def _answers(self) -> bool:
         done = subprocess.run([self.docker, "info"], capture_output=True, check=False)
         return done.returncode == 0 and b"Server Version" in done.stdout
+
+    def bases(self) -> tuple[str, bool]:
+        """The tag of the base images, made where they are not there yet, and whether they were.
+
+        It comes from what they are made of; those of other tags go.
+        """
+        folder = ROOT / "scenarios" / "containers" / "bases"
+        made_of = [*sorted(folder.iterdir()), Path("/etc/ssl/certs/ca-certificates.crt")]
+        content = b"".join(file.read_bytes() for file in made_of)
+        tag = hashlib.sha256(content).hexdigest()[:12]
+        listed = self.run("images", "--format", "{{.Repository}}:{{.Tag}}").split()
+        wanted = {f"buildarena-base/{base}:{tag}" for base in BASES}
+        there = wanted <= set(listed)
+        if not there:
+            command(["bash", str(folder / "make.sh"), tag], DOCKER=self.docker)
+        old = {name for name in listed if name.startswith("buildarena-base/")} - wanted
+        if old:
+            self.run("rmi", "--force", *sorted(old), check=False)
+        return tag, there
 
     def build(self, source: Path, version: str, tag: str) -> dict[str, float]:
         """Builds every image of a source tree; seconds by target."""
@@ -84,8 +111,15 @@ class Engine:
             took[target] = time.monotonic() - began
         return took
 
-    def megabytes(self, image: str) -> float:
-        return float(self.json("image", "inspect", image)[0]["Size"]) / 1e6
+    def megabytes(self, *images: str) -> float:
+        """What images take on the disk, with layers that they share counted once."""
+        layers: dict[tuple[str, ...], int] = {}
+        for image in images:
+            words = ("--no-trunc", "--human=false", "--format", "{{.Size}} {{.CreatedBy}}")
+            lines = self.run("history", *words, image).splitlines()[::-1]
+            for i, line in enumerate(lines):
+                layers[tuple(lines[: i + 1])] = int(line.split()[0])
+        return sum(layers.values()) / 1e6
 
 
 class Project:
@@ -96,7 +130,7 @@ class Project:
 
     def compose(self, *words: str, check: bool = True, **environment: str) -> str:
         return command(
-            ["docker-compose", "--project-name", self.name, *words],
+            [*self.engine.composer, "--project-name", self.name, *words],
             check=check,
             **{**self.environment, **environment},
         )
@@ -147,6 +181,12 @@ def _client() -> str:
     plugin = subprocess.run(["docker", "buildx", "version"], capture_output=True, check=False)
     old = Path("/usr/bin/docker")
     return str(old) if plugin.returncode and old.exists() else "docker"
+
+
+def _composer() -> list[str]:
+    """Compose 2 where Docker's client has it, or 1, which Debian has."""
+    plugin = subprocess.run(["docker", "compose", "version"], capture_output=True, check=False)
+    return ["docker-compose"] if plugin.returncode else ["docker", "compose"]
 
 
 def command(words: Sequence[str], *, check: bool = True, **environment: str) -> str:

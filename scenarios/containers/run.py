@@ -9,6 +9,7 @@ verifies every job there. At the end nothing is left.
 import argparse
 import json
 import random
+import shlex
 import shutil
 import signal
 import subprocess
@@ -22,7 +23,6 @@ from typing import Any
 
 import httpx
 from scenarios.containers.engine import (
-    BASES,
     ROOT,
     TARGETS,
     Engine,
@@ -33,6 +33,7 @@ from scenarios.containers.engine import (
 )
 from scenarios.containers.inspecting import check_confinement, check_no_secrets
 from scenarios.containers.service import Service
+from support.documents.code_blocks import shown_in
 
 SWEEP = {
     "name": "containers",
@@ -40,9 +41,29 @@ SWEEP = {
     "models": ["builtin/expert", "builtin/idle"],
     "samples": 20,
     "simulator": "mujoco",
+    "worlds": 0,
 }
-SMALL = {**SWEEP, "name": "upgrade", "tasks": ["support-3", "transport-2"], "samples": 10}
+"""One trial a job; the smaller sweep has those in varied worlds too."""
+SMALL = {
+    **SWEEP,
+    "name": "upgrade",
+    "tasks": ["support-3", "transport-2"],
+    "samples": 4,
+    "worlds": 4,
+}
 PORTS = {"first": (18443, 18080), "second": (19443, 19080)}
+BACKUPS = "batest-backups"
+"""The volume that outlives the projects."""
+LARGEST_MB = {
+    "api": 400,
+    "construct": 480,
+    "simulate-pybullet": 400,
+    "simulate-mujoco": 400,
+    "tools": 560,
+    "proxy": 60,
+    "all but proxy": 900,
+}
+"""What images may take; construct workers have both engines, to verify with, and the providers."""
 LONG_RUNNING = (
     "postgres",
     "valkey",
@@ -65,6 +86,7 @@ class Run:
         stack.callback(subprocess.run, ["git", "worktree", "prune"], cwd=ROOT, check=False)
         stack.callback(shutil.rmtree, self.folder, ignore_errors=True)
         self.figures: dict[str, Any] = {}
+        self.tag = ""
         self.random = random.Random(18)
 
     @contextmanager
@@ -88,16 +110,18 @@ class Run:
             {
                 "COMPOSE_FILE": str(secrets / "docker-compose.yml"),
                 "BUILDARENA_VERSION": version,
-                "BUILDARENA_HTTPS_PORT": f"127.0.0.1:{https}",
-                "BUILDARENA_HTTP_PORT": f"127.0.0.1:{http}",
-                "POSTGRES_IMAGE": "buildarena-base/postgres:test",
-                "VALKEY_IMAGE": "buildarena-base/valkey:test",
-                "CADDY_IMAGE": "buildarena-base/caddy:test",
-                "PYTHON_IMAGE": "buildarena-base/python:test",
-                "S3_IMAGE": "buildarena-base/s3:test",
+                "BUILDARENA_HTTPS_PORT": str(https),
+                "BUILDARENA_HTTP_PORT": str(http),
+                "BUILDARENA_BACKUPS": BACKUPS,
+                "POSTGRES_IMAGE": f"buildarena-base/postgres:{self.tag}",
+                "VALKEY_IMAGE": f"buildarena-base/valkey:{self.tag}",
+                "CADDY_IMAGE": f"buildarena-base/caddy:{self.tag}",
+                "PYTHON_IMAGE": f"buildarena-base/python:{self.tag}",
+                "S3_IMAGE": f"buildarena-base/s3:{self.tag}",
                 **environment,
             },
         )
+        project.destroy()  # what a run that was killed has left
         self.stack.callback(project.destroy)
         return project
 
@@ -108,16 +132,8 @@ class Run:
 
 def build(run: Run) -> None:
     with run.step("base images"):
-        docker = {"DOCKER": run.engine.docker}
-        command(["bash", "scenarios/containers/bases/make.sh", "test"], **docker)
-        if not run.keep:
-            run.stack.callback(
-                run.engine.run,
-                "rmi",
-                "--force",
-                *(f"buildarena-base/{b}:test" for b in BASES),
-                check=False,
-            )
+        run.tag, there = run.engine.bases()
+        run.figures["base images were there"] = there
     previous = run.folder / "previous"
     with run.step("images of the commit before"):
         subprocess.run(
@@ -125,21 +141,28 @@ def build(run: Run) -> None:
             cwd=ROOT,
             check=True,
         )
-        run.engine.build(previous, "previous", "test")
+        run.figures["build_s of the commit before"] = run.engine.build(
+            previous, "previous", run.tag
+        )
     with run.step("images of this commit"):
-        run.engine.build(ROOT, "current", "test")
+        run.figures["build_s"] = run.engine.build(ROOT, "current", run.tag)
     versions = ("previous", "current")
     if not run.keep:
         names = [f"buildarena/{target}:{version}" for target in TARGETS for version in versions]
         run.stack.callback(run.engine.run, "rmi", "--force", *names, check=False)
-    base = run.engine.megabytes("buildarena-base/python:test")
-    run.figures["image_mb"] = {
-        target: round(run.engine.megabytes(f"buildarena/{target}:current")) for target in TARGETS
-    } | {"python base of all but proxy": round(base)}
+    named = {target: f"buildarena/{target}:current" for target in TARGETS}
+    sizes = {target: round(run.engine.megabytes(image)) for target, image in named.items()}
+    five = [image for target, image in named.items() if target != "proxy"]
+    sizes["all but proxy"] = round(run.engine.megabytes(*five))
+    run.figures["image_mb"] = sizes
+    assert not {n: mb for n, mb in sizes.items() if mb > LARGEST_MB[n]}, sizes
 
 
 def first_job(run: Run) -> tuple[Project, Service]:
     project = run.project("first", "previous")
+    run.engine.run("volume", "rm", "--force", BACKUPS)
+    run.engine.run("volume", "create", BACKUPS)
+    run.stack.callback(run.engine.run, "volume", "rm", "--force", BACKUPS, check=False)
     with run.step("up to the first job's end"):
         began = time.monotonic()
         project.compose("up", "--detach", "--no-build")
@@ -244,6 +267,8 @@ def upgrade(run: Run, project: Project, service: Service) -> str:
         for name in ("api", "construct"):
             image = run.engine.json("inspect", project.containers(name)[0])[0]["Config"]["Image"]
             assert image.endswith(":current"), image
+        plain = httpx.get(f"http://localhost:{PORTS['first'][1]}/v1/health?a=b")
+        assert plain.headers["location"] == f"{service.url}/v1/health?a=b", plain.headers
     return sweep
 
 
@@ -254,10 +279,6 @@ def restore_elsewhere(run: Run, project: Project) -> tuple[Project, Service]:
         run.figures["backup"] = {
             k: v for k, v in json.loads(said[said.index("{") :]).items() if "artifact" in k
         }
-        volume = f"{project.name}_backups"
-        kept = run.folder / "backups"
-        mounted = run.engine.json("volume", "inspect", volume)[0]["Mountpoint"]
-        shutil.copytree(mounted, kept)
     with run.step("destroy"):
         project.destroy()
         assert not project.left(), project.left()
@@ -267,16 +288,21 @@ def restore_elsewhere(run: Run, project: Project) -> tuple[Project, Service]:
         BUILDARENA_ARTIFACTS_URL="s3://buildarena",
         BUILDARENA_S3_ENDPOINT="http://s3:9000",
         BUILDARENA_S3_ALLOW_HTTP="true",
+        COMPOSE_PROFILES="s3",
     )
     with run.step("restore elsewhere, into S3"):
-        other.compose("--profile", "s3", "up", "--detach", "--no-build", "postgres", "valkey", "s3")
-        other.wait_healthy(["postgres", "valkey", "s3"])
-        other.compose("--profile", "tools", "create", "--no-build", "tools")
-        mounted = run.engine.json("volume", "inspect", f"{other.name}_backups")[0]["Mountpoint"]
-        shutil.copytree(run.folder / "backups", mounted, dirs_exist_ok=True)
-        other.compose("run", "--rm", "--no-deps", "roles")
-        other.compose("run", "--rm", "--no-deps", "tools", "restore", "/backups")
-        other.compose("up", "--detach", "--no-build")
+        # The store first, as the document has it; then its lines, word for word.
+        other.compose("up", "--detach", "s3")
+        other.wait_healthy(["s3"])
+        (shown,) = [
+            block.code
+            for block in shown_in(ROOT / "docs/deploying.md")
+            if "restore /backups" in block.code
+        ]
+        for line in shown.splitlines():
+            docker, compose, *words = shlex.split(line, comments=True)
+            assert (docker, compose) == ("docker", "compose"), line
+            other.compose(*words)
         key = run.secrets_of("second")["admin_key"]
         service = Service(other, PORTS["second"][0], key, run.folder)
         service.wait_up()

@@ -10,6 +10,7 @@ import yaml
 
 from buildarena_cli.command_table import COMMANDS
 from buildarena_geometry import kernels
+from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
 
@@ -88,6 +89,50 @@ def test_images_of_ours_run_as_an_ordinary_user() -> None:
         assert users[-1:] == ["10001:10001"], _target(service)
 
 
+def test_images_share_the_layers_of_what_all_need() -> None:
+    parents = {
+        stage: base
+        for base, stage in re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
+    }
+    for target in {_target(service) for service in OURS.values()} - {"proxy"}:
+        line = [target]
+        while line[-1] in parents:
+            line.append(parents[line[-1]])
+        assert line[-3:] == ["shared", "runtime", "scratch"], line
+    assert parents["proxy"] == "scratch"
+    assert "RUN" not in DOCKERFILE.split("FROM scratch AS proxy")[1], "it has no shell"
+
+
+def test_an_engine_is_only_where_something_is_simulated() -> None:
+    engines = {"mujoco", "pybullet"}
+    for lock in (ROOT / "deploy/docker/locks").glob("*.lock"):
+        found = set(re.findall(r"^([a-z]+)==", lock.read_text(), re.MULTILINE)) & engines
+        simulated = {"construct": engines, "build": set()}
+        wanted = {name.removeprefix("simulate-") for name in [lock.stem] if "simulate" in name}
+        assert found == simulated.get(lock.stem, wanted), lock.name
+
+
+def test_nothing_is_trimmed_that_a_source_names() -> None:
+    lines = (ROOT / "deploy/docker/trimmed.txt").read_text().splitlines()
+    trimmed = {line for line in lines if not line.startswith("#")}
+    assert "trimmed.txt" in (ROOT / "docs/deploying.md").read_text()
+    for path in (
+        *ROOT.glob("libs/*/src"),
+        *ROOT.glob("services/*/src"),
+        *ROOT.glob("clients/*/src"),
+    ):
+        for source in path.rglob("*.py"):
+            named = re.findall(
+                r"^ *(?:import|from) ([a-z][\w.]+)(?: import (\w+))?",
+                source.read_text(),
+                re.MULTILINE,
+            )
+            for module, name in named:
+                found = Path(*module.split("."), name)
+                kept = [found, *found.parents]
+                assert not [p for each in kept for p in trimmed if each.match(p)], (source, module)
+
+
 def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
     targets = set(re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE, re.MULTILINE))
     assert {_target(service) for service in OURS.values()} <= targets
@@ -99,12 +144,12 @@ def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
 def test_only_settings_that_exist_are_set() -> None:
     known = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields} | {kernels.CHOICE}
     client = {"BUILDARENA_URL", "BUILDARENA_KEY", "BUILDARENA_PROMETHEUS_URL"}
-    proxy = {"BUILDARENA_SITE", "BUILDARENA_TLS", "BUILDARENA_BASE_PATH"}
+    proxy = {"BUILDARENA_SITE", "BUILDARENA_HTTPS_PORT", "BUILDARENA_TLS", "BUILDARENA_BASE_PATH"}
     for name, service in OURS.items():
         allowed = {"proxy": proxy, "tools": known | client}.get(name, known)
         for variable in variables(service):
             if variable.startswith("BUILDARENA_"):
-                assert variable.removesuffix("_FILE") in allowed, (name, variable)
+                assert {variable, variable.removesuffix("_FILE")} & allowed, (name, variable)
 
 
 def test_no_secret_stands_in_a_variable() -> None:
@@ -117,6 +162,38 @@ def test_no_secret_stands_in_a_variable() -> None:
                     each if isinstance(each, str) else each["target"] for each in service["secrets"]
                 ]
                 assert str(value).removeprefix("/run/secrets/") in mounted
+
+
+def test_whoever_knows_the_models_mounts_the_operators_file(tmp_path) -> None:
+    mounted = {
+        name
+        for name, service in SERVICES.items()
+        if any("/etc/buildarena/models.yaml:ro" in each for each in service.get("volumes", []))
+    }
+    named = {name for name in SERVICES if "BUILDARENA_MODELS_FILE" in variables(SERVICES[name])}
+    assert mounted == named == {"api", "construct"}
+    example = ROOT / "deploy/docker/models.yaml"
+    assert load_registry(example) == load_registry(), "as it comes it adds nothing"
+    shown = [line.removeprefix("# ") for line in example.read_text().splitlines()[2:]]
+    (tmp_path / "models.yaml").write_text("\n".join(shown))
+    added = load_registry(tmp_path / "models.yaml")
+    assert added.provider_of(added.models["own/big"]).key == "OWN_API_KEY"
+
+
+def test_backups_are_of_no_project() -> None:
+    volume = COMPOSE["volumes"]["backups"]
+    assert volume["external"] is True
+    name = volume["name"].partition(":-")[2].removesuffix("}")
+    documented = (ROOT / "docs/deploying.md").read_text()
+    assert f"docker volume create {name}" in documented
+    assert "backups:/backups" in SERVICES["tools"]["volumes"]
+
+
+def test_redirects_lead_to_the_port_that_people_reach() -> None:
+    caddyfile = (ROOT / "deploy/caddy/Caddyfile").read_text()
+    assert "auto_https disable_redirects" in caddyfile
+    assert "redir https://{host}:{$BUILDARENA_HTTPS_PORT:443}{uri} 308" in caddyfile
+    assert SERVICES["proxy"]["ports"][1] == "${BUILDARENA_HTTPS_PORT:-443}:8443"
 
 
 def test_each_secret_is_made_and_each_variable_is_explained() -> None:

@@ -1,8 +1,10 @@
 """The manifests for Kubernetes: valid, and as closed as they say."""
 
 import json
+import os
 import re
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import jsonschema
 import kubernetes_validate
@@ -11,6 +13,8 @@ import yaml
 from support.documents.manifests import (
     KUBERNETES,
     OVERLAYS,
+    config_of,
+    kustomized,
     needs_kubectl,
     of_kind,
     pods,
@@ -19,20 +23,31 @@ from support.documents.manifests import (
 )
 from support.documents.promtool import needs_promtool, promtool
 
+from buildarena_cli.command_table import COMMANDS
 from buildarena_pipeline import __version__
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
-SCHEMA = json.loads(
-    (Path(__file__).parents[1] / "data" / "keda-scaledobject.schema.json").read_text()
-)
+DATA = Path(__file__).parents[1] / "data"
+SCHEMAS = {
+    "ScaledObject": "keda-scaledobject",
+    "PodMonitor": "podmonitor",
+    "HTTPRoute": "httproute",
+}
+"""Kinds that are not Kubernetes' own, with the schema of each."""
+MAINTENANCE = {
+    "backup": ["backup", "$(BACKUPS)"],
+    "gc": ["artifacts", "gc"],
+    "pack": ["history", "pack"],
+}
 DOCKERFILE = KUBERNETES.parent / "docker" / "Dockerfile"
 VERSIONS = ("1.29", kubernetes_validate.latest_version())
 VERSION = __version__
 OURS = ("api", "construct", "simulate-mujoco", "simulate-pybullet")
-FILES = sorted(path for path in KUBERNETES.rglob("*.yaml") if path.name != "kustomization.yaml")
+NO_MANIFESTS = {"kustomization.yaml", "models.yaml"}
+FILES = sorted(path for path in KUBERNETES.rglob("*.yaml") if path.name not in NO_MANIFESTS)
 BUCKET = {"AWS_ENDPOINT", "AWS_REGION"}
 
 in_each_overlay = [needs_kubectl, pytest.mark.parametrize("overlay", OVERLAYS)]
@@ -45,9 +60,10 @@ def each_overlay(test):
 
 
 def check(document: dict) -> None:
-    """Validates a document against Kubernetes' own schemas, or KEDA's."""
-    if document["kind"] == "ScaledObject":
-        jsonschema.validate(document, SCHEMA)
+    """Validates a document against Kubernetes' own schemas, or those of what extends it."""
+    if document["kind"] in SCHEMAS:
+        schema = json.loads((DATA / f"{SCHEMAS[document['kind']]}.schema.json").read_text())
+        jsonschema.Draft202012Validator(schema).validate(document)
         return
     for version in VERSIONS:
         kubernetes_validate.validate(document, version, strict=True)
@@ -145,7 +161,7 @@ def test_no_environment_holds_a_secret(overlay) -> None:
 def test_settings_are_ones_that_there_are(overlay) -> None:
     documents = rendered(overlay)
     fields = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields}
-    (config,) = of_kind(documents, "ConfigMap").values()
+    config = config_of(documents)
     assert set(config["data"]) - fields - BUCKET <= {"HOME"}
     for name in config["data"].keys() & fields:
         field = name.removeprefix("BUILDARENA_").lower()
@@ -190,6 +206,9 @@ def test_pods_are_stopped_and_moved_with_care(overlay) -> None:
         container = pod["spec"]["containers"][0]
         assert ("readinessProbe" in container) == (name == "api")
         assert "livenessProbe" in container
+        # What starts has its own time; then a probe needs no delay.
+        assert container["startupProbe"]["failureThreshold"] >= 60
+        assert "initialDelaySeconds" not in container["livenessProbe"]
     api = pods(documents)["api"]["spec"]["containers"][0]
     alive = api["livenessProbe"]["httpGet"]["path"]
     assert alive == "/openapi.json", "a lost database must not have the API killed"
@@ -219,7 +238,7 @@ def test_nothing_goes_in_or_out_that_is_not_named(overlay) -> None:
             assert rule["ports"], policy
     stores = policies["stores-out"]["spec"]["podSelector"]["matchLabels"]
     reach = {name for name, given in labels.items() if stores.items() <= given.items()}
-    assert reach == {*OURS, "migrate"} | ({"roles"} & set(labels))
+    assert reach == {*OURS, "migrate", *MAINTENANCE} | ({"roles"} & set(labels))
 
 
 @each_overlay
@@ -271,3 +290,157 @@ def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path) -> None:
     file = tmp_path / "queries.yml"
     file.write_text(yaml.safe_dump({"groups": [{"name": "x", "rules": rules}]}))
     promtool("check", "rules", str(file))
+
+
+@each_overlay
+def test_pods_of_a_kind_are_spread_by_their_name(overlay) -> None:
+    for name, pod in pods(rendered(overlay)).items():
+        if name in OURS:
+            (spread,) = pod["spec"]["topologySpreadConstraints"]
+            assert spread["topologyKey"] == "kubernetes.io/hostname"
+            assert spread["labelSelector"]["matchLabels"] == {"app.kubernetes.io/name": name}
+
+
+@each_overlay
+def test_a_change_of_settings_rolls_pods_out(overlay) -> None:
+    documents = rendered(overlay)
+    config, models = config_of(documents), config_of(documents, "models")
+    assert {**load_models(models)} == {}, "as it comes it adds nothing"
+    for name in OURS:
+        spec = pods(documents)[name]["spec"]
+        (container,) = spec["containers"]
+        assert container["envFrom"] == [{"configMapRef": {"name": config["metadata"]["name"]}}]
+        mounted = [v["configMap"]["name"] for v in spec["volumes"] if "configMap" in v]
+        assert mounted == ([models["metadata"]["name"]] if name in {"api", "construct"} else [])
+
+
+def load_models(config: dict) -> dict:
+    return {k: v for k, v in yaml.safe_load(config["data"]["models.yaml"]).items() if v}
+
+
+@each_overlay
+def test_a_job_of_each_version_has_a_name_of_its_own_and_nothing_that_changes(overlay) -> None:
+    for name, job in of_kind(rendered(overlay), "Job").items():
+        label = job["metadata"]["labels"]["app.kubernetes.io/name"]
+        assert name == f"{label}-{VERSION}"
+        (container,) = job["spec"]["template"]["spec"]["containers"]
+        assert "envFrom" not in container, "a ConfigMap's name changes with it, and a job can't"
+
+
+@each_overlay
+def test_what_must_be_done_again_and_again_has_its_times(overlay) -> None:
+    documents = rendered(overlay)
+    found = of_kind(documents, "CronJob")
+    assert set(found) == set(MAINTENANCE)
+    assert len({each["spec"]["schedule"] for each in found.values()}) == len(found)
+    for name, each in found.items():
+        assert each["spec"]["concurrencyPolicy"] == "Forbid"
+        (container,) = pods(documents)[name]["spec"]["containers"]
+        assert container["args"] == MAINTENANCE[name]
+        assert container["args"][0] in COMMANDS
+        assert container["image"] == f"buildarena/tools:{VERSION}"
+        given = {entry["name"]: entry["value"] for entry in container["env"]}
+        mounts = {mount["mountPath"] for mount in container["volumeMounts"]}
+        if overlay == "small":
+            assert "/artifacts" in mounts
+        else:
+            assert "AWS_SECRET_ACCESS_KEY_FILE" in given
+        if name == "backup":
+            artifacts = config_of(documents)["data"].get("BUILDARENA_ARTIFACTS_URL", "/artifacts")
+            bucket = artifacts.removesuffix("/artifacts") or "/artifacts"
+            assert not given["BACKUPS"].startswith(f"{bucket}/"), "apart from what it saves"
+            assert given["BACKUPS"].startswith("s3://") or given["BACKUPS"] in mounts
+
+
+@needs_kubectl
+def test_postgres_compiles_no_short_query() -> None:
+    (container,) = pods(rendered("small"))["postgres"]["spec"]["containers"]
+    assert "jit=off" in container["args"]
+    assert container["startupProbe"]["failureThreshold"] >= 60
+
+
+@pytest.fixture
+def with_component(tmp_path):
+    """What an overlay applies with one of the components."""
+
+    def render(overlay: str, component: str) -> list[dict]:
+        resource = os.path.relpath(KUBERNETES / "overlays" / overlay, tmp_path)
+        added = os.path.relpath(KUBERNETES / "components" / component, tmp_path)
+        text = yaml.safe_dump({"resources": [resource], "components": [added]})
+        (tmp_path / "kustomization.yaml").write_text(text)
+        documents = kustomized(tmp_path)
+        for document in documents:
+            check(document)
+        return documents
+
+    return render
+
+
+@each_overlay
+def test_a_gateway_takes_the_place_of_the_ingress(overlay, with_component) -> None:
+    documents = with_component(overlay, "gateway")
+    assert not of_kind(documents, "Ingress")
+    (route,) = of_kind(documents, "HTTPRoute").values()
+    (rule,) = route["spec"]["rules"]
+    (backend,) = rule["backendRefs"]
+    (port,) = of_kind(documents, "Service")[backend["name"]]["spec"]["ports"]
+    assert backend["port"] == port["port"]
+    assert rule["timeouts"]["request"] == "0s", "streams stay open"
+    callers = of_kind(documents, "NetworkPolicy")["callers"]["spec"]["ingress"][0]["from"]
+    spaces = [each["namespaceSelector"]["matchLabels"] for each in callers]
+    parent = route["spec"]["parentRefs"][0]["namespace"]
+    assert {"kubernetes.io/metadata.name": parent} in spaces
+
+
+@each_overlay
+def test_prometheus_operator_finds_each_pod_of_the_api(overlay, with_component) -> None:
+    documents = with_component(overlay, "prometheus-operator")
+    (monitor,) = of_kind(documents, "PodMonitor").values()
+    pod = pods(documents)["api"]
+    selector = monitor["spec"]["selector"]["matchLabels"]
+    assert selector.items() <= pod["metadata"]["labels"].items()
+    (endpoint,) = monitor["spec"]["podMetricsEndpoints"]
+    assert endpoint["port"] in {port["name"] for port in pod["spec"]["containers"][0]["ports"]}
+    scraped = yaml.safe_load(
+        (KUBERNETES.parent / "monitoring/prometheus/prometheus.yml").read_text()
+    )["scrape_configs"]
+    assert endpoint["path"] in {each.get("metrics_path") for each in scraped}
+    secret = next(v["secret"] for v in pod["spec"]["volumes"] if v["name"] == "secrets")
+    credentials = endpoint["authorization"]["credentials"]
+    assert credentials["name"] == secret["secretName"]
+    assert credentials["key"] in {item["key"] for item in secret["items"]}
+
+
+@each_overlay
+def test_models_in_the_cluster_can_be_named_and_reached(overlay, with_component, tmp_path) -> None:
+    documents = with_component(overlay, "models-in-cluster")
+    file = tmp_path / "models.yaml"
+    file.write_text(config_of(documents, "models")["data"]["models.yaml"])
+    registry = load_registry(file)
+    (model,) = registry.models.keys() - load_registry().models.keys()
+    url = urlsplit(registry.provider_of(registry.models[model]).base_url)
+    _, namespace, kind = url.hostname.split(".")
+    policy = of_kind(documents, "NetworkPolicy")["models-in-cluster"]["spec"]
+    assert policy["podSelector"]["matchLabels"] == {"app.kubernetes.io/name": "construct"}
+    (rule,) = policy["egress"]
+    assert kind == "svc"
+    assert rule["ports"] == [{"protocol": "TCP", "port": url.port}]
+    (to,) = rule["to"]
+    assert to["namespaceSelector"]["matchLabels"] == {"kubernetes.io/metadata.name": namespace}
+
+
+@pytest.mark.parametrize(
+    ("path", "spoil"),
+    [
+        ("components/gateway/route.yaml", lambda spec: spec["rules"][0].update(backend="api")),
+        ("components/gateway/route.yaml", lambda spec: spec["rules"][0].update(timeouts=3)),
+        ("components/prometheus-operator/pods.yaml", lambda spec: spec.pop("selector")),
+        ("overlays/external/scaling.yaml", lambda spec: spec.update(minReplicas=1)),
+    ],
+)
+def test_a_wrong_document_of_what_extends_kubernetes_is_found(path, spoil) -> None:
+    document = read((KUBERNETES / path).read_text())[0]
+    check(document)
+    spoil(document["spec"])
+    with pytest.raises(jsonschema.ValidationError):
+        check(document)

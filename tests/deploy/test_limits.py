@@ -12,7 +12,14 @@ from pathlib import Path
 
 import pytest
 import yaml
-from support.documents.manifests import KUBERNETES, OVERLAYS, needs_kubectl, of_kind, pods, rendered
+from support.documents.manifests import (
+    KUBERNETES,
+    OVERLAYS,
+    config_of,
+    needs_kubectl,
+    pods,
+    rendered,
+)
 
 from buildarena_environment.processes import ALLOCATOR
 from buildarena_store.rights import ROLES
@@ -38,6 +45,9 @@ ROLE_OF = {
     "simulate-pybullet": "simulate",
     "migrate": OWNER,
     "tools": OWNER,
+    "backup": OWNER,
+    "gc": OWNER,
+    "pack": OWNER,
 }
 """Whose database URL a service mounts; `roles` alone has the superuser's."""
 SMALLEST_PREFIX = 24
@@ -77,14 +87,15 @@ def test_each_service_that_stays_says_whether_it_works(name) -> None:
         return
     if default(service["image"]).startswith("buildarena/"):
         stage = default(service["image"]).removeprefix("buildarena/").split(":")[0]
-        parent = re.search(rf"^FROM (\S+) AS {stage}$", DOCKERFILE, re.MULTILINE)[1]
-        checks = [
-            body
-            for found, body in re.findall(
+        recipes = dict(
+            re.findall(
                 r"^FROM \S+ AS (\S+)\n(.*?)(?=^FROM |\Z)", DOCKERFILE, re.MULTILINE | re.DOTALL
             )
-            if found in {stage, parent} and "HEALTHCHECK" in body
-        ]
+        )
+        checks = []
+        while stage in recipes and not checks:
+            checks = [recipes[stage]] if "HEALTHCHECK" in recipes[stage] else []
+            stage = re.search(rf"^FROM (\S+) AS {stage}$", DOCKERFILE, re.MULTILINE)[1]
         assert len(checks) == 1, name
         assert "socket" not in checks[0]
     else:
@@ -99,7 +110,8 @@ def test_checks_go_as_far_as_a_user_does() -> None:
     proxied = re.search(r"AS proxy\n.*?HEALTHCHECK.*?(CMD .*?)\n", DOCKERFILE, re.DOTALL)[1]
     (port,) = re.findall(r"127\.0\.0\.1:(\d+)", proxied)
     own = re.search(
-        rf"^http://127\.0\.0\.1:{port} \{{\n\tbind 127\.0\.0\.1\n\treverse_proxy api",
+        rf"^http://127\.0\.0\.1:{port} \{{\n\tbind 127\.0\.0\.1\n\treverse_proxy api:8321\n"
+        r"\trewrite \* \{\$BUILDARENA_BASE_PATH\}/v1/health\n",
         CADDYFILE,
         re.MULTILINE,
     )
@@ -151,12 +163,12 @@ def test_nobody_kills_a_worker_before_its_time() -> None:
         assert default(SERVICES[name]["environment"][stopping]) == "60"
         assert SERVICES[name]["stop_grace_period"] == f"${{{stopping}:-60}}s", name
     base = KUBERNETES / "base"
-    config = yaml.safe_load((base / "config.yaml").read_text())
+    (grace,) = re.findall(rf"^{stopping}=(\d+)$", (base / "config.env").read_text(), re.MULTILINE)
     for name in workers:
         documents = yaml.safe_load_all((base / f"{name}.yaml").read_text())
         (pod,) = (one["spec"]["template"] for one in documents if one["kind"] == "Deployment")
         given = pod["spec"]["terminationGracePeriodSeconds"]
-        assert given >= float(config["data"][stopping]), name
+        assert given >= float(grace), name
 
 
 def test_the_api_trusts_the_proxys_address_and_no_other() -> None:
@@ -210,7 +222,7 @@ def test_pods_sign_in_as_their_own_roles_and_ask_more_than_a_port(overlay) -> No
 @needs_kubectl
 @in_each_overlay
 def test_no_wide_network_is_trusted(overlay) -> None:
-    (config,) = of_kind(rendered(overlay), "ConfigMap").values()
+    config = config_of(rendered(overlay))
     trusted = config["data"]["BUILDARENA_TRUSTED_PROXIES"]
     for network in filter(None, trusted.split(",")):
         assert ip_network(network).prefixlen >= SMALLEST_PREFIX, network

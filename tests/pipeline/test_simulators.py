@@ -19,7 +19,13 @@ from buildarena_pipeline.runtime.simulators.known import (
 )
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_pipeline.submission.submission import Submissions
-from buildarena_simulation import DEFAULT_ENGINE, ENGINES, rollout
+from buildarena_simulation import (
+    ALL_ENGINES,
+    DEFAULT_ENGINE,
+    ENGINES,
+    SIMULATION_VERSION,
+    rollout,
+)
 from buildarena_store.states import simulate_queue
 
 JOB = JobSpec(task="support-1", model="builtin/idle", simulator=BESIEGE)
@@ -73,6 +79,13 @@ def test_where_the_default_engine_is_missing_it_is_refused_and_never_replaced(
     (issue,) = caught.value.issues
     assert "pip install pybullet" in issue.message
     assert issue.choices == ("mujoco",)
+
+
+def test_a_service_that_has_no_engine_takes_jobs_for_all_of_ours(submissions, monkeypatch) -> None:
+    monkeypatch.setattr("buildarena_pipeline.runtime.simulators.known.ENGINES", ())
+    for name in ALL_ENGINES:
+        job, _ = submissions.submit_job(JOB.model_copy(update={"simulator": name}))
+        assert job.track_config["simulation_version"] == SIMULATION_VERSION
 
 
 def test_an_unknown_simulator_is_told_of_the_game_only_where_there_is_one(

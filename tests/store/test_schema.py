@@ -12,6 +12,7 @@ from buildarena_store import Database, SchemaVersionError
 from buildarena_store import database as database_module
 from buildarena_store.database import SCHEMA
 from buildarena_store.migrating import alembic_config
+from buildarena_store.tables import metadata
 
 
 def test_the_code_names_the_newest_migration() -> None:
@@ -105,6 +106,51 @@ def test_migrations_only_add_or_say_that_they_break() -> None:
 )
 def test_what_takes_away_is_recognised(sql, breaks) -> None:
     assert bool(TAKES_AWAY.search(sql)) is breaks
+
+
+LARGE = (
+    "attempts",
+    "board_cells",
+    "events",
+    "external_calls",
+    "job_artifacts",
+    "jobs",
+    "journal",
+    "rollouts",
+    "sweep_jobs",
+)
+"""Tables that have millions of rows somewhere."""
+LOCKS_A_LARGE_TABLE = re.compile(
+    rf"CREATE (?:UNIQUE )?INDEX (?!CONCURRENTLY)\S+ ON (?:{'|'.join(LARGE)})\b", re.IGNORECASE
+)
+LAST_THAT_LOCKED = "2026_11_24_draws"
+
+
+def test_later_migrations_make_indexes_of_large_tables_while_others_write() -> None:
+    assert set(LARGE) <= set(metadata.tables)
+    script = ScriptDirectory.from_config(alembic_config(""))
+    for revision in script.walk_revisions():
+        if revision.revision == LAST_THAT_LOCKED:
+            break
+        out = io.StringIO()
+        config = alembic_config("postgresql+psycopg://")
+        config.output_buffer = out
+        command.upgrade(config, f"{revision.down_revision}:{revision.revision}", sql=True)
+        found = LOCKS_A_LARGE_TABLE.findall(out.getvalue())
+        assert not found, f"{revision.revision}: see CONTRIBUTING.md, {found}"
+
+
+@pytest.mark.parametrize(
+    ("sql", "locks"),
+    [
+        ("CREATE INDEX ix_luck ON jobs (seed)", True),
+        ("CREATE UNIQUE INDEX ix_luck ON events (id)", True),
+        ("CREATE INDEX CONCURRENTLY ix_luck ON jobs (seed)", False),
+        ("CREATE INDEX ix_luck ON budgets (id)", False),
+    ],
+)
+def test_what_locks_a_large_table_is_recognised(sql, locks) -> None:
+    assert bool(LOCKS_A_LARGE_TABLE.search(sql)) is locks
 
 
 @pytest.mark.parametrize("idle_s", [0.0, 1000.0])

@@ -1,5 +1,6 @@
 """Kubernetes' manifests as `kubectl kustomize` renders them."""
 
+import re
 import shutil
 import subprocess
 from functools import cache
@@ -26,8 +27,13 @@ def read(text: str) -> list[dict[str, Any]]:
 @cache
 def rendered(overlay: str) -> list[dict[str, Any]]:
     """What an overlay would apply."""
+    return kustomized(KUBERNETES / "overlays" / overlay)
+
+
+def kustomized(folder: Path) -> list[dict[str, Any]]:
+    """What the kustomization in a folder would apply."""
     done = subprocess.run(
-        [str(KUBECTL), "kustomize", str(KUBERNETES / "overlays" / overlay)],
+        [str(KUBECTL), "kustomize", str(folder)],
         capture_output=True,
         text=True,
         timeout=60,
@@ -43,7 +49,17 @@ def of_kind(documents: list[dict[str, Any]], *kinds: str) -> dict[str, dict[str,
     return {each["metadata"]["name"]: each for each in documents if each["kind"] in kinds}
 
 
+def config_of(documents: list[dict[str, Any]], name: str = "buildarena") -> dict[str, Any]:
+    """The ConfigMap of a name, which ends in a checksum."""
+    found = of_kind(documents, "ConfigMap")
+    (config,) = (each for full, each in found.items() if re.fullmatch(rf"{name}-\w{{10}}", full))
+    return config
+
+
 def pods(documents: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    """What each workload's pods are, by its name."""
-    found = of_kind(documents, "Deployment", "StatefulSet", "Job")
-    return {name: each["spec"]["template"] for name, each in found.items()}
+    """What each workload's pods are, by the name that its pods have as a label."""
+    found = of_kind(documents, "Deployment", "StatefulSet", "Job").values()
+    templates = [each["spec"]["template"] for each in found]
+    crons = of_kind(documents, "CronJob").values()
+    templates += [each["spec"]["jobTemplate"]["spec"]["template"] for each in crons]
+    return {each["metadata"]["labels"]["app.kubernetes.io/name"]: each for each in templates}

@@ -8,7 +8,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 
 from buildarena_simulation.constants import DEFAULT_ENGINE
-from buildarena_simulation.engines.registry import ENGINES, engine_version
+from buildarena_simulation.engines.registry import ALL_ENGINES, ENGINES, engine_version
 from buildarena_simulation.errors import (
     BuildarenaSimulationError,
     MachineNotSimulable,
@@ -23,6 +23,7 @@ from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Trajectory
 
 __all__ = [
+    "ALL_ENGINES",
     "DEFAULT_ENGINE",
     "ENGINES",
     "SIMULATION_VERSION",

@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
+import argparse
+import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.models import ModelRegistry, load_registry
 from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.job_runner import StageHandler
 from buildarena_pipeline.runtime.settings import load_settings
 from buildarena_pipeline.runtime.worker_process import SideWork, WorkerSpec, run_worker
 from buildarena_store.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
+from buildarena_worker.providers.keys import key_report
 from buildarena_worker.providers.registry import require_known_protocols
 from buildarena_worker.wiring import construct_handler, verification_runner
 
 
 def main() -> None:
     """Serves the construct queue until it is asked to stop."""
+    parser = argparse.ArgumentParser(prog="buildarena_worker", description=main.__doc__)
+    parser.add_argument(
+        "--check",
+        nargs="*",
+        metavar="MODEL",
+        help="only see whether providers' keys are there, and those of these models in any case",
+    )
+    options = parser.parse_args()
     try:
         settings = load_settings()
         registry = load_registry(settings.models_file)
         require_known_protocols(registry)
+        if options.check is not None:
+            sys.exit(_check(registry, options.check))
 
         def make_handler(context: Context) -> StageHandler:
             return construct_handler(context, registry)
@@ -45,6 +58,15 @@ def main() -> None:
         )
     except StartupError as error:
         sys.exit(f"construct worker: {error}")
+
+
+def _check(registry: ModelRegistry, models: Sequence[str]) -> int:
+    """Prints what is found of providers' keys; 1 for what keeps these models from being reached."""
+    report = key_report(registry, os.environ)
+    unknown = [name for name in models if name not in registry.models]
+    lines = [*report.lines(), *(f"{name}: no such model" for name in unknown)]
+    sys.stdout.write("".join(f"{line}\n" for line in lines))
+    return int(bool(report.strangers or unknown or set(models) & set(report.without)))
 
 
 main()

@@ -34,21 +34,30 @@ class EngineModule(Protocol):
 
 
 @cache
-def known_engines() -> Mapping[str, str]:
-    """The module of each engine that is installed, by the engine's name; the default one first.
-
-    PyBullet has wheels for few systems and is missing where it can't be compiled; MuJoCo is always
-    there.
-    """
+def all_engines() -> Mapping[str, str]:
+    """The module of each engine by the engine's name, installed or not; the default one first."""
     folders = [part.name for part in pkgutil.iter_modules(engines.__path__) if part.ispkg]
-    ours = {
-        name: f"{engines.__name__}.{name}.engine"
-        for name in folders
-        if name != "shared" and find_spec(import_module(f"{engines.__name__}.{name}").LIBRARY)
-    }
+    ours = {name: f"{engines.__name__}.{name}.engine" for name in folders if name != "shared"}
     others = {point.name: point.value for point in metadata.entry_points(group=GROUP)}
     names = sorted({*ours, *others}, key=lambda name: (name != DEFAULT_ENGINE, name))
     return MappingProxyType({name: (others | ours)[name] for name in names})
+
+
+@cache
+def known_engines() -> Mapping[str, str]:
+    """Those whose library is installed.
+
+    PyBullet has wheels for few systems and is missing where it can't be compiled; MuJoCo is always
+    there, except in the image of the API, which simulates nothing.
+    """
+    return MappingProxyType({n: module for n, module in all_engines().items() if _can_run(module)})
+
+
+def _can_run(module: str) -> bool:
+    folder, _, _ = module.rpartition(".")
+    if not folder.startswith(f"{engines.__name__}."):
+        return True
+    return find_spec(import_module(folder).LIBRARY) is not None
 
 
 def create_engine(name: str, world: "World") -> "Engine":
@@ -83,3 +92,5 @@ def _load(name: str) -> EngineModule:
 
 ENGINES: Final = tuple(known_engines())
 """Names of the engines that are installed."""
+ALL_ENGINES: Final = tuple(all_engines())
+"""Names of all engines, also of those that are not installed here."""

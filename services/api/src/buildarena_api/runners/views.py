@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from buildarena_pipeline.runtime.settings import SimulatorName
 from buildarena_pipeline.runtime.trials import FaultReason
-from buildarena_simulation import ENGINES
+from buildarena_simulation import ALL_ENGINES
 from buildarena_store.artifacts.kinds import EVIDENCE_NAME
 from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
 
@@ -185,7 +185,7 @@ class Annotation(_Document):
     engine_version: Annotated[str, Field(max_length=80)]
 
 
-EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ENGINES))]
+EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ALL_ENGINES))]
 
 
 class Outcome(_Document):

@@ -1,7 +1,8 @@
 """The simulators that jobs can name: our engines, the game, and what workers announce.
 
-A service knows its simulators without having them: the engines' names come with the physics, the
-game's version from the settings, and any other simulator from the workers that bring it.
+A service knows its simulators without having them: the engines' names come with the physics (where
+a process has engines of its own, only those count: others are missing on that machine), the game's
+version from the settings, and any other simulator from the workers that bring it.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE, SimulatorKind
 from buildarena_simulation import (
+    ALL_ENGINES,
     DEFAULT_ENGINE,
     ENGINES,
     SIMULATION_VERSION,
@@ -53,7 +55,8 @@ class SimulatorInfo:
 
 def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
     """The simulators that a service takes jobs for whether or not a worker is there, by name."""
-    known = {name: SimulatorInfo(name=name, version=SIMULATION_VERSION) for name in ENGINES}
+    engines = ENGINES or ALL_ENGINES
+    known = {name: SimulatorInfo(name=name, version=SIMULATION_VERSION) for name in engines}
     game = settings.besiege_version
     if game is not None:
         known[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", repeatable=False)
