@@ -19,6 +19,7 @@ from buildarena_simulation.engines.mujoco.joints import (
 )
 from buildarena_simulation.engines.mujoco.model import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.engines.mujoco.tendons import Tendons, weld_wrenches
+from buildarena_simulation.engines.mujoco.wheels import wheel_contacts
 from buildarena_simulation.engines.shared.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
 from buildarena_simulation.engines.shared.joint_frames import is_simple_component
@@ -35,10 +36,8 @@ _STEPS_PER_EVALUATION = 20
 _SOLREF = (0.02, 1.0)
 _FRICTION_S = 0.03
 _SOLIMP = (0.95, 0.995, 0.005, 0.5, 2.0)
-_IMPRATIO = 10.0
+_IMPRATIO = 1e4
 _ITERATIONS = 50
-_SERVO_SLIP = 2.0
-"""A wheel's motor reaches its torque limit this far off its target, rad/s: stiff, calm at rest."""
 
 
 def _ignore(message: str) -> None:
@@ -68,6 +67,7 @@ class MujocoEngine:
         self._solids = Solids(world.structure)
         self._holds: tuple[Hold, ...] = ()
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
+        self._mass = float(world.structure.masses.sum())
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
         self._targets: FloatArray | None = None
@@ -141,6 +141,9 @@ class MujocoEngine:
         self._set_drag(moments)
         self._set_velocities(motion)
         mujoco.mj_forward(self._model, self._data)
+        wheels = len(self._structure.wheels)
+        self._wheels = wheel_contacts(self._model, self._data, wheels, _FRICTION_S)
+        self._wheels.bear(self._model, self._mass + self._cargo_mass)
 
     def set_cargo_mass(self, mass: float) -> None:
         """See `Engine`."""
@@ -155,6 +158,7 @@ class MujocoEngine:
         model.body_invweight0[body] = self._invweight_times_mass / mass
         model.dof_invweight0[:6] = self._dof_invweight_times_mass / mass
         self._cargo_mass = mass
+        self._wheels.bear(model, self._mass + mass)
 
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
@@ -243,7 +247,6 @@ class MujocoEngine:
             solimp=_SOLIMP,
             impratio=_IMPRATIO,
             iterations=_ITERATIONS,
-            servo_slip=_SERVO_SLIP,
         )
 
     def _apply_own_forces(self, step: int) -> None:

@@ -47,6 +47,7 @@ from buildarena_simulation.engines.pybullet.hinges import HingedComponent, hinge
 from buildarena_simulation.engines.pybullet.joints import articulated
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.engines.pybullet.ropes import rope_forces
+from buildarena_simulation.engines.pybullet.slipping import SlippingWheels
 from buildarena_simulation.engines.pybullet.urdf import urdf_of
 from buildarena_simulation.engines.shared.closest_points import shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
@@ -69,6 +70,9 @@ with quiet_output():
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
 _ITERATIONS, _ITERATIONS_OF_JOINTS = 100, 60
+_RESTLESS = 1e-3
+"""A step's change of a target, rad/s, by which wheels may begin to slip."""
+
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -107,6 +111,9 @@ class PyBulletEngine:
         self._grips = BulletGrips(self._client)
         self._fresh: Motion | None = None
         self._own: list[tuple[int, Force]] = []
+        self._slipping = SlippingWheels(
+            self._client, world.structure, self._surfaces, world.gravity
+        )
 
     @property
     def time_step_s(self) -> float:
@@ -163,6 +170,7 @@ class PyBulletEngine:
             self._free_bodies.append(self._cargo)
         mixed = mixed_clusters(self._structure, clusters)
         self._mixed = {c: self._address[c] for c in mixed}
+        self._slipping.enter(clusters, self._address, self.time_step_s)
         self._grips.enter(clusters, motion, self._axes, self._address, self._cargo)
 
     def set_cargo_mass(self, mass: float) -> None:
@@ -184,13 +192,15 @@ class PyBulletEngine:
             len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
         )
         velocity = self._free_velocities()
-        driven: FloatArray | None = None
+        driven = self._targets
         for step, row in enumerate(targets):
-            if len(row) and (driven is None or (row != driven).any()):
+            change = np.abs(row - driven).max() if len(row) and driven is not None else np.inf
+            if len(row) and (step == 0 or change != 0.0):
                 for component in self._components:
                     component.follow(row, self._client)
-                driven = row
+            driven = row
             self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
+            self._slipping.push(step, told=change > _RESTLESS)
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
             if impacts.is_impact(velocity - before):
@@ -376,4 +386,5 @@ class PyBulletEngine:
             self._motion,
             outsiders={} if self._cargo is None else {self._cargo: CARGO},
             surfaces=self._surfaces,
+            added=self._slipping.contacts(),
         )
