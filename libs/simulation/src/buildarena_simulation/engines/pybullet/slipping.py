@@ -17,6 +17,7 @@ from buildarena_simulation.engines.pybullet.bodies import friction_of, set_frict
 from buildarena_simulation.engines.pybullet.contacts import TOUCHING
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.engines.pybullet.wheel_loads import Vector, Wheel, mean_of, share
+from buildarena_simulation.engines.shared.joint_frames import seat_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import Structure
 
@@ -48,7 +49,8 @@ _STARTS, _ENDS = 0.6, 0.2
 between two looks."""
 
 _PARALLEL: Final = 0.99
-"""Cosine of the angle between normals above which contacts are with one face."""
+"""Cosine of the angle between normals above which contacts are with one face, and between a hinge
+and the upright above which it only steers: it passes on its wheel's load as if it were rigid."""
 
 _TRACE: Final = 1e-3
 """A push so small that it only says where a contact without one is, mass·unit/s²."""
@@ -106,7 +108,7 @@ class SlippingWheels:
                     body, link = address[c]
                     self._wheels.setdefault(body, {})[link] = Wheel(
                         cluster=c,
-                        parent=int(clusters.parent[c]),
+                        parent=_borne(self._structure, clusters, int(clusters.parent[c])),
                         mass=mass,
                         friction=friction_of(self._structure, clusters.blocks[c]),
                     )
@@ -199,6 +201,15 @@ class SlippingWheels:
         for link in elsewhere:
             touching.pop(link, None)
         return touching
+
+
+def _borne(structure: Structure, clusters: Clusters, c: int) -> int:
+    """The cluster on which a wheel's cluster bears, through joints that only steer."""
+    while clusters.parent[c] >= 0 and seat_of(structure, clusters, c) == "hinge":
+        if abs(structure.joints.axes[clusters.seated[c]][2]) < _PARALLEL:
+            break
+        c = int(clusters.parent[c])
+    return c
 
 
 def _cosine(first: Vector, second: Vector) -> float:
