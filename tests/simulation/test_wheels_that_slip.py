@@ -66,7 +66,7 @@ def test_a_car_with_a_braking_wheel_turns_and_travels_as_coulomb_says(
 
 @pytest.mark.parametrize("braked", [0, 3])
 def test_wheels_on_hinges_that_only_steer_share_their_load_alike(engine, braked) -> None:
-    """The hinges' drives give way a little, so the turn may differ more than that of a rigid car."""
+    """The hinges' drives give way a little: the turn may differ more than a rigid car's."""
     machine = drafted(slalom_car(0), [(STARTS_S, "UpArrow", 20.0)])
     expected = planar_car(machine, _hold(machine, (braked,))).drive(DURATION_S - STARTS_S)
     scenario = Scenario(duration_s=DURATION_S, control=Control(mode="agent"))

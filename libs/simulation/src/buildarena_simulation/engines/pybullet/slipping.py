@@ -57,8 +57,8 @@ _TRACE: Final = 1e-3
 
 
 _SAG: Final = 0.01
-"""How far wheels on springs yield under the weight of their own machine, units: a hard one that meets
-an edge stops within one step, with a blow that no spring behind it softens."""
+"""How far wheels on springs yield under the weight of their own machine, units: a hard one that
+meets an edge stops within one step, with a blow that no spring behind it softens."""
 
 
 class _Contact(NamedTuple):
