@@ -78,14 +78,6 @@ def test_wheels_on_hinges_that_only_steer_share_their_load_alike(engine, braked)
     assert heading[-1] - heading[0] == pytest.approx(expected.turned, rel=0.06)
 
 
-@pytest.mark.parametrize("seed", [4, 15, 18])
-def test_an_edge_does_not_break_the_frame_of_a_vehicle_on_suspensions(engine, seed) -> None:
-    """PyBullet's hard wheels stopped within a step there, and the blow broke the frame."""
-    _, trajectory = _on_the_rough_road(seed, engine, 5.0)
-    assert not trajectory.breaks
-    assert trajectory.positions[-1, 0, 1] > 20.0
-
-
 @pytest.mark.parametrize("braked", [(0,), (2,), (0, 1)])
 def test_the_ground_bears_a_slipping_car_evenly(engine, braked) -> None:
     machine, _ = _braked(braked, 5, 1)

@@ -56,11 +56,6 @@ _TRACE: Final = 1e-3
 """A push so small that it only says where a contact without one is, mass·unit/s²."""
 
 
-_SAG: Final = 0.01
-"""How far wheels on springs yield under the weight of their own machine, units: a hard one that
-meets an edge stops within one step, with a blow that no spring behind it softens."""
-
-
 class _Contact(NamedTuple):
     """Where a wheel touches ground or terrain: push, place and normal in the world, other body."""
 
@@ -107,31 +102,16 @@ class SlippingWheels:
         self._wheels: dict[int, dict[int, Wheel]] = {}
         for component in clusters.components:
             mass = float(clusters.mass[list(component)].sum())
-            rolling = [c for c in component[1:] if self._is_wheel(clusters, c)]
-            for c in rolling:
-                body, link = address[c]
-                if _is_sprung(self._structure, clusters, c):
-                    self._soften(body, link, mass / len(rolling))
-                if self._structure.parts[clusters.seated[c]].module.motor:
+            for c in component[1:]:
+                part = self._structure.parts[clusters.seated[c]]
+                if part.is_wheel and part.module.motor and clusters.seated_is_outer[c]:
+                    body, link = address[c]
                     self._wheels.setdefault(body, {})[link] = Wheel(
                         cluster=c,
                         parent=_borne(self._structure, clusters, int(clusters.parent[c])),
                         mass=mass,
                         friction=friction_of(self._structure, clusters.blocks[c]),
                     )
-
-    def _is_wheel(self, clusters: Clusters, c: int) -> bool:
-        """Whether a cluster is a wheel on its axle."""
-        seated = clusters.seated[c]
-        return bool(self._structure.parts[seated].is_wheel and clusters.seated_is_outer[c])
-
-    def _soften(self, body: int, link: int, mass: float) -> None:
-        """Makes a wheel a spring that bears a mass, damped so that it does not swing."""
-        stiffness = mass * self._gravity / _SAG
-        damping = 2.0 * math.sqrt(stiffness * mass)
-        pybullet.changeDynamics(
-            body, link, contactStiffness=stiffness, contactDamping=damping, **self._client
-        )
 
     def push(self, step: int, *, told: bool) -> None:
         """Applies the friction of the next step.
@@ -230,14 +210,6 @@ def _borne(structure: Structure, clusters: Clusters, c: int) -> int:
             break
         c = int(clusters.parent[c])
     return c
-
-
-def _is_sprung(structure: Structure, clusters: Clusters, c: int) -> bool:
-    """Whether a wheel's cluster hangs on its component's root by a slider, as suspensions are."""
-    while (c := int(clusters.parent[c])) >= 0 and clusters.parent[c] >= 0:
-        if seat_of(structure, clusters, c) == "slider":
-            return True
-    return False
 
 
 def _cosine(first: Vector, second: Vector) -> float:
