@@ -1,6 +1,7 @@
 """MuJoCo behind the engine seam: one body per cluster, one geom per block, hinges for axles."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ from buildarena_simulation.engines.base import (
     rotation_of,
 )
 from buildarena_simulation.engines.mujoco.addresses import addresses_in
+from buildarena_simulation.engines.mujoco.contacts import KeptContacts, kept_contacts
 from buildarena_simulation.engines.mujoco.joints import (
     drag_apart,
     enter_joint,
@@ -173,7 +175,10 @@ class MujocoEngine:
             drag_apart(model, data, (self._clusters, at.bodies), self.motion(), self._apart)
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
-            len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
+            len(targets),
+            gravity=self._world.gravity,
+            time_step_s=self.time_step_s,
+            mass=self._mass + self._cargo_mass,
         )
         velocity = data.qvel[at.free_dofs]
         if self._world.field is not None:
@@ -181,10 +186,16 @@ class MujocoEngine:
         for step, row in enumerate(targets):
             self._apply_own_forces(step)
             at.joints.follow(model, data, row)
+            if step + 1 == len(targets):
+                kept = kept_contacts(data)
+                impacts.before_last(kept.pressed, partial(self._contacts_of, kept))
             mujoco.mj_step(model, data)
             before, velocity = velocity, data.qvel[at.free_dofs]
             if impacts.is_impact(velocity - before):
-                impacts.take(self._read_contacts())
+                impacts.take(self._contacts_of(kept_contacts(data)))
+        self._last_contacts = kept_contacts(data)
+        if impacts.ends_in_blow(self._last_contacts.pressed):
+            impacts.take(self._contacts_of(self._last_contacts))
         self._limit_spin()
         self._keep_cargo_state()
         self._impacts = impacts
@@ -193,7 +204,7 @@ class MujocoEngine:
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
-        return self._impacts.mean(self._read_contacts)
+        return self._impacts.mean(lambda: self._contacts_of(self._last_contacts))
 
     @property
     def struck(self) -> bool:
@@ -315,14 +326,8 @@ class MujocoEngine:
             scale = np.minimum(1.0, MAX_SPIN / np.maximum(speeds, 1e-9))
             self._data.qvel[dofs] = spins * scale[:, None]
 
-    def _read_contacts(self) -> ContactForces:
-        data, at = self._data, self._addresses
-        contact, count = data.contact, data.ncon
-        address = contact.efc_address[:count]
-        active = (address >= 0).nonzero()[0]
-        geoms = contact.geom[active]
-        components = data.efc_force[address[active][:, None] + np.arange(3)]
-        frames = contact.frame[active].reshape(-1, 3, 3)
+    def _contacts_of(self, kept: KeptContacts) -> ContactForces:
+        at, geoms, frames, components = self._addresses, kept.geoms, kept.frames, kept.components
         # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
         force = (components[:, None] @ frames)[:, 0]
         clusters = at.body_of_geom[geoms]
@@ -331,7 +336,7 @@ class MujocoEngine:
         own = np.concatenate([geoms[rows, k] for rows, k, _ in sides])
         facing = np.concatenate([geoms[rows, 1 - k] for rows, k, _ in sides])
         sign = np.concatenate([np.full((len(rows), 1), sign) for rows, _, sign in sides])
-        point = contact.pos[active][row]
+        point = kept.point[row]
         index, block, weight = self._blocks_at(own, point)
         return ContactForces(
             block=block,

@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from buildarena_worker.builtin.designs.design import Design, PartDesign
 from buildarena_worker.builtin.designs.drafting import (
     DOWN,
@@ -15,7 +13,6 @@ from buildarena_worker.builtin.designs.drafting import (
     SOUTH,
     UP,
     WEST,
-    Direction,
     Draft,
 )
 
@@ -23,7 +20,7 @@ _LIFTS_S = (18.5, 18.2, 17.9, 17.6)
 """When the lift begins, by seed, seconds."""
 
 _MOTORS = 4
-_LIGHT_S = 0.72
+_LIGHT_S = 0.8
 """When a cargo that grows heavier is still light enough for three motors, seconds."""
 
 
@@ -68,25 +65,20 @@ def swinging_arm(seed: int) -> Design:
 
 def geared_lift(seed: int) -> Design:
     """An arm on a large gear wheel that four powered ones drive, with a counterweight."""
-    return _geared_lift(_LIFTS_S[seed % len(_LIFTS_S)], lasts=1.2, weights=(UP, DOWN))
+    return _geared_lift(_LIFTS_S[seed % len(_LIFTS_S)], lasts=1.2)
 
 
 def loaded_lift(seed: int) -> Design:
     """The same machine with three of its motors: all four jerk, and a light cargo slips off."""
-    begin = _LIGHT_S + 0.04 * (seed % 4)
-    return _geared_lift(begin, lasts=1.3, weights=(EAST, UP, DOWN), driven=3)
+    return _geared_lift(_LIGHT_S + 0.04 * (seed % 4), lasts=1.3, driven=3)
 
 
-def _geared_lift(
-    begin: float, *, lasts: float, weights: Sequence[Direction], driven: int = _MOTORS
-) -> Design:
+def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design:
     """A geared arm with a counterweight.
 
     Args:
         begin: When it begins to lift, seconds.
         lasts: For how long it does, seconds.
-        weights: Where logs sit on the near end of the arm, beside one at its tip; with fewer of
-            them all four motors break nothing.
         driven: How many of its motors do.
     """
     named = "All four motors" if driven == _MOTORS else f"{driven} of the motors"
@@ -98,7 +90,7 @@ def _geared_lift(
     hand = draft.attach(draft.row(root, NORTH, 6)[-1], EAST, "Swivel")
     draft.attach(draft.row(hand, DOWN, 3)[-1], DOWN, "Grabber")
     near = draft.row(root, SOUTH, 4)[-1]
-    for way in weights:
+    for way in (EAST, UP, DOWN):
         draft.attach(near, way, "Log", note="counterweight")
     draft.attach(draft.attach(near, SOUTH), EAST, "Log", note="counterweight")
     _brace(draft, beams, post)
