@@ -47,7 +47,7 @@ from buildarena_simulation.engines.pybullet.hinges import HingedComponent, hinge
 from buildarena_simulation.engines.pybullet.joints import articulated
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.engines.pybullet.ropes import pull_ends, rope_forces
-from buildarena_simulation.engines.pybullet.slipping import SlippingWheels
+from buildarena_simulation.engines.pybullet.slipping import SlippingWheels, changes_of
 from buildarena_simulation.engines.pybullet.urdf import urdf_of
 from buildarena_simulation.engines.shared.closest_points import shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
@@ -70,9 +70,6 @@ with quiet_output():
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
 _ITERATIONS, _ITERATIONS_OF_JOINTS = 100, 60
-_RESTLESS = 1e-3
-"""A step's change of a target, rad/s, by which wheels may begin to slip."""
-
 _ORIGIN = (0.0, 0.0, 0.0)
 
 
@@ -198,15 +195,13 @@ class PyBulletEngine:
             mass=self._mass + self._cargo_mass,
         )
         velocity = self._free_velocities()
-        driven = self._targets
-        for step, row in enumerate(targets):
-            change = np.abs(row - driven).max() if len(row) and driven is not None else np.inf
+        changes = changes_of(self._targets, targets)
+        for step, (row, change) in enumerate(zip(targets, changes, strict=True)):
             if len(row) and (step == 0 or change != 0.0):
                 for component in self._components:
                     component.follow(row, self._client)
-            driven = row
             self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
-            self._slipping.push(step, told=change > _RESTLESS)
+            self._slipping.push(step, change)
             if step + 1 == len(targets):
                 impacts.before_last(*self._kept_contacts())
             pybullet.stepSimulation(**self._client)

@@ -13,13 +13,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from buildarena_simulation.engines.pybullet.bodies import friction_of, set_friction
 from buildarena_simulation.engines.pybullet.contacts import TOUCHING
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.engines.pybullet.wheel_loads import Vector, Wheel, mean_of, share
 from buildarena_simulation.engines.shared.joint_frames import seat_of
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import Structure
+from buildarena_simulation.structure.model import FloatArray, Structure
 
 with quiet_output():
     import pybullet
@@ -32,6 +34,12 @@ _LOADS_S: Final = 0.008
 
 _WATCHED_S: Final = 0.1
 """How long wheels are looked at often after their motors were told something, s."""
+
+_RESTLESS: Final = 1e-3
+"""A step's change of a target, rad/s, by which wheels may begin to slip."""
+
+_FREE: Final = 1e-9
+"""Counts as the change of a target that there is none of, rad/s."""
 
 _COUPLING: Final = 3.0
 """How much faster friction stops the slip of a machine's wheels than its mass alone says: what
@@ -63,6 +71,20 @@ class _Contact(NamedTuple):
     place: Vector
     normal: Vector
     other: int
+
+
+def changes_of(before: FloatArray | None, targets: FloatArray) -> list[float]:
+    """By how much a driven joint's target changes at most in each step.
+
+    Args:
+        before: (D,) the targets before the first step; None if there were none.
+        targets: (S, D) NaN where a joint turns freely, which counts as a small change.
+    """
+    if not targets.shape[1]:
+        return [0.0] * len(targets)
+    first = np.full(targets.shape[1], np.inf) if before is None else before
+    changes = np.abs(np.diff(targets, axis=0, prepend=first[None]))
+    return list(np.nan_to_num(changes, nan=_FREE, posinf=np.inf).max(axis=1).tolist())
 
 
 class SlippingWheels:
@@ -113,14 +135,14 @@ class SlippingWheels:
                         friction=friction_of(self._structure, clusters.blocks[c]),
                     )
 
-    def push(self, step: int, *, told: bool) -> None:
+    def push(self, step: int, change: float) -> None:
         """Applies the friction of the next step.
 
         Args:
             step: Its number since the last evaluation.
-            told: Whether motors have new targets in it.
+            change: Of motors' targets in it at most, rad/s.
         """
-        self._left = self._watched if told else self._left - 1
+        self._left = self._watched if change > _RESTLESS else self._left - 1
         client, frame = self._client, pybullet.WORLD_FRAME
         for body, wheels in self._wheels.items():
             often = self._left > 0 or any(wheel.slips for wheel in wheels.values())
