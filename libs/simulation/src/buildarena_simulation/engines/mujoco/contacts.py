@@ -1,4 +1,4 @@
-"""The contacts of one of MuJoCo's steps, kept to be read when the next one has been made."""
+"""The contacts of one of MuJoCo's steps, stored to be read when the next one has been made."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from buildarena_simulation.structure.model import FloatArray, IntArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KeptContacts:
+class StepContacts:
     """Contacts that exert a force; K of them.
 
     Attributes:
@@ -30,7 +30,7 @@ class KeptContacts:
         return float(self.components[:, 0].sum())
 
 
-def kept_contacts(data: "mujoco.MjData") -> KeptContacts:
+def step_contacts(data: "mujoco.MjData") -> StepContacts:
     """The contacts of the last step.
 
     Args:
@@ -38,7 +38,7 @@ def kept_contacts(data: "mujoco.MjData") -> KeptContacts:
     """
     contact, address = data.contact, data.contact.efc_address[: data.ncon]
     active = (address >= 0).nonzero()[0]
-    return KeptContacts(
+    return StepContacts(
         geoms=contact.geom[active],
         point=contact.pos[active],
         frames=contact.frame[active].reshape(-1, 3, 3),

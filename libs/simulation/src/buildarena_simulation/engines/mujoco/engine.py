@@ -14,7 +14,7 @@ from buildarena_simulation.engines.base import (
     rotation_of,
 )
 from buildarena_simulation.engines.mujoco.addresses import addresses_in
-from buildarena_simulation.engines.mujoco.contacts import KeptContacts, kept_contacts
+from buildarena_simulation.engines.mujoco.contacts import StepContacts, step_contacts
 from buildarena_simulation.engines.mujoco.joints import (
     drag_apart,
     enter_joint,
@@ -187,13 +187,13 @@ class MujocoEngine:
             self._apply_own_forces(step)
             at.joints.follow(model, data, row)
             if step + 1 == len(targets):
-                kept = kept_contacts(data)
-                impacts.before_last(kept.pressed, partial(self._contacts_of, kept))
+                contacts = step_contacts(data)
+                impacts.before_last(contacts.pressed, partial(self._contacts_of, contacts))
             mujoco.mj_step(model, data)
             before, velocity = velocity, data.qvel[at.free_dofs]
             if impacts.is_impact(velocity - before):
-                impacts.take(self._contacts_of(kept_contacts(data)))
-        self._last_contacts = kept_contacts(data)
+                impacts.take(self._contacts_of(step_contacts(data)))
+        self._last_contacts = step_contacts(data)
         if impacts.ends_in_blow(self._last_contacts.pressed):
             impacts.take(self._contacts_of(self._last_contacts))
         self._limit_spin()
@@ -326,8 +326,9 @@ class MujocoEngine:
             scale = np.minimum(1.0, MAX_SPIN / np.maximum(speeds, 1e-9))
             self._data.qvel[dofs] = spins * scale[:, None]
 
-    def _contacts_of(self, kept: KeptContacts) -> ContactForces:
-        at, geoms, frames, components = self._addresses, kept.geoms, kept.frames, kept.components
+    def _contacts_of(self, contacts: StepContacts) -> ContactForces:
+        at, geoms = self._addresses, contacts.geoms
+        frames, components = contacts.frames, contacts.components
         # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
         force = (components[:, None] @ frames)[:, 0]
         clusters = at.body_of_geom[geoms]
@@ -336,7 +337,7 @@ class MujocoEngine:
         own = np.concatenate([geoms[rows, k] for rows, k, _ in sides])
         facing = np.concatenate([geoms[rows, 1 - k] for rows, k, _ in sides])
         sign = np.concatenate([np.full((len(rows), 1), sign) for rows, _, sign in sides])
-        point = kept.point[row]
+        point = contacts.point[row]
         index, block, weight = self._blocks_at(own, point)
         return ContactForces(
             block=block,

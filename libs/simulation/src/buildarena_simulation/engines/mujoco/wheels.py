@@ -57,11 +57,11 @@ class WheelContacts:
         if not len(self.pairs):
             return
         share = mass / (_POINTS * self.wheels)
-        given = (1.0 - _IMPEDANCE) * self.compliance
+        scale = (1.0 - _IMPEDANCE) * self.compliance
         stiffness = np.minimum(share * -model.opt.gravity[2] / _SAG, _STIFFEST / self.largest)
         damping = np.minimum(2.0 * np.sqrt(stiffness * share), _MOST_DAMPED / self.largest)
-        model.pair_solref[self.pairs, 0] = -given * stiffness
-        model.pair_solref[self.pairs, 1] = -given * damping
+        model.pair_solref[self.pairs, 0] = -scale * stiffness
+        model.pair_solref[self.pairs, 1] = -scale * damping
 
 
 def wheel_contacts(
@@ -89,7 +89,7 @@ def wheel_contacts(
 
 def _largest_compliance(model: "mujoco.MjModel", data: "mujoco.MjData", body: int) -> float:
     """Velocity of a body's centre per unit impulse on it, the largest of all directions."""
-    along, given = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    along, gained = np.zeros((3, model.nv)), np.zeros((3, model.nv))
     mujoco.mj_jacBodyCom(model, data, along, None, body)
-    mujoco.mj_solveM(model, data, given, along)
-    return float(np.linalg.eigvalsh(along @ given.T)[-1])
+    mujoco.mj_solveM(model, data, gained, along)
+    return float(np.linalg.eigvalsh(along @ gained.T)[-1])

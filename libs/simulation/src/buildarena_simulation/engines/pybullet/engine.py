@@ -203,15 +203,15 @@ class PyBulletEngine:
             self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
             self._slipping.push(step, change)
             if step + 1 == len(targets):
-                impacts.before_last(*self._kept_contacts())
+                impacts.before_last(*self._step_contacts())
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
             if impacts.is_impact(velocity - before):
                 self._motion = self._read_motion()
-                impacts.take(self._kept_contacts()[1]())
+                impacts.take(self._step_contacts()[1]())
         self._targets = targets[-1]
         self._motion = self._read_motion()
-        pressed, self._last_contacts = self._kept_contacts()
+        pressed, self._last_contacts = self._step_contacts()
         if impacts.ends_in_blow(pressed):
             impacts.take(self._last_contacts())
         limit_spin(self._client, self._components, self._motion)
@@ -378,11 +378,11 @@ class PyBulletEngine:
                     self._hinges.follow(motion, c, state[0], state[1])
         return motion
 
-    def _kept_contacts(self) -> tuple[float, Callable[[], ContactForces]]:
+    def _step_contacts(self) -> tuple[float, Callable[[], ContactForces]]:
         """What the contacts of the last step press together, and what reads them, later too."""
-        kept, added = pybullet.getContactPoints(**self._client), self._slipping.contacts()
-        return sum(contact[9] for contact in kept), lambda: read_contacts(
-            kept,
+        touching, added = pybullet.getContactPoints(**self._client), self._slipping.contacts()
+        return sum(contact[9] for contact in touching), lambda: read_contacts(
+            touching,
             self._cluster_of_link,
             self._shapes,
             self._motion,

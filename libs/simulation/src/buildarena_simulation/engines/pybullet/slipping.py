@@ -216,9 +216,9 @@ class SlippingWheels:
                 continue
             x, y, z = contact[7]
             place, normal = (contact[5], (x, y, z)) if ours else (contact[6], (-x, -y, -z))
-            found = touching.setdefault(link, [])
-            found.append(_Contact(push, place, normal, other))
-            if _cosine(found[0].normal, normal) < _PARALLEL:
+            contacts = touching.setdefault(link, [])
+            contacts.append(_Contact(push, place, normal, other))
+            if _cosine(contacts[0].normal, normal) < _PARALLEL:
                 elsewhere.add(link)
         for link in elsewhere:
             touching.pop(link, None)
