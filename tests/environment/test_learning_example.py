@@ -88,7 +88,7 @@ def test_the_learned_bridge_beats_the_expert(engine) -> None:
     assert learned.counts
     assert learned.reason is None
     assert set(learned.score.flags) <= {"never_fell"}
-    assert learned.score.metrics["floor_share"] < 0.01
+    assert learned.score.metrics["floor_share"] < 0.02
     assert learned.score.metrics["least_terrain_share"] > 0.4
     before = try_machine(task, expert.machines["main"], engine)
     assert learned.score.indicator > before.score.indicator

@@ -37,7 +37,7 @@ def test_what_the_libraries_would_choose_does_not_matter() -> None:
 
 @several
 def test_a_trial_of_other_kernels_is_repeated_to_the_byte() -> None:
-    machine = load_machine("deck")
+    machine = load_machine("wide-deck")
     own, *others = (
         write_trajectory(trajectory)
         for trajectory in (

@@ -45,7 +45,7 @@ from buildarena_simulation.trajectory import Trajectory
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
 
-SIMULATION_VERSION: Final = "5"
+SIMULATION_VERSION: Final = "6"
 """Version of the shared model: rises with every change that can move a trajectory."""
 
 _PROGRESS_EVERY = 10

@@ -97,7 +97,7 @@ def mean_contacts(readings: Sequence[tuple[float, ContactForces]]) -> ContactFor
     Args:
         readings: Each with the share of the time that it represents.
     """
-    if len(readings) == 1:
+    if len(readings) == 1 and readings[0][0] == 1.0:
         return readings[0][1]
     return joined(
         [

@@ -1,6 +1,7 @@
 """MuJoCo behind the engine seam: one body per cluster, one geom per block, hinges for axles."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -13,12 +14,14 @@ from buildarena_simulation.engines.base import (
     rotation_of,
 )
 from buildarena_simulation.engines.mujoco.addresses import addresses_in
+from buildarena_simulation.engines.mujoco.contacts import StepContacts, step_contacts
 from buildarena_simulation.engines.mujoco.joints import (
     drag_apart,
     enter_joint,
 )
 from buildarena_simulation.engines.mujoco.model import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.engines.mujoco.tendons import Tendons, weld_wrenches
+from buildarena_simulation.engines.mujoco.wheels import wheel_contacts
 from buildarena_simulation.engines.shared.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
 from buildarena_simulation.engines.shared.joint_frames import is_simple_component
@@ -35,10 +38,8 @@ _STEPS_PER_EVALUATION = 20
 _SOLREF = (0.02, 1.0)
 _FRICTION_S = 0.03
 _SOLIMP = (0.95, 0.995, 0.005, 0.5, 2.0)
-_IMPRATIO = 10.0
+_IMPRATIO = 1e4
 _ITERATIONS = 50
-_SERVO_SLIP = 2.0
-"""A wheel's motor reaches its torque limit this far off its target, rad/s: stiff, calm at rest."""
 
 
 def _ignore(message: str) -> None:
@@ -68,6 +69,7 @@ class MujocoEngine:
         self._solids = Solids(world.structure)
         self._holds: tuple[Hold, ...] = ()
         self._rope_alive = np.ones(len(world.structure.ropes), dtype=bool)
+        self._mass = float(world.structure.masses.sum())
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
         self._targets: FloatArray | None = None
@@ -141,6 +143,9 @@ class MujocoEngine:
         self._set_drag(moments)
         self._set_velocities(motion)
         mujoco.mj_forward(self._model, self._data)
+        wheels = len(self._structure.wheels)
+        self._wheels = wheel_contacts(self._model, self._data, wheels, _FRICTION_S)
+        self._wheels.bear(self._model, self._mass + self._cargo_mass)
 
     def set_cargo_mass(self, mass: float) -> None:
         """See `Engine`."""
@@ -155,6 +160,7 @@ class MujocoEngine:
         model.body_invweight0[body] = self._invweight_times_mass / mass
         model.dof_invweight0[:6] = self._dof_invweight_times_mass / mass
         self._cargo_mass = mass
+        self._wheels.bear(model, self._mass + mass)
 
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
@@ -169,7 +175,10 @@ class MujocoEngine:
             drag_apart(model, data, (self._clusters, at.bodies), self.motion(), self._apart)
         data.ctrl[at.thrust_actuators] = thrusts
         impacts = ImpactWatch(
-            len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
+            len(targets),
+            gravity=self._world.gravity,
+            time_step_s=self.time_step_s,
+            mass=self._mass + self._cargo_mass,
         )
         velocity = data.qvel[at.free_dofs]
         if self._world.field is not None:
@@ -177,10 +186,16 @@ class MujocoEngine:
         for step, row in enumerate(targets):
             self._apply_own_forces(step)
             at.joints.follow(model, data, row)
+            if step + 1 == len(targets):
+                contacts = step_contacts(data)
+                impacts.before_last(contacts.pressed, partial(self._contacts_of, contacts))
             mujoco.mj_step(model, data)
             before, velocity = velocity, data.qvel[at.free_dofs]
             if impacts.is_impact(velocity - before):
-                impacts.take(self._read_contacts())
+                impacts.take(self._contacts_of(step_contacts(data)))
+        self._last_contacts = step_contacts(data)
+        if impacts.ends_in_blow(self._last_contacts.pressed):
+            impacts.take(self._contacts_of(self._last_contacts))
         self._limit_spin()
         self._keep_cargo_state()
         self._impacts = impacts
@@ -189,7 +204,7 @@ class MujocoEngine:
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
-        return self._impacts.mean(self._read_contacts)
+        return self._impacts.mean(lambda: self._contacts_of(self._last_contacts))
 
     @property
     def struck(self) -> bool:
@@ -243,7 +258,6 @@ class MujocoEngine:
             solimp=_SOLIMP,
             impratio=_IMPRATIO,
             iterations=_ITERATIONS,
-            servo_slip=_SERVO_SLIP,
         )
 
     def _apply_own_forces(self, step: int) -> None:
@@ -312,14 +326,9 @@ class MujocoEngine:
             scale = np.minimum(1.0, MAX_SPIN / np.maximum(speeds, 1e-9))
             self._data.qvel[dofs] = spins * scale[:, None]
 
-    def _read_contacts(self) -> ContactForces:
-        data, at = self._data, self._addresses
-        contact, count = data.contact, data.ncon
-        address = contact.efc_address[:count]
-        active = (address >= 0).nonzero()[0]
-        geoms = contact.geom[active]
-        components = data.efc_force[address[active][:, None] + np.arange(3)]
-        frames = contact.frame[active].reshape(-1, 3, 3)
+    def _contacts_of(self, contacts: StepContacts) -> ContactForces:
+        at, geoms = self._addresses, contacts.geoms
+        frames, components = contacts.frames, contacts.components
         # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
         force = (components[:, None] @ frames)[:, 0]
         clusters = at.body_of_geom[geoms]
@@ -328,7 +337,7 @@ class MujocoEngine:
         own = np.concatenate([geoms[rows, k] for rows, k, _ in sides])
         facing = np.concatenate([geoms[rows, 1 - k] for rows, k, _ in sides])
         sign = np.concatenate([np.full((len(rows), 1), sign) for rows, _, sign in sides])
-        point = contact.pos[active][row]
+        point = contacts.point[row]
         index, block, weight = self._blocks_at(own, point)
         return ContactForces(
             block=block,

@@ -1,6 +1,6 @@
 """Moving joints in a compiled MuJoCo model: where they start, and the targets of their drives."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -8,6 +8,7 @@ import numpy as np
 
 from buildarena_simulation.engines.base import quaternion_of, rotation_of
 from buildarena_simulation.engines.shared.joint_frames import (
+    drive_of,
     driven_clusters,
     entered_place,
     is_simple,
@@ -22,19 +23,29 @@ from buildarena_simulation.structure.motion import Motion
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointAddresses:
-    """The driven joints of a compiled model; H of them.
+    """The driven joints of a compiled model: P for a place, V for a speed.
 
     Attributes:
-        driven: (H,) which of the structure's driven joints each is.
-        signs: (H,) -1 where the body moved is not the seated block's but its mount's.
-        actuators: (H,) actuator of each.
-        gains: (H,) gain of each that turns freely at times, else 0.
+        placed: (P,) which of the structure's driven joints each is.
+        place_signs: (P,) -1 where the body moved is not the seated block's but its mount's.
+        actuators: (P,) actuator of each.
+        turned: (V,) as `placed`.
+        turn_signs: (V,) as `place_signs`.
+        rotors: (V,) velocity of each motor's rotor.
+        clutches: (V,) tendon of each.
+        torques: (V,) most that each exerts, mass·unit²/s² (a slider's, mass·unit/s²).
+        frees: Whether some turn freely at times.
     """
 
-    driven: IntArray
-    signs: FloatArray
+    placed: IntArray
+    place_signs: FloatArray
     actuators: IntArray
-    gains: FloatArray
+    turned: IntArray
+    turn_signs: FloatArray
+    rotors: IntArray
+    clutches: IntArray
+    torques: FloatArray
+    frees: bool
 
     def follow(self, model: "mujoco.MjModel", data: "mujoco.MjData", row: FloatArray) -> None:
         """Gives the drives their targets.
@@ -44,17 +55,15 @@ class JointAddresses:
             data: Its state.
             row: (D,) as in `Schedule.targets`.
         """
-        if not len(self.driven):
-            return
-        wanted = row[self.driven] * self.signs
-        if self.gains.any():
-            rows = self.gains.nonzero()[0]
-            free = np.isnan(wanted)
-            on = np.where(free[rows], 0.0, self.gains[rows])
-            model.actuator_gainprm[self.actuators[rows], 0] = on
-            model.actuator_biasprm[self.actuators[rows], 2] = -on
-            wanted[free] = 0.0
-        data.ctrl[self.actuators] = wanted
+        if len(self.placed):
+            data.ctrl[self.actuators] = row[self.placed] * self.place_signs
+        if len(self.turned):
+            speeds = row[self.turned] * self.turn_signs
+            if self.frees:
+                free = np.isnan(speeds)
+                model.tendon_frictionloss[self.clutches] = np.where(free, 0.0, self.torques)
+                speeds[free] = 0.0
+            data.qvel[self.rotors] = speeds
 
 
 def joint_addresses(
@@ -67,20 +76,27 @@ def joint_addresses(
         structure: The machine.
         clusters: Its clusters.
     """
-    place = {int(block): d for d, block in enumerate(structure.joints.driven)}
+    number = {int(block): d for d, block in enumerate(structure.joints.driven)}
     inside = driven_clusters(structure, clusters)
-    actuators = np.array([model.actuator(f"hinge {c}").id for c in inside], dtype=np.int64)
-    joints = [structure.parts[clusters.seated[c]].module.joint for c in inside]
-    free = [
-        joint is not None and joint.drive is not None and joint.drive.default_mode == "free"
-        for joint in joints
-    ]
+    drives = {c: drive_of(structure, clusters, c) for c in inside}
+    places = [c for c, drive in drives.items() if drive and drive.kind == "position"]
+    speeds = [c for c in inside if c not in places]
+    clutches = _whole(model.tendon(f"clutch {c}").id for c in speeds)
     return JointAddresses(
-        driven=np.array([place[int(clusters.seated[c])] for c in inside], dtype=np.int64),
-        signs=np.array([sign_of(clusters, c) for c in inside]),
-        actuators=actuators,
-        gains=np.where(free, model.actuator_gainprm[actuators, 0], 0.0) if inside else np.zeros(0),
+        placed=_whole(number[int(clusters.seated[c])] for c in places),
+        place_signs=np.array([sign_of(clusters, c) for c in places]),
+        actuators=_whole(model.actuator(f"hinge {c}").id for c in places),
+        turned=_whole(number[int(clusters.seated[c])] for c in speeds),
+        turn_signs=np.array([sign_of(clusters, c) for c in speeds]),
+        rotors=_whole(model.joint(f"rotor {c}").dofadr[0] for c in speeds),
+        clutches=clutches,
+        torques=model.tendon_frictionloss[clutches].copy(),
+        frees=any(drive and drive.default_mode == "free" for drive in drives.values()),
     )
+
+
+def _whole(numbers: Iterable[int]) -> IntArray:
+    return np.array([int(number) for number in numbers], dtype=np.int64)
 
 
 def enter_joint(

@@ -43,7 +43,6 @@ class MjcfSettings:
         solimp: Impedance of contacts.
         impratio: Stiffness of friction over that of normal forces.
         iterations: Most iterations of the solver.
-        servo_slip: How far off its target a wheel's motor reaches its torque limit, rad/s.
     """
 
     time_step_s: float
@@ -52,7 +51,6 @@ class MjcfSettings:
     solimp: Sequence[float]
     impratio: float
     iterations: int
-    servo_slip: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +86,9 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
     """The MJCF text of a world with its clusters.
 
     Bodies are named "cluster C", their joints "hinge C", free joints "free C", geoms "solid C K",
-    sites and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo".
+    sites and actuators of cannons "cannon N", tendons "rope R", the cargo "cargo"; a motor's rotor
+    and its joint "rotor C", its tendon "clutch C"; contacts with ground and terrain "wheel …" and
+    "block …".
     """
     joints = JointText(
         structure=world.structure,
@@ -96,7 +96,6 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         axes=state.axes,
         force_unit=world.force_unit,
         drive_unit=world.drive_unit,
-        servo_slip=settings.servo_slip,
     )
     lines = [
         "<mujoco>",
@@ -110,8 +109,10 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
             impratio=settings.impratio,
             iterations=settings.iterations,
             tolerance=1e-10,
+            ccd_tolerance=1e-9,
+            ccd_iterations=200,
         ),
-        '<flag autoreset="disable"/>',  # a rollout that blows up must not restart unnoticed
+        '<flag autoreset="disable" nativeccd="disable"/>',
         "</option>",
         "<default>",
         tag("geom", condim=3, solref=settings.solref, solimp=settings.solimp),
@@ -121,6 +122,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         *_static(world),
         *_cargo(world, state.cargo_mass),
         *_components(world.structure, state, joints),
+        *joints.rotors(),
         "</worldbody>",
         "<contact>",
         *_exclusions(state.clusters),
@@ -128,6 +130,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         "</contact>",
         "<tendon>",
         *_ropes(world.structure, state),
+        *joints.clutches(),
         "</tendon>",
         "<equality>",
         *joints.equalities(),
@@ -262,15 +265,17 @@ def _surface_pairs(world: World, state: MjcfState, settings: MjcfSettings) -> It
     """
     surfaces = ["ground"] * world.ground + [f"terrain {i}" for i in range(len(world.terrain))]
     sliding = [
-        (f"solid {c} {k}", solid.friction)
+        (f"solid {c} {k}", solid)
         for c, solids in enumerate(state.solids)
         for k, solid in enumerate(solids)
     ]
-    for name, coefficient in sliding:
-        roll, spin = _friction(coefficient)[1:]
+    for name, solid in sliding:
+        coefficient, roll, spin = _friction(solid.friction)
+        kind = "wheel" if solid.is_wheel else "block"
         for surface in surfaces:
             yield tag(
                 "pair",
+                name=f"{kind} {name} {surface}",
                 geom1=surface,
                 geom2=name,
                 condim=3,

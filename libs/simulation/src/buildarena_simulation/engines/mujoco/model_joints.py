@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from buildarena_simulation.engines.mujoco.xml_text import tag
+from buildarena_simulation.engines.mujoco.xml_text import opened, tag
 from buildarena_simulation.engines.shared.joint_frames import (
+    drive_of,
     driven_clusters,
     engaged,
     is_simple,
@@ -37,8 +38,8 @@ _SERVO_SLACK = 0.01
 _SERVO_TIME_S = 0.02
 """Time constant with which a drive reaches its place, seconds."""
 
-_SERVO_SLIP = 0.2
-"""A joint's drive exerts all its force this far off its speed, rad/s or units/s."""
+_ROTOR_INERTIA = 1e6
+"""Of a motor's rotor: what its clutch does to it in a step is nothing, mass·unit²."""
 
 _ARMATURE = 1e-3
 """Inertia added to each hinge of a constant-velocity joint: two of them share an axis when it is
@@ -55,7 +56,6 @@ class JointText:
         axes: (C, 3, 3) machine_from_principal.
         force_unit: Mass·unit/s² in a unit of the modules' forces.
         drive_unit: The same for what drives joints.
-        servo_slip: How far off its target a wheel's motor reaches its torque limit, rad/s.
     """
 
     structure: Structure
@@ -63,7 +63,6 @@ class JointText:
     axes: FloatArray
     force_unit: float
     drive_unit: float
-    servo_slip: float
 
     def joints(self, c: int) -> Iterator[str]:
         """The joints by which a cluster hangs on its parent."""
@@ -100,31 +99,57 @@ class JointText:
             yield self._tied(f"hinge {second}", f"hinge {first}", ratio)
 
     def drives(self) -> Iterator[str]:
-        """The motors of wheels and the drives of joints."""
-        structure, clusters = self.structure, self.clusters
-        for c in driven_clusters(structure, clusters):
-            part = structure.parts[clusters.seated[c]]
-            drive = None if part.module.joint is None else part.module.joint.drive
-            name, most = f"hinge {c}", structure.torques[clusters.seated[c]] * self.drive_unit
-            if drive is None:
-                kv = most / self.servo_slip
-                yield tag("velocity", name=name, joint=name, kv=kv, forcerange=(-most, most))
+        """The drives for a place."""
+        for c in driven_clusters(self.structure, self.clusters):
+            drive = drive_of(self.structure, self.clusters, c)
+            if drive is None or drive.kind != "position":
                 continue
             most = drive.force * self.drive_unit
-            if drive.kind == "speed":
-                kv = most / _SERVO_SLIP
-                yield tag("velocity", name=name, joint=name, kv=kv, forcerange=(-most, most))
-            else:
-                kp = most / _SERVO_SLACK
-                yield tag(
-                    "general",
-                    name=name,
-                    joint=name,
-                    biastype="affine",
-                    gainprm=kp,
-                    biasprm=(0.0, -kp, -kp * _SERVO_TIME_S),
-                    forcerange=(-most, most),
-                )
+            kp = most / _SERVO_SLACK
+            yield tag(
+                "general",
+                name=f"hinge {c}",
+                joint=f"hinge {c}",
+                biastype="affine",
+                gainprm=kp,
+                biasprm=(0.0, -kp, -kp * _SERVO_TIME_S),
+                forcerange=(-most, most),
+            )
+
+    def rotors(self) -> Iterator[str]:
+        """What turns at the speed that a motor is to have, whatever the load; see `clutches`."""
+        for c, _ in self._motors():
+            yield opened("body", name=f"rotor {c}")
+            inertia = (_ROTOR_INERTIA,) * 3
+            yield tag("inertial", pos=(0.0, 0.0, 0.0), mass=1.0, diaginertia=inertia)
+            yield tag("joint", name=f"rotor {c}", type="hinge", axis=(0.0, 0.0, 1.0))
+            yield "</body>"
+
+    def clutches(self) -> Iterator[str]:
+        """Friction between motors' rotors and their joints, at most their torque.
+
+        So a motor holds its speed exactly up to its torque, and a brake its place.
+        """
+        for c, most in self._motors():
+            yield opened(
+                "fixed",
+                name=f"clutch {c}",
+                frictionloss=most,
+                solreffriction=_TIE_SOLREF,
+                solimpfriction=_TIE_SOLIMP,
+            )
+            yield tag("joint", joint=f"hinge {c}", coef=1.0)
+            yield tag("joint", joint=f"rotor {c}", coef=-1.0)
+            yield "</fixed>"
+
+    def _motors(self) -> Iterator[tuple[int, float]]:
+        """Clusters that are driven at a speed, and the most that drives them."""
+        for c in driven_clusters(self.structure, self.clusters):
+            drive = drive_of(self.structure, self.clusters, c)
+            if drive is None:
+                yield c, float(self.structure.torques[self.clusters.seated[c]]) * self.drive_unit
+            elif drive.kind == "speed":
+                yield c, drive.force * self.drive_unit
 
     def _halves(self, c: int, pos: FloatArray) -> Iterator[str]:
         """Three hinges of which the outer ones turn alike: two universal joints, back to back."""

@@ -13,7 +13,7 @@ from buildarena_simulation.structure.contacts import WORLD, ContactForces
 from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
 
-_TOUCHING: Final = 0.005
+TOUCHING: Final = 0.005
 """Points nearer than this touch, though the solver may have given them no force, units."""
 
 
@@ -25,6 +25,7 @@ def read_contacts(
     *,
     outsiders: Mapping[int, int],
     surfaces: Mapping[int, int],
+    added: Sequence[tuple[int, tuple[float, ...]]] = (),
 ) -> ContactForces:
     """The contact forces on all blocks.
 
@@ -35,11 +36,12 @@ def read_contacts(
         motion: Where the clusters are.
         outsiders: What `ContactForces.other` calls each moving body that is not a cluster.
         surfaces: What `ContactForces.surface` calls each fixed body.
+        added: Cluster and row of further forces: point, force, normal, fixed body.
     """
     rows: dict[int, list[tuple[float, ...]]] = {}
     for contact in contacts:
         push = contact[9]
-        if push == 0.0 and contact[8] > _TOUCHING:
+        if push == 0.0 and contact[8] > TOUCHING:
             continue
         (nx, ny, nz), f1, (ux, uy, uz), f2, (vx, vy, vz) = contact[7], *contact[10:14]
         # The normal points from the second body to the first.
@@ -58,6 +60,8 @@ def read_contacts(
             rows.setdefault(second, []).append(
                 (*contact[6], -x, -y, -z, -nx, -ny, -nz, other, fixed)
             )
+    for c, row in added:
+        rows.setdefault(c, []).append((*row[:9], WORLD, row[9]))
     return _gathered(
         [_to_blocks(np.array(table), c, shapes[c], motion) for c, table in sorted(rows.items())]
     )

@@ -8,7 +8,7 @@ square, so drag is a force of ours.
 import itertools
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 from pathlib import Path
@@ -46,7 +46,8 @@ from buildarena_simulation.engines.pybullet.grips import BulletGrips
 from buildarena_simulation.engines.pybullet.hinges import HingedComponent, hinge_frames
 from buildarena_simulation.engines.pybullet.joints import articulated
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
-from buildarena_simulation.engines.pybullet.ropes import rope_forces
+from buildarena_simulation.engines.pybullet.ropes import pull_ends, rope_forces
+from buildarena_simulation.engines.pybullet.slipping import SlippingWheels, changes_of
 from buildarena_simulation.engines.pybullet.urdf import urdf_of
 from buildarena_simulation.engines.shared.closest_points import shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
@@ -95,6 +96,8 @@ class PyBulletEngine:
         self._tensions = np.zeros(len(world.structure.ropes))
         self._place_of_wheel = {int(i): w for w, i in enumerate(world.structure.wheels)}
         self._targets: FloatArray | None = None
+        self._mass = float(world.structure.masses.sum())
+        self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._iterations = _ITERATIONS_OF_JOINTS if has_joints(world.structure) else _ITERATIONS
         self._client = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
@@ -107,6 +110,9 @@ class PyBulletEngine:
         self._grips = BulletGrips(self._client)
         self._fresh: Motion | None = None
         self._own: list[tuple[int, Force]] = []
+        self._slipping = SlippingWheels(
+            self._client, world.structure, self._surfaces, world.gravity
+        )
 
     @property
     def time_step_s(self) -> float:
@@ -163,10 +169,12 @@ class PyBulletEngine:
             self._free_bodies.append(self._cargo)
         mixed = mixed_clusters(self._structure, clusters)
         self._mixed = {c: self._address[c] for c in mixed}
+        self._slipping.enter(clusters, self._address, self.time_step_s)
         self._grips.enter(clusters, motion, self._axes, self._address, self._cargo)
 
     def set_cargo_mass(self, mass: float) -> None:
         """See `Engine`."""
+        self._cargo_mass = mass
         pybullet.changeDynamics(self._cargo, -1, mass=mass, **self._client)
 
     def drop_rope(self, index: int) -> None:
@@ -181,23 +189,31 @@ class PyBulletEngine:
             self._structure, self._clusters, self._motion, self._axes, self._moments
         )
         impacts = ImpactWatch(
-            len(targets), gravity=self._world.gravity, time_step_s=self.time_step_s
+            len(targets),
+            gravity=self._world.gravity,
+            time_step_s=self.time_step_s,
+            mass=self._mass + self._cargo_mass,
         )
         velocity = self._free_velocities()
-        driven: FloatArray | None = None
-        for step, row in enumerate(targets):
-            if len(row) and (driven is None or (row != driven).any()):
+        changes = changes_of(self._targets, targets)
+        for step, (row, change) in enumerate(zip(targets, changes, strict=True)):
+            if len(row) and (step == 0 or change != 0.0):
                 for component in self._components:
                     component.follow(row, self._client)
-                driven = row
             self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
+            self._slipping.push(step, change)
+            if step + 1 == len(targets):
+                impacts.before_last(*self._step_contacts())
             pybullet.stepSimulation(**self._client)
             before, velocity = velocity, self._free_velocities()
             if impacts.is_impact(velocity - before):
                 self._motion = self._read_motion()
-                impacts.take(self._read_contacts())
+                impacts.take(self._step_contacts()[1]())
         self._targets = targets[-1]
         self._motion = self._read_motion()
+        pressed, self._last_contacts = self._step_contacts()
+        if impacts.ends_in_blow(pressed):
+            impacts.take(self._last_contacts())
         limit_spin(self._client, self._components, self._motion)
         if self._mixed:
             follow_friction(self._client, self._structure, self._mixed, self._shapes, self._motion)
@@ -205,7 +221,7 @@ class PyBulletEngine:
 
     def contacts(self) -> ContactForces:
         """See `Engine`."""
-        return self._impacts.mean(self._read_contacts)
+        return self._impacts.mean(self._last_contacts)
 
     @property
     def struck(self) -> bool:
@@ -329,12 +345,7 @@ class PyBulletEngine:
             time_step_s=self.time_step_s,
         )
         self._tensions = pulls.tension
-        ends = pulls.forces
-        for block, point, force in zip(ends.block, ends.point, ends.force, strict=True):
-            body, link = self._address[int(clusters.cluster_of[block])]
-            pybullet.applyExternalForce(
-                body, link, force.tolist(), point.tolist(), pybullet.WORLD_FRAME, **self._client
-            )
+        pull_ends(self._client, pulls.forces, clusters, self._address)
 
     def _free_velocities(self) -> FloatArray:
         """Velocity of every component and of the cargo, (K, 3), units/s."""
@@ -367,13 +378,15 @@ class PyBulletEngine:
                     self._hinges.follow(motion, c, state[0], state[1])
         return motion
 
-    def _read_contacts(self) -> ContactForces:
-        contacts = pybullet.getContactPoints(**self._client)
-        return read_contacts(
-            contacts,
+    def _step_contacts(self) -> tuple[float, Callable[[], ContactForces]]:
+        """What the contacts of the last step press together, and what reads them, later too."""
+        touching, added = pybullet.getContactPoints(**self._client), self._slipping.contacts()
+        return sum(contact[9] for contact in touching), lambda: read_contacts(
+            touching,
             self._cluster_of_link,
             self._shapes,
             self._motion,
             outsiders={} if self._cargo is None else {self._cargo: CARGO},
             surfaces=self._surfaces,
+            added=added,
         )

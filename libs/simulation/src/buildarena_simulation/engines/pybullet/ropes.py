@@ -4,15 +4,20 @@ A fixed stiffness diverges on small blocks; here it follows the effective mass b
 ends, so that the explicit step stays stable whatever hangs on it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import PointForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.vectors import cross, turned
+
+with quiet_output():
+    import pybullet
 
 _STIFFNESS_SHARE = 0.2
 _DAMPING_SHARE = 0.8
@@ -95,6 +100,27 @@ def rope_forces(
             force=np.concatenate([force[taut], -force[taut]]),
         ),
     )
+
+
+def pull_ends(
+    client: Mapping[str, int],
+    forces: PointForces,
+    clusters: Clusters,
+    address: Mapping[int, tuple[int, int]],
+) -> None:
+    """Applies forces on blocks in the next step.
+
+    Args:
+        client: The engine's world.
+        forces: The forces.
+        clusters: The clusters.
+        address: Body and link of each.
+    """
+    for block, point, force in zip(forces.block, forces.point, forces.force, strict=True):
+        body, link = address[int(clusters.cluster_of[block])]
+        pybullet.applyExternalForce(
+            body, link, force.tolist(), point.tolist(), pybullet.WORLD_FRAME, **client
+        )
 
 
 def _at_ends(

@@ -2,6 +2,7 @@
 
 Contacts at rest change slowly, so the interval's last step represents all quiet ones. A step with
 an impact is read as well: otherwise its impulse would be missed, or counted for the whole interval.
+Where the last step itself is an impact, the step before it represents the quiet ones.
 """
 
 from collections.abc import Callable
@@ -15,6 +16,10 @@ from buildarena_simulation.structure.model import FloatArray
 _IMPACT: Final = 3.0
 """A change of velocity faster than this many g is an impact: more than fall and driving make."""
 
+_JUMP: Final = 1.0
+"""So is a rise of all that contacts press by this many weights in the last step: what hits a wheel
+on a spring hardly moves the machine."""
+
 
 class ImpactWatch:
     """Collects the contact readings of one interval.
@@ -23,18 +28,31 @@ class ImpactWatch:
         step_count: Steps in the interval.
         gravity: Downward acceleration, units/s².
         time_step_s: Length of a step, seconds.
+        mass: Of machine and cargo, mass units.
     """
 
-    def __init__(self, step_count: int, *, gravity: float, time_step_s: float) -> None:
+    def __init__(self, step_count: int, *, gravity: float, time_step_s: float, mass: float) -> None:
         self._count = step_count
-        self._limit = _IMPACT * gravity * time_step_s
+        self._limit, self._jump = _IMPACT * gravity * time_step_s, _JUMP * gravity * mass
         self._impacts: list[ContactForces] = []
         self._ends_in_impact = False
+        self._quiet: Callable[[], ContactForces] | None = None
+        self._pressed = 0.0
 
     @property
     def struck(self) -> bool:
         """Whether there was an impact."""
         return bool(self._impacts)
+
+    def before_last(self, pressed: float, read: Callable[[], ContactForces]) -> None:
+        """Notes the contacts that there are ahead of the interval's last step.
+
+        Args:
+            pressed: Sum of what they press, mass·unit/s².
+            read: Reads them, after that step as well.
+        """
+        self._pressed = pressed
+        self._quiet = None if self._ends_in_impact else read
 
     def is_impact(self, change: FloatArray) -> bool:
         """Whether the step just made must be read.
@@ -45,17 +63,29 @@ class ImpactWatch:
         self._ends_in_impact = bool(np.abs(change).max() > self._limit)
         return self._ends_in_impact
 
+    def ends_in_blow(self, pressed: float) -> bool:
+        """Whether the last step must be read for what its contacts press.
+
+        Args:
+            pressed: Sum of it, mass·unit/s².
+        """
+        if self._ends_in_impact or pressed - self._pressed <= self._jump:
+            return False
+        self._ends_in_impact = True
+        return True
+
     def take(self, contacts: ContactForces) -> None:
         """Keeps the reading of a step that was an impact."""
         self._impacts.append(contacts)
 
     def mean(self, read: Callable[[], ContactForces]) -> ContactForces:
-        """The mean over the interval; if it ended in an impact, its quiet steps are unknown.
+        """The mean over the interval; if it ended in several impacts, its quiet steps are unknown.
 
         Args:
             read: Reads the contacts of the last step.
         """
         readings = [(1.0 / self._count, contacts) for contacts in self._impacts]
-        if not self._ends_in_impact:
-            readings.append((1.0 - len(self._impacts) / self._count, read()))
+        quiet = self._quiet if self._ends_in_impact else read
+        if quiet is not None:
+            readings.append((1.0 - len(self._impacts) / self._count, quiet()))
         return mean_contacts(readings)

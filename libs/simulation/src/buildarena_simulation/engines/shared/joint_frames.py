@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from buildarena_geometry.modules.joints import MOVING_JOINTS
+from buildarena_geometry.modules.joints import MOVING_JOINTS, Drive
 from buildarena_simulation.engines.base import quaternion_of
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
@@ -148,6 +148,12 @@ def driven_clusters(structure: Structure, clusters: Clusters) -> list[int]:
         if module.motor is not None or (module.joint is not None and module.joint.drive):
             driven.append(c)
     return driven
+
+
+def drive_of(structure: Structure, clusters: Clusters, c: int) -> Drive | None:
+    """The drive of a driven cluster's joint; None of a wheel, which has a motor."""
+    joint = structure.parts[clusters.seated[c]].module.joint
+    return None if joint is None else joint.drive
 
 
 def engaged(structure: Structure, clusters: Clusters) -> list[tuple[int, int, float]]:

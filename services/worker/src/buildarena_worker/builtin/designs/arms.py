@@ -89,7 +89,8 @@ def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design
     root = draft.attach(wheel, EAST)
     hand = draft.attach(draft.row(root, NORTH, 6)[-1], EAST, "Swivel")
     draft.attach(draft.row(hand, DOWN, 3)[-1], DOWN, "Grabber")
-    near = draft.row(root, SOUTH, 4)[-1]
+    # A unit longer, the weights would brush the ground while the arm rises.
+    near = draft.row(root, SOUTH, 3)[-1]
     for way in (EAST, UP, DOWN):
         draft.attach(near, way, "Log", note="counterweight")
     draft.attach(draft.attach(near, SOUTH), EAST, "Log", note="counterweight")

@@ -29,12 +29,10 @@ _LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
 _SLALOM = (
     (2.73, _RIGHT, 0.16),
     (3.48, _LEFT, 0.38),
-    (5.3, _RIGHT, 0.12),
+    (5.3, _RIGHT, 0.13),
     (5.64, _RIGHT, 0.31),
-    (7.46, _LEFT, 0.19),
-    (8.84, _RIGHT, 0.04),
-    (9.65, _LEFT, 0.01),
-    (10.8, _RIGHT, 0.26),
+    (7.46, _LEFT, 0.21),
+    (8.84, _RIGHT, 0.1),
 )
 """When which way the slalom's car steers and for how long, seconds. It lets the third gate be: from
 the second to the fourth it goes straight. Found by search on both engines; it passes the other four
@@ -42,7 +40,7 @@ within 1.2 of their middles."""
 _WAVE_S = 0.36
 _WAVE = (
     *(3, -2, -2, -3, 0, 0, 5, 5, 5, -3, -7, -10, -7, 2, 8, 11, 10, 6, -5, -11, -13, -11, -6, 6),
-    *(11, 14, 12, 9, -2, -10, -13, -13, -13, -7, 6, 12, 12, 13, 14, 7, -7, -12, -11, -10, -15),
+    *(11, 14, 12, 9, -2, -10, -13, -13, -13, -7, 6, 12, 12, 13, 17, 6, -7, -12, -15, -10, -15),
     *(-13, 4, 11, 11, 10, 13, 17, 5, -9, -12, -10, -9, -13, -18, 0, 10, 11, 8, 9, 13, 16, 3, -9),
     *(-14, -17, -17, -7, 7, 19, 19, 4, -13, -16, -6, 9, 10, 2),
 )
@@ -50,14 +48,14 @@ _WAVE = (
 right above 0. Found by steering the car on both engines at once, towards the middle between where
 each of them had it."""
 _TOUR = (
-    (0.4, _AHEAD, 1.96),
-    (0.56, _RIGHT, 0.03),
-    (2.2, _LEFT, 0.04),
+    (0.4, _AHEAD, 2.0),
+    (0.56, _RIGHT, 0.04),
+    (2.2, _LEFT, 0.05),
     (3.68, _AHEAD, 1.76),
-    (3.84, _RIGHT, 0.05),
-    (6.76, _BACK, 1.28),
-    (6.92, _LEFT, 0.09),
-    (7.32, _LEFT, 0.02),
+    (3.84, _RIGHT, 0.07),
+    (6.76, _BACK, 1.34),
+    (6.92, _LEFT, 0.12),
+    (7.32, _LEFT, 0.03),
     (7.76, _LEFT, 0.03),
 )
 """When the car of the three stops presses which key and for how long, seconds; found likewise."""
