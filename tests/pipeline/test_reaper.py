@@ -1,5 +1,9 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
+from buildarena_cli.local import free_port
+from buildarena_pipeline.broker.queues import Queues
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_pipeline.runtime.reaper import Reaper
 
@@ -66,6 +70,26 @@ def test_one_reaper_works_at_a_time(context, submissions) -> None:
         # The lock is held here; the update above is not visible to others until the end.
         reap(context)
         assert context.queues.waiting("construct") == 0
+
+
+def test_of_several_processes_one_reaps_in_each_period(context, monkeypatch) -> None:
+    reaped = []
+
+    def note(reaper: Reaper) -> None:
+        reaped.append(reaper)
+
+    monkeypatch.setattr(Reaper, "reap", note)
+    first, second = Reaper(context, period_s=30), Reaper(context, period_s=30)
+    for reaper in (first, second, second, first):
+        reaper._reap_safely()
+    assert reaped == [first]
+    # The broker only saves work: without one, each does it.
+    away = Queues(f"redis://127.0.0.1:{free_port()}/0")
+    alone = [Reaper(replace(context, queues=away), period_s=30) for _ in range(2)]
+    for reaper in alone:
+        reaper._reap_safely()
+    assert reaped == [first, *alone]
+    away.close()
 
 
 def test_a_queue_that_is_always_empty_is_sent_more_each_time(context, submissions) -> None:

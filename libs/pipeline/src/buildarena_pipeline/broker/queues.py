@@ -117,6 +117,21 @@ class Queues:
             self._note_failure(queue, error)
             return None
 
+    def is_first(self, work: str, period_s: float) -> bool:
+        """Whether no process has asked this within a period; also true where the broker is away.
+
+        Args:
+            work: What is to be done by one process in each period.
+            period_s: How long the others are told no.
+        """
+        if self._breaker.is_open:
+            return True
+        try:
+            return bool(self._redis.set(f"buildarena.{work}", 1, nx=True, px=int(1000 * period_s)))
+        except (RedisError, OSError) as error:
+            self._note_failure(work, error)
+            return True
+
     def _note_failure(self, queue: str, error: Exception) -> None:
         log.warning("broker_unreachable", queue=queue, error=str(error))
         self._breaker.failed()

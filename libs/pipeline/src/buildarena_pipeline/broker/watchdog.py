@@ -19,7 +19,7 @@ from buildarena_pipeline.periodic import Periodic
 
 log = structlog.get_logger(__name__)
 
-PERIOD_S = 1.0
+PERIOD_S = 2.0
 STALLED_AFTER_S = 5.0
 """A consumer that works takes a message within milliseconds."""
 

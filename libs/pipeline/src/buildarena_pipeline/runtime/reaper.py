@@ -1,7 +1,8 @@
 """The reaper: recovers jobs of dead workers and notifies workers of jobs that wait unnoticed.
 
-Every worker process and the API run one in a thread; a lock in the database lets one at a time
-do the work, so that no process is needed for it and none can be missing.
+Every worker process and the API run one in a thread. The broker lets one of them at the work each
+second, so that the others stay idle; where it is away all of them try, and a lock in the database
+lets one at a time. So no process is needed for it and none can be missing.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from buildarena_store.states import VERIFY_QUEUE
 
 REAPER_LOCK = 0x726561706572  # "reaper"
 PERIOD_S = 1.0
+SELDOM_EVERY = 5
+"""Runs after which that is done which can wait for some seconds."""
 FORGETS_EVERY = 600
 """Runs after which what is known of old leases is removed."""
 
@@ -36,6 +39,7 @@ class Reaper:
         self._context = context
         self._most: dict[str, int] = {}
         self._runs = 0
+        self._period_s = period_s
         self._thread = Periodic(self._reap_safely, name="reaper", period_s=period_s)
 
     def start(self) -> None:
@@ -47,6 +51,9 @@ class Reaper:
         self._thread.stop()
 
     def _reap_safely(self) -> None:
+        # Asking the broker costs a tenth of a run; nothing rests on its answer.
+        if not self._context.queues.is_first("reaper", 0.9 * self._period_s):
+            return
         try:
             self.reap()
         except SQLAlchemyError as error:
@@ -66,15 +73,20 @@ class Reaper:
                 log.info("recovered", jobs=recovered)
             for queue in self._context.store.waiting.queues():
                 self._notify(queue)
-            self._context.store.external_calls.abandon_idle()
-            checks = self._context.store.verifications.to_notify(MAX_WAITING)
-            if checks:
-                self._context.queues.announce(VERIFY_QUEUE, checks)
-            # So that whoever reads the counts first after a year finds little to add.
-            self._context.store.metrics.gather()
-            self._runs += 1
-            if self._runs % FORGETS_EVERY == 1:
+            if self._runs % SELDOM_EVERY == 0:
+                self._do_seldom()
+            if self._runs % FORGETS_EVERY == 0:
                 self._context.store.leases.forget_ended()
+            self._runs += 1
+
+    def _do_seldom(self) -> None:
+        store = self._context.store
+        store.external_calls.abandon_idle()
+        checks = store.verifications.to_notify(MAX_WAITING)
+        if checks:
+            self._context.queues.announce(VERIFY_QUEUE, checks)
+        # So that whoever reads the counts first after a year finds little to add.
+        store.metrics.gather()
 
     def _notify(self, queue: str) -> None:
         """Notifies a queue's workers; of twice as many jobs each time they have taken all."""
