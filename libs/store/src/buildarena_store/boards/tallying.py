@@ -169,7 +169,9 @@ _EACH: Final = [
     _bytes_of(func.float8send(_GAINED)).label("gained"),
     _bytes_of(func.float8send(cast(jobs.c.cost_usd, Double))).label("costs"),
     _bytes_of(func.int8send(jobs.c.output_tokens)).label("output_tokens"),
-    _bytes_of(func.timestamptz_send(jobs.c.finished_at)).label("finished"),
+    _bytes_of(func.timestamptz_send(func.coalesce(jobs.c.finished_at, jobs.c.created_at))).label(
+        "finished"
+    ),
     _bytes_of(func.int8send(jobs.c.requests)).label("requests"),
     _bytes_of(func.int8send(jobs.c.input_tokens)).label("input_tokens"),
     _bytes_of(func.int8send(func.coalesce(_PARTS, UNKNOWN_TOKENS))).label("parts"),
