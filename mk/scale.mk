@@ -9,3 +9,8 @@ bench-scale: $(STAMP) ## Measures boards, lists, claims and a large sweep at 1,0
 
 bench-heartbeats: $(STAMP) ## What heartbeats cost Postgres, for one worker and for a hundred
 	@$(TEST_PYTHON) -m benchmarks.scale.bench_heartbeats --json .buildarena/bench-heartbeats.json
+
+.PHONY: bench-idle
+
+bench-idle: $(STAMP) ## What each process of a service costs while there is nothing to do; two minutes
+	@$(TEST_PYTHON) -m benchmarks.idle.bench_idle --json .buildarena/bench-idle.json
