@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from operator import itemgetter
 from random import SystemRandom
 from typing import Any, Final
 
@@ -37,8 +36,7 @@ class Jobs:
         Returns:
             How many were added or opened again.
         """
-        # In the order of their ids, so that one page of an index after another is written.
-        rows = sorted((_new_row(job) for job in new), key=itemgetter("id"))
+        rows = [_new_row(job) for job in new]
         columns = [jobs.c[name] for name in rows[0]]
         # One JSON text instead of a bound value for each column of each row: ten times as fast.
         given = rows_of(rows, columns)

@@ -58,10 +58,10 @@ SWEEPS_MOVED = _of_job("sweep_jobs", "sweep_place(sweep_id, OLD)", "-1, 0, 0, 0"
 SWEEPS_USED = _of_job("sweep_use", KEY, ", ".join(f"NEW.{name} - OLD.{name}" for name in USE))
 SWEEPS_LOST = _of_job("sweep_lost", KEY, "NEW.lost_requests - OLD.lost_requests, 0, 0, 0")
 # A job that moves meanwhile does not see the sweep yet, and is counted where it comes to. Those
-# that this transaction made can't move.
+# that this transaction wrote can't move.
 SETTLED = """
-    PERFORM 1 FROM jobs JOIN added ON added.job_id = jobs.id WHERE jobs.created_at <> now()
-    ORDER BY jobs.id FOR SHARE OF jobs;"""
+    PERFORM 1 FROM jobs JOIN added ON added.job_id = jobs.id
+    WHERE jobs.xmin <> pg_current_xact_id()::xid ORDER BY jobs.id FOR SHARE OF jobs;"""
 BEGUN = "DELETE FROM figure_changes; DELETE FROM figures;"
 # As `recount_jobs` of the revision before has it.
 COUNTED = """
