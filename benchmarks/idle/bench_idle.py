@@ -20,8 +20,8 @@ from buildarena_cli.local.stack import Stack
 IDLE_S = 60.0
 SETTLING_S = 15.0
 """After a start, what is seldom done has been done once."""
-MOST_IDLE_PERCENT = 0.5
-MOST_TO_START_S = 1.5
+MAX_IDLE_PERCENT = 0.5
+MAX_START_S = 1.5
 WORKERS = ("construct worker", "mujoco worker", "pybullet worker")
 
 
@@ -55,8 +55,8 @@ def measure(stack: Stack) -> dict[str, Any]:
         "idle_percent": idle,
         "to_start_cpu_s": started,
         "of_the_bar": {
-            **{name: round(value / MOST_IDLE_PERCENT, 2) for name, value in idle.items()},
-            **{f"{name}, start": round(s / MOST_TO_START_S, 2) for name, s in started.items()},
+            **{name: round(value / MAX_IDLE_PERCENT, 2) for name, value in idle.items()},
+            **{f"{name}, start": round(s / MAX_START_S, 2) for name, s in started.items()},
         },
         "load_average": [round(value, 1) for value in os.getloadavg()],
     }
