@@ -12,5 +12,5 @@ bench-heartbeats: $(STAMP) ## What heartbeats cost Postgres, for one worker and 
 
 .PHONY: bench-idle
 
-bench-idle: $(STAMP) ## What each process of a service costs while there is nothing to do; two minutes
+bench-idle: $(STAMP) ## What each process of a service costs while there is nothing to do; five minutes
 	@$(TEST_PYTHON) -m benchmarks.idle.bench_idle --json .buildarena/bench-idle.json

@@ -18,8 +18,8 @@ from support.servers.stacks import running_stack
 from buildarena_cli.local.stack import Stack
 
 IDLE_S = 60.0
-SETTLING_S = 15.0
-"""After a start, what is seldom done has been done once."""
+SETTLING_S = 200.0
+"""The supervisor of a service that was just started measures more often."""
 MAX_IDLE_PERCENT = 0.5
 MAX_START_S = 1.5
 WORKERS = ("construct worker", "mujoco worker", "pybullet worker")
