@@ -66,11 +66,11 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
         "metrics": rng.choice((None, {}, {"parts": rng.randrange(90)})),
         "flags": rng.choice(FLAGS),
         "refusals": rng.choice((None, {}, {"overlap": 3}, {"overlap": 1, "full": 0})),
-        "requests": rng.randrange(100),
+        "requests": rng.choice((rng.randrange(100), 2**40 + rng.randrange(100))),
         "input_tokens": rng.randrange(10**9),
         "output_tokens": rng.choice((0, rng.randrange(10**6))),
         "cost_usd": round(rng.random(), 6),
-        "actions": rng.randrange(9),
+        "actions": rng.choice((rng.randrange(9), 2**40 + rng.randrange(9))),
         "refused_actions": rng.randrange(3),
         "finished_at": START + timedelta(hours=rng.randrange(1000)),
         "imported_from": "elsewhere" if imported else None,
@@ -228,6 +228,36 @@ def test_boards_equal_boards_made_from_every_job(context, process, seed) -> None
             params = random_query(rng)
             assert asked(api, params) == expected(context, params), params
         disturb(context, rng, step + 1)
+
+
+def test_a_period_takes_apart_what_ended_alike(context, process) -> None:
+    """One tally of forty trials, of which each period has some, with counts of any size."""
+    rng = random.Random(3)
+    alike = random_job(rng, 0) | {
+        "task": "lift-1",
+        "task_version": builtin_tasks()["lift-1"].version,
+        "model_config": {"provider": "made-up", "decoding": {}},
+        "track": TRACKS[0],
+        "outcome": "success",
+        "success": True,
+        "flags": [],
+    }
+    own = ("id", "seed", "finished_at", *(n for n in alike if n.endswith("_tokens")))
+    made = []
+    for number in range(40):
+        other = random_job(rng, number)
+        counts = {"requests": 2**40 + number, "actions": 2**40 + number, "refused_actions": number}
+        refusals = {f"class {rng.randrange(3)}": rng.randrange(1, 2**40)}
+        made.append(alike | {name: other[name] for name in own} | counts | {"refusals": refusals})
+    execute(context, insert(jobs), made)
+    api = process()
+    for hours in (0, 100, 400, 500, 900):
+        for end in (450, 700, 1000):
+            period = {
+                "since": START + timedelta(hours=hours),
+                "until": START + timedelta(hours=end),
+            }
+            assert asked(api, BOARD | period) == expected(context, BOARD | period), period
 
 
 def fill(context, count: int = 30) -> None:

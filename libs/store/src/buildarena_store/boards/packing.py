@@ -19,7 +19,6 @@ from buildarena_benchmark.leaderboard import Details, Tally, Total
 _FLOATS: Final[np.dtype[Any]] = np.dtype(">f8")
 _INTEGERS: Final[np.dtype[Any]] = np.dtype(">i8")
 """As the database sends them."""
-_SMALL: Final[np.dtype[Any]] = np.dtype(">i4")
 _FIGURES: Final = {
     "indicators": _FLOATS,
     "shares": _FLOATS,
@@ -31,10 +30,10 @@ _FIGURES: Final = {
 _DETAILS: Final = {
     "finished_us": _INTEGERS,
     "input_tokens": _INTEGERS,
-    "requests": _SMALL,
-    "parts": _SMALL,
-    "actions": _SMALL,
-    "refused_actions": _SMALL,
+    "requests": _INTEGERS,
+    "parts": _INTEGERS,
+    "actions": _INTEGERS,
+    "refused_actions": _INTEGERS,
 }
 """The same of details; refusals follow, in the order of the classes that the tally names."""
 
@@ -84,7 +83,7 @@ def pack_details(details: Sequence[Details]) -> bytes:
     parts = []
     for one in details:
         parts += [getattr(one, name).astype(kind) for name, kind in _DETAILS.items()]
-        parts += [times.astype(_SMALL) for _, times in sorted(one.refusals.items())]
+        parts += [times.astype(_INTEGERS) for _, times in sorted(one.refusals.items())]
     return b"".join(part.tobytes() for part in parts)
 
 
@@ -122,7 +121,7 @@ def unpack_details(said: Sequence[Mapping[str, Any]], data: bytes) -> list[Detai
     details, start = [], 0
     for one in said:
         classes = sorted(one["refusals"])
-        kinds = [*_DETAILS.values(), *[_SMALL] * len(classes)]
+        kinds = [*_DETAILS.values(), *[_INTEGERS] * len(classes)]
         arrays = list(_arrays(data, start, one["number"], kinds))
         start += one["number"] * sum(kind.itemsize for kind in kinds)
         own, refusals = arrays[: len(_DETAILS)], arrays[len(_DETAILS) :]
