@@ -46,6 +46,16 @@ def _heading(machine: Machine, trajectory: Trajectory) -> np.ndarray:
     return np.unwrap(np.arctan2(-ahead[:, 0], ahead[:, 1]))
 
 
+def _driven(machine: Machine, engine: str) -> tuple[float, float]:
+    """How far a car travels, units, and how much it turns, rad."""
+    scenario = Scenario(duration_s=DURATION_S, control=Control(mode="agent"))
+    trajectory = simulate(machine, scenario, engine)
+    places = trajectory.positions[:, 0, :2].astype(float)
+    heading = _heading(machine, trajectory)
+    travelled = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    return float(travelled), float(heading[-1] - heading[0])
+
+
 @pytest.mark.parametrize(
     ("braked", "length", "track"),
     [((0,), 5, 1), ((1,), 5, 1), ((2,), 5, 1), ((3,), 5, 1), ((0,), 9, 1), ((3,), 7, 2)],
@@ -55,13 +65,9 @@ def test_a_car_with_a_braking_wheel_turns_and_travels_as_coulomb_says(
 ) -> None:
     machine, held = _braked(braked, length, track)
     expected = planar_car(machine, held).drive(DURATION_S - STARTS_S)
-    scenario = Scenario(duration_s=DURATION_S, control=Control(mode="agent"))
-    trajectory = simulate(machine, scenario, engine)
-    places = trajectory.positions[:, 0, :2].astype(float)
-    travelled = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-    heading = _heading(machine, trajectory)
+    travelled, turned = _driven(machine, engine)
     assert travelled == pytest.approx(expected.travelled, rel=0.05)
-    assert heading[-1] - heading[0] == pytest.approx(expected.turned, rel=0.05)
+    assert turned == pytest.approx(expected.turned, rel=0.05)
 
 
 @pytest.mark.parametrize("braked", [0, 3])
@@ -69,13 +75,9 @@ def test_wheels_on_hinges_that_only_steer_share_their_load_alike(engine, braked)
     """The hinges' drives give way a little: the turn may differ more than a rigid car's."""
     machine = drafted(slalom_car(0), [(STARTS_S, "UpArrow", 20.0)])
     expected = planar_car(machine, _hold(machine, (braked,))).drive(DURATION_S - STARTS_S)
-    scenario = Scenario(duration_s=DURATION_S, control=Control(mode="agent"))
-    trajectory = simulate(machine, scenario, engine)
-    places = trajectory.positions[:, 0, :2].astype(float)
-    travelled = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
-    heading = _heading(machine, trajectory)
+    travelled, turned = _driven(machine, engine)
     assert travelled == pytest.approx(expected.travelled, rel=0.01)
-    assert heading[-1] - heading[0] == pytest.approx(expected.turned, rel=0.06)
+    assert turned == pytest.approx(expected.turned, rel=0.06)
 
 
 @pytest.mark.parametrize("braked", [(0,), (2,), (0, 1)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 from sqlalchemy import (
     JSON,
     BigInteger,
@@ -13,6 +15,7 @@ from sqlalchemy import (
     Numeric,
     Table,
     Text,
+    TextClause,
     literal_column,
     text,
 )
@@ -84,3 +87,17 @@ figure_changes = Table(
     Column("key", JSONB, nullable=False),
     *_amounts(),
 )
+OF_A_SWEEP: Final = "kind IN ('sweep_jobs', 'sweep_use', 'sweep_lost')"
+"""The condition that figures are of a sweep: in which place its jobs are, what they used, and the
+requests that were lost."""
+
+
+def kept_figures(condition: str) -> TextClause:
+    """The query for figures of which a condition holds: rows of kind, key, and a to d."""
+    return text(
+        f"""
+        SELECT kind, key, sum(a) AS a, sum(b) AS b, sum(c) AS c, sum(d) AS d
+        FROM (SELECT * FROM figures UNION ALL SELECT * FROM figure_changes) AS both_kinds
+        WHERE {condition} GROUP BY kind, key ORDER BY kind, key
+        """  # noqa: S608 - the conditions are constants of the program
+    )

@@ -12,6 +12,7 @@ from sqlalchemy import Connection, func, select, text
 
 from buildarena_store import events
 from buildarena_store.database import Database
+from buildarena_store.derived_tables import OF_A_SWEEP, kept_figures
 from buildarena_store.server_figures import ServerFigures, read_server
 from buildarena_store.states import Audit, JobState, SweepState, Verdict
 from buildarena_store.tables import jobs, sweeps
@@ -146,14 +147,7 @@ _GATHER: Final = text(
         c = figures.c + excluded.c, d = figures.d + excluded.d
     """
 )
-_STORED: Final = text(
-    """
-    SELECT kind, key, sum(a) AS a, sum(b) AS b, sum(c) AS c, sum(d) AS d
-    FROM (SELECT * FROM figures UNION ALL SELECT * FROM figure_changes) AS both_kinds
-    WHERE kind NOT IN ('sweep_jobs', 'sweep_use', 'sweep_lost')
-    GROUP BY kind, key ORDER BY kind, key
-    """
-)
+_STORED: Final = kept_figures(f"NOT {OF_A_SWEEP}")
 
 Amounts = tuple[float, float, float, float]
 

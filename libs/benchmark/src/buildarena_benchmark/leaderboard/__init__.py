@@ -46,7 +46,6 @@ from buildarena_benchmark.leaderboard.tallies import (
     Total,
     tallied,
     tally_between,
-    total_of,
 )
 from buildarena_benchmark.outcomes import SCORED
 
@@ -91,5 +90,4 @@ __all__ = [
     "summarise_tallies",
     "tallied",
     "tally_between",
-    "total_of",
 ]

@@ -216,9 +216,9 @@ def summarise_tallies(
         input_tokens_mean=_mean_total(tally.input_tokens for tally in counted),
         output_tokens_mean=_mean_total(total_of(tally.output_tokens) for tally in counted),
         cost_usd_mean=_mean(costs),
-        cost_per_success_usd=cost_per_success(costs.tolist(), successes)
-        if len(costs) == number
-        else None,
+        cost_per_success_usd=cost_per_success(
+            [*costs.tolist(), *[None] * (number - len(costs))], successes
+        ),
         invalid_action_rate=refused / actions if actions else None,
         pass_at=_pass_chances(pass_at_k, figures[:, 0]),
         pass_all=_pass_chances(pass_hat_k, figures[:, 0]),

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,33 @@ class Details:
     refused_actions: Integers
     refusals: Mapping[str, Integers]
 
+    def inside(self, chosen: NDArray[np.bool_]) -> Details:
+        """The same of some of the trials, (N,) bool."""
+        return Details(
+            finished_us=self.finished_us[chosen],
+            requests=self.requests[chosen],
+            input_tokens=self.input_tokens[chosen],
+            parts=self.parts[chosen],
+            actions=self.actions[chosen],
+            refused_actions=self.refused_actions[chosen],
+            refusals={name: times[chosen] for name, times in self.refusals.items()},
+        )
+
+    def totals(self) -> dict[str, Any]:
+        """What they come to, as fields of a `Tally`."""
+        last = None
+        if len(self.finished_us):
+            last = EPOCH + int(self.finished_us.max()) * _MICROSECOND
+        return {
+            "requests": total_of(self.requests),
+            "input_tokens": total_of(self.input_tokens),
+            "parts": total_of(self.parts),
+            "actions": int(self.actions.sum()),
+            "refused_actions": int(self.refused_actions.sum()),
+            "refusals": {name: int(times.sum()) for name, times in self.refusals.items()},
+            "newest": last,
+        }
+
 
 def tally_between(
     tally: Tally, details: Details, since: datetime | None, until: datetime | None
@@ -129,8 +156,8 @@ def tally_between(
         inside &= details.finished_us < (until - EPOCH) // _MICROSECOND
     if inside.all():
         return tally
-    finished = details.finished_us[inside]
-    refusals = {name: int(times[inside].sum()) for name, times in details.refusals.items()}
+    totals = details.inside(inside).totals()
+    refusals = {name: times for name, times in totals["refusals"].items() if times}
     return replace(
         tally,
         indicators=tally.indicators[inside],
@@ -138,13 +165,7 @@ def tally_between(
         gained=tally.gained[inside],
         costs_usd=tally.costs_usd[inside],
         output_tokens=tally.output_tokens[inside],
-        requests=total_of(details.requests[inside]),
-        input_tokens=total_of(details.input_tokens[inside]),
-        parts=total_of(details.parts[inside]),
-        actions=int(details.actions[inside].sum()),
-        refused_actions=int(details.refused_actions[inside].sum()),
-        refusals={name: times for name, times in refusals.items() if times},
-        newest=EPOCH + int(finished.max()) * _MICROSECOND if len(finished) else None,
+        **{**totals, "refusals": refusals},
     )
 
 

@@ -9,7 +9,7 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import Any, Final
 
 import numpy as np
@@ -37,9 +37,7 @@ from buildarena_benchmark.leaderboard import (
     Details,
     Tally,
     tally_between,
-    total_of,
 )
-from buildarena_benchmark.leaderboard.tallies import EPOCH
 from buildarena_store.boards.packing import floats, integers
 from buildarena_store.boards.trials import COUNTS, CellId, TrialFilter, decoding_of
 from buildarena_store.rows import bound_texts
@@ -226,7 +224,6 @@ def _refusals(texts: Sequence[str]) -> dict[str, NDArray[np.int64]]:
 
 def _tally_of(row: Row[Any], details: Details) -> Tally:
     number = row.number
-    refusals = {name: int(times.sum()) for name, times in details.refusals.items()}
     return Tally(
         outcome=row.outcome,
         reason=row.reason,
@@ -242,11 +239,5 @@ def _tally_of(row: Row[Any], details: Details) -> Tally:
         output_tokens=np.full(number, UNKNOWN_TOKENS)
         if row.external
         else integers(row.output_tokens),
-        requests=total_of(details.requests),
-        input_tokens=total_of(details.input_tokens),
-        parts=total_of(details.parts),
-        actions=int(details.actions.sum()),
-        refused_actions=int(details.refused_actions.sum()),
-        refusals=refusals,
-        newest=EPOCH + timedelta(microseconds=int(details.finished_us.max())),
+        **details.totals(),
     )

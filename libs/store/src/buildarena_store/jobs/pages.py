@@ -213,8 +213,7 @@ def _read_by_id(
     query = select(*JOB_COLUMNS).where(*conditions)
     if place.after is not None:
         query = query.where(_further(place.order, jobs.c.id, place.after[1]))
-    in_order = jobs.c.id.desc() if place.order.descending else jobs.c.id.asc()
-    return list(connection.execute(query.order_by(in_order).limit(limit)))
+    return list(connection.execute(query.order_by(*_sorted(place.order, jobs.c.id)).limit(limit)))
 
 
 def _read_beginning(
@@ -225,7 +224,7 @@ def _read_beginning(
 ) -> list[Any]:
     """The first jobs of a page, as far as they are at the beginning of the order."""
     order = place.order
-    columns = [c.desc() if order.descending else c.asc() for c in (_COLUMNS[order.by], jobs.c.id)]
+    columns = _sorted(order, _COLUMNS[order.by], jobs.c.id)
     first = select(jobs.c.id).where(*place.behind()).order_by(*columns).limit(BEGINNING).subquery()
     query = select(*JOB_COLUMNS).join(first, first.c.id == jobs.c.id).where(*conditions)
     return list(connection.execute(query.order_by(*columns).limit(limit)))
@@ -241,8 +240,7 @@ def _read_along(
     """The first jobs along an order's index."""
     place = _COLUMNS[order.by]
     query = select(*JOB_COLUMNS, place.label("place")).where(*conditions).limit(limit)
-    columns = (c.desc() if order.descending else c.asc() for c in (place, jobs.c.id))
-    query = query.order_by(*columns)
+    query = query.order_by(*_sorted(order, place, jobs.c.id))
     if order.by != "cost":
         return list(connection.execute(query))
     # What waits has cost nothing yet: in one index, ended jobs would all lie behind it.
@@ -285,12 +283,10 @@ def _read_few(
         chosen = chosen.where(or_(*behind))
     # Were it not made first, the order's index might be gone along after all.
     some = chosen.offset(0).subquery("some")
-    place = some.c.place.desc() if order.descending else some.c.place.asc()
-    id_order = some.c.id.desc() if order.descending else some.c.id.asc()
+    place, id_order = _sorted(order, some.c.place, some.c.id)
     first = select(some.c.id, some.c.place).order_by(place.nulls_last(), id_order).limit(limit)
     page = first.subquery("page")
-    place = page.c.place.desc() if order.descending else page.c.place.asc()
-    id_order = page.c.id.desc() if order.descending else page.c.id.asc()
+    place, id_order = _sorted(order, page.c.place, page.c.id)
     query = select(*JOB_COLUMNS).join(page, page.c.id == jobs.c.id)
     return list(connection.execute(query.order_by(place.nulls_last(), id_order)))
 
@@ -362,6 +358,10 @@ def _ways_to_hold(connection: Connection, wanted: str) -> list[ColumnElement[boo
         few = len(some) <= MAX_SORTED
         ways.append(jobs.c.id == func.any(bound_texts(some)) if few else held_in)
     return ways
+
+
+def _sorted(order: Order, *columns: ColumnElement[Any]) -> list[ColumnElement[Any]]:
+    return [column.desc() if order.descending else column.asc() for column in columns]
 
 
 def _behind(order: Order, value: SortValue, id_: str) -> ColumnElement[bool]:

@@ -9,11 +9,12 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any, Final
 
-from sqlalchemy import Connection, Row, func, literal, select, text
+from sqlalchemy import Connection, Row, func, literal, select
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.database import Database
+from buildarena_store.derived_tables import OF_A_SWEEP, kept_figures
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import begins_with
 from buildarena_store.rows import bound_texts, columns_of, value_of
@@ -203,7 +204,7 @@ class Sweeps:
         amounts: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids}
         with self._database.statement() as connection:
             for row in connection.execute(_FIGURES, {"ids": list(ids)}):
-                amounts[row.sweep].append(row)
+                amounts[row.key[0]].append(row)
         return {id_: _progress(rows) for id_, rows in amounts.items()}
 
     def troubles(self, sweep_id: str, *, limit: int) -> list[Trouble]:
@@ -284,11 +285,4 @@ def _progress(rows: Sequence[Row[Any]]) -> SweepProgress:
 
 
 _COLUMNS = columns_of(Sweep, sweeps)
-_FIGURES: Final = text(
-    """
-    SELECT kind, key, key ->> 0 AS sweep, sum(a) AS a, sum(b) AS b, sum(c) AS c, sum(d) AS d
-    FROM (SELECT * FROM figures UNION ALL SELECT * FROM figure_changes) AS both_kinds
-    WHERE key ->> 0 = ANY(:ids) AND kind IN ('sweep_jobs', 'sweep_use', 'sweep_lost')
-    GROUP BY kind, key ORDER BY kind, key
-    """
-)
+_FIGURES: Final = kept_figures(f"key ->> 0 = ANY(:ids) AND {OF_A_SWEEP}")

@@ -9,7 +9,6 @@ down_revision = "2026_11_24_job_ids"
 branch_labels = None
 depends_on = None
 
-PLACE = "state, stage, outcome, reason, queue"
 USE = ("requests", "input_tokens", "output_tokens", "cost_usd")
 COLUMNS = "(kind, key, a, b, c, d)"
 
