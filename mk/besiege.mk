@@ -4,8 +4,8 @@ FILES ?= 10000
 FAULTY_RUNS ?= 200
 GAME_TESTS := services/simworker-besiege/tests
 
-fuzz-besiege: $(STAMP) ## Reads 10,000 damaged machine files of the game; each is refused or sound
-	@PYTHONPATH=. $(BIN)/python tests/besiege/fuzz_files.py --files $(FILES)
+fuzz-besiege: $(STAMP) ## Reads, writes and reads again 10,000 damaged machine files; each is refused or whole
+	@PYTHONPATH=.:tests $(BIN)/python tests/besiege/fuzz_files.py --files $(FILES)
 
 besiege: $(STAMP) ## All nine tasks through the stand-in game's window, and 20 killed runners
 	@BESIEGE_TASKS=all BESIEGE_KILLS=20 $(BIN)/pytest -n 2 --timeout=900 $(GAME_TESTS)/test_end_to_end.py $(GAME_TESTS)/test_killed_runner.py

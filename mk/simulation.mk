@@ -1,4 +1,5 @@
-.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-processors
+.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-processors bench-game bench-control bench-worlds \
+	game-evidence evidence-machines
 
 bench-simulation: $(STAMP) ## Measures the simulation and the engines' agreement; JSON in .buildarena/
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_simulation --json .buildarena/bench-simulation.json
@@ -12,3 +13,18 @@ bench-agreement-workshop: $(STAMP) ## The same for 120 machines of the workshop'
 
 bench-processors: $(STAMP) ## Compares 200 trials' bytes over kinds of processors; an hour
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_processors --json .buildarena/bench-processors.json
+
+bench-game: $(STAMP) ## What published trials in the real game say beside our engines
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_game --json .buildarena/bench-game.json
+
+bench-control: $(STAMP) ## What a controller costs: a tick, and a trial beside one by keys
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_control --json .buildarena/bench-control.json
+
+bench-worlds: $(STAMP) ## Who passes in fifty drawn worlds of each task for programs; half an hour
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_worlds --json .buildarena/bench-worlds.json
+
+game-evidence: $(STAMP) ## Writes the tables of assumptions and of agreement with the game in the documents
+	@$(TEST_PYTHON) -m benchmarks.simulation.game_evidence
+
+evidence-machines: $(STAMP) ## Writes the machines of a first evening with the game, after a change of the expert
+	@$(TEST_PYTHON) -m support.machines.evidence

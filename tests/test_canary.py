@@ -14,6 +14,7 @@ NUMBER = CANARY.rpartition(" ")[2]
 SOURCES = [
     *sorted((ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/catalogue").glob("*.yaml")),
     *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").glob("*.py")),
+    *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").rglob("*.lua")),
     ROOT / "docs/expert.md",
     PAGE,
 ]

@@ -12,6 +12,7 @@ $Venv = Join-Path $Root 'venv'
 $BuildArena = Join-Path $Venv 'Scripts\buildarena.exe'
 $KeyFile = Join-Path $Root 'runner.key'
 $SettingsFile = Join-Path $Root 'runner.json'
+$Constraints = Join-Path $Root 'constraints.txt'
 $Logs = Join-Path $Root 'logs'
 
 function Assert-Windows {

@@ -30,10 +30,35 @@ param(
     # Certificates to trust besides the system's (PEM), for a service with its own authority.
     [string] $CaFile = '',
     [string] $Python = 'py',
-    [switch] $SkipCalibration
+    [switch] $SkipCalibration,
+    # Installs although the screen may lock, sleep or show a screen saver.
+    [switch] $SkipDesktopCheck
 )
 
 . "$PSScriptRoot\common.ps1"
+
+function Save-Constraints {
+    # Each wheel of ours by its path, so that no index can put another of its name in its place;
+    # everything else in the versions that were tested.
+    param([Parameter(Mandatory)] [string] $Folder)
+    $ours = @(Get-ChildItem -LiteralPath $Folder -Filter 'buildarena*.whl')
+    if ($ours.Count -eq 0) { throw "$Folder has no wheels of BuildArena: name the folder that make dist wrote" }
+    $lines = @($ours | ForEach-Object {
+        $name = $_.Name.Split('-')[0].Replace('_', '-')
+        "$name @ $(([Uri] $_.FullName).AbsoluteUri)"
+    })
+    $tested = Join-Path $Folder 'constraints.txt'
+    if (-not (Test-Path -LiteralPath $tested)) { throw "$tested is not there: copy the whole folder that make dist wrote" }
+    $lines += @(Get-Content -LiteralPath $tested)
+    [IO.File]::WriteAllLines($Constraints, [string[]] $lines)
+}
+
+function Get-Wheel {
+    param([Parameter(Mandatory)] [string] $Folder, [Parameter(Mandatory)] [string] $Name)
+    $found = @(Get-ChildItem -LiteralPath $Folder -Filter "$Name-*.whl")
+    if ($found.Count -ne 1) { throw "$Folder has $($found.Count) wheels of ${Name}: copy what make dist wrote into an empty folder" }
+    $found[0].FullName
+}
 
 function Install-Packages {
     $launcher = if ($Python -eq 'py') { @('py', '-3') } else { @($Python) }
@@ -47,10 +72,18 @@ function Install-Packages {
         if ($LASTEXITCODE -ne 0) { throw "no environment could be made in $Venv" }
     }
     $from = @()
+    $wanted = @('buildarena-cli', 'buildarena-simworker-besiege[window]')
     if ($Wheels) {
-        $from = @('--find-links', (Resolve-Path -LiteralPath $Wheels).Path)
+        $folder = (Resolve-Path -LiteralPath $Wheels).Path
+        Save-Constraints -Folder $folder
+        $from = @('--constraint', $Constraints)
+        # What is asked for by its name and an extra is not taken from a constraint's path.
+        $wanted = @(
+            (Get-Wheel -Folder $folder -Name 'buildarena_cli'),
+            "$(Get-Wheel -Folder $folder -Name 'buildarena_simworker_besiege')[window]"
+        )
     }
-    & (Join-Path $Venv 'Scripts\python.exe') -m pip install --quiet --disable-pip-version-check --upgrade @from buildarena-cli 'buildarena-simworker-besiege[window]'
+    & (Join-Path $Venv 'Scripts\python.exe') -m pip install --quiet --disable-pip-version-check --upgrade @from @wanted
     if ($LASTEXITCODE -ne 0) { throw 'the packages could not be installed; pip says why above' }
 }
 
@@ -86,6 +119,13 @@ function Save-Settings {
     [IO.File]::WriteAllText($SettingsFile, ($kept | ConvertTo-Json -Depth 4))
 }
 
+function Test-Desktop {
+    & (Join-Path $PSScriptRoot 'check-desktop.ps1') -GameFolder $GameFolder
+    if ($LASTEXITCODE -ne 0 -and -not $SkipDesktopCheck) {
+        throw 'this desktop would stop the runner: change what is named above, or give -SkipDesktopCheck'
+    }
+}
+
 function Test-Runner {
     $trust = @()
     if ($CaFile) { $trust = @('--ca-file', $CaFile) }
@@ -117,12 +157,13 @@ function Register-Runner {
 }
 
 Assert-Windows
+Test-Desktop
 New-Item -ItemType Directory -Force -Path $Root, $Logs | Out-Null
 Stop-Runner
 Install-Packages
 Save-Key
 Save-Settings
-foreach ($name in 'common.ps1', 'start-runner.ps1', 'uninstall-runner.ps1') {
+foreach ($name in 'common.ps1', 'check-desktop.ps1', 'start-runner.ps1', 'uninstall-runner.ps1') {
     $source = Join-Path $PSScriptRoot $name
     $target = Join-Path $Root $name
     if ($source -ne $target) { Copy-Item -LiteralPath $source -Destination $target -Force }

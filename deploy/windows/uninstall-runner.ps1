@@ -17,13 +17,13 @@ if (Get-ScheduledTask -TaskName $TaskName -ErrorAction SilentlyContinue) {
     Unregister-ScheduledTask -TaskName $TaskName -Confirm:$false
 }
 if (Test-Path -LiteralPath $KeyFile) { Remove-Item -LiteralPath $KeyFile -Force }
-$left = @($Venv, $SettingsFile, (Join-Path $Root 'besiege'))
+$left = @($Venv, $SettingsFile, $Constraints, (Join-Path $Root 'besiege'))
 if (-not $KeepLogs) { $left += $Logs }
 foreach ($path in $left) {
     if (Test-Path -LiteralPath $path) { Remove-Item -LiteralPath $path -Recurse -Force }
 }
 # Last, as this script may be one of them.
-foreach ($name in 'start-runner.ps1', 'common.ps1', 'uninstall-runner.ps1') {
+foreach ($name in 'start-runner.ps1', 'check-desktop.ps1', 'common.ps1', 'uninstall-runner.ps1') {
     $path = Join-Path $Root $name
     if (Test-Path -LiteralPath $path) { Remove-Item -LiteralPath $path -Force }
 }

@@ -6,7 +6,9 @@ from buildarena_api.leaderboard.filters import _ranked_over
 from buildarena_benchmark import builtin_tasks, paper_tasks
 
 FAMILIES = {"budget-1", "repair-1", "identify-1"}
+CONTROL = {"landing-1", "slalom-2", "hover-3"}
 WORKSHOP = {*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"}
+OTHERS = WORKSHOP | FAMILIES | CONTROL
 
 
 def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
@@ -22,8 +24,9 @@ def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
         (None, None, set(paper_tasks())),
         (None, ["flight"], {"flight-1", "flight-2"}),
         (None, ["mechanisms", "flight"], WORKSHOP),
-        (None, ["headroom"], set(builtin_tasks()) - set(paper_tasks()) - WORKSHOP - FAMILIES),
+        (None, ["headroom"], set(builtin_tasks()) - set(paper_tasks()) - OTHERS),
         (None, ["families"], FAMILIES),
+        (None, ["control"], CONTROL),
         (None, ["support"], {"support-1", "support-2", "support-3"}),
         (["support-1"], ["flight"], None),
     ],

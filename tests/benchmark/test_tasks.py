@@ -39,15 +39,19 @@ HEADROOM = [
     *("flight-3", "lift-4", "mechanisms-7"),
 ]
 FAMILIES = ["budget-1", "repair-1", "identify-1"]
+CONTROL = ["landing-1", "slalom-2", "hover-3"]
+
+
+GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL}
 
 
 def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
-    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES]
+    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL]
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         kind, _, level = name.rpartition("-")
-        category = "headroom" if name in HEADROOM else "families" if name in FAMILIES else kind
+        category = next((group for group, names in GROUPS.items() if name in names), kind)
         assert (task.category, task.level) == (category, int(level))
         assert set(task.difficulty) == DIMENSIONS
         assert all(1 <= weight <= 3 for weight in task.difficulty.values())

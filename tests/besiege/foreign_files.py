@@ -29,9 +29,3 @@ def block(kind: int, place: str = 'x="0" y="0" z="1.5"', data: str = "", scale: 
         f'<Rotation x="0" y="0" z="0" w="1"/><Scale x="{scale}" y="1" z="1"/></Transform>'
         f"<Data>{data}</Data></Block>"
     )
-
-
-TRACKER = (
-    '<StringArray key="requiredMods">1d45bae7~L~1.0.0~BuildArena Block Tracker</StringArray>'
-    '<Boolean key="tracker.enabled">True</Boolean>'
-)

@@ -1,4 +1,4 @@
-"""Reads many damaged machine files; `make fuzz-besiege`."""
+"""Reads, writes and reads again many damaged machine files; `make fuzz-besiege`."""
 
 import argparse
 import random
@@ -7,10 +7,33 @@ import time
 import traceback
 from collections import Counter
 
-from tests.besiege.hostile import mutated
-from tests.besiege.test_hostile_files import SAMPLES, refused_or_sound
+from tests.besiege.golden import golden_file
+from tests.besiege.hostile import mutated, rearranged
+from tests.besiege.playing import press, vehicle
+from tests.besiege.real_files import RICH
+from tests.besiege.round_trips import round_trip
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_besiege import plain_machine_file, prepare_run
 
 SLOWEST_S = 10.0
+
+
+def _trial(task: str) -> bytes:
+    scenario, presses = builtin_tasks()[task].scenario, [press(1.0, "UpArrow", 1.0)]
+    machine = vehicle(cannon=True)
+    return prepare_run(machine, scenario, name="m", run_id="r", controls=presses).machine_file
+
+
+SAMPLES = [
+    golden_file("single_5_transport_medium"),
+    plain_machine_file(vehicle(cannon=True), name="m", controls=[press(1.0, "UpArrow", 1.0)]),
+    _trial("transport-2"),
+    _trial("lift-2"),
+    RICH,
+    RICH,
+]
+DAMAGES = [mutated, rearranged]
 
 
 def main() -> int:
@@ -21,14 +44,15 @@ def main() -> int:
     drawn = random.Random(options.seed)
     ends: Counter[str] = Counter()
     slowest, started = 0.0, time.perf_counter()
-    for _ in range(options.files):
+    for number in range(options.files):
         which, seed = drawn.randrange(len(SAMPLES)), drawn.getrandbits(32)
+        damage = DAMAGES[number % len(DAMAGES)]
         before = time.process_time()
         try:
-            ends["sound" if refused_or_sound(mutated(SAMPLES[which], seed)) else "refused"] += 1
+            ends["whole" if round_trip(damage(SAMPLES[which], seed)) else "refused"] += 1
         except Exception:  # noqa: BLE001  whatever it is, it is what is looked for
             traceback.print_exc()
-            print(f"file {which}, seed {seed}")  # noqa: T201  the command's output
+            print(f"file {which}, {damage.__name__}, seed {seed}")  # noqa: T201  the output
             ends["broken"] += 1
         slowest = max(slowest, time.process_time() - before)
     print(  # noqa: T201  the command's output

@@ -1,7 +1,9 @@
 """Machine files of strangers: damaged at random, and made to do harm."""
 
+import copy
 import random
 import re
+from xml.etree import ElementTree as ET
 
 BOMB = (
     b'<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "aaaaaaaaaa">'
@@ -92,3 +94,53 @@ def _brackets(data: bytes, drawn: random.Random) -> bytes:
             [b"1", b"-1", b"null", b"[]", b"{}", b'"A"', b"1e999", b"NaN", b"", b"{", b"true"]
         )
     return data[: start + 19] + b"".join(words) + data[end:]
+
+
+TAGS = ["Boolean", "Single", "String", "StringArray", "Data", "Block", "Blocks", "Transform", "X"]
+KEYS = ["flipped", "bmt-forward", "bmt-speed", "lua_data", "LUA", "buildarena.stored.lua", "", "k"]
+NAMES = ["key", "id", "guid", "x", "w", "place", "name", "bsgVersion", "modId", "xml:space"]
+VALUES = [*TEXTS, "T", "M3", "\t a \r\n b ", "]]>", "--[[", "]] os.exit()", "\u2028", "a" * 3000]
+
+
+def rearranged(data: bytes, seed: int) -> bytes:
+    """A file with a few elements, keys and values changed, that is still valid XML."""
+    drawn = random.Random(seed)
+    root = ET.fromstring(data)
+    for _ in range(drawn.randint(1, 4)):
+        element = drawn.choice(list(root.iter()))
+        drawn.choice((_tag, _attribute, _attribute, _text, _text, _child, _child, _child))(
+            element, drawn
+        )
+    # A carriage return in a text stays one only as a reference.
+    return ET.tostring(root, encoding="utf-8").replace(b"\r", b"&#13;")
+
+
+def _tag(element: ET.Element, drawn: random.Random) -> None:
+    element.tag = drawn.choice(TAGS)
+
+
+def _attribute(element: ET.Element, drawn: random.Random) -> None:
+    name = drawn.choice([*element.keys(), drawn.choice(NAMES)])
+    if drawn.random() < 0.2:
+        element.attrib.pop(name, None)
+    else:
+        element.set(name, drawn.choice(KEYS if name == "key" else VALUES))
+
+
+def _text(element: ET.Element, drawn: random.Random) -> None:
+    if drawn.random() < 0.8:
+        element.text = drawn.choice(VALUES)
+    else:
+        element.tail = drawn.choice(VALUES)
+
+
+def _child(element: ET.Element, drawn: random.Random) -> None:
+    """Doubles, moves or removes one of an element's children."""
+    if not len(element):
+        return
+    at = drawn.randrange(len(element))
+    child = copy.deepcopy(element[at])
+    if drawn.random() < 0.5:
+        element.remove(element[at])
+    if drawn.random() < 0.7:
+        element.insert(drawn.randint(0, len(element)), child)

@@ -3,6 +3,7 @@
 from support.lua_game import LuaGame
 
 from buildarena_besiege import GameLog
+from buildarena_besiege.exporting.probes import height_at
 from buildarena_besiege.run import prepared_machine
 from buildarena_geometry import KeyPress, Machine
 
@@ -39,6 +40,7 @@ def played(machine, scenario, *, controls=None, updates=None, run_id=RUN, **game
     references: dict[object, int] = {r.reference_key: i for i, r in enumerate(found.records)}
     references[0] = references.pop(found.records[0].reference_key)
     wanted = round(scenario.duration_s * 100) if updates is None else updates
+    game.setdefault("ground", lambda east, north: height_at(scenario.terrain, east, north))
     return LuaGame(references, **game).play(found.script, wanted)
 
 

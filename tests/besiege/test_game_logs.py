@@ -37,7 +37,7 @@ def test_a_log_knows_its_begin_its_end_and_its_time() -> None:
     assert (log.begun, log.ended, log.time_s, log.complaints) == (False, False, 0.0, ())
     log.read(LINES[0])
     assert (log.begun, log.ended, log.time_s) == (True, False, 0.0)
-    log.read("\n".join(LINES[:11]))
+    log.read("\n".join(LINES[:12]))
     assert log.time_s == pytest.approx(0.4)
     log.read(WHOLE)
     assert (log.begun, log.ended, log.time_s) == (True, True, 2.5)

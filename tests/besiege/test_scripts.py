@@ -228,3 +228,54 @@ def test_machines_the_game_cannot_take_are_refused() -> None:
         prepare_run(Machine(), SHORT, name="a", run_id="r")
     with pytest.raises(ValueError, match="1 to 200 characters"):
         prepare_run(vehicle(), SHORT, name="a", run_id="")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_first_lines_are_printed_again_at_one_and_at_two_seconds(version) -> None:
+    lines = played(vehicle(), SHORT, version=version, updates=230).lines
+    early = [line for line in lines if line.split(",")[2] == "s" and int(line.split(",")[3]) <= 60]
+    assert {line: early.count(line) for line in early} == dict.fromkeys(early, 3)
+    assert len(set(early)) == 15
+    one, two = (
+        next(i for i, line in enumerate(lines) if f",s,{update}," in line) for update in (100, 200)
+    )
+    for at in (one, two):
+        assert set(early) <= set(lines[at : at + 30])
+
+
+def test_a_large_machine_does_not_push_its_own_lines_out_of_the_window() -> None:
+    machine = vehicle()
+    for _ in range(92):
+        assert attach(machine, str(machine.state.next_id - 1), "E").ok
+    lines = played(machine, Scenario(duration_s=2.0), updates=130).lines
+    at = next(i for i, line in enumerate(lines) if ",s,100,12," in line)
+    again = lines[at + 1 : next(i for i, line in enumerate(lines) if ",s,104,1," in line)]
+    assert len(again) == 150
+    assert set(again) <= set(lines[:at])
+
+
+def test_what_blocks_are_is_looked_up_once() -> None:
+    game = played(vehicle(), Scenario(duration_s=2.0))
+    assert game.looked_up == 4
+
+
+def test_a_block_that_the_game_destroyed_is_not_asked_where_it_is() -> None:
+    game = played(vehicle(), Scenario(duration_s=2.0), destroyed=lambda i, n: i == 2 and n > 100)
+    entries = [line.split(",") for line in game.lines if ",s," in line]
+    states = {int(one[3]): one[17] for one in entries}
+    assert (states[100], states[104], states[200]) == ("-", "x", "x")
+    places = {int(one[3]): one[18:21] for one in entries}
+    assert places[200] == places[100], "where it was last"
+    trajectory = trajectory_of(log_of(game), vehicle(), Scenario(duration_s=2.0), game="1", mod="2")
+    assert trajectory.pieces[-1].tolist() == [0, 0, 2, 0], "it is joined to nothing any more"
+
+
+def test_a_script_formats_no_number_as_the_computers_language_has_it() -> None:
+    """The mod's %f ignores its precision, and writes a comma where people write one."""
+    for task in TASKS.values():
+        try:
+            script = prepare_run(vehicle(cannon=True), task.scenario, name="a", run_id="r").script
+        except MachineNotPlayableError:
+            continue
+        code = [line for line in script.splitlines() if not line.startswith("--")]
+        assert not [line for line in code if "%f" in line or "%g" in line or "tostring" in line]

@@ -10,8 +10,9 @@ from support.machines.building import attach
 from tests.besiege.playing import RUN, log_of, played, press, vehicle
 
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_besiege import GameLog, LogIncompleteError, trajectory_of
+from buildarena_besiege import GameLog, LogIncompleteError, game_start, trajectory_of
 from buildarena_besiege.logs.trajectories import Samples, made_trajectory
+from buildarena_besiege.run import prepared_machine
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, read_trajectory, simulate, write_trajectory
 
@@ -233,3 +234,42 @@ def rocket_with_a_weight_aside() -> Machine:
     for base, face in (("1", "C"), ("12", "A")):
         assert attach(machine, base, face, "Small Wooden Block", note="").ok
     return machine
+
+
+ROOTS = [record.position for record in prepared_machine(MACHINE, SHORT, run_id=RUN).records]
+
+
+def begun(i: int, n: int) -> tuple[float, float, float]:
+    """Where blocks are that stand where the game puts them, and drift slowly."""
+    x, y, z = ROOTS[i] + game_start(MACHINE, SHORT).position[[0, 2, 1]]
+    return (float(x) + 0.01 * n / 4, float(y), float(z))
+
+
+@pytest.mark.parametrize("late", [0.24, 0.32, 0.4])
+def test_a_late_start_counts_where_the_first_sample_is_near_where_the_trial_begins(late) -> None:
+    gone = set(range(4, round(late * 100), 4))
+    log = without(played(MACHINE, SHORT, path=begun), gone)
+    found = trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
+    assert found.settings["longest_gap_s"] == pytest.approx(late)
+
+    def elsewhere(i: int, n: int) -> tuple[float, float, float]:
+        x, y, z = begun(i, n)
+        return (x + 4.0, y, z)
+
+    log = without(played(MACHINE, SHORT, path=elsewhere), gone)
+    with pytest.raises(LogIncompleteError, match=r"Between 0\.00 s"):
+        trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
+
+
+def test_a_start_later_than_that_is_refused() -> None:
+    log = without(played(MACHINE, SHORT, path=begun), set(range(4, 44, 4)))
+    with pytest.raises(LogIncompleteError, match=r"Between 0\.00 s and 0\.44 s"):
+        trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
+
+
+def test_a_cargo_that_the_game_destroyed_is_no_trial() -> None:
+    scenario = TASKS["transport-2"].scenario.model_copy(update={"duration_s": 2.0})
+    cargo = len(MACHINE.blocks)
+    game = played(MACHINE, scenario, path=still, destroyed=lambda i, n: i == cargo and n > 150)
+    with pytest.raises(LogIncompleteError, match=r"destroyed the cargo at 1\.52 s"):
+        trajectory(game, scenario=scenario)

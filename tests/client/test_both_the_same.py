@@ -63,6 +63,7 @@ CALLED = {
     "get_artifact_by_name": "artifact",
     "get_trajectory": "trajectory",
     "export": "export_leaderboard",
+    "show_evidence": "evidence_table",
     "agreement_table": "agreement",
     "stream_job": "job_events",
     "stream_sweep": "sweep_events",

@@ -1,9 +1,11 @@
 """The scripts for a Windows machine: PowerShell, and of commands and functions that there are."""
 
+import json
 import os
 import re
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,6 +25,7 @@ CALL = re.compile(r"(?:Invoke-BuildArena|& \$BuildArena) (?P<words>[a-z][^\n|]+)
 # What comes with Windows PowerShell 5.1 and its modules.
 CMDLETS = {
     *("Copy-Item", "ConvertFrom-Json", "ConvertTo-Json", "ForEach-Object", "Get-CimInstance"),
+    *("Get-ChildItem", "Get-ItemProperty", "Write-Warning"),
     *("Get-Content", "Get-Date", "Get-Item", "Get-ScheduledTask", "Join-Path", "Move-Item"),
     *("New-Item", "New-Object", "New-ScheduledTaskAction", "New-ScheduledTaskPrincipal"),
     *("New-ScheduledTaskSettingsSet", "New-ScheduledTaskTrigger", "New-TimeSpan", "Out-Null"),
@@ -140,3 +143,68 @@ def test_commands_of_the_runner_load_nothing_that_windows_lacks(words) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_the_installer_takes_our_wheels_by_path_and_the_rest_as_tested() -> None:
+    text = (WINDOWS / "install-runner.ps1").read_text()
+    assert "--find-links" not in text, "an index could put another package of the name in its place"
+    assert "'--constraint', $Constraints" in text
+    assert "constraints.txt" in text
+
+
+@pytest.mark.slow
+def test_pip_takes_a_wheel_that_a_constraint_names_by_its_path(tmp_path) -> None:
+    """What the installer relies on: also for a package with extras, and for what it needs."""
+    for name, needs in (("arena-low", ""), ("arena-top", "Requires-Dist: arena-low==1.0\n")):
+        _wheel(tmp_path, name, needs)
+    lines = [f"{file.name.split('-')[0]} @ {file.as_uri()}" for file in tmp_path.glob("*.whl")]
+    (top,) = tmp_path.glob("arena_top*.whl")
+    constraints = tmp_path / "constraints.txt"
+    constraints.write_text("\n".join(line.replace("_", "-", 1) for line in lines) + "\n")
+    subprocess.run([sys.executable, "-m", "venv", str(tmp_path / "venv")], check=True, timeout=120)
+    done = subprocess.run(
+        [
+            *(
+                tmp_path / "venv" / "bin" / "python",
+                "-m",
+                "pip",
+                "install",
+                "--dry-run",
+                "--no-index",
+                "--quiet",
+            ),
+            *("--report", "-", "--constraint", str(constraints), f"{top}[window]"),
+        ],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    urls = {one["download_info"]["url"] for one in json.loads(done.stdout)["install"]}
+    assert urls == {file.as_uri() for file in tmp_path.glob("*.whl")}
+
+
+def _wheel(folder: Path, name: str, needs: str) -> None:
+    stem = name.replace("-", "_")
+    info = f"{stem}-1.0.dist-info"
+    with zipfile.ZipFile(folder / f"{stem}-1.0-py3-none-any.whl", "w") as wheel:
+        metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\nProvides-Extra: window\n"
+        wheel.writestr(f"{info}/METADATA", metadata + needs)
+        wheel.writestr(
+            f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
+        )
+        wheel.writestr(f"{info}/RECORD", "")
+
+
+@pytest.mark.parametrize(
+    "looked_at",
+    [
+        *("STANDBYIDLE", "HIBERNATEIDLE", "VIDEOIDLE", "ScreenSaveActive"),
+        *("InactivityTimeoutSecs", "AutoAdminLogon", "RUNASADMIN", "SESSIONNAME"),
+    ],
+)
+def test_the_desktop_is_checked_before_anything_is_installed(looked_at) -> None:
+    assert looked_at in (WINDOWS / "check-desktop.ps1").read_text()
+    text = (WINDOWS / "install-runner.ps1").read_text()
+    assert text.index("\nTest-Desktop\n") < text.index("\nInstall-Packages\n")

@@ -6,6 +6,7 @@ import pytest
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_environment import Environment
+from buildarena_environment import briefing as words_around
 from buildarena_environment.briefing import briefing_digest
 from buildarena_environment.world import world_text
 from buildarena_geometry import module_set, modules_named
@@ -33,6 +34,8 @@ def test_the_world_is_told_from_the_constants(monkeypatch):
         far.moment,
         constants.ROPE_STRENGTH,
         constants.LOAD_FILTER_S,
+        constants.BLOW_FILTER_S,
+        constants.CARGO_BOUNCE,
     ):
         assert plain(figure) in text
     monkeypatch.setattr(constants, "GRAVITY", 9.75)
@@ -91,3 +94,15 @@ def test_told_and_withheld_are_tracks_of_their_own():
     # Tracks of before there were data sheets say nothing of them, and had none.
     assert "data_sheets" not in configs[0]
     assert SweepSpec(tasks=["lift-1"], models=["a"]).data_sheets
+
+
+@pytest.mark.parametrize("file", ["briefing.md", "controller.md", "senses.json"])
+def test_other_words_around_a_statement_are_another_digest(monkeypatch, file):
+    caches = (briefing_digest, words_around._text)
+    digest, read = briefing_digest("once", "guidelines"), words_around.file_text
+    monkeypatch.setattr(words_around, "file_text", lambda name: read(name) + "!" * (name == file))
+    for cached in caches:
+        cached.cache_clear()
+    assert briefing_digest("once", "guidelines") != digest
+    for cached in caches:
+        cached.cache_clear()

@@ -131,3 +131,18 @@ def test_a_machine_can_not_wander_out_of_reach_step_by_step(build):
     assert outcome.reason == RefusalClass.OUT_OF_RANGE
     assert assembly == before
     assert Machine.from_document(assembly.to_document()) == assembly
+
+
+def test_an_accepted_program_is_in_the_log_as_it_is_however_long(build) -> None:
+    machine, program = build(), "function control() return {} end" + "\n-- é" * 9_000
+    assert machine.act("set_controller", {"program": program}).ok
+    assert machine.log[-1].arguments == {"program": program}
+    again = replay(machine.log)
+    assert again.controller == program
+    assert again.to_document() == machine.to_document()
+    refused = machine.act("set_controller", {"program": program * 3})
+    assert not refused.ok
+    assert machine.log[-1].arguments == {
+        "program": {"unreadable": f"text of {3 * len(program)} characters"}
+    }
+    assert replay(machine.log).to_document() == machine.to_document()

@@ -30,7 +30,7 @@ def test_its_python_runs_as_it_stands(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "change", [("load 246.19", "load 246.20"), ("Refused (", "Accepted ("), ('"F")', '"A")')]
+    "change", [("load 959.81", "load 959.82"), ("Refused (", "Accepted ("), ('"F")', '"A")')]
 )
 def test_it_can_fail(tmp_path, monkeypatch, change, capsys):
     monkeypatch.chdir(tmp_path)

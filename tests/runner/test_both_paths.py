@@ -114,6 +114,7 @@ def test_a_machine_that_is_refused_has_failed(context, do_next) -> None:
     assert (now.outcome, now.indicator, now.metrics["parts"]) == ("unsuccessful", 0.0, 2)
     (record,) = context.store.rollouts.read(job.id)
     assert (record.trajectory_hash, record.trace) == (None, [])
+    assert "which is tracked" in now.manifest["simulator"]["refused"]
 
 
 def test_a_fault_keeps_its_evidence_and_is_tried_again(context, do_next) -> None:

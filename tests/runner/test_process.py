@@ -68,7 +68,7 @@ def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
     secret = runner_key(context)[1]
     with runner(tmp_path, url, secret, "--at-once", "2") as process:
         state = context.store.jobs.get
-        wait_until(lambda: all(state(j.id).state == "done" for j in jobs), 60, "jobs are done")
+        wait_until(lambda: all(state(j.id).state == "done" for j in jobs), 150, "jobs are done")
         for job in jobs:
             kept = context.store.jobs.artifacts(ended(context, job).id)
             assert kept["trajectory-0"] == digest
@@ -78,15 +78,15 @@ def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
         assert (worker.alive, worker.pid) == (True, process.pid)
         assert worker.peak_memory_bytes > 20_000_000
         long = waiting(context, LONG)
-        wait_until(lambda: state(long.id).state == "running", 30, "the long trial runs")
+        wait_until(lambda: state(long.id).state == "running", 90, "the long trial runs")
         # A crashed engine costs one trial.
         for engine in engines(process):
             engine.kill()
         wait_until(lambda: state(long.id).faults == 1, 30, "the fault is reported")
         assert "ended with code -9 in the middle of a trial" in state(long.id).detail
-        wait_until(lambda: state(long.id).state == "running", 30, "it is tried again")
+        wait_until(lambda: state(long.id).state == "running", 90, "it is tried again")
         process.send_signal(signal.SIGTERM)
-        assert process.wait(8) == 0
+        assert process.wait(20) == 0
         now = state(long.id)
         assert (now.state, now.faults) == ("queued", 1)
         results = [one.result for one in context.store.jobs.attempts(long.id)]

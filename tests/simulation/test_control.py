@@ -12,7 +12,7 @@ from support.machines.trials import press
 from buildarena_geometry import KeyPress, Machine, load_catalogue
 from buildarena_geometry.flames import heating
 from buildarena_simulation import Scenario, simulate
-from buildarena_simulation.control import heated_cannons, plan_schedule
+from buildarena_simulation.control import DriveState, heated_cannons, key_levels, plan_schedule
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.scenario import Control, SpanPlacement
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, UP, WEST
@@ -22,12 +22,13 @@ WHEEL_SPEED, WHEEL_LAG_RATE = MOTOR.speed, MOTOR.lag_per_s
 
 
 def _speeds(machine: Machine, *keys: KeyPress) -> np.ndarray:
+    structure, times = structure_of(machine), 0.01 * np.arange(300)
     return plan_schedule(
-        structure_of(machine),
-        bindings_of(machine),
-        keys,
+        structure,
+        key_levels(bindings_of(machine), keys, times),
+        DriveState.still(structure),
         control=Control(mode="agent"),
-        step_count=300,
+        times=times,
         time_step_s=0.01,
     ).targets
 

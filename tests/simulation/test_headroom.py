@@ -53,7 +53,8 @@ def test_stilts_that_hang_over_the_floor_add_nothing(engine, tasks, task, gap, h
         trial(tasks[task], propped_beam(gap, places, height=height, foot=1), engine, duration_s=8.0)
         for places in ((), (-3, 3))
     )
-    assert stilted[0].indicator <= 1.05 * bare[0].indicator
+    # They weigh a fifth of the machine, so the cargo bounces a little less.
+    assert stilted[0].indicator <= 1.1 * bare[0].indicator
 
 
 @slow_on_pybullet

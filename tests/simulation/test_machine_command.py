@@ -1,5 +1,6 @@
 """The command `machine simulate` and `machine render`, without any server."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -109,7 +110,7 @@ def test_a_seed_varies_the_start(run, tmp_path) -> None:
 
 
 def test_seeds_tell_how_often_a_machine_succeeds(run) -> None:
-    given = ("simulate", str(DATA / "beam.json"), "--engine", "mujoco")
+    given = ("simulate", str(DATA / "beam-braced-on-top.json"), "--engine", "mujoco")
     done = run(*given, "--seeds", "3", "--json", task_name="support-1")
     found = json.loads(done.stdout)
     assert (found["trials"], found["successes"], found["robustness"]) == (3, 3, 1.0)
@@ -186,3 +187,64 @@ def test_an_assembly_with_too_few_sub_structures_is_not_simulated(run) -> None:
     assert json.loads(done.stdout)["success"] is False
     fine = run("check", str(DATA / "assembly-braced.json"), task_name="lift-3")
     assert fine.exit_code == 0, fine.output
+
+
+CONTROL = Path(__file__).parents[2] / "examples" / "control"
+
+
+def controlled(run, program: Path, task_name: str, *more: str):
+    car = str(CONTROL / "car.machine.json")
+    more = ("--controller", str(program), "--engine", "mujoco", *more)
+    return run("simulate", car, *more, task_name=task_name)
+
+
+def test_a_program_acts_in_place_of_keys(run, tmp_path) -> None:
+    task = str(CONTROL / "to-the-mark.yaml")
+    done = controlled(run, CONTROL / "to-the-mark.lua", task, "--json")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["success"]
+
+    wrong = tmp_path / "wrong.lua"
+    wrong.write_text("function control(t, sense)\n  return { forwards = sense.goal.x }\nend\n")
+    failed = controlled(run, wrong, task)
+    assert "line 2, tick 0 (0.00 s): attempt to index a nil value (field 'goal')" in failed.stderr
+    wrong.write_text("function control(t, sense) return { spining_forward = 1 } end")
+    assert "there is spinning_forward" in controlled(run, wrong, task).stderr
+    refused = controlled(run, CONTROL / "to-the-mark.lua", "transport-1")
+    assert "the task offers no senses: it takes keys alone" in refused.stderr
+
+
+def test_what_a_program_sensed_is_written_tick_by_tick(run, tmp_path) -> None:
+    out = tmp_path / "trace.csv"
+    task = str(CONTROL / "to-the-mark.yaml")
+    done = controlled(run, CONTROL / "to-the-mark.lua", task, "--trace", str(out))
+    assert done.exit_code == 0, done.output
+    head, *rows = list(csv.reader(out.read_text().splitlines()))
+    assert head[:2] == ["t", "position.x"]
+    assert "marks.goal.relative.y" in head
+    assert any(name.endswith(".spinning_forward") for name in head)
+    assert [float(row[0]) for row in rows] == pytest.approx([k / 25 for k in range(500)])
+    keys = run("simulate", str(CONTROL / "car.machine.json"), "--trace", str(out), task_name=task)
+    assert keys.exit_code != 0
+    assert "the machine has none: --controller" in keys.stderr
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [(None, "No such file"), ("x" * 70_000, "at most 65,536 bytes, found 70,000")],
+)
+def test_a_program_that_cannot_be_taken_is_refused(run, tmp_path, content, words) -> None:
+    program = tmp_path / "program.lua"
+    if content is not None:
+        program.write_text(content)
+    done = controlled(run, program, str(CONTROL / "to-the-mark.yaml"))
+    assert done.exit_code != 0
+    assert words in done.stderr
+
+
+def test_the_documentation_shows_the_example_as_it_is() -> None:
+    page = (CONTROL.parents[1] / "docs" / "control.md").read_text(encoding="utf-8")
+    assert (CONTROL / "to-the-mark.lua").read_text(encoding="utf-8") in page
+    task = (CONTROL / "to-the-mark.yaml").read_text(encoding="utf-8")
+    senses = page.split("```yaml\n")[1].split("```")[0].split("\n", 2)[2]
+    assert senses in task

@@ -58,7 +58,7 @@ def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tas
 @slow_on_pybullet
 def test_overlap_on_the_terrain_never_hurts(engine, tasks) -> None:
     loads = [
-        trial(tasks["support-1"], beam(length), engine)[0].metrics["load_at_first_break"]
+        trial(tasks["support-1"], beam(length, "t"), engine)[0].metrics["load_at_first_break"]
         for length in (7, 11, 25)
     ]
     assert loads == sorted(loads)
@@ -112,7 +112,7 @@ def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(engine, tasks) -> N
 
 @slow_on_pybullet
 def test_a_bridge_built_along_the_gap_is_turned_across_it(engine, tasks) -> None:
-    along = trial(tasks["support-1"], beam(7, direction=EAST), engine)[0]
-    across = trial(tasks["support-1"], beam(7), engine)[0]
+    along = trial(tasks["support-1"], beam(7, "t", direction=EAST), engine)[0]
+    across = trial(tasks["support-1"], beam(7, "t"), engine)[0]
     assert along.success
     assert along.indicator == pytest.approx(across.indicator, rel=0.1)

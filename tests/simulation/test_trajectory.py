@@ -61,7 +61,7 @@ def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(engine, tas
 
 
 def test_a_trajectory_tells_what_each_joint_bears_over_time(engine, tasks) -> None:
-    trajectory = simulate(beam(7), tasks["support-1"].scenario, engine)
+    trajectory = simulate(beam(7, "t"), tasks["support-1"].scenario, engine)
     loads = trajectory.joint_loads
     assert loads is not None
     assert loads.dtype == np.float32
@@ -108,7 +108,7 @@ def test_older_files_are_read_and_can_be_written(tasks) -> None:
     assert again.joint_loads is None
     assert _equal(dataclasses.replace(trajectory, joint_loads=None), again)
     assert write_trajectory(again, schema=2) == old
-    with pytest.raises(ValueError, match="schema 1 are not written, only of 2 and 3"):
+    with pytest.raises(ValueError, match="schema 1 are not written, only of 2 and 3 and 4"):
         write_trajectory(trajectory, schema=1)
     with pytest.raises(ValueError, match="joint_loads has shape"):
         dataclasses.replace(trajectory, joint_loads=np.zeros((3, 2), dtype=np.float32))

@@ -93,3 +93,11 @@ def test_workers_that_are_killed_under_the_same_number_are_all_counted_as_lost(
         silence(store, name)
     report(worker_id("simulate"))
     assert store.workers.counts().lost == {"simulate": 5}
+
+
+def test_a_host_forgets_its_workers_that_were_killed_and_nobody_elses(store, report) -> None:
+    report("killed", pid=2)
+    report("running", pid=3)
+    report("elsewhere", pid=2, host="other")
+    store.workers.forget_ended("h", lambda pid: pid == 3)
+    assert {worker.id for worker in store.workers.page(limit=9)} == {"running", "elsewhere"}

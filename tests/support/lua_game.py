@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 Path = Callable[[int, int], tuple[float, float, float]]
 """Where block number i of the file is after n updates, Besiege's components."""
 
+Ground = Callable[[float, float], float | str | None]
+"""The ground's height at a place east and north; "b" where a block is in the way, None for none."""
+
 VERSIONS = ("lua51", "lua52", "lua53", "lua54", "lua55", "luajit21")
 
 
@@ -18,6 +21,10 @@ def golden_path(i: int, n: int) -> tuple[float, float, float]:
         1 + 0.25 * i + 0.0021 * n + 0.004,
         -0.75 * i - 0.0053 * n + 0.002,
     )
+
+
+def flat_ground(_east: float, _north: float) -> float:
+    return 0.0
 
 
 def golden_burning(i: int, n: int) -> bool:
@@ -35,6 +42,11 @@ class LuaGame:
     version: str = "lua54"
     path: Path = golden_path
     burning: Callable[[int, int], bool] = golden_burning
+    destroyed: Callable[[int, int], bool] = lambda _i, _n: False
+    ground: Ground = flat_ground
+    gravity: float = -32.81
+    screen: tuple[int, int] = (1280, 800)
+    looked_up: int = 0
     updates: int = 0
     lines: list[str] = field(default_factory=list)
     calls: dict[str, list[tuple[int, bool]]] = field(default_factory=dict)
@@ -55,6 +67,16 @@ class LuaGame:
                 ),
             }
         )
+        globals_["physics"] = runtime.table_from(
+            {
+                "gravity": lambda: self._vector(runtime, (0.0, self.gravity, 0.0)),
+                "raycast": lambda start, along: self._hit(runtime, start, along),
+            }
+        )
+        globals_["screen"] = runtime.table_from(
+            {"width": lambda: float(self.screen[0]), "height": lambda: float(self.screen[1])}
+        )
+        globals_["entities"] = runtime.table_from({"count": lambda: 0.0})
         module = runtime.execute(script)
         assert set(module) == {"play", "update", "late_update", "fixed_update", "on_gui"}
         module["play"]()
@@ -97,11 +119,31 @@ class LuaGame:
 
     def _info(self, runtime, key):
         number = self.references[key]
+        self.looked_up += 1
 
         def position():
-            x, y, z = self.path(number, self.updates)
-            return runtime.table_from({"x": x, "y": y, "z": z})
+            assert not self.destroyed(number, self.updates), "the game has no such block any more"
+            return self._vector(runtime, self.path(number, self.updates))
 
         return runtime.table_from(
-            {"position": position, "burning": lambda: self.burning(number, self.updates)}
+            {
+                "position": position,
+                "burning": lambda: self.burning(number, self.updates),
+                "destroyed": lambda: self.destroyed(number, self.updates),
+            }
         )
+
+    def _hit(self, runtime, start, along):
+        # The mod takes four components of every vector.
+        assert all(isinstance(one[axis], int | float) for one in (start, along) for axis in "xyzw")
+        assert (along["x"], along["y"], along["z"]) == (0, -1, 0)
+        height = self.ground(start["x"], start["z"])
+        if height is None:
+            return None
+        high = 3.0 if height == "b" else float(height)
+        point = self._vector(runtime, (start["x"], high, start["z"]))
+        return runtime.table_from({"point": point, "is_block": height == "b"})
+
+    @staticmethod
+    def _vector(runtime, components):
+        return runtime.table_from(dict(zip("xyz", components, strict=True)) | {"w": 0.0})

@@ -35,7 +35,8 @@ NEAR = 0.01
 @pytest.fixture
 def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Context]:
     """A service whose queue of the game is served by a runner in a process of its own."""
-    own = replace(rig, patience=2.0).environment()
+    # Six times as fast as a game: the log keeps half a second of a large machine's lines then.
+    own = replace(rig, patience=2.0, speed=6.0).environment()
     settings = context.settings.model_copy(
         update={"besiege_game": "1.75-23370", "besiege_mod": "1.4"}
     )

@@ -30,6 +30,10 @@ def run(*words: str):
         (["calibrate", "--try"], ["calibrate", "--try"]),
         (["doctor"], ["doctor"]),
         (["doctor", "--json"], ["doctor", "--json"]),
+        (
+            ["first-evening", "--steps", "drop,wheels", "--repeats", "2"],
+            ["first-evening", "--out", "first-evening", "--steps", "drop,wheels", "--repeats", "2"],
+        ),
     ],
 )
 def test_the_runners_program_takes_the_commands_place(monkeypatch, words, given) -> None:

@@ -1,5 +1,6 @@
 """A game without a window, driven over TCP."""
 
+import contextlib
 import json
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,8 +11,8 @@ from game_rig import VERSION, Rig, experts_machine, our_score, short_trial, tria
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_pipeline.errors import PermanentError
 from buildarena_pipeline.runtime.simulators.simulator import SimulatorFaultError
+from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
 from buildarena_pipeline.runtime.trial_checks import (
-    OutcomeRefusedError,
     checked_trajectory,
     checked_versions,
 )
@@ -79,10 +80,14 @@ def test_a_fault_once_is_got_over(headless, fault) -> None:
 
 
 @pytest.mark.usefixtures("headless")
-def test_a_game_that_cannot_be_started_is_a_fault_with_a_sentence(monkeypatch) -> None:
+def test_a_game_that_cannot_be_started_is_a_fault_with_a_sentence(monkeypatch, tmp_path) -> None:
     monkeypatch.setenv("BUILDARENA_BESIEGE_COMMAND", "/nowhere/besiege")
+    monkeypatch.setenv("BUILDARENA_BESIEGE_STATE", str(tmp_path))
     settings = BesiegeSettings()
     simulator = BesiegeSimulator(settings, HeadlessDesktop(settings), {})
     task, machine = short_trial("transport-1")
-    with pytest.raises(SimulatorFaultError, match="cannot be started"):
+    with (
+        contextlib.closing(simulator),
+        pytest.raises(SimulatorFaultError, match="cannot be started"),
+    ):
         simulator.run(trial_of(task, machine))

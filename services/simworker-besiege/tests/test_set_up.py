@@ -5,16 +5,18 @@ import os
 import subprocess
 import sys
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import Self
 
 import pytest
 from game_rig import Rig
+from steam_library import library
 
 from buildarena_simworker_besiege.errors import NotSetUpError
 from buildarena_simworker_besiege.log_sources import LogFile
 from buildarena_simworker_besiege.process import GameProcess
 from buildarena_simworker_besiege.screen.calibration import (
+    FOR_SAVING,
     POSITIONS,
     Calibration,
     load_calibration,
@@ -51,9 +53,10 @@ def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> 
 def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     places = {**Calibration().positions, "open_machine": (0.9, 0.9)}
     Calibration(positions=places).save(rig.folder / "state" / "calibration.json")
-    done = answer(["calibrate", "--try"], replace(rig, patience=0.05), screen)
+    done = answer(["calibrate", "--try"], replace(rig, patience=0.1), screen)
     assert done.returncode == 1
-    assert "It does not work yet: load the machine" in done.stdout
+    assert "It does not work yet: " in done.stdout
+    assert "load the machine batry: the list of machines stayed open" in done.stdout
 
 
 def test_a_person_points_at_each_place(rig, screen) -> None:
@@ -61,7 +64,9 @@ def test_a_person_points_at_each_place(rig, screen) -> None:
         done = person.calibrate()
     assert done == 0, person.told
     found = load_calibration(rig.folder / "state" / "calibration.json")
-    assert found.window is not None
+    assert found.window == (1280, 800)
+    assert found.pixels["log_window"] == pytest.approx((640, 400), abs=2)
+    assert "A machine runs and prints" in person.told
     assert found.positions["start"] == pytest.approx((0.5, 0.5), abs=0.01)
     kept = {name: place for name, (place, _) in POSITIONS.items() if name != "start"}
     assert {name: found.positions[name] for name in kept} == kept
@@ -90,11 +95,11 @@ class GamePlayed:
 
     def calibrate(self) -> int:
         self._point_at_the_middle()
-        answers = "".join("\n" if name == "start" else "k\n" for name in POSITIONS)
+        answers = "".join("\n" if name == "start" else "k\n" for name in POSITIONS) + "\n"
         # Positions are only asked for here: that they work is another test's.
         program = (
             "from buildarena_simworker_besiege import calibrate as c;"
-            "c.try_out = lambda *_: True;"
+            "c.try_out = lambda *_: True; c.learnt = lambda before, *_: before;"
             "import sys; sys.argv = ['x', 'calibrate'];"
             "import buildarena_simworker_besiege.__main__"
         )
@@ -114,7 +119,8 @@ class GamePlayed:
         program = (
             "from buildarena_simworker_besiege.screen.input import ScreenInput;"
             "from buildarena_simworker_besiege.screen.windows import open_windows;"
-            "h = ScreenInput(); a = open_windows().find('besiege');"
+            "from buildarena_simworker_besiege.screen.window_types import Wanted;"
+            "h = ScreenInput(); a = open_windows(Wanted(title='besiege')).find();"
             "h.move(a.left + a.width // 2, a.top + a.height // 2)"
         )
         subprocess.run(
@@ -172,16 +178,19 @@ def test_what_is_missing_is_named_with_advice(rig, changes, named) -> None:
     assert "BUILDARENA_BESIEGE_" in found[named]["advice"]
 
 
-@pytest.mark.parametrize("kind", ["folder", "manifest", "none"])
-def test_the_mod_is_looked_for_by_name_and_by_manifest(rig, tmp_path, kind) -> None:
-    mods = tmp_path / "game" / "Besiege_Data" / "Mods"
-    (mods / "Other").mkdir(parents=True)
-    if kind == "folder":
-        (mods / "Lua Scripting Mod").mkdir()
-    elif kind == "manifest":
-        (mods / "Other" / "Mod.xml").write_text("<Mod><Name>LuaScripting</Name></Mod>")
-    found = findings(rig, {"BUILDARENA_BESIEGE_FOLDER": str(tmp_path / "game")})
-    assert found["Lua Scripting Mod"]["ok"] == (kind != "none")
+def test_the_doctor_names_versions_that_differ(rig, tmp_path) -> None:
+    kept = {"build": "1", "mod_file_version": "1.4"}
+    rig.calibrate(installed=kept)
+    folder = str(library(tmp_path, version="1.2.0"))
+    found = findings(rig, {"BUILDARENA_BESIEGE_FOLDER": folder})
+    assert found["Lua Scripting Mod"]["advice"] == "BUILDARENA_BESIEGE_MOD is 1.4: set it to 1.2.0"
+    assert "2383785201" in found["Lua Scripting Mod"]["detail"]
+    assert found["build of the game"]["detail"] == "25346, as Steam has it"
+    assert not found["unchanged"]["ok"]
+    assert "the game's build was 1 " in found["unchanged"]["detail"]
+    (tmp_path / "empty").mkdir()
+    found = findings(rig, {"BUILDARENA_BESIEGE_FOLDER": str(tmp_path / "empty")})
+    assert not found["Lua Scripting Mod"]["ok"]
 
 
 def findings(rig: Rig, changes: dict[str, str]):
@@ -199,17 +208,38 @@ def test_a_calibration_comes_back_as_it_was(tmp_path) -> None:
     assert Calibration().digest != made.digest
 
 
+def test_a_calibration_of_before_there_were_places_for_saving_has_the_usual_ones(tmp_path) -> None:
+    file = tmp_path / "calibration.json"
+    places = {name: [0.5, 0.5] for name in POSITIONS if name not in FOR_SAVING}
+    file.write_text(json.dumps(spoiled(positions=places)))
+    positions = load_calibration(file).positions
+    assert {name: positions[name] for name in FOR_SAVING} == {
+        name: POSITIONS[name][0] for name in FOR_SAVING
+    }
+    assert positions["start"] == (0.5, 0.5)
+
+
+def spoiled(**changes: object) -> dict[str, object]:
+    """What a calibration's file holds, with something changed."""
+    made = {"version": 2, **asdict(Calibration())}
+    return {**made, **changes}
+
+
 @pytest.mark.parametrize(
     "content",
     [
         "",
         "[]",
         "{}",
-        '{"version": 2}',
-        '{"version": 1, "positions": {"start": [0.1, 0.1]}}',
-        json.dumps({"version": 1, "positions": {name: [0.5, 1.5] for name in POSITIONS}}),
-        json.dumps({"version": 1, "positions": {name: ["a", 0] for name in POSITIONS}}),
-        json.dumps({"version": 1, "positions": {name: [0.5] for name in POSITIONS}}),
+        '{"version": 1}',
+        '{"version": 2, "positions": {"start": [0.1, 0.1]}}',
+        json.dumps({"version": 2, "positions": {name: [0.5, 0.5] for name in POSITIONS}}),
+        json.dumps(spoiled(positions={**Calibration().positions, "more": [0.5, 0.5]})),
+        json.dumps(spoiled(positions={name: [0.5, 1.5] for name in POSITIONS})),
+        json.dumps(spoiled(positions={name: ["a", 0] for name in POSITIONS})),
+        json.dumps(spoiled(positions={name: [0.5] for name in POSITIONS})),
+        json.dumps(spoiled(pixels={"log_window": [1, 1], "lua_panel": [1, -1]})),
+        json.dumps(spoiled(pixels={"log_window": [1, 1], "lua_panel": [0.5, 0.5]})),
     ],
 )
 def test_a_spoiled_calibration_is_refused_with_what_to_do(tmp_path, content) -> None:

@@ -149,3 +149,33 @@ def spoil(rng, node, value):
             node[key] = value
             return
         node = child
+
+
+def test_a_controller_is_part_of_its_machine() -> None:
+    plain = Machine()
+    plain.act("start", {})
+    steered = plain.with_controller("function control() end")
+    assert (steered == plain, plain.controller) == (False, "")
+    document = steered.to_document()
+    assert "controller" not in plain.to_document()
+    assert document["controller"] == "function control() end"
+    again = Machine.from_document(document)
+    assert again == steered == steered.copy()
+    assert again.act("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Torch"}).ok
+    assert again.controller == steered.controller
+    assert steered.with_controller("") == plain
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [
+        ("\x00", "without NUL characters"),
+        ("\ud800", "lone surrogates"),
+        ("é" * 40_000, "at most 65,536 bytes, found 80,000"),
+        (5, "controller"),
+    ],
+)
+def test_a_controller_that_cannot_be_stored_is_refused(program, words) -> None:
+    document = {**Machine().to_document(), "controller": program}
+    with pytest.raises(DocumentError, match=words):
+        Machine.from_document(document)

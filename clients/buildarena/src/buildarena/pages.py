@@ -103,12 +103,15 @@ class Shown:
 
     def _document(self) -> dict[str, Any]:
         from buildarena_api.scenes import machine_scene
+        from buildarena_simulation import world_of
 
-        scenario = None if self.task is None else self.task.scenario.model_dump(mode="json")
+        world = None if self.task is None else self.task.scenario
+        if world is not None and self.trajectory is not None:
+            world = world_of(world, self.trajectory)
         return {
             "title": self.title,
             "machine": machine_scene(self.machine).model_dump(mode="json"),
-            "scenario": scenario,
+            "scenario": None if world is None else world.model_dump(mode="json"),
             "trial": None if self.trajectory is None else _trial(self.trajectory),
         }
 

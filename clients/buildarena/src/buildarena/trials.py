@@ -91,7 +91,8 @@ def simulate(
         machine: The machine.
         task: A built-in task's name, a task file, or a task.
         engine: ``pybullet`` or ``mujoco``; by default the one that scores jobs which name none.
-        seed: Varies the start a little, as a fair repetition would; None for the exact one.
+        seed: Varies the start a little, as a fair repetition would, and draws what the task leaves
+            to it; None for the exact one.
 
     Returns:
         The trial. One of a machine that the task does not allow, or that can't be simulated,

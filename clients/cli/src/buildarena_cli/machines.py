@@ -57,6 +57,20 @@ def read_machine(file: Path, dialect: str | None = None) -> Machine:
     return imported.machine
 
 
+def controlled(machine: Machine, program: Path) -> Machine:
+    """A copy of a machine that a program controls.
+
+    Raises:
+        CommandError: The program cannot be read, or is too long.
+    """
+    try:
+        return machine.with_controller(program.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise CommandError(f"{program}: {error.strerror or error}") from error
+    except ValueError as error:
+        raise CommandError(f"{program}: {error}") from error
+
+
 def read_imported(file: Path, dialect: str | None = None) -> ImportedMachine:
     """The machine of a file with what was not understood; see `read_machine`."""
     from buildarena_besiege import read_any_machine

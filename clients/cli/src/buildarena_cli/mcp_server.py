@@ -11,7 +11,7 @@ import json
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import Any, Final
 
 from mcp import types
 from mcp.server import Server, ServerRequestContext
@@ -34,6 +34,7 @@ SESSION = {
 }
 
 Arguments = Mapping[str, Any]
+EVERY_TOOL: Final = building_tools(on_demand=True, programs=True)
 
 
 def make_server(client: Client) -> Server[Any]:
@@ -42,7 +43,7 @@ def make_server(client: Client) -> Server[Any]:
     Args:
         client: The API.
     """
-    machine_tools = CaselessNames(tool.name for tool in building_tools(on_demand=True))
+    machine_tools = CaselessNames(tool.name for tool in EVERY_TOOL)
     # Threads would carry out calls that were sent side by side in any order.
     turns: defaultdict[object, asyncio.Lock] = defaultdict(asyncio.Lock)
 
@@ -148,8 +149,8 @@ def _tools(simulators: Sequence[Mapping[str, Any]]) -> list[types.Tool]:
                 ["session", *tool.parameters.get("required", [])],
             ),
         )
-        # Sessions of tasks with inline modules refuse lookups.
-        for tool in building_tools(on_demand=True)
+        # Sessions of tasks with inline modules refuse lookups, those that take keys alone programs.
+        for tool in EVERY_TOOL
     ]
     return managing + building
 

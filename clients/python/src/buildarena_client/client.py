@@ -205,3 +205,8 @@ class Client:
     submit_session = _call(Api.submit_session)
     check_machine = _call(Api.check_machine)
     try_machine = _call(Api.try_machine)
+
+    add_evidence = _call(Api.add_evidence)
+    evidence = _call(Api.evidence)
+    evidence_table = _call(Api.evidence_table)
+    evidence_file = _call(Api.evidence_file)

@@ -9,6 +9,7 @@ import { Legend } from "./Legend";
 import { loadsAt, mostLoaded } from "./loads";
 import type { CameraLock } from "./lock";
 import { readScene, type MachineScene } from "./machine";
+import { PilotingView } from "./PilotingView";
 import { startBounds } from "./playing";
 import { Stage } from "./Stage";
 import { Surroundings, type Scenario } from "./Surroundings";
@@ -57,6 +58,14 @@ export default function TrialView(props: TrialProps) {
       {loads && <Legend whole={props.trial.loads === null} />}
       <Broken breaks={props.trial.breaks} seek={clock.seek} />
       <TrialCurves trial={props.trial} clock={clock} />
+      {props.trial.piloting !== null && (
+        <PilotingView
+          piloting={props.trial.piloting}
+          times={props.trial.times}
+          program={props.scene.controller}
+          clock={clock}
+        />
+      )}
     </Stack>
   );
 }

@@ -1,4 +1,4 @@
-import type { Trial } from "./trial";
+import type { Piloting, Trial } from "./trial";
 
 export interface Curve {
   name: string;
@@ -57,4 +57,28 @@ export function curvesOf(trial: Trial): Curve[] {
     curves.push({ name: "Mass of the cargo", unit: "mass units", values: trial.cargo.mass });
   }
   return curves;
+}
+
+/** What of a program is drawn unless others are chosen: how far it asked for its first actions. */
+export function firstNames({ actionNames }: Piloting): string[] {
+  return actionNames.slice(0, 6);
+}
+
+/** What a program sensed or asked for, over the time of a trial; of names that it does not have, nothing. */
+export function pilotingCurves(piloting: Piloting, names: readonly string[]): Curve[] {
+  const column = (of: Float32Array, width: number, at: number): Float64Array => {
+    const values = Float64Array.from({ length: of.length / width }, (_, i) => of[i * width + at] ?? NaN);
+    // Nobody asks at the last instant: it stays where it was.
+    const last = values.length - 1;
+    if (last > 0 && Number.isNaN(values[last])) values[last] = values[last - 1] ?? NaN;
+    return values;
+  };
+  return names.flatMap((name) => {
+    const action = piloting.actionNames.indexOf(name);
+    if (action >= 0)
+      return [{ name, unit: "asked for", values: column(piloting.answers, piloting.actionNames.length, action) }];
+    const sense = piloting.senseNames.indexOf(name);
+    if (sense < 0) return [];
+    return [{ name, unit: "sensed", values: column(piloting.senses, piloting.senseNames.length, sense) }];
+  });
 }

@@ -32,6 +32,7 @@ const SCENE: MachineScene = {
       end: { block: "2", point: [0, 0, 0.5] },
     },
   ],
+  controller: "",
 };
 
 const at = (matrix: Matrix4): number[] => new Vector3().setFromMatrixPosition(matrix).toArray();
@@ -104,6 +105,7 @@ const TRIAL: Trial = {
   ],
   loads: Float32Array.of(0, 0, 1.25, 0.25, 0, 0.5),
   breaks: [],
+  piloting: null,
   engine: "e",
   engineVersion: "1",
 };

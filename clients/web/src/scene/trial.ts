@@ -15,6 +15,16 @@ export interface Break {
   ratio: number;
 }
 
+/** What a program sensed, and how far it asked for actions, at each instant. */
+export interface Piloting {
+  senseNames: readonly string[];
+  /** T x S; no numbers at the last instant. */
+  senses: Float32Array;
+  actionNames: readonly string[];
+  /** T x A, 0 to 1. */
+  answers: Float32Array;
+}
+
 /** A rollout: T instants, N tracked blocks, J joints. */
 export interface Trial {
   times: Float64Array;
@@ -33,6 +43,8 @@ export interface Trial {
   /** T x J shares of strength, in the order of the peaks; null in older trajectories. */
   loads: Float32Array | null;
   breaks: readonly Break[];
+  /** Null where keys were pressed, or nothing. */
+  piloting: Piloting | null;
   engine: string;
   engineVersion: string;
 }
@@ -42,6 +54,8 @@ interface Facts {
   cargo_size: [number, number, number] | null;
   joint_peaks: JointPeak[];
   breaks: Break[];
+  sense_names?: string[];
+  action_names?: string[];
   engine: string;
   engine_version: string;
 }
@@ -95,6 +109,15 @@ export function readTrial(file: ArrayBuffer): Trial {
     peaks: facts.joint_peaks,
     loads: flat(table, "joint_loads"),
     breaks: facts.breaks,
+    piloting:
+      facts.sense_names === undefined
+        ? null
+        : {
+            senseNames: facts.sense_names,
+            senses: flat(table, "senses") ?? NONE,
+            actionNames: facts.action_names ?? [],
+            answers: flat(table, "answers") ?? NONE,
+          },
     engine: facts.engine,
     engineVersion: facts.engine_version,
   };

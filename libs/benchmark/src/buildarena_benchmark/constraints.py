@@ -35,7 +35,8 @@ def broken_constraint(task: Task, machine: Machine) -> Broken | None:
     Returns:
         Class and sentence, or None when the machine may be simulated.
     """
-    return next(filter(None, (check(task, machine) for check in _checks(task))), None)
+    checks = (*_checks(task), _violated(_wrong_control))
+    return next(filter(None, (check(task, machine) for check in checks)), None)
 
 
 def share_of_constraints(task: Task, machine: Machine) -> float:
@@ -230,6 +231,13 @@ def _crowded(task: Task, machine: Machine) -> str | None:
         if size > limits.max_blocks:
             named = f"sub-structure {letter}" if letter else "the machine"
             return f"{named} has {size} blocks, the task allows {limits.max_blocks} in one"
+    return None
+
+
+def _wrong_control(task: Task, machine: Machine) -> str | None:
+    """Whether a program acts where the task offers no senses."""
+    if machine.controller and not task.takes_programs:
+        return "the machine has a controller, and the task offers no senses: it takes keys alone"
     return None
 
 

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 from buildarena_benchmark.scorers.measures.stability import is_unstable
 from buildarena_benchmark.scorers.registry import known_scorers
 from buildarena_benchmark.scorers.scorer import UNSTABLE, Metric
+from buildarena_simulation import world_of
 
 if TYPE_CHECKING:
     from buildarena_benchmark.tasks.task import Task
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
-    from buildarena_simulation.rollout import Decision
+    from buildarena_simulation.trial import Decision
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,10 +47,11 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
         The score; a rollout that blew up is flagged `unstable` and is never a success.
     """
     scorer = known_scorers()[task.scorer]
-    verdict = scorer.judge(task.scoring, task.scenario, machine, trajectory)
+    scenario = world_of(task.scenario, trajectory)
+    verdict = scorer.judge(task.scoring, scenario, machine, trajectory)
     flags = tuple(flag.name for flag in verdict.flags)
     metrics = {**_machine_metrics(machine), **_finite(verdict.metrics)}
-    if is_unstable(task.scenario, machine, trajectory, verdict.deciding):
+    if is_unstable(scenario, machine, trajectory, verdict.deciding):
         return Score(
             success=False,
             indicator=0.0,
@@ -64,7 +66,7 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     )
 
 
-def decision(task: "Task") -> "Decision | None":
+def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
     """Tells when a running trial is decided, for those who try many machines.
 
     A trial that ends there has the success, indicator and flags of the whole one; metrics that tell
@@ -72,12 +74,13 @@ def decision(task: "Task") -> "Decision | None":
 
     Args:
         task: The task.
+        seed: Of the trial.
 
     Returns:
         What `simulate` takes as `until`; None where the whole trial decides.
     """
     decide = known_scorers()[task.scorer].decision
-    return decide(task.scoring, task.scenario) if decide else None
+    return decide(task.scoring, task.scenario.world(seed)) if decide else None
 
 
 def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:

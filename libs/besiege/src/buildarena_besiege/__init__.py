@@ -12,10 +12,14 @@ from buildarena_besiege.errors import (
     MachineNotPlayableError,
 )
 from buildarena_besiege.exporting.level import level_file
+from buildarena_besiege.importing.file_data import file_data_lines
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_besiege.logs.game_log import GameLog, run_ids
+from buildarena_besiege.logs.level_check import level_finding
 from buildarena_besiege.logs.published import looks_published, published_trajectory
 from buildarena_besiege.logs.state_log import StateLog
+from buildarena_besiege.logs.stored import logged_trajectory
+from buildarena_besiege.logs.telemetry import read_telemetry, telemetry_log, telemetry_trajectory
 from buildarena_besiege.logs.trajectories import trajectory_of
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start
@@ -29,8 +33,11 @@ __all__ = [
     "MachineFileError",
     "MachineNotPlayableError",
     "StateLog",
+    "file_data_lines",
     "game_start",
     "level_file",
+    "level_finding",
+    "logged_trajectory",
     "looks_published",
     "plain_machine_file",
     "prepare_run",
@@ -38,6 +45,9 @@ __all__ = [
     "read_any_machine",
     "read_machine_file",
     "read_presses",
+    "read_telemetry",
     "run_ids",
+    "telemetry_log",
+    "telemetry_trajectory",
     "trajectory_of",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from buildarena_besiege.importing.file_data import file_data_lines
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_geometry import KeyPress
 from buildarena_geometry.errors import DocumentError
@@ -33,7 +34,7 @@ def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> 
     if data.lstrip(_LEADING).startswith(_XML_BEGINNINGS):
         return read_machine_file(data)
     machine = machine_of(_json(data, where), where=where, version=dialect)
-    return ImportedMachine(machine=machine, name="", not_understood=())
+    return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
 
 
 def read_presses(data: bytes, *, where: str) -> tuple[KeyPress, ...]:

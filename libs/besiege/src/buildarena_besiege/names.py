@@ -24,6 +24,26 @@ _TYPE_NAMES: Final[Mapping[int, str]] = MappingProxyType(
         CARGO: "Ballast",
     }
 )
+SETTINGS: Final = frozenset(
+    {
+        *("flipped", "bmt-version", "bmt-speed", "bmt-acceleration", "bmt-automatic"),
+        *("bmt-toggle-mode", "bmt-auto-brake", "bmt-opt-collider", "bmt-hold-to-fire"),
+        *("bmt-strength", "bmt-mass", "bmt-fthrust", "bmt-slider", "bmt-toggle", "bmt-range"),
+        *("bmt-rotation-speed", "bmt-limits", "bmt-spring", "bmt-damper", "bmt-duration"),
+        *("bmt-charge", "bmt-power", "bmt-rate-of-fire"),
+    }
+)
+"""Settings of blocks, beside key lists, that public files, converters and registries name."""
+
+MACHINE_SETTINGS: Final = (
+    "requiredMods",
+    "tracker.enabled",
+    "tracker.sample_rate_hz",
+    "tracker.target_guids",
+    "tracker.output_basename",
+)
+"""Entries of a machine's own data that public files have, beside its script."""
+
 CARGO_ID: Final = "Ballast"
 """What logs and normalised forms call the cargo in place of a block's id."""
 

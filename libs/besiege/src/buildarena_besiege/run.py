@@ -12,7 +12,13 @@ from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.header import header_lines
 from buildarena_besiege.exporting.level import level_file
 from buildarena_besiege.exporting.machine_file import CargoBox, Guids, block_records, machine_text
+from buildarena_besiege.exporting.probes import level_probes, ray_start
 from buildarena_besiege.exporting.script import FIRST_BLOCK, Reported, Telling, script_text
+from buildarena_besiege.importing.rewriting import (
+    has_file_data,
+    restored_records,
+    restored_text,
+)
 from buildarena_besiege.keys import (
     UPDATES_PER_S,
     bindings_of,
@@ -23,6 +29,7 @@ from buildarena_besiege.keys import (
 )
 from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose, put_down
+from buildarena_besiege.timeline import control_timeline, timeline_bytes
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
 from buildarena_simulation.constants import GRAVITY, MAX_PARTS
 from buildarena_simulation.scenario import ReleasedPlacement, SpanPlacement
@@ -53,8 +60,12 @@ class GameRun:
         set_ground: Whether "set ground" must be clicked before the start.
         level: The level to be opened (.blv); None for the flat sandbox.
         key_changes: What the script does to keys: time in seconds, key, whether it goes down.
+        scenario: What the machine is put through.
         needs_script: Whether a score needs what only the script does or reports: the cargo's
             growing mass, or which cannons burn.
+        block_ids: The ids of the file's blocks in its order, by their guids; the cargo's is
+            "Ballast".
+        bindings: The keys of each block's actions in this trial, by block id.
     """
 
     name: str
@@ -67,6 +78,18 @@ class GameRun:
     level: bytes | None
     key_changes: tuple[tuple[float, str, bool], ...]
     needs_script: bool
+    scenario: Scenario
+    block_ids: Mapping[str, str]
+    bindings: Mapping[str, Mapping[str, tuple[str, ...]]]
+
+    def timeline(self, machine: Machine) -> bytes:
+        """What its keys do, as a timeline of channels for the machine it was made of.
+
+        Raises:
+            MachineNotPlayableError: A key moves an action that no channel is known of.
+        """
+        numbers = {block_id: number for number, block_id in enumerate(self.block_ids.values(), 1)}
+        return timeline_bytes(control_timeline(machine, self.key_changes, self.bindings, numbers))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -137,7 +160,10 @@ def prepare_run(
         key_changes=tuple(
             (edge.update / UPDATES_PER_S, edge.key, edge.down) for edge in prepared.edges
         ),
+        scenario=scenario,
         needs_script=scenario.cargo is not None or scenario.control.mode == "held",
+        block_ids={record.guid: record.part for record in prepared.records},
+        bindings=bindings_of(machine, scenario.control),
     )
 
 
@@ -150,6 +176,9 @@ def plain_machine_file(
 ) -> bytes:
     """The machine file of a machine as it was built, for no trial; its keys play by themselves.
 
+    A machine that was read from a file goes back with everything that the file said of it, but for
+    a script that is not ours: it is there, under names by which no mod runs it.
+
     Args:
         machine: The machine.
         name: Stem of the file.
@@ -158,11 +187,21 @@ def plain_machine_file(
 
     Raises:
         MachineNotPlayableError: The game cannot take the machine.
+        MachineFileError: The machine's file data is not what a machine file says.
         ValueError: The name cannot be used.
     """
     _require_name(name)
-    prepared = prepared_machine(machine, None, controls=controls, new_guid=new_guid)
-    return machine_text(name, prepared.pose, prepared.records, prepared.script).encode("utf-8")
+    _require_playable(machine)
+    presses = tuple(machine.control_sequence if controls is None else controls)
+    keys = bindings_of(machine, None)
+    edges = key_edges(bound_presses(presses, machine))
+    records = restored_records(machine, block_records(machine, Guids(new_guid), keys=keys), keys)
+    header = header_lines(machine, records, presses, plain=True, of_file=has_file_data(machine))
+    script = script_text(header, edges, cargo=None, cargo_reference="", telling=None)
+    text = restored_text(machine, name, records, script)
+    if text is None:
+        text = machine_text(name, AS_BUILT, records, script)
+    return text.encode("utf-8")
 
 
 def prepared_machine(
@@ -197,6 +236,8 @@ def prepared_machine(
             begin=begin_fields(machine, scenario, tracked, len(played)),
             last_update=round(scenario.duration_s * UPDATES_PER_S),
             blocks=_reported(machine, scenario, tracked, references),
+            probes=tuple((probe.east, probe.north) for probe in level_probes(scenario)),
+            ray_start=ray_start(scenario),
         )
     script = script_text(
         header_lines(machine, records, presses),
@@ -249,6 +290,8 @@ def _reported(
 def _require_playable(machine: Machine) -> None:
     if not machine.blocks:
         raise MachineNotPlayableError("The machine has no blocks.")
+    if machine.controller:
+        raise MachineNotPlayableError("the game plays keys, no controller: use another engine")
     if machine.part_count > MAX_PARTS:
         raise MachineNotPlayableError(
             f"The machine has {machine.part_count} parts; more than {MAX_PARTS} are not played."

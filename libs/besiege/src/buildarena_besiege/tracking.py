@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import zlib
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_simulation.scenario import SpanPlacement
+
+LINE_VERSION: Final = 2
+"""Of the lines that a script prints; from 2 on they report the level that is open."""
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -50,7 +53,7 @@ def begin_fields(
         tracked: The blocks that are reported.
         presses: How many key presses reach some action.
     """
-    return f"1,{presses},{run_digest(machine, scenario, tracked)}"
+    return f"{LINE_VERSION},{presses},{run_digest(machine, scenario, tracked)}"
 
 
 def run_digest(machine: Machine, scenario: Scenario, tracked: tuple[str, ...]) -> int:

@@ -6,6 +6,7 @@ its own loop (it writes its own key presses) is said around it.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
@@ -27,6 +28,7 @@ from buildarena_simulation.constants import (
     START_SHIFT,
     START_YAW_DEG,
 )
+from buildarena_simulation.controllers.senses import TICK_S
 
 _CONTROL: Final = {
     "agent": (
@@ -38,6 +40,13 @@ _CONTROL: Final = {
     "held": "You need not bind any key: every water cannon fires from t = {from_s:g} s on.",
     "none": "No key is pressed in this trial, so you need not bind any.",
 }
+
+_PROGRAMS: Final = (
+    "You may write a program that senses and acts in place of key presses: `set_controller`, on "
+    "the machine that is simulated, before you submit. {contract}\n\n"
+    "Without a program, keys are played: `change_control_key` binds them, `add_control_sequence` "
+    "presses them."
+)
 
 _GIVEN: Final = (
     "A machine stands in `{main}` already, with its keys and its key presses: your first call "
@@ -160,7 +169,8 @@ def briefing_digest(
         on_demand: Whether modules are looked up: who does that does not compare with who is told.
         data_sheets: Whether it is told the numbers of modules and world.
     """
-    words = [_text(trials, guidelines), *_CONTROL.values(), *_CHECKS.values()]
+    words = [_text(trials, guidelines), *_CONTROL.values(), *_CHECKS.values(), _PROGRAMS]
+    words += [file_text(name) for name in ("controller.md", "senses.json")]
     if on_demand:
         words.append(_ON_DEMAND)
     if data_sheets:
@@ -171,16 +181,38 @@ def briefing_digest(
 
 @cache
 def _text(trials: str, guidelines: str) -> str:
-    frame = resources.files(__package__).joinpath("briefing.md").read_text(encoding="utf-8")
-    return (
-        frame.strip().replace("$trials", trials).replace("$guidelines", guidelines.strip()) + "\n"
-    )
+    frame = file_text("briefing.md")
+    return frame.replace("$trials", trials).replace("$guidelines", guidelines.strip()) + "\n"
 
 
 def _control(task: Task) -> str:
     if task.beginning is not None:
         return _GIVEN.format(main=MAIN)
+    if task.takes_programs:
+        return _PROGRAMS.format(contract=programs_told(task))
     return _CONTROL[task.control].format(from_s=task.scenario.control.from_s)
+
+
+def programs_told(task: Task) -> str:
+    """What a program is told and may answer, in a task that takes programs."""
+    senses = task.scenario.senses
+    assert senses is not None  # noqa: S101 - it takes programs
+    kinds = json.loads(file_text("senses.json"))
+    lines = [f"- {kinds[kind]}" for kind in kinds if kind in senses.offers]
+    late = (
+        f" What you sense is {senses.delay_ticks * TICK_S:g} s old." if senses.delay_ticks else ""
+    )
+    noise = ", ".join(f"{kind} {sigma:g}" for kind, sigma in senses.noise.items() if sigma)
+    exact = f" Standard deviations of its noise: {noise}." if noise else ""
+    return Template(file_text("controller.md")).substitute(
+        senses="\n".join(lines), accuracy=f"{late}{exact}"
+    )
+
+
+@cache
+def file_text(name: str) -> str:
+    """The text of a file of this package, without blanks around it."""
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8").strip()
 
 
 def _sub_structures(task: Task) -> str:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import resources
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_benchmark import Task
-from buildarena_environment.briefing import briefing, catalogue_told, trials_told
+from buildarena_environment.briefing import briefing, catalogue_told, file_text, trials_told
 from buildarena_environment.choices import checked_simulator, chosen_task, reference_of
 from buildarena_environment.errors import (
     EpisodeOverError,
@@ -188,19 +187,19 @@ class Environment:
     @property
     def observation(self) -> Observation:
         """What a builder has before its first step."""
-        file = resources.files(__package__).joinpath("guidelines.md")
-        guidelines = file.read_text(encoding="utf-8")
         text = briefing(
             self.task,
             trials=trials_told(self.rounds, self.task.tests),
-            guidelines=guidelines,
+            guidelines=file_text("guidelines.md"),
             values={
                 "calls": f"{self.limits.steps:,}",
                 "after": LAST if self.rounds == 1 else AGAIN,
             },
             data_sheets=self.data_sheets,
         )
-        tools = tools_of_models(on_demand=self.task.constraints.on_demand)
+        tools = tools_of_models(
+            on_demand=self.task.constraints.on_demand, programs=self.task.takes_programs
+        )
         return Observation(task=self.task.name, briefing=text, tools=tools)
 
     @property

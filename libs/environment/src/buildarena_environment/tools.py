@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from buildarena_geometry import GROUPS, LOOKUP, ToolDefinition, object_schema, tool_definitions
+from buildarena_geometry import (
+    GROUPS,
+    LOOKUP,
+    PROGRAM,
+    ToolDefinition,
+    object_schema,
+    tool_definitions,
+)
 
 MAIN: Final = "main"
 """What a machine is called where no name is given."""
@@ -34,22 +41,30 @@ MACHINE: Final = {
 """Schema of the argument that says which machine a call is meant for."""
 LOOKUPS: Final = tuple(tool.name for tool in tool_definitions([LOOKUP]))
 """Names of the tools that modules are looked up with."""
+(SET_CONTROLLER,) = (tool.name for tool in tool_definitions([PROGRAM]))
 
 
-def building_tools(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
+def building_tools(
+    *, on_demand: bool = False, programs: bool = False
+) -> tuple[ToolDefinition, ...]:
     """All actions of the geometry library, as they are.
 
     Args:
         on_demand: Whether the task has its modules looked up, and there are tools for that.
+        programs: Whether it takes programs in place of keys.
     """
-    return tool_definitions((*GROUPS, LOOKUP) if on_demand else GROUPS)
+    further = [LOOKUP] * on_demand + [PROGRAM] * programs
+    return tool_definitions((*GROUPS, *further))
 
 
-def tools_of_models(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
+def tools_of_models(
+    *, on_demand: bool = False, programs: bool = False
+) -> tuple[ToolDefinition, ...]:
     """The actions with one more argument, `machine`, and the tool that submits.
 
     Args:
         on_demand: As for `building_tools`.
+        programs: As for `building_tools`.
     """
     building = [
         replace(
@@ -59,6 +74,6 @@ def tools_of_models(*, on_demand: bool = False) -> tuple[ToolDefinition, ...]:
                 "properties": {**tool.parameters["properties"], "machine": MACHINE},
             },
         )
-        for tool in building_tools(on_demand=on_demand)
+        for tool in building_tools(on_demand=on_demand, programs=programs)
     ]
     return (*building, SUBMIT)

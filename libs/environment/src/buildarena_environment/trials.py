@@ -18,7 +18,6 @@ from buildarena_benchmark.scores import decision
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory, simulate
 
-NOT_SIMULABLE = "not_simulable"
 TOPPLED_DEG: Final = 60.0
 """A starting block that leans by more has toppled, degrees. Ours."""
 
@@ -29,8 +28,8 @@ class Trial:
 
     Attributes:
         score: Its score.
-        reason: Why it was not simulated: the class of the broken constraint, or ``not_simulable``;
-            None where it was.
+        reason: Why it was not simulated: the class of the broken constraint, or the kind of
+            `MachineNotSimulable`: ``not_simulable``, ``controller_failed``; None where it was.
         detail: That in a sentence; "" where it was simulated.
         wall_s: Seconds that it took.
         trajectory: What the simulator recorded, where there was a trial and it is kept.
@@ -121,12 +120,12 @@ def try_machine(
             wall_s=time.perf_counter() - started,
         )
     try:
-        until = None if whole else decision(task)
+        until = None if whole else decision(task, seed=seed)
         trajectory = simulate(machine, task.scenario, simulator, seed=seed, until=until)
     except MachineNotSimulable as refusal:
         return Trial(
             score=failed_score(task, machine),
-            reason=NOT_SIMULABLE,
+            reason=refusal.kind,
             detail=refusal.reason,
             wall_s=time.perf_counter() - started,
         )

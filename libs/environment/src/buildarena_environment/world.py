@@ -101,6 +101,9 @@ def _sharing(modules: Collection[Module]) -> Iterator[str]:
     yield (
         "Joints that bear a load together share it by their stiffness, as beams of a frame do; "
         f"loads are smoothed over {plain(constants.LOAD_FILTER_S)} s, so short blows count less."
+        f" A cargo that lands counts over {plain(constants.BLOW_FILTER_S)} s, and bounces off with "
+        f"{plain(constants.CARGO_BOUNCE)} / (1 + mass of the machine / "
+        f"{plain(constants.BOUNCE_MASS)}) of its speed beyond {plain(constants.MIN_LANDING_SPEED)}."
     )
     if any(module.kind == "connector" for module in modules):
         yield (

@@ -27,6 +27,7 @@ from buildarena_geometry.steps import Difference, Step, step
 from buildarena_geometry.tools import (
     GROUPS,
     LOOKUP,
+    PROGRAM,
     ToolDefinition,
     object_schema,
     tool_definitions,
@@ -41,6 +42,7 @@ __all__ = [
     "KEYS",
     "LOOKUP",
     "MODULE_SETS",
+    "PROGRAM",
     "Accepted",
     "ActionLog",
     "ActionRecord",

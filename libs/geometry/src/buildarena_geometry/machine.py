@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -13,7 +14,7 @@ from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
 from buildarena_geometry.feedback.mobility import consequences
 from buildarena_geometry.feedback.words import listing, number
-from buildarena_geometry.json_values import json_value
+from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controller, json_value
 from buildarena_geometry.measures import bounds, center_of_mass
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
@@ -134,9 +135,11 @@ class Machine:
             list(mine.blocks.items()) == list(theirs.blocks.items())
             and list(mine.connectors.items()) == list(theirs.connectors.items())
             and mine.control_sequence == theirs.control_sequence
+            and mine.controller == theirs.controller
             and mine.next_id == theirs.next_id
             and mine.structures == theirs.structures
             and mine.structures_made == theirs.structures_made
+            and mine.file_data == theirs.file_data
         )
 
     __hash__ = None  # type: ignore[assignment]  # it changes
@@ -197,6 +200,24 @@ class Machine:
     def control_sequence(self) -> tuple[KeyPress, ...]:
         """The key presses in the order of entry."""
         return self._state.control_sequence
+
+    @property
+    def controller(self) -> str:
+        """The program that acts in place of the control sequence; "" without one."""
+        return self._state.controller
+
+    def with_controller(self, program: str) -> Self:
+        """A copy that a program controls.
+
+        Args:
+            program: Lua, see docs/control.md; "" leaves the control sequence. It is not read here.
+
+        Raises:
+            ValueError: It is too long, or no text that can be stored.
+        """
+        check_controller(program)
+        state = replace(self._state, controller=program)
+        return self.restored(replace(self.logged, state=state))
 
     @property
     def log(self) -> ActionLog:
@@ -296,10 +317,12 @@ class Machine:
     def _record(self, name: object, arguments: object, outcome: Outcome) -> None:
         reason = None if isinstance(outcome, Accepted) else outcome.reason
         written = name if isinstance(name, str) else ""
+        # Whoever does it again needs all of what was accepted: a program is long.
+        whole = {"longest": MAX_CONTROLLER_BYTES} if reason is None else {}
         self._records.append(
             ActionRecord(
                 name=str(json_value(written)),
-                arguments={} if arguments is None else json_value(arguments),
+                arguments={} if arguments is None else json_value(arguments, **whole),
                 reason=reason,
             )
         )

@@ -60,7 +60,10 @@ class MachineState:
         structures: an assembly's sub-structures by letter.
         structures_made: how many letters have been given out.
         control_sequence: in the order of entry.
+        controller: the program that acts in place of the control sequence; "" without one.
         next_id: the number the next block or connector gets.
+        file_data: what the game's machine file that it was read from has beside its blocks, as
+            XML; "" where it was not read from one.
     """
 
     catalogue: Catalogue
@@ -71,7 +74,9 @@ class MachineState:
     structures: Mapping[str, SubStructure] = field(default_factory=dict)
     structures_made: int = 0
     control_sequence: tuple[KeyPress, ...] = ()
+    controller: str = ""
     next_id: int = 1
+    file_data: str = ""
 
     @property
     def started(self) -> bool:

@@ -30,6 +30,9 @@ GROUPS = ("build", "refine", "assemble", "control", "query")
 """What every builder has."""
 LOOKUP = "lookup"
 """What builders also have where they look modules up on demand."""
+PROGRAM = "program"
+"""What builders also have where a program may act."""
+ALL_GROUPS = (*GROUPS, LOOKUP, PROGRAM)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +43,7 @@ class ToolDefinition:
         name: the action's name.
         description: what it does.
         parameters: JSON schema of its arguments, an object.
-        group: one of `GROUPS`, or `LOOKUP`; empty for a tool that is not a machine's action.
+        group: one of `ALL_GROUPS`; empty for a tool that is not a machine's action.
     """
 
     name: str
@@ -107,7 +110,7 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
     """The actions of some groups as tools for models.
 
     Args:
-        groups: names from `GROUPS`, and `LOOKUP`.
+        groups: names from `ALL_GROUPS`.
 
     Returns:
         The definitions, group by group in the order asked for.
@@ -117,8 +120,8 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
     """
     wanted = tuple(groups)
     for group in wanted:
-        if group not in (*GROUPS, LOOKUP):
-            known = ", ".join((*GROUPS, LOOKUP))
+        if group not in ALL_GROUPS:
+            known = ", ".join(ALL_GROUPS)
             raise ValueError(f"there is no group {group!r}; the groups are {known}")
     return tuple(
         action.definition
@@ -230,6 +233,7 @@ ACTIONS: Mapping[str, Action] = {
                 catalogue.describe_module,
             ),
         ),
+        (PROGRAM, (control.set_controller,)),
     )
     for propose in proposers
 }

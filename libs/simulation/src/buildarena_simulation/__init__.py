@@ -11,6 +11,7 @@ from buildarena_simulation.constants import DEFAULT_ENGINE
 from buildarena_simulation.engines.registry import ALL_ENGINES, ENGINES, engine_version
 from buildarena_simulation.errors import (
     BuildarenaSimulationError,
+    ControllerFailed,
     MachineNotSimulable,
     SimulationError,
     TrajectoryFormatError,
@@ -18,9 +19,16 @@ from buildarena_simulation.errors import (
 )
 from buildarena_simulation.parquet import read_trajectory, schema_of, write_trajectory
 from buildarena_simulation.processor import processor
-from buildarena_simulation.rollout import SIMULATION_VERSION, require_engine, simulate
+from buildarena_simulation.rollout import SIMULATION_VERSION, require_engine, simulate, world_of
 from buildarena_simulation.scenario import Scenario
-from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Trajectory
+from buildarena_simulation.trajectory import (
+    Bearing,
+    Break,
+    Event,
+    JointPeak,
+    Piloting,
+    Trajectory,
+)
 
 __all__ = [
     "ALL_ENGINES",
@@ -30,9 +38,11 @@ __all__ = [
     "Bearing",
     "Break",
     "BuildarenaSimulationError",
+    "ControllerFailed",
     "Event",
     "JointPeak",
     "MachineNotSimulable",
+    "Piloting",
     "Scenario",
     "SimulationError",
     "Trajectory",
@@ -44,5 +54,6 @@ __all__ = [
     "require_engine",
     "schema_of",
     "simulate",
+    "world_of",
     "write_trajectory",
 ]

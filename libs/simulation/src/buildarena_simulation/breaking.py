@@ -1,17 +1,24 @@
 """Breaking: the worst joint over its strength gives way, one per evaluation."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from buildarena_simulation.bearing import BearingMeter
-from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.engines.base import Engine, World
+from buildarena_simulation.constants import BLOW_FILTER_S, GRAVITY
+from buildarena_simulation.engines.base import CargoPose, Engine, World
 from buildarena_simulation.holding import Holding
+from buildarena_simulation.landing import Landing, landing_of
 from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import EvenSharing, PointForces, together
+from buildarena_simulation.structure.contacts import (
+    ContactForces,
+    EvenSharing,
+    PointForces,
+    together,
+)
 from buildarena_simulation.structure.loads import JointLoads, LoadModel
 from buildarena_simulation.structure.model import JOINT_KINDS, BoolArray, FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion, rope_ends
@@ -44,13 +51,14 @@ class BreakingModel:
 
     Attributes:
         holding: What blocks hold; None where none can.
+        landing: How the cargo lands on the machine; None if it does not, or if something broke.
     """
 
     def __init__(
         self, world: World, clusters: Clusters, motion: Motion, *, interval_s: float
     ) -> None:
         structure = self._structure = world.structure
-        self._field = world.field
+        self._field, self._gravity = world.field, world.gravity
         self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
         self.bearing = BearingMeter(structure, len(world.terrain), gravity=world.gravity)
         self._loads = LoadModel(structure, clusters, motion, gravity=world.gravity)
@@ -65,6 +73,14 @@ class BreakingModel:
         self.breaks: list[Break] = []
         self.events: list[Event] = []
         self.holding: Holding | None = None
+        self.landing: Landing | None = None
+        self._landed: Landing | None = None
+        self._cargo_before: CargoPose | None = None
+        self._cargo_mass, self._machine_mass = 0.0, float(structure.masses.sum())
+
+    def blow(self, wind: FloatArray) -> None:
+        """Says what accelerates every mass from now on beside gravity, (3,), units/s²."""
+        self._loads.wind = wind
 
     def follow(
         self,
@@ -74,6 +90,7 @@ class BreakingModel:
         *,
         time_s: float,
         cargo_mass: float | None,
+        cargo_before: CargoPose | None = None,
         repeat_finer: Callable[[], Motion] | None = None,
     ) -> None:
         """Evaluates the loads after one interval and breaks what is overloaded.
@@ -84,12 +101,14 @@ class BreakingModel:
             thrusts: (C,) recoil of each cannon during the interval, mass·unit/s².
             time_s: Time now, seconds.
             cargo_mass: Mass of the cargo now.
+            cargo_before: The cargo at the start of the interval.
             repeat_finer: Repeats the interval in finer steps and says how the clusters move then;
                 None where it cannot be repeated.
         """
-        self.motion = motion
+        self.motion, self.landing, self._landed = motion, None, self.landing
+        self._cargo_before, self._cargo_mass = cargo_before, cargo_mass or 0.0
         self._unseen_s += self._interval_s
-        if self._calm and not engine.struck:
+        if self._calm and not engine.struck and self._landed is None:
             self._calm = False
             return
         filters = self._loads.filters()
@@ -117,6 +136,7 @@ class BreakingModel:
                     (time_s, cargo_mass),
                 )
                 self._loads.holds[broken] = False
+            self.landing = None
             self._fall_apart(engine)
 
     def _evaluated(self, engine: Engine, thrusts: FloatArray) -> tuple[JointLoads, FloatArray]:
@@ -125,8 +145,20 @@ class BreakingModel:
         forces = self._forces(engine, thrusts, tensions)
         # An impact is reported for one interval only, whatever was left out before.
         seen_s = self._interval_s if engine.struck else self._unseen_s
-        loads = self._loads.evaluate(forces, self.motion, elapsed_s=self._unseen_s, seen_s=seen_s)
+        loads = self._loads.evaluate(
+            forces,
+            self.motion,
+            elapsed_s=self._unseen_s,
+            seen_s=seen_s,
+            **self._blow(),
+        )
         return loads, tensions
+
+    def _blow(self) -> dict[str, float]:
+        """How the loads of the last interval count, if the cargo landed in it."""
+        if self.landing is None or not self.landing.counts:
+            return {}
+        return {"filter_s": BLOW_FILTER_S, "fading": self.landing.fading}
 
     def _is_blow(self, loads: JointLoads, tensions: FloatArray) -> bool:
         """Whether a joint or rope would break by a load that has risen all at once."""
@@ -217,7 +249,7 @@ class BreakingModel:
         clusters, motion = self.clusters, self.motion
         cargo = engine.cargo() if self._has_cargo else None
         faces = self._faces.find(clusters, motion, cargo)
-        contacts = faces.joined_to(engine.contacts(), clusters.cluster_of)
+        contacts = faces.joined_to(self._contacts(engine, cargo), clusters.cluster_of)
         others = [self._pushes(thrusts), self._pulls(tensions)]
         if self.holding is not None:
             others.append(self.holding.forces(clusters, motion))
@@ -235,6 +267,25 @@ class BreakingModel:
         if self.holding is not None:
             self.bearing.add_held(*self.holding.lifts())
         return together([shared, *others])
+
+    def _contacts(self, engine: Engine, cargo: CargoPose | None) -> ContactForces:
+        """The engine's contacts, with what the cargo's bounce adds to them."""
+        contacts, before = engine.contacts(), self._cargo_before
+        if before is None or cargo is None:
+            return contacts
+        self.landing = landing_of(
+            contacts,
+            before,
+            cargo,
+            so_far=self._landed,
+            mass=self._cargo_mass,
+            machine_mass=self._machine_mass,
+            gravity=self._gravity,
+            interval_s=self._interval_s,
+        )
+        if self.landing is None or not self.landing.counts:
+            return contacts
+        return replace(contacts, force=self.landing.stress * contacts.force)
 
     def _pushes(self, thrusts: FloatArray) -> PointForces:
         structure, motion = self._structure, self.motion

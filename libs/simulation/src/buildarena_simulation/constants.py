@@ -44,6 +44,28 @@ whatever it is fixed to; an explicit step is stable below 2/45 s.
 LOAD_FILTER_S: Final = 0.16
 """Time constant of the low-pass filter on block wrenches, s. Fitted at g = 32.81."""
 
+CARGO_BOUNCE: Final = 0.78
+"""Share of its speed beyond `MIN_LANDING_SPEED` with which a cargo leaves a machine without mass.
+
+Fitted with `BOUNCE_MASS` to logs of the game: the first bounces on a beam of seven blocks, of mass
+2.05, and on a bridge of 73, of some 22 (docs/physics.md).
+"""
+
+BOUNCE_MASS: Final = 12.4
+"""Of a machine on which a cargo bounces half as well, mass units."""
+
+MIN_LANDING_SPEED: Final = 2.0
+"""A cargo that meets a machine more slowly comes to rest on it, units/s.
+
+Source: the bounce threshold that the game's engine has where nothing else is set.
+"""
+
+BLOW_FILTER_S: Final = 0.05
+"""In place of `LOAD_FILTER_S` while a cargo lands, s.
+
+Fitted: the beam of seven bears the first landing and breaks at the second, as in the game's log.
+"""
+
 MAX_PARTS: Final = 2000
 """A machine with more blocks and connectors is not simulated."""
 

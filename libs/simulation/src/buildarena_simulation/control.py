@@ -3,8 +3,7 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Final, Protocol
+from typing import Final, Protocol, Self
 
 import numpy as np
 
@@ -13,10 +12,12 @@ from buildarena_geometry.flames import flames_touch
 from buildarena_simulation.constants import GRAVITY, KEY_DELAY_S
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.drives import lagged, place_targets, speed_targets
-from buildarena_simulation.structure.model import BoolArray, FloatArray, Part, Structure
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 
 PRESSES: Final = "presses"
 """Where a trajectory's settings keep the key presses of the trial; see `written_presses`."""
+SEED: Final = "seed"
+"""Where they keep the seed of the trial; they have none of an exact one."""
 
 
 class KeyHold(Protocol):
@@ -82,19 +83,65 @@ Bindings = Sequence[Mapping[str, Sequence[str]]]
 """Per block: the keys bound to each of its actions."""
 
 
+def channel(block_id: str, action: str) -> str:
+    """What an action of one block is called where a controller asks for it."""
+    return f"{block_id}.{action}"
+
+
+Levels = Callable[[int, str], FloatArray]
+"""How far an action of a part is asked for at each of S steps, 0 to 1, (S,).
+
+Parts are counted as in `bindings_of`: the blocks, then the springs.
+"""
+
+
+def key_levels(bindings: Bindings, keys: Sequence[KeyHold], times: FloatArray) -> Levels:
+    """What keys ask for: 1 while one of an action's keys is held.
+
+    Args:
+        bindings: The keys of each part's actions; parts beyond them have none.
+        keys: The control sequence.
+        times: (S,) when the steps begin, seconds.
+    """
+
+    def level(part: int, action: str) -> FloatArray:
+        bound = bindings[part].get(action, ()) if part < len(bindings) else ()
+        return held_during(keys, bound, times).astype(np.float64)
+
+    return level
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Schedule:
-    """Commands of a whole trial, one row per engine step.
+    """Commands of some steps, one row each.
 
     Attributes:
         targets: (S, D) target of each driven joint (`Joints.driven`): of a wheel its speed about
             its outward axis, rad/s; of another what its drive holds, rad, rad/s, units or units/s,
             NaN where it is free.
-        firing: (S, C) whether each cannon's key is held.
+        firing: (S, C) how far each cannon is asked to fire, 0 to 1.
     """
 
     targets: FloatArray
-    firing: BoolArray
+    firing: FloatArray
+
+
+@dataclass(slots=True)
+class DriveState:
+    """What drives have come to; D driven joints.
+
+    Attributes:
+        speeds: (D,) what follows a wheel's, or a drive's, wanted speed.
+        places: (D,) where each drive for a place aims.
+    """
+
+    speeds: FloatArray
+    places: FloatArray
+
+    @classmethod
+    def still(cls, structure: Structure) -> Self:
+        """Before anything was asked for."""
+        return cls(*(np.zeros(len(structure.joints.driven)) for _ in range(2)))
 
 
 def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray) -> BoolArray:
@@ -115,49 +162,42 @@ def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray
 
 def plan_schedule(
     structure: Structure,
-    bindings: Bindings,
-    keys: Sequence[KeyHold],
+    levels: Levels,
+    state: DriveState,
     *,
     control: Control,
-    step_count: int,
+    times: FloatArray,
     time_step_s: float,
 ) -> Schedule:
-    """The commands a control sequence gives.
+    """The commands of some steps.
 
-    A driven wheel's target follows its key by a first-order lag; without a key, or with keys for
-    both directions, it brakes.
+    A driven wheel's target follows what is asked for by a first-order lag; where nothing is, or
+    both directions alike, it brakes.
 
     Args:
         structure: The machine.
-        bindings: (N,) the keys of each block's actions.
-        keys: The control sequence; read in mode "agent" only.
+        levels: What is asked for.
+        state: What the drives have come to before; they go on from it.
         control: Who presses the keys.
-        step_count: Number of engine steps in the trial.
+        times: (S,) when each step begins, seconds.
         time_step_s: Length of one, seconds.
     """
-    times = np.asarray(np.arange(step_count) * time_step_s, dtype=np.float64)
-    pressed = keys if control.mode == "agent" else ()
-
-    def held(block: int, action: str) -> BoolArray:
-        return held_during(pressed, bindings[block].get(action, ()), times)
-
-    targets = _targets(structure, held, step_count=step_count, time_step_s=time_step_s)
+    targets = _targets(structure, levels, state, step_count=len(times), time_step_s=time_step_s)
+    firing = np.zeros((len(times), len(structure.cannons)))
     if control.mode == "held":
-        firing = np.repeat(
-            (times >= control.from_s - 1e-9)[:, None], len(structure.cannons), axis=1
-        )
+        firing[times >= control.from_s - 1e-9] = 1.0
         return Schedule(targets=targets, firing=firing)
-    firing = np.zeros((step_count, len(structure.cannons)), dtype=bool)
     for c, block in enumerate(structure.cannons):
         thrust = structure.parts[block].module.thrust
         if thrust is not None:
-            firing[:, c] = held(block, thrust.action)
+            firing[:, c] = levels(int(block), thrust.action)
     return Schedule(targets=targets, firing=firing)
 
 
 def _targets(
     structure: Structure,
-    held: Callable[[int, str], BoolArray],
+    levels: Levels,
+    state: DriveState,
     *,
     step_count: int,
     time_step_s: float,
@@ -170,58 +210,56 @@ def _targets(
         motor = part.module.motor
         if motor is None:
             continue
-        forward = held(int(block), motor.forward).astype(np.float64)
-        backward = held(int(block), motor.backward).astype(np.float64)
+        forward, backward = (levels(int(block), way) for way in (motor.forward, motor.backward))
         # Clockwise seen from outside is against the outward axis.
         sign = -1.0 if part.forward_is_clockwise else 1.0
         targets[:, w] = sign * motor.speed * (forward - backward)
         lags[w] = motor.lag_per_s
-    targets = lagged(targets, lags, time_step_s)
+    before = state.speeds
+    targets, state.speeds = lagged(targets, lags, time_step_s, before=before)
     for d, block in enumerate(structure.joints.driven):
-        driven = _driven(structure.parts[block], partial(held, int(block)), step_count, time_step_s)
-        if driven is not None:
-            targets[:, d] = driven
+        part = structure.parts[block]
+        joint = part.module.joint
+        if joint is None or joint.drive is None:
+            continue
+        drive = joint.drive
+        none = np.zeros(step_count)
+        forward = none if drive.forward is None else levels(int(block), drive.forward)
+        backward = none if drive.backward is None else levels(int(block), drive.backward)
+        sign = -1.0 if part.forward_is_clockwise else 1.0
+        if drive.kind == "speed":
+            targets[:, d], state.speeds[d] = speed_targets(
+                drive, forward, backward, sign=sign, time_step_s=time_step_s, before=before[d]
+            )
+            continue
+        targets[:, d] = place_targets(
+            drive,
+            forward,
+            backward,
+            sign=sign,
+            limits=joint.limits,
+            time_step_s=time_step_s,
+            place=state.places[d],
+        )
+        state.places[d] = targets[-1, d]
     return targets
 
 
-def _driven(
-    part: Part, held: Callable[[str], BoolArray], step_count: int, time_step_s: float
-) -> FloatArray | None:
-    """The targets of a joint's own drive, (S,); None if it has none."""
-    joint = part.module.joint
-    if joint is None or joint.drive is None:
-        return None
-    drive = joint.drive
-    none = np.zeros(step_count, dtype=bool)
-    forward = none if drive.forward is None else held(drive.forward)
-    backward = none if drive.backward is None else held(drive.backward)
-    sign = -1.0 if part.forward_is_clockwise else 1.0
-    if drive.kind == "speed":
-        return speed_targets(drive, forward, backward, sign=sign, time_step_s=time_step_s)
-    return place_targets(
-        drive, forward, backward, sign=sign, limits=joint.limits, time_step_s=time_step_s
-    )
-
-
-def effective_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> int:
-    """How many of the key presses reach some block's action.
-
-    Args:
-        bindings: (N,) the keys of each block's actions.
-        keys: The control sequence.
-    """
-    return len(_reaching(bindings, keys))
-
-
-def written_presses(bindings: Bindings, keys: Sequence[KeyHold]) -> str:
-    """The key presses that reach some block's action, as a trajectory's settings keep them.
+def reaching(bindings: Bindings, keys: Sequence[KeyHold]) -> list[KeyHold]:
+    """The key presses that reach some block's action.
 
     Args:
         bindings: (N,) the keys of each block's actions.
         keys: The control sequence as it was played.
     """
-    presses = [[key.key, key.time_s, key.hold_for_s] for key in _reaching(bindings, keys)]
-    return json.dumps(presses, separators=(",", ":"))
+    bound = {key for actions in bindings for names in actions.values() for key in names}
+    return [key for key in keys if key.key in bound]
+
+
+def written_presses(presses: Sequence[KeyHold]) -> str:
+    """Key presses as a trajectory's settings keep them: those that reach something."""
+    rows = [[press.key, press.time_s, press.hold_for_s] for press in presses]
+    return json.dumps(rows, separators=(",", ":"))
 
 
 def read_presses(text: str) -> tuple[KeyPress, ...]:
@@ -230,11 +268,6 @@ def read_presses(text: str) -> tuple[KeyPress, ...]:
         KeyPress(key=key, time_s=time_s, hold_for_s=hold_for_s)
         for key, time_s, hold_for_s in json.loads(text)
     )
-
-
-def _reaching(bindings: Bindings, keys: Sequence[KeyHold]) -> list[KeyHold]:
-    bound = {key for actions in bindings for names in actions.values() for key in names}
-    return [key for key in keys if key.key in bound]
 
 
 def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArray) -> BoolArray:
@@ -258,12 +291,12 @@ def heated_cannons(structure: Structure, shown: FloatArray, directions: FloatArr
     return np.asarray(heated[structure.cannons])
 
 
-def recoil(structure: Structure, firing: BoolArray, heated: BoolArray) -> FloatArray:
+def recoil(structure: Structure, firing: FloatArray, heated: BoolArray) -> FloatArray:
     """Recoil of each cannon, (C,), mass·unit/s².
 
     Args:
         structure: The machine.
-        firing: (C,) whether each cannon's key is held.
+        firing: (C,) how far each cannon is asked to fire, 0 to 1.
         heated: (C,) whether a flame touches it.
     """
     thrusts = np.where(heated, structure.heated_thrusts, structure.cold_thrusts)

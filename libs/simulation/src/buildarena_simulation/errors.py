@@ -1,5 +1,7 @@
 """Errors of buildarena_simulation: a machine's fault, a caller's fault and a crash stay apart."""
 
+from typing import Any, ClassVar
+
 
 class BuildarenaSimulationError(Exception):
     """Base of every error this package raises."""
@@ -10,11 +12,50 @@ class MachineNotSimulable(BuildarenaSimulationError):  # noqa: N818 - it names t
 
     Args:
         reason: What is wrong with the machine, fit to be shown to a person or a model.
+
+    Attributes:
+        kind: Which class of reasons it is.
     """
+
+    kind: ClassVar[str] = "not_simulable"
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
         self.reason = reason
+
+
+class ControllerFailed(MachineNotSimulable):
+    """A controller's program failed: a fault of the machine, never of the service.
+
+    Args:
+        words: What went wrong.
+        line: The line of the program; None if there is none.
+        tick: At which tick, from 0; None before the first one.
+        time_s: When that was, seconds.
+
+    Attributes:
+        line: The line of the program.
+        tick: The tick.
+    """
+
+    kind: ClassVar[str] = "controller_failed"
+
+    def __init__(
+        self, words: str, *, line: int | None = None, tick: int | None = None, time_s: float = 0.0
+    ) -> None:
+        at = [] if line is None else [f"line {line}"]
+        at += [] if tick is None else [f"tick {tick} ({time_s:.2f} s)"]
+        super().__init__(f"the controller failed{', ' if at else ''}{', '.join(at)}: {words}")
+        self.line, self.tick = line, tick
+        self._parts = words, line, tick, time_s
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Processes hand it to each other."""
+        return _failed, self._parts
+
+
+def _failed(words: str, line: int | None, tick: int | None, time_s: float) -> ControllerFailed:
+    return ControllerFailed(words, line=line, tick=tick, time_s=time_s)
 
 
 class SimulationError(BuildarenaSimulationError):

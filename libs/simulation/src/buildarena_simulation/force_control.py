@@ -1,33 +1,36 @@
-"""How keys control blocks that push, hold a height, contract or let go."""
+"""What is asked of blocks that push, hold a height, contract, grab or let go."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from buildarena_geometry.modules.forces import Spring
-from buildarena_simulation.control import Bindings, KeyHold, held_during
+from buildarena_simulation.control import Levels
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.force_field import Commands
-from buildarena_simulation.structure.grips import grips_of
+from buildarena_simulation.structure.grips import Grips
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 from buildarena_simulation.structure.own_forces import OwnForces
+
+_ON = 0.5
+"""Above which share something that is only on or off is on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceSchedule:
-    """Commands of a whole trial, one row per engine step.
+    """Commands of some steps, one row each.
 
     Attributes:
-        pushing: (S, P) whether each fan's key is held.
+        pushing: (S, P) how far each fan is asked to push, 0 to 1.
         heights: (S, A) by how much each held height was moved, units.
         let_go: (S, D) whether each decoupler's key was pressed by then.
         rests: (S, K) length of each spring at rest, as a share of its built length.
-        grab: (S, G) whether each grip's key for it is held.
-        release: (S, G) the same to let go.
+        grab: (S, G) whether each grip is asked to.
+        release: (S, G) whether it is asked to let go.
     """
 
-    pushing: BoolArray
+    pushing: FloatArray
     heights: FloatArray
     let_go: BoolArray
     rests: FloatArray
@@ -49,90 +52,116 @@ class ForceSchedule:
         )
 
 
+@dataclass(slots=True)
+class ForceState:
+    """What blocks that exert forces have come to.
+
+    Attributes:
+        moved: (A,) for how many steps each held height has risen.
+        let_go: (D,) whether each decoupler was asked to by now.
+        rests: (K,) length of each spring at rest, as a share of its built length.
+    """
+
+    moved: FloatArray
+    let_go: BoolArray
+    rests: FloatArray
+
+    @classmethod
+    def still(cls, structure: Structure, forces: OwnForces) -> Self:
+        """Before anything was asked for."""
+        return cls(
+            moved=np.zeros(len(forces.altitudes)),
+            let_go=np.zeros(len(forces.decouplers), dtype=bool),
+            rests=np.ones(len(structure.ropes.spring_of)),
+        )
+
+
 def plan_forces(
     structure: Structure,
     forces: OwnForces,
-    bindings: Bindings,
-    keys: Sequence[KeyHold],
+    levels: Levels,
+    state: ForceState,
     *,
+    grips: Grips,
     control: Control,
     times: FloatArray,
+    time_step_s: float,
 ) -> ForceSchedule:
-    """The commands a control sequence gives to blocks that exert forces by themselves.
+    """The commands to blocks that exert forces by themselves.
 
     Where the scenario holds the cannons' keys, it holds the fans' keys too.
 
     Args:
         structure: The machine.
         forces: What its blocks exert.
-        bindings: (N + K,) the keys of each block's actions, then of each spring's.
-        keys: The control sequence; read in mode "agent" only.
+        levels: What is asked for; what is no share is on above a half.
+        state: What they have come to before; they go on from it.
+        grips: Its blocks that hold.
         control: Who presses the keys.
-        times: (S,) when each engine step begins, seconds, evenly spaced from 0.
+        times: (S,) when each step begins, seconds.
+        time_step_s: Length of one, seconds.
     """
-    pressed = keys if control.mode == "agent" else ()
-    time_step_s = float(times[1]) if len(times) > 1 else 0.0
-    pushing = np.zeros((len(times), len(forces.pushes)), dtype=bool)
-    if control.mode == "held":
-        pushing[times >= control.from_s - 1e-9] = True
+    pushing = np.zeros((len(times), len(forces.pushes)))
     for k, block in enumerate(forces.pushes):
         push = structure.parts[block].module.push
         if push is not None:
-            pushing[:, k] |= held_during(pressed, bindings[block].get(push.action, ()), times)
+            pushing[:, k] = levels(int(block), push.action)
+    if control.mode == "held":
+        pushing[times >= control.from_s - 1e-9] = 1.0
     heights = np.zeros((len(times), len(forces.altitudes)))
     for k, (block, of) in enumerate(zip(forces.altitudes, forces.altitude_of, strict=True)):
-        bound = bindings[block]
-        rises = held_during(pressed, bound.get(of.rise, ()), times).astype(np.float64)
-        sinks = held_during(pressed, bound.get(of.sink, ()), times).astype(np.float64)
-        heights[:, k] = np.cumsum(rises - sinks) * of.rate * time_step_s
+        moved = levels(int(block), of.rise) - levels(int(block), of.sink)
+        steps = state.moved[k] + np.cumsum(moved)
+        heights[:, k], state.moved[k] = steps * of.rate * time_step_s, steps[-1]
     let_go = np.zeros((len(times), len(forces.decouplers)), dtype=bool)
     for k, block in enumerate(forces.decouplers):
         decoupling = structure.parts[block].module.decouple
         if decoupling is not None:
-            held = held_during(pressed, bindings[block].get(decoupling.action, ()), times)
-            let_go[:, k] = np.logical_or.accumulate(held)
-    grab, release = _grip_keys(structure, bindings, pressed, times)
+            asked = levels(int(block), decoupling.action) > _ON
+            let_go[:, k] = np.logical_or.accumulate(asked) | state.let_go[k]
+    state.let_go |= let_go[-1]
+    grab, release = _grabbing(structure, grips, levels, len(times))
     return ForceSchedule(
         pushing=pushing,
         heights=heights,
         let_go=let_go,
-        rests=_rests(structure, bindings, pressed, times),
+        rests=_rests(structure, levels, state, len(times), time_step_s),
         grab=grab,
         release=release,
     )
 
 
-def _grip_keys(
-    structure: Structure, bindings: Bindings, pressed: Sequence[KeyHold], times: FloatArray
+def _grabbing(
+    structure: Structure, grips: Grips, levels: Levels, step_count: int
 ) -> tuple[BoolArray, BoolArray]:
-    """Whether the keys that grab, and those that release, are held, each (S, G)."""
-    grips = grips_of(structure)
-    grab, release = (np.zeros((len(times), len(grips)), dtype=bool) for _ in range(2))
+    """Whether each grip is asked to grab, and to let go, each (S, G)."""
+    grab, release = (np.zeros((step_count, len(grips)), dtype=bool) for _ in range(2))
     for g, block in enumerate(grips.blocks):
         grip = structure.parts[block].module.grip
         if grip is not None:
-            grab[:, g] = held_during(pressed, bindings[block].get(grip.grab, ()), times)
-            release[:, g] = held_during(pressed, bindings[block].get(grip.release, ()), times)
+            grab[:, g] = levels(block, grip.grab) > _ON
+            release[:, g] = levels(block, grip.release) > _ON
     return grab, release
 
 
 def _rests(
-    structure: Structure, bindings: Bindings, pressed: Sequence[KeyHold], times: FloatArray
+    structure: Structure, levels: Levels, state: ForceState, step_count: int, time_step_s: float
 ) -> FloatArray:
     """Length of each spring at rest, (S, K), as a share of its built length."""
-    rests = np.ones((len(times), len(structure.ropes.spring_of)))
-    # Tests of structures alone give the keys of blocks only, or none.
-    of_springs = [*bindings[len(structure) :], *({} for _ in structure.ropes.spring_of)]
-    for k, (spring, bound) in enumerate(zip(structure.ropes.spring_of, of_springs, strict=False)):
-        held = held_during(pressed, bound.get(spring.contract or "", ()), times)
-        if held.any():
-            rests[:, k] = _drawn(held, spring, float(times[1]))
+    rests = np.tile(state.rests, (step_count, 1))
+    for k, spring in enumerate(structure.ropes.spring_of):
+        if spring.contract is None:
+            continue
+        held = levels(len(structure) + k, spring.contract) > _ON
+        if held.any() or state.rests[k] < 1.0:
+            rests[:, k] = _drawn(held, spring, time_step_s, float(state.rests[k]))
+            state.rests[k] = rests[-1, k]
     return rests
 
 
-def _drawn(held: BoolArray, spring: Spring, time_step_s: float) -> FloatArray:
+def _drawn(held: BoolArray, spring: Spring, time_step_s: float, share: float) -> FloatArray:
     """Share of its built length that a spring has at rest, (S,): it goes to and fro evenly."""
-    step, share = spring.rate * time_step_s, 1.0
+    step = spring.rate * time_step_s
     shares = np.ones(len(held))
     for k, contracts in enumerate(held.tolist()):
         shares[k] = share = (

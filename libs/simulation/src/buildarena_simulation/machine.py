@@ -139,6 +139,12 @@ def bindings_of(machine: "Machine") -> Bindings:
     return [*(block.bindings for block in machine.blocks.values()), *(s.bindings for s in springs)]
 
 
+def part_ids(machine: "Machine") -> list[str]:
+    """The ids of the parts of `bindings_of`, in the same order."""
+    springs = [c.id for c in machine.connectors.values() if c.module.link == "spring"]
+    return [*machine.blocks, *springs]
+
+
 def _part(block: "Block") -> Part:
     pose, module = block.world_from_block, block.module
     rotation = np.array(pose.rotation)

@@ -14,38 +14,81 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_simulation.errors import TrajectoryFormatError
-from buildarena_simulation.trajectory import Bearing, Break, Event, JointPeak, Trajectory
+from buildarena_simulation.trajectory import (
+    Bearing,
+    Break,
+    Event,
+    JointPeak,
+    Piloting,
+    Trajectory,
+)
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 SCHEMA_VERSION: Final = 3
-_READABLE: Final = (1, 2, 3)
+PILOTED_SCHEMA: Final = 4
+"""Schema of trials with a program: what it sensed and asked for is there as well."""
+_READABLE: Final = (1, 2, 3, 4)
 """Schema 1 has no pieces and no bearing forces, schema 2 no loads over time."""
-_WRITABLE: Final = (2, 3)
+_WRITABLE: Final = (2, 3, 4)
 _LOADS_FROM: Final = 3
 
 _BEARING: Final = ("ground", "terrain", "cargo", "wheels")
 _KEY: Final = b"buildarena.trajectory"
 _COMPRESSION_LEVEL: Final = 6
+_FLOATS: Final = {"time_s": "time_s", "cargo_mass": "cargo_mass"} | {
+    name: f"{name}.list.element"
+    for name in (
+        *("positions", "quaternions", "cargo_position", "cargo_quaternion"),
+        *("joint_loads", "senses", "answers"),
+        *(f"bearing_{name}" for name in _BEARING),
+    )
+}
+"""Columns of floating-point numbers, and their paths in a file."""
 
 
-def write_trajectory(trajectory: Trajectory, *, schema: int = SCHEMA_VERSION) -> bytes:
+def schema_for(trajectory: Trajectory) -> int:
+    """The schema that a trajectory is written in."""
+    return SCHEMA_VERSION if trajectory.piloting is None else PILOTED_SCHEMA
+
+
+def write_trajectory(trajectory: Trajectory, *, schema: int | None = None) -> bytes:
     """The bytes of a trajectory's file; equal trajectories give equal bytes.
 
     Args:
         trajectory: What is written.
-        schema: 2 to write it as versions before this one did, without loads over time: so can a
-            file of theirs be compared byte by byte.
+        schema: 2 to write it as versions before this one did, without loads over time, or 3,
+            without what a program sensed: so can a file of theirs be compared byte by byte.
 
     Raises:
         ValueError: Files of this schema are no longer written.
     """
+    schema = schema_for(trajectory) if schema is None else schema
     if schema not in _WRITABLE:
         choices = " and ".join(str(version) for version in _WRITABLE)
         raise ValueError(f"files of schema {schema} are not written, only of {choices}")
     import pyarrow as pa
     import pyarrow.parquet as pq
+
+    columns, facts = _columns(trajectory, schema), _facts(trajectory, schema)
+    table = pa.table(columns).replace_schema_metadata({_KEY: json.dumps(facts).encode()})
+    out = io.BytesIO()
+    pq.write_table(
+        table,
+        out,
+        compression="zstd",
+        compression_level=_COMPRESSION_LEVEL,
+        use_dictionary=False,
+        use_byte_stream_split=[path for name, path in _FLOATS.items() if name in columns],
+        write_statistics=False,
+    )
+    return out.getvalue()
+
+
+def _columns(trajectory: Trajectory, schema: int) -> "dict[str, pa.Array]":
+    """The series, a row for each instant."""
+    import pyarrow as pa
 
     count = len(trajectory.time_s)
     columns: dict[str, pa.Array] = {
@@ -67,6 +110,15 @@ def write_trajectory(trajectory: Trajectory, *, schema: int = SCHEMA_VERSION) ->
             columns[f"bearing_{name}"] = _rows(getattr(bearing, name).reshape(count, -1))
     if trajectory.joint_loads is not None and schema >= _LOADS_FROM:
         columns["joint_loads"] = _rows(trajectory.joint_loads)
+    if trajectory.piloting is not None and schema >= PILOTED_SCHEMA:
+        columns["senses"] = _rows(trajectory.piloting.senses)
+        columns["answers"] = _rows(trajectory.piloting.answers)
+    return columns
+
+
+def _facts(trajectory: Trajectory, schema: int) -> dict[str, Any]:
+    """What is no series, as JSON values."""
+    bearing, piloting = trajectory.bearing, trajectory.piloting
     facts = {
         "schema_version": schema,
         "block_ids": trajectory.block_ids,
@@ -82,32 +134,9 @@ def write_trajectory(trajectory: Trajectory, *, schema: int = SCHEMA_VERSION) ->
     }
     if trajectory.events:
         facts["events"] = [asdict(event) for event in trajectory.events]
-    table = pa.table(columns).replace_schema_metadata({_KEY: json.dumps(facts).encode()})
-    floats = [
-        path
-        for name, path in (
-            ("time_s", "time_s"),
-            ("cargo_mass", "cargo_mass"),
-            ("positions", "positions.list.element"),
-            ("quaternions", "quaternions.list.element"),
-            ("cargo_position", "cargo_position.list.element"),
-            ("cargo_quaternion", "cargo_quaternion.list.element"),
-            ("joint_loads", "joint_loads.list.element"),
-            *((f"bearing_{name}", f"bearing_{name}.list.element") for name in _BEARING),
-        )
-        if name in columns
-    ]
-    out = io.BytesIO()
-    pq.write_table(
-        table,
-        out,
-        compression="zstd",
-        compression_level=_COMPRESSION_LEVEL,
-        use_dictionary=False,
-        use_byte_stream_split=floats,
-        write_statistics=False,
-    )
-    return out.getvalue()
+    if piloting is not None and schema >= PILOTED_SCHEMA:
+        facts |= {"sense_names": piloting.sense_names, "action_names": piloting.action_names}
+    return facts
 
 
 def read_trajectory(data: bytes) -> Trajectory:
@@ -141,6 +170,9 @@ def read_trajectory(data: bytes) -> Trajectory:
         joint_loads=_matrix(columns["joint_loads"], count) if "joint_loads" in columns else None,
         pieces=_matrix(columns["pieces"], count) if "pieces" in columns else None,
         bearing=_bearing(columns, count, facts.pop("wheel_ids", None)),
+        piloting=_piloting(
+            columns, count, facts.pop("sense_names", None), facts.pop("action_names", None)
+        ),
     )
     return Trajectory(**facts)
 
@@ -179,6 +211,22 @@ def _bearing(
         cargo=series["cargo"].reshape(count),
         wheels=series["wheels"],
         wheel_ids=tuple(wheel_ids),
+    )
+
+
+def _piloting(
+    columns: "dict[str, pa.ListArray]",
+    count: int,
+    senses: list[str] | None,
+    actions: list[str] | None,
+) -> Piloting | None:
+    if senses is None or actions is None:
+        return None
+    return Piloting(
+        sense_names=tuple(senses),
+        senses=_matrix(columns["senses"], count),
+        action_names=tuple(actions),
+        answers=_matrix(columns["answers"], count),
     )
 
 

@@ -16,6 +16,7 @@ from buildarena_simulation.structure.model import BoolArray, FloatArray, Structu
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import (
+    Piloting,
     Setting,
     Trajectory,
     rounded_loads,
@@ -133,6 +134,7 @@ class Recorder:
         self,
         *,
         breaking: "BreakingModel",
+        piloting: Piloting | None,
         engine: str,
         engine_version: str,
         simulation_version: str,
@@ -146,6 +148,7 @@ class Recorder:
         structure = self._structure
         positions, quaternions = self._poses()
         return Trajectory(
+            piloting=piloting,
             time_s=self._time_s[recorded],
             block_ids=self._ids,
             positions=rounded_positions(positions),

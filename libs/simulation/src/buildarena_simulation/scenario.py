@@ -6,11 +6,13 @@ may come from strangers, so every number has bounds within which the engines sta
 """
 
 import math
-from typing import Annotated, Any, Final, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Final, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
+from buildarena_simulation.draws import Draws, at_end, drawn
 
 MAX_DURATION_S: Final = 600.0
 
@@ -29,7 +31,7 @@ BlockId = Annotated[str, Field(min_length=1, max_length=40)]
 
 def _is_default(value: Any) -> bool:
     """Whether an addition to the format is unused: older texts and hashes stay as they were."""
-    return value is None or value is False or value == ()
+    return value is None or value is False or value in ((), {})
 
 
 class _Document(BaseModel):
@@ -167,6 +169,37 @@ class Control(_Document):
     until_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
 
 
+SenseKind = Literal["pose", "blocks", "joints", "wheels", "cargo", "marks", "gates"]
+NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
+
+
+class Senses(_Document):
+    """What a controller is told, how exactly and how late.
+
+    Attributes:
+        offers: Kinds of senses.
+        noise: Standard deviation of each figure of a kind: places in units, speeds in units/s,
+            components of axes, spins in rad/s, joints in rad or units and their speeds.
+        delay_ticks: By how many ticks of 0.04 s what is told is late.
+    """
+
+    offers: Annotated[tuple[SenseKind, ...], Field(max_length=16)] = get_args(SenseKind)
+    noise: Mapping[NoiseKind, Annotated[float, Field(ge=0, le=100)]] = {}
+    delay_ticks: Annotated[int, Field(ge=0, le=25)] = 0
+
+
+class Gusts(_Document):
+    """Wind that pushes everything sideways, each mass alike, and that each seed draws anew.
+
+    Attributes:
+        strength: Greatest acceleration that it gives, units/s².
+        shortest_s: Period of its quickest part, seconds; the slowest has four times as long.
+    """
+
+    strength: Annotated[float, Field(gt=0, le=20)]
+    shortest_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
+
+
 class Scenario(_Document):
     """Everything about a trial but the machine and the engine.
 
@@ -186,6 +219,10 @@ class Scenario(_Document):
             unit at the usual gravity: joints and drives are as strong as ever.
         drive_strength: How strong drives are, as a share of their data: the torque of motors, the
             force and torque of driven joints, the push of fans.
+        senses: What a controller is told; None where it takes no controller.
+        gusts: Wind; None where there is none. A trial without a seed has that of seed 0.
+        draws: What the seed of a trial draws, see `buildarena_simulation.draws`; a trial without a
+            seed has the figures that stand here.
     """
 
     duration_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
@@ -201,6 +238,9 @@ class Scenario(_Document):
     clear_start: Annotated[bool, Field(exclude_if=_is_default)] = False
     gravity: Annotated[Gravity, Field(exclude_if=lambda value: value == GRAVITY)] = GRAVITY
     drive_strength: Annotated[Strength, Field(exclude_if=lambda value: value == 1)] = 1.0
+    senses: Annotated[Senses | None, Field(exclude_if=_is_default)] = None
+    gusts: Annotated[Gusts | None, Field(exclude_if=_is_default)] = None
+    draws: Annotated[Draws, Field(exclude_if=_is_default)] = {}
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:
@@ -219,6 +259,42 @@ class Scenario(_Document):
                 f"duration_s {self.duration_s} is not a multiple of {1 / SAMPLE_RATE_HZ} s"
             )
         return self
+
+    @model_validator(mode="after")
+    def _ranges_can_be_simulated(self) -> Self:
+        try:
+            _ = self.ends  # making them is the check
+        except ValidationError as error:
+            wrong = error.errors()[0]
+            place = ".".join(map(str, wrong["loc"]))
+            raise ValueError(f"draws: at the end of a range, {place}: {wrong['msg']}") from error
+        return self
+
+    @property
+    def ends(self) -> tuple[Self, ...]:
+        """The worlds with the least figures of all that is drawn, and with the greatest."""
+        if not self.draws:
+            return ()
+        return tuple(self._world(at_end(self._fixed(), self.draws, end)) for end in (0, 1))
+
+    def world(self, seed: int | None) -> Self:
+        """What a trial with this seed is put through: nothing of it is drawn any more.
+
+        Args:
+            seed: Of the trial; None for the figures that stand here.
+        """
+        if not self.draws:
+            return self
+        fixed = self._fixed()
+        return self._world(fixed if seed is None else drawn(fixed, self.draws, seed))
+
+    def _fixed(self) -> dict[str, Any]:
+        """What stands here, as JSON values, the usual figures too."""
+        fixed = self.model_dump(mode="json", exclude={"draws"})
+        return {"gravity": self.gravity, "drive_strength": self.drive_strength} | fixed
+
+    def _world(self, document: dict[str, Any]) -> Self:
+        return type(self).model_validate(document)
 
     @property
     def sample_count(self) -> int:

@@ -104,11 +104,33 @@ class Bearing:
             "cargo": (count,),
             "wheels": (count, len(self.wheel_ids)),
         }
-        for name, shape in shapes.items():
-            array = getattr(self, name)
-            if array.shape != shape:
-                raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
-            array.setflags(write=False)
+        _close(self, shapes)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Piloting:
+    """What a program sensed at T instants and asked for from there on. Arrays are read-only.
+
+    Attributes:
+        sense_names: (S,) as the program names them: "position.x", "marks.goal.relative.x".
+        senses: (T, S) float32; not a number at the last instant, when nobody asks any more.
+        action_names: (A,) of blocks' actions that were ever asked for: "7.spinning_forward".
+        answers: (T, A) float32, how far each was asked for, 0 to 1.
+    """
+
+    sense_names: tuple[str, ...]
+    senses: NDArray[np.float32]
+    action_names: tuple[str, ...]
+    answers: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        """Checks that the arrays fit together, and closes them."""
+        count = len(self.senses)
+        wanted = {
+            "senses": (count, len(self.sense_names)),
+            "answers": (count, len(self.action_names)),
+        }
+        _close(self, wanted)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -140,6 +162,7 @@ class Trajectory:
             on. None where no simulator of ours ran, and in files of schemas 1 and 2.
         breaks: In order of time.
         events: Releases and grabs that the machine was made for, in order of time.
+        piloting: What its program sensed and asked for; None where keys were pressed, or nothing.
         engine: Name of the engine.
         engine_version: Version of the engine's library.
         simulation_version: Version of the shared model.
@@ -166,6 +189,7 @@ class Trajectory:
     bearing: Bearing | None = None
     joint_loads: NDArray[np.float32] | None = None
     events: tuple[Event, ...] = ()
+    piloting: Piloting | None = None
 
     def __post_init__(self) -> None:
         """Checks that the arrays fit together, and closes them."""
@@ -180,14 +204,25 @@ class Trajectory:
             "pieces": (count, blocks),
             "joint_loads": (count, len(self.joint_peaks)),
         }
-        for name, shape in wanted.items():
-            array = getattr(self, name)
-            if array is not None and array.shape != shape:
-                raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
+        if self.piloting is not None and len(self.piloting.senses) != count:
+            raise ValueError(f"piloting has {len(self.piloting.senses)} instants, not {count}")
+        _close(self, wanted)
+
+
+def _close(holder: Bearing | Piloting | Trajectory, wanted: Mapping[str, tuple[int, ...]]) -> None:
+    """Checks the shapes of the arrays that there are, and makes all of them read-only.
+
+    Raises:
+        ValueError: One has another shape.
+    """
+    for name, shape in wanted.items():
+        array = getattr(holder, name)
+        if array is not None and array.shape != shape:
+            raise ValueError(f"{name} has shape {array.shape}, expected {shape}")
+    for field in fields(holder):
+        value = getattr(holder, field.name)
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)
 
 
 def rounded_positions(positions: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -35,6 +35,7 @@ from buildarena_store.errors import (
     UploadError,
 )
 from buildarena_store.events import Event, Events
+from buildarena_store.evidence import EvidenceFiles, StoredEvidence
 from buildarena_store.jobs.external_calls import ExternalCall, ExternalCalls
 from buildarena_store.jobs.job import Job, JobKey, NewJob
 from buildarena_store.jobs.jobs import Jobs
@@ -81,6 +82,7 @@ __all__ = [
     "EndedKeyError",
     "Event",
     "Events",
+    "EvidenceFiles",
     "ExternalCall",
     "ExternalCalls",
     "Job",
@@ -114,6 +116,7 @@ __all__ = [
     "StaleLeaseError",
     "Store",
     "StoreError",
+    "StoredEvidence",
     "StoredTask",
     "Sweep",
     "SweepProgress",

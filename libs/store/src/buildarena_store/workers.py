@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Final
@@ -130,6 +130,18 @@ class Workers:
         """Removes a worker that shuts down from the register."""
         with self._database.transaction() as connection:
             connection.execute(delete(workers).where(workers.c.id == worker_id))
+
+    def forget_ended(self, host: str, is_running: Callable[[int], bool]) -> None:
+        """Removes a host's workers that were killed: nobody has to look for them.
+
+        Args:
+            host: As they reported it.
+            is_running: Whether a process of that host runs, by its id.
+        """
+        ours = select(workers.c.id, workers.c.pid).where(workers.c.host == host)
+        with self._database.transaction() as connection:
+            ended = [row.id for row in connection.execute(ours) if not is_running(row.pid)]
+            connection.execute(delete(workers).where(workers.c.id.in_(ended)))
 
     def trim(self, prefix: str, *, most: int) -> None:
         """Forgets all but the workers whose ids begin so that reported last.

@@ -45,6 +45,7 @@ from buildarena_api.routes import (
     catalogue,
     comparisons,
     events,
+    evidence,
     exports,
     health,
     jobs,
@@ -98,7 +99,7 @@ ORDINARY = (
     simulators,
     workers,
 )
-LIMITED_THEMSELVES = (events, exports, archives, comparisons, metrics)
+LIMITED_THEMSELVES = (events, exports, archives, evidence, comparisons, metrics)
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
 thread."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
@@ -220,7 +221,7 @@ def _add_middleware(app: FastAPI) -> None:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
         BodyLimitMiddleware,
-        unlimited={archives.IMPORT_PATH},
+        unlimited={archives.IMPORT_PATH, evidence.PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
         most=runner.max_request_bytes,

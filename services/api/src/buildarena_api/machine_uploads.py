@@ -16,7 +16,12 @@ from fastapi import Request
 from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_api.http.problems import ProblemError
 from buildarena_benchmark import ValidationIssue
-from buildarena_besiege import ImportedMachine, MachineFileError, read_machine_file
+from buildarena_besiege import (
+    ImportedMachine,
+    MachineFileError,
+    file_data_lines,
+    read_machine_file,
+)
 from buildarena_geometry import DocumentError, Machine
 from buildarena_geometry.json_texts import TooDeepError, read_json
 from buildarena_simulation.constants import MAX_PARTS
@@ -114,7 +119,7 @@ def _content(data: bytes) -> ImportedMachine:
     if data.lstrip(_BLANKS).startswith(b"<"):
         return read_machine_file(data)
     machine = Machine.from_document(_document(data))
-    return ImportedMachine(machine=machine, name="", not_understood=())
+    return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
 
 
 def _not_storable(machine: Machine) -> str | None:

@@ -81,6 +81,7 @@ class MachineScene(BaseModel):
     modules: dict[str, ModuleShape]
     blocks: list[BlockPlace]
     connectors: list[ConnectorPlace]
+    controller: str = Field(description="The program that acts; empty where keys are pressed")
 
 
 class SceneView(BaseModel):
@@ -113,6 +114,7 @@ def machine_scene(machine: Machine) -> MachineScene:
         modules={name: _module(module) for name, module in used.items()},
         blocks=[_block(block) for block in machine.blocks.values()],
         connectors=[_connector(link, machine) for link in machine.connectors.values()],
+        controller=machine.controller,
     )
 
 

@@ -1,4 +1,4 @@
-"""``python -m buildarena_simworker_besiege calibrate|doctor``: this machine's game."""
+"""``python -m buildarena_simworker_besiege COMMAND``: this machine's game."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ import argparse
 import json
 import sys
 from dataclasses import asdict
+from pathlib import Path
 
 from buildarena_simworker_besiege.doctor import examine
 from buildarena_simworker_besiege.errors import DesktopError, NotSetUpError
+from buildarena_simworker_besiege.installed import installed
 from buildarena_simworker_besiege.screen.calibration import Calibration, load_calibration
+from buildarena_simworker_besiege.screen.window_types import Wanted, Windows
 from buildarena_simworker_besiege.set_up import make_desktop
 from buildarena_simworker_besiege.settings import BesiegeSettings
 
 
 def main() -> None:
-    """Calibrates or examines this machine's game."""
+    """Calibrates, examines or tries out this machine's game."""
     parser = argparse.ArgumentParser(prog="buildarena besiege", description=main.__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     calibrate = commands.add_parser("calibrate", help="find out where to click, and try it")
@@ -25,14 +28,27 @@ def main() -> None:
     calibrate.add_argument(
         "--try", dest="only_try", action="store_true", help="only try the calibration that is there"
     )
+    calibrate.add_argument(
+        "--path", action="store_true", help="record the clicks from the game's title to its level"
+    )
     doctor = commands.add_parser("doctor", help="what this machine lacks to play the game")
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
+    evening = commands.add_parser("first-evening", help="play every step, and pack the evidence")
+    evening.add_argument("--out", type=Path, default=Path("first-evening"))
+    evening.add_argument("--steps", default="", help="names of steps, with commas between them")
+    evening.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     settings = BesiegeSettings()
     try:
         if options.command == "doctor":
             sys.exit(_doctor(settings, as_json=options.json))
-        sys.exit(_calibrate(settings, ask=not options.defaults, only_try=options.only_try))
+        if options.command == "first-evening":
+            sys.exit(_first_evening(settings, options))
+        sys.exit(
+            _calibrate(
+                settings, ask=not options.defaults, only_try=options.only_try, path=options.path
+            )
+        )
     except (NotSetUpError, DesktopError) as error:
         sys.exit(f"error: {error}")
 
@@ -48,28 +64,99 @@ def _doctor(settings: BesiegeSettings, *, as_json: bool) -> int:
     return 0 if all(finding.ok for finding in findings) else 1
 
 
-def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool) -> int:
-    from buildarena_simworker_besiege.calibrate import ask_positions, try_out
+def _first_evening(settings: BesiegeSettings, options: argparse.Namespace) -> int:
+    from buildarena_pipeline.evidence import EvidenceError
+    from buildarena_simworker_besiege.first_evening import first_evening
+
+    names = [name.strip() for name in options.steps.split(",") if name.strip()]
+    _say("Hands off mouse and keyboard.")
+    try:
+        evidence = first_evening(
+            settings, options.out, steps=names, repeats=options.repeats, tell=_say
+        )
+    except EvidenceError as error:
+        sys.exit(f"error: {error}")
+    _say(f"wrote {options.out / 'evidence.zip'}: send it with `buildarena besiege evidence add`")
+    return 0 if all(step.state != "failed" for step in evidence.steps) else 1
+
+
+def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool, path: bool) -> int:
+    from buildarena_simworker_besiege.calibrate import ask_positions, record_path
     from buildarena_simworker_besiege.screen.input import ScreenInput
-    from buildarena_simworker_besiege.screen.windows import open_windows
 
     file = settings.calibration_file
+    calibration = load_calibration(file) if file.exists() else Calibration()
+    if ask and not only_try:
+        asking = record_path if path else ask_positions
+        calibration = asking(
+            ScreenInput(settings.pace),
+            _windows(settings),
+            ask=input,
+            tell=_say,
+            before=calibration,
+        )
     if not only_try:
-        before = load_calibration(file) if file.exists() else Calibration()
-        calibration = before
-        if ask:
-            screen_input, windows = ScreenInput(settings.pace), open_windows()
-            calibration = ask_positions(
-                screen_input, windows, settings.title, ask=input, tell=_say, before=before
-            )
-        calibration.save(file)
-        _say(f"saved {file}, calibration {calibration.digest}")
-    desktop, _ = make_desktop(settings)
+        _save(calibration, settings)
+    if path:
+        return 0
     _say("Trying it: hands off mouse and keyboard.")
+    if ask and not only_try:
+        _point_at_log(settings, calibration)
+    return _try(settings)
+
+
+def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
+    """The log is asked for while a machine prints: before, there is none to point at."""
+    from buildarena_simworker_besiege.calibrate import ask_log, opened_terrain, printing_run
+    from buildarena_simworker_besiege.screen.input import ScreenInput
+    from buildarena_simworker_besiege.screen.window import WindowDesktop
+
+    desktop, _ = make_desktop(settings)
     try:
-        return 0 if try_out(desktop, settings.time_limits, _say) else 1
+        if isinstance(desktop, WindowDesktop):
+            desktop.print_lines(printing_run(opened_terrain(settings)))
+            _save(
+                ask_log(
+                    ScreenInput(settings.pace),
+                    _windows(settings),
+                    ask=input,
+                    tell=_say,
+                    before=calibration,
+                ),
+                settings,
+            )
+            desktop.stop()
+            desktop.clear()
     finally:
         desktop.close()
+
+
+def _try(settings: BesiegeSettings) -> int:
+    from buildarena_simworker_besiege.calibrate import learnt, opened_terrain, try_out
+
+    desktop, _ = make_desktop(settings)
+    try:
+        played = try_out(desktop, settings.time_limits, _say, opened_terrain(settings))
+        if played is None:
+            return 1
+        if settings.desktop == "window":
+            before = load_calibration(settings.calibration_file)
+            present = installed(settings.folder)
+            _save(learnt(before, played, _windows(settings), present), settings)
+    finally:
+        desktop.close()
+    return 0
+
+
+def _windows(settings: BesiegeSettings) -> Windows:
+    from buildarena_simworker_besiege.screen.windows import open_windows
+
+    return open_windows(Wanted(title=settings.title, executable=settings.executable))
+
+
+def _save(calibration: Calibration, settings: BesiegeSettings) -> None:
+    calibration.save(settings.calibration_file)
+    _say(f"saved {settings.calibration_file}, calibration {calibration.digest}")
 
 
 def _say(line: str) -> None:

@@ -65,6 +65,14 @@ class Desktop(Protocol):
     def new_log(self, run: GameRun) -> RunLog:
         """An empty log that collects the run's lines."""
 
+    def require_level(self, run: GameRun, log: RunLog) -> None:
+        """Checks what the run reports of its level, as soon as it does.
+
+        Raises:
+            WrongLevelError: Another level than the run's is open.
+            ScreenError: The game draws to another size than when it was calibrated.
+        """
+
     def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
         """The run's trajectory from its log.
 

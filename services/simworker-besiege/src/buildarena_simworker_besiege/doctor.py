@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
-from buildarena_simworker_besiege.errors import NotSetUpError
+from buildarena_simworker_besiege.errors import DesktopError, GameChangedError, NotSetUpError
+from buildarena_simworker_besiege.installed import APP, MOD_FOLDERS, Installed, installed
 from buildarena_simworker_besiege.screen.calibration import load_calibration
+from buildarena_simworker_besiege.screen.window_types import Wanted
 from buildarena_simworker_besiege.settings import BesiegeSettings
-
-MOD_FOLDERS = ("Besiege_Data/Mods", "Mods", "../../workshop/content/346010", "Contents/Mods")
-"""Where mods lie below the game's folder; the third is Steam's workshop beside it."""
+from buildarena_simworker_besiege.toolkit.command_line import require_toolkit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,13 +46,22 @@ def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
         if settings.version
         else "set BUILDARENA_BESIEGE_GAME and BUILDARENA_BESIEGE_MOD as the service has them",
     )
+    if settings.driver == "toolkit":
+        detail = "its command can be run, and leaves its runs where they are looked for"
+        yield _tried("toolkit", detail, lambda: require_toolkit(settings))
+        return
     yield _machines(settings)
     yield _command(settings)
     if settings.desktop == "window":
-        yield _mod(settings)
+        present = installed(settings.folder)
+        yield _mod(settings, present)
+        yield _build(settings, present)
         yield _tried("display", "screen found", _display)
         yield _tried("calibration", str(settings.calibration_file), lambda: _calibration(settings))
-        yield _tried("window", f"titled {settings.title!r}", lambda: _window(settings))
+        yield _tried(
+            "unchanged", "the game that was calibrated", lambda: _unchanged(settings, present)
+        )
+        yield _tried("window", str(_wanted(settings)), lambda: _window(settings))
 
 
 def _machines(settings: BesiegeSettings) -> Finding:
@@ -76,11 +85,23 @@ def _command(settings: BesiegeSettings) -> Finding:
             detail="the runner cannot start the game by itself",
             advice="set BUILDARENA_BESIEGE_COMMAND, so that a frozen game is restarted",
         )
+    try:
+        program = settings.words(None)[0]
+    except (ValueError, IndexError) as error:
+        advice = "correct BUILDARENA_BESIEGE_COMMAND"
+        return Finding(name="restart", ok=False, detail=str(error), advice=advice)
+    if shutil.which(program) is None:
+        return Finding(
+            name="restart",
+            ok=False,
+            detail=f"there is no program {program}",
+            advice='correct BUILDARENA_BESIEGE_COMMAND; a path with blanks stands in quotes ("…")',
+        )
     opens = "and opens levels" if settings.opens_levels else "with the level opened by hand"
     return Finding(name="restart", ok=True, detail=f"{settings.command} {opens}")
 
 
-def _mod(settings: BesiegeSettings) -> Finding:
+def _mod(settings: BesiegeSettings, present: Installed) -> Finding:
     name = "Lua Scripting Mod"
     if settings.folder is None:
         return Finding(
@@ -89,36 +110,48 @@ def _mod(settings: BesiegeSettings) -> Finding:
             detail="not looked for: the game's folder is not set",
             advice="set BUILDARENA_BESIEGE_FOLDER to have it looked for",
         )
-    for place in MOD_FOLDERS:
-        folder = settings.folder / place
-        mod = _lua_mod(folder) if folder.is_dir() else None
-        if mod is not None:
-            return Finding(name=name, ok=True, detail=str(mod))
+    if present.mod_file is None:
+        return Finding(
+            name=name,
+            ok=False,
+            detail=f"no Mod.xml of it in {', '.join(MOD_FOLDERS)} below {settings.folder}",
+            advice="subscribe to it in Steam's workshop, start the game once, and enable it",
+        )
+    same = not settings.mod or not present.mod or settings.mod == present.mod
     return Finding(
         name=name,
-        ok=False,
-        detail=f"no folder or manifest that speaks of Lua below {settings.folder}",
-        advice="subscribe to the Lua Scripting Mod in Steam's workshop and start the game once",
+        ok=same,
+        detail=f"{present.mod or 'no version'} in {present.mod_file}",
+        advice="" if same else f"BUILDARENA_BESIEGE_MOD is {settings.mod}: set it to {present.mod}",
     )
 
 
-def _lua_mod(folder: Path) -> Path | None:
-    """A mod of that kind, recognised by its folder's name or its manifest."""
-    for mod in sorted(folder.iterdir()):
-        if not mod.is_dir():
-            continue
-        if "lua" in mod.name.casefold():
-            return mod
-        for manifest in mod.glob("*od.xml"):
-            if "lua" in manifest.read_text(encoding="utf-8", errors="replace").casefold():
-                return mod
-    return None
+def _build(settings: BesiegeSettings, present: Installed) -> Finding:
+    name = "build of the game"
+    if settings.folder is None:
+        return Finding(name=name, ok=True, detail="not looked for: the game's folder is not set")
+    if not present.build:
+        return Finding(
+            name=name,
+            ok=True,
+            detail=f"no appmanifest_{APP}.acf of Steam beside {settings.folder}",
+            advice="look yourself that the game is still the version that was calibrated",
+        )
+    return Finding(name=name, ok=True, detail=f"{present.build}, as Steam has it")
+
+
+def _unchanged(settings: BesiegeSettings, present: Installed) -> None:
+    """Whether the game is the one that was calibrated."""
+    try:
+        present.require(load_calibration(settings.calibration_file).installed)
+    except GameChangedError as error:
+        raise NotSetUpError(str(error)) from error
 
 
 def _tried(name: str, detail: str, check: Callable[[], None]) -> Finding:
     try:
         check()
-    except NotSetUpError as error:
+    except (NotSetUpError, DesktopError) as error:
         what, _, advice = str(error).rpartition(": ")
         return Finding(name=name, ok=False, detail=what or str(error), advice=advice)
     return Finding(name=name, ok=True, detail=detail)
@@ -141,7 +174,7 @@ def _calibration(settings: BesiegeSettings) -> None:
 
     calibration = load_calibration(settings.calibration_file)
     _display()
-    area = open_windows().find(settings.title)
+    area = open_windows(_wanted(settings)).find()
     if area is not None and calibration.window not in {None, (area.width, area.height)}:
         was = "x".join(map(str, calibration.window or ()))
         raise NotSetUpError(
@@ -154,8 +187,13 @@ def _window(settings: BesiegeSettings) -> None:
     from buildarena_simworker_besiege.screen.windows import open_windows
 
     _display()
-    if open_windows().find(settings.title) is None and not settings.command:
+    wanted = _wanted(settings)
+    if open_windows(wanted).find() is None and not settings.command:
         raise NotSetUpError(
-            f"no window has {settings.title!r} in its title: start the game, or correct "
-            "BUILDARENA_BESIEGE_TITLE"
+            f"there is no {wanted}: start the game, or correct BUILDARENA_BESIEGE_TITLE and "
+            "BUILDARENA_BESIEGE_EXECUTABLE"
         )
+
+
+def _wanted(settings: BesiegeSettings) -> Wanted:
+    return Wanted(title=settings.title, executable=settings.executable)

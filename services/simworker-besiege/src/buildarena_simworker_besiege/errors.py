@@ -24,8 +24,24 @@ class GameGoneError(DesktopError):
     """The game is not running, or has no window."""
 
 
-class LevelClosedError(DesktopError):
+class ScreenError(DesktopError):
+    """Mouse, keyboard, clipboard or picture of the screen cannot be used at the moment."""
+
+
+class NeedsPersonError(DesktopError):
+    """Only somebody at the machine can help: the job goes back until that happened."""
+
+
+class LevelClosedError(NeedsPersonError):
     """The job needs a level that is not open, and the runner cannot open it."""
+
+
+class GameChangedError(NeedsPersonError):
+    """The game or its mod is another than the one that was calibrated."""
+
+
+class WrongLevelError(DesktopError):
+    """The script measured another level than the one the job needs."""
 
 
 class NotSetUpError(Exception):

@@ -9,10 +9,8 @@ whether cannons burn: tasks that need either are refused.
 from __future__ import annotations
 
 import queue
-import shlex
 import socket
 import subprocess
-import sys
 import threading
 import time
 from typing import IO, Final
@@ -21,12 +19,14 @@ from buildarena_besiege import GameRun, StateLog, level_file
 from buildarena_geometry import Machine
 from buildarena_pipeline.errors import PermanentError
 from buildarena_simulation import Scenario, Trajectory
+from buildarena_simworker_besiege.commands import command_words
 from buildarena_simworker_besiege.desktop import RunLog
 from buildarena_simworker_besiege.errors import (
     DesktopError,
     GameGoneError,
     StepFailedError,
 )
+from buildarena_simworker_besiege.game_lock import GameLock
 from buildarena_simworker_besiege.process import GameProcess
 from buildarena_simworker_besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker_besiege.traces import Traces
@@ -51,6 +51,7 @@ class HeadlessDesktop:
         self._limits = settings.time_limits
         self._process = GameProcess(settings)
         self._traces = Traces(settings.state)
+        self._lock = GameLock(f"the game of {settings.state.absolute()}")
         self._socket: socket.socket | None = None
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         self._reader: threading.Thread | None = None
@@ -153,6 +154,9 @@ class HeadlessDesktop:
         self._enter_level()
         self._traces.remove()
 
+    def require_level(self, run: GameRun, log: RunLog) -> None:
+        """The level was loaded by its path, and the game said so."""
+
     def recover(self) -> None:
         """Nothing can be in the way of a game without a window."""
 
@@ -173,12 +177,13 @@ class HeadlessDesktop:
         """Ends the game."""
         self._end()
         self._traces.remove()
+        self._lock.release()
 
     def _start_anew(self) -> None:
         self._end()
         port = _free_port(self._settings.port)
         words = [
-            *shlex.split(self._settings.command, posix=sys.platform != "win32"),
+            *command_words(self._settings.command),
             *("--ip", "127.0.0.1", "--port", str(port)),
         ]
         process = self._process.start(None, piped=True, words=words)

@@ -16,6 +16,7 @@ from buildarena_simworker_besiege.desktop import Desktop, RunLog
 from buildarena_simworker_besiege.errors import (
     DesktopError,
     GameGoneError,
+    NeedsPersonError,
     StepFailedError,
 )
 from buildarena_simworker_besiege.time_limits import TimeLimits
@@ -94,6 +95,10 @@ def play(
         try:
             game_log, pace = _attempt(desktop, run, require_held, limits)
             trajectory = read(run, game_log)
+        except NeedsPersonError as error:
+            screenshots += _pictures(desktop)
+            _start_clean(desktop, faults)
+            raise RunFailedError(str(error), screenshots, waits_for_person=True) from error
         except (DesktopError, LogIncompleteError) as error:
             log.warning("run_failed", attempt=attempt, error=str(error))
             faults.append(str(error))
@@ -121,6 +126,7 @@ def _attempt(
     elapsed = time.monotonic() - started
     desktop.stop()
     game_log.read(desktop.read_log())
+    desktop.require_level(run, game_log)
     desktop.clear()
     return game_log, run.duration_s / max(elapsed, 1e-3)
 
@@ -142,6 +148,7 @@ def _follow(
     while not _is_over(game_log, run):
         require_held()
         game_log.read(desktop.read_log())
+        desktop.require_level(run, game_log)
         now = time.monotonic()
         if game_log.complaints:
             raise StepFailedError("run the script", f"the game says {game_log.complaints[0]!r}")
@@ -167,7 +174,7 @@ def _is_over(game_log: RunLog, run: GameRun) -> bool:
 def _pictures(desktop: Desktop) -> list[bytes]:
     try:
         picture = desktop.screenshot()
-    except OSError:
+    except (OSError, DesktopError):
         return []
     return [] if picture is None else [picture]
 

@@ -58,9 +58,38 @@ class GameProcess:
         """Digest of the level it was started with; None when it was not started here."""
         return None if self._process() is None else str(self._known().get("level"))
 
+    @property
+    def started(self) -> bool:
+        """Whether a runner started it; otherwise a person did, whose game outlives the runner."""
+        return bool(self._known().get("started"))
+
     def is_running(self) -> bool:
         """Whether the game that was started here still runs."""
         return self._process() is not None
+
+    def awaited(self) -> bool:
+        """Whether the game may still show its window: it runs, or its launcher handed over.
+
+        A launcher ends, or stays beside the game, once it handed over; it is never started again
+        while the game may be on its way: six games were started in a row.
+        """
+        return self.is_running() or (self._child is not None and self._child.poll() == 0)
+
+    def adopt(self, pid: int | None) -> None:
+        """Takes the process of the game's window for the game, where a launcher started it.
+
+        Args:
+            pid: Of the window; None where the screen does not say, and the name must do.
+        """
+        known = self._known()
+        if pid is None and not self.is_running():
+            others = sorted(self._others(), key=lambda other: other.create_time())
+            pid = others[-1].pid if others else None
+        if pid is None or pid == known.get("pid"):
+            return
+        if not self._settings.executable and pid in self._children():
+            return
+        self._note(pid, str(known.get("level", "")), started=self.started)
 
     def start(
         self, level: bytes | None, *, piped: bool = False, words: list[str] | None = None
@@ -95,30 +124,30 @@ class GameProcess:
             except OSError as error:
                 raise GameGoneError(f"the game cannot be started: {error}") from error
         self._child = process
-        with suppress(psutil.NoSuchProcess):
-            known = {
-                "pid": process.pid,
-                "created": psutil.Process(process.pid).create_time(),
-                "level": level_digest(level),
-            }
-            write_whole(self._file, json.dumps(known).encode())
+        self._note(process.pid, level_digest(level), started=True)
         return process
 
     def kill(self) -> None:
-        """Ends it and everything it started."""
+        """Ends it and everything it started, and games that a launcher left on this screen.
+
+        A machine has one game: one more would take the keyboard, and Steam starts no second.
+        """
         process = self._process()
-        if process is not None:
-            family = [process]
-            with suppress(psutil.NoSuchProcess):
-                family += process.children(recursive=True)
-            for member in family:
-                with suppress(psutil.NoSuchProcess):
-                    member.terminate()
-            _, alive = psutil.wait_procs(family, timeout=END_S)
-            for member in alive:
-                with suppress(psutil.NoSuchProcess):
-                    member.kill()
-            psutil.wait_procs(alive, timeout=END_S)
+        family = [] if process is None else [process]
+        with suppress(psutil.NoSuchProcess):
+            family += [] if process is None else process.children(recursive=True)
+        if self.can_start and self._settings.desktop == "window":
+            family += [other for other in self._others() if other not in family]
+        for member in family:
+            with suppress(psutil.Error):
+                member.terminate()
+        _, alive = psutil.wait_procs(family, timeout=END_S)
+        for member in alive:
+            with suppress(psutil.Error):
+                member.kill()
+        psutil.wait_procs(alive, timeout=END_S)
+        if self._is_launcher(process):
+            self._child = None
         if self._child is not None:
             self._child.wait()
             if self._child.stdout is not None:
@@ -134,6 +163,46 @@ class GameProcess:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(level)
         return file.absolute()
+
+    def _children(self) -> set[int]:
+        """The processes that the started one began, whose window may be one's."""
+        process = self._process()
+        with suppress(psutil.NoSuchProcess):
+            return set() if process is None else {child.pid for child in process.children(True)}
+        return set()
+
+    def _is_launcher(self, game: psutil.Process | None) -> bool:
+        """Whether what was started runs on, beside the game that it started."""
+        child = self._child
+        return (
+            child is not None
+            and child.poll() is None
+            and game is not None
+            and (child.pid != game.pid)
+        )
+
+    def _note(self, pid: int, level: str, *, started: bool) -> None:
+        with suppress(psutil.NoSuchProcess):
+            created = psutil.Process(pid).create_time()
+            known = {"pid": pid, "created": created, "level": level, "started": started}
+            write_whole(self._file, json.dumps(known).encode())
+
+    def _others(self) -> list[psutil.Process]:
+        """Processes of the game's name that this account runs on this screen."""
+        wanted = executable_stem(self._settings.executable)
+        own = psutil.Process()
+        processes = []
+        for process in psutil.process_iter():
+            with suppress(psutil.Error, OSError):
+                if (
+                    wanted
+                    and executable_stem(process.name()) == wanted
+                    and process.username() == own.username()
+                    and _screen_of(process) == _screen_of(own)
+                    and process.status() != psutil.STATUS_ZOMBIE
+                ):
+                    processes.append(process)
+        return processes
 
     def _known(self) -> dict[str, Any]:
         try:
@@ -151,6 +220,21 @@ class GameProcess:
         except (KeyError, ValueError, psutil.NoSuchProcess):
             return None
         return process if same and alive else None
+
+
+def executable_stem(name: str) -> str:
+    """A program's name without the ending that its system adds, in lower case."""
+    stem = name.strip().casefold()
+    for ending in (".exe", ".x86_64", ".x86", ".app"):
+        stem = stem.removesuffix(ending)
+    return stem
+
+
+def _screen_of(process: psutil.Process) -> str:
+    """Which X11 screen a process shows its windows on; one for all elsewhere."""
+    if sys.platform in {"win32", "darwin"}:
+        return ""
+    return str(process.environ().get("DISPLAY", ""))
 
 
 def _apart() -> Mapping[str, Any]:

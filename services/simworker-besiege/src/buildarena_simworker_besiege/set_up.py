@@ -7,6 +7,7 @@ from typing import Any
 
 from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import NotSetUpError
+from buildarena_simworker_besiege.installed import installed
 from buildarena_simworker_besiege.screen.calibration import load_calibration
 from buildarena_simworker_besiege.settings import BesiegeSettings
 
@@ -29,15 +30,18 @@ def make_desktop(settings: BesiegeSettings) -> tuple[Desktop, Mapping[str, Any]]
         return HeadlessDesktop(settings), {"desktop": "headless"}
     from buildarena_simworker_besiege.screen.input import ScreenInput
     from buildarena_simworker_besiege.screen.window import WindowDesktop
+    from buildarena_simworker_besiege.screen.window_types import Wanted
     from buildarena_simworker_besiege.screen.windows import open_windows
 
     calibration = load_calibration(settings.calibration_file)
     screen_input = ScreenInput(settings.pace)
-    desktop = WindowDesktop(settings, calibration, screen_input, open_windows())
+    windows = open_windows(Wanted(title=settings.title, executable=settings.executable))
+    desktop = WindowDesktop(settings, calibration, screen_input, windows)
     facts = {
         "desktop": "window",
         "calibration": calibration.digest,
         "screen": "x".join(map(str, screen_input.screen_size())),
         "log": "window" if settings.log_file is None else "file",
+        **installed(settings.folder).as_facts(),
     }
     return desktop, facts

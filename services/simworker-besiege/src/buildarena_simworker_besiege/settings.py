@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+from buildarena_simworker_besiege.commands import command_words
 from buildarena_simworker_besiege.time_limits import TimeLimits
 
 LEVEL_FIELD = "{level}"
@@ -46,7 +45,30 @@ class BesiegeSettings(BaseSettings):
         Literal["window", "headless"],
         Field(description="window: by mouse and keyboard; headless: over TCP"),
     ] = "window"
-    title: Annotated[str, Field(description="Part of the window's title")] = "besiege"
+    driver: Annotated[
+        Literal["desktop", "toolkit"],
+        Field(
+            description="desktop: the game itself, by its window or over TCP; toolkit: the command "
+            "line of BuildArena 2.0's toolkit, which COMMAND names"
+        ),
+    ] = "desktop"
+    runs: Annotated[
+        Path | None,
+        Field(
+            description="Folder in which the toolkit makes one for each run, where COMMAND does "
+            "not name {folder}"
+        ),
+    ] = None
+    title: Annotated[str, Field(description="Title of the game's window, whatever its case")] = (
+        "Besiege"
+    )
+    executable: Annotated[
+        str,
+        Field(
+            description="Name of the game's program, with or without its ending; with an empty one "
+            "a window's title is enough"
+        ),
+    ] = "Besiege"
     calibration: Annotated[
         Path | None, Field(description="Calibration file; default STATE/calibration.json")
     ] = None
@@ -98,8 +120,7 @@ class BesiegeSettings(BaseSettings):
     def words(self, level: Path | None) -> list[str]:
         """The command that starts the game with a level; empty where none is set."""
         text = "" if level is None else str(level)
-        words = shlex.split(self.command, posix=sys.platform != "win32")
-        return [word.replace(LEVEL_FIELD, text) for word in words]
+        return [word.replace(LEVEL_FIELD, text) for word in command_words(self.command)]
 
     @property
     def opens_levels(self) -> bool:

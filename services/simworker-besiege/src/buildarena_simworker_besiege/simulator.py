@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from buildarena_besiege import GameRun, MachineNotPlayableError, prepare_run
-from buildarena_pipeline.errors import PermanentError, StartupError
-from buildarena_pipeline.runtime.annotations import annotate
+from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.simulators.installed import InstalledSimulator
 from buildarena_pipeline.runtime.simulators.simulator import (
@@ -20,18 +19,22 @@ from buildarena_pipeline.runtime.simulators.simulator import (
     TrialResult,
 )
 from buildarena_simworker_besiege.desktop import Desktop
-from buildarena_simworker_besiege.errors import LevelClosedError, NotSetUpError
+from buildarena_simworker_besiege.errors import NeedsPersonError, NotSetUpError
+from buildarena_simworker_besiege.game_simulator import GameSimulator
 from buildarena_simworker_besiege.placing import require_placed
 from buildarena_simworker_besiege.play import LAGGING, Played, RunFailedError, play
 from buildarena_simworker_besiege.set_up import make_desktop
 from buildarena_simworker_besiege.settings import BesiegeSettings
+from buildarena_simworker_besiege.toolkit.simulator import ToolkitSimulator
 
-LEVEL_WAIT_S: Final = 60.0
-"""How long a job waits that needs a level which only a person can open."""
+PERSON_WAIT_S: Final = 60.0
+"""How long a job waits that needs something which only a person can do, such as open a level."""
+FAULT_WAIT_S: Final = 5.0
+"""How long a job waits after a fault of the game."""
 
 
-class BesiegeSimulator:
-    """Runs trials in the game.
+class BesiegeSimulator(GameSimulator):
+    """Runs trials in the game by its desktop.
 
     Args:
         settings: Versions and folders.
@@ -39,35 +42,13 @@ class BesiegeSimulator:
         facts: What else a manifest should hold: calibration, screen.
     """
 
-    name = BESIEGE
-    repeatable = False
-
     def __init__(
         self, settings: BesiegeSettings, desktop: Desktop, facts: Mapping[str, Any]
     ) -> None:
-        self._settings = settings
+        super().__init__(settings, facts)
         self._desktop = desktop
-        self._facts = facts
 
-    @property
-    def versions(self) -> Mapping[str, Any]:
-        """What can change a trajectory."""
-        return {
-            "engine": BESIEGE,
-            "simulation": self._settings.version,
-            "game": self._settings.game,
-            "mod": self._settings.mod,
-            **self._facts,
-        }
-
-    def run(self, trial: TrialRequest) -> TrialResult:
-        """Plays the machine in the game; see `Simulator`."""
-        if trial.version != self._settings.version:
-            raise PermanentError(
-                f"the job was submitted for {BESIEGE}-{trial.version}, and this worker plays "
-                f"{BESIEGE}-{self._settings.version}: submit it again",
-                reason="game_version",
-            )
+    def _play(self, trial: TrialRequest) -> TrialResult:
         name = _file_name(trial)
 
         def make_run(attempt: int) -> GameRun:
@@ -94,22 +75,16 @@ class BesiegeSimulator:
             )
         except MachineNotPlayableError as error:
             raise MachineRefusedError(str(error)) from error
-        except LevelClosedError as error:
-            raise SimulatorFaultError(str(error), delay_s=LEVEL_WAIT_S, endless=True) from error
-        except (RunFailedError, NotSetUpError) as error:
-            shots = getattr(error, "screenshots", [])
-            files = {
-                f"screenshot-{trial.number}-{trial.token}-{index}.png": File(
-                    data=shot, media_type="image/png"
-                )
-                for index, shot in enumerate(shots)
-            }
-            raise SimulatorFaultError(str(error), files=files, delay_s=5.0) from error
+        except NeedsPersonError as error:
+            raise SimulatorFaultError(str(error), delay_s=PERSON_WAIT_S, endless=True) from error
+        except RunFailedError as error:
+            raise _fault(error, trial) from error
+        except NotSetUpError as error:
+            raise SimulatorFaultError(str(error), delay_s=FAULT_WAIT_S) from error
         return TrialResult(
             trajectory=played.trajectory,
             versions={**self.versions, **_course(played)},
             files=_files(played, trial.number),
-            annotations=annotate(trial.task, trial.machine, trial.controls),
         )
 
     def close(self) -> None:
@@ -130,7 +105,7 @@ def describe(name: str) -> InstalledSimulator:
     )
 
 
-def besiege_simulator(settings: Settings) -> BesiegeSimulator:
+def besiege_simulator(settings: Settings) -> BesiegeSimulator | ToolkitSimulator:
     """The game of this machine.
 
     Raises:
@@ -143,6 +118,8 @@ def besiege_simulator(settings: Settings) -> BesiegeSimulator:
             "Besiege and of its Lua Scripting Mod, as the service names them"
         )
     try:
+        if own.driver == "toolkit":
+            return ToolkitSimulator(own)
         desktop, facts = make_desktop(own)
     except NotSetUpError as error:
         raise StartupError(str(error)) from error
@@ -155,6 +132,19 @@ def _examined(settings: Settings) -> tuple[str, str]:
         advice = "see `python -m buildarena_simworker_besiege doctor`"
         return f"{BESIEGE} is not set up", advice
     return f"{BESIEGE} {version}", ""
+
+
+def _fault(error: RunFailedError, trial: TrialRequest) -> SimulatorFaultError:
+    """A run's failure with what the screen showed."""
+    files = {
+        f"screenshot-{trial.number}-{trial.token}-{index}.png": File(
+            data=shot, media_type="image/png"
+        )
+        for index, shot in enumerate(error.screenshots)
+    }
+    waits = error.waits_for_person
+    delay_s = PERSON_WAIT_S if waits else FAULT_WAIT_S
+    return SimulatorFaultError(str(error), files=files, delay_s=delay_s, endless=waits)
 
 
 def _file_name(trial: TrialRequest) -> str:

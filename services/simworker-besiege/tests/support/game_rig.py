@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from support.machines.building import BLOCK, built
-from support.player import Player
+from support.machines.evidence import experts_machine
 
 from buildarena_benchmark import Score, Task, builtin_tasks, score
 from buildarena_besiege import game_start
@@ -29,6 +29,8 @@ TRIALS = {
     "lift-2": {"duration_s": 6.0},
 }
 """The trials that are played in a few seconds."""
+SIZE = (1280, 800)
+"""Of the stand-in's window."""
 GAME, MOD = "1.75-23370", "1.4"
 VERSION = f"{GAME}-{MOD}"
 
@@ -65,49 +67,49 @@ class Rig:
         """What the game says of itself."""
         return json.loads((self.folder / "report.json").read_text())
 
-    def environment(self) -> dict[str, str]:
+    def game(self, *options: str, launcher: Path | None = None) -> str:
+        """The command that starts the stand-in.
+
+        Args:
+            options: Besides those of every rig.
+            launcher: Where a launcher notes that it started one, which then ends; none if left out.
+        """
+        first = ["-m", "stand_in_game"]
+        if launcher is not None:
+            first = ["-m", "stand_in_game.launcher", str(launcher)]
         words = [
-            *(sys.executable, "-m", "stand_in_game", "--machines", str(self.machines)),
-            *("--games", str(GAMES)),
+            *(sys.executable, *first, "--machines", str(self.machines), "--games", str(GAMES)),
             *("--speed", str(self.speed), "--report", str(self.folder / "report.json")),
-            *("--level={level}", "--faults-once", str(self.faults)),
+            *("--faults-once", str(self.faults), *options),
         ]
+        return " ".join(words)
+
+    def environment(self) -> dict[str, str]:
         return {
             "BUILDARENA_BESIEGE_GAME": GAME,
             "BUILDARENA_BESIEGE_MOD": MOD,
             "BUILDARENA_BESIEGE_MACHINES": str(self.machines),
             "BUILDARENA_BESIEGE_STATE": str(self.folder / "state"),
-            "BUILDARENA_BESIEGE_COMMAND": " ".join(words),
+            "BUILDARENA_BESIEGE_COMMAND": self.game("--level={level}"),
             "BUILDARENA_BESIEGE_PACE": str(self.pace),
             "BUILDARENA_BESIEGE_PATIENCE": str(self.patience),
             "PYTHONPATH": os.pathsep.join([SUPPORT, os.environ.get("PYTHONPATH", "")]),
         }
 
-    def calibrate(self) -> None:
-        """Saves the positions at which the stand-in has its buttons."""
+    def calibrate(self, **changes: Any) -> None:
+        """Saves the positions at which the stand-in has its buttons, and what else is named."""
         from buildarena_simworker_besiege.screen.calibration import Calibration
 
-        Calibration().save(self.folder / "state" / "calibration.json")
+        made = replace(Calibration(window=SIZE, screen=SIZE), **changes)
+        made.save(self.folder / "state" / "calibration.json")
 
 
-def experts_machine(task: str) -> Machine:
-    """What the expert builds, with its key presses."""
-    asked = Player()("builtin/expert", task=task).suspended
-    assert asked is not None
-    document = asked.machine.to_document()
-    if asked.controls is not None:
-        document["control_sequence"] = [
-            {"time_s": press.time_s, "key": press.key, "hold_for_s": press.hold_for_s}
-            for press in asked.controls
-        ]
-    return Machine.from_document(document)
-
-
-def tried_machine() -> tuple[Machine, Scenario]:
-    """What `calibrate` plays to see whether the positions are right."""
+def tried_machine(level: str = "") -> tuple[Machine, Scenario]:
+    """What `calibrate` plays to see whether the positions are right, in a task's level."""
     machine = built(("1", "A", BLOCK))
-    scenario = {"duration_s": TRIAL_S, "control": {"mode": "agent"}}
-    return machine, Scenario.model_validate(scenario)
+    scenario = Scenario.model_validate({"duration_s": TRIAL_S, "control": {"mode": "agent"}})
+    terrain = builtin_tasks()[level].scenario.terrain if level else ()
+    return machine, scenario.model_copy(update={"terrain": terrain})
 
 
 def short_trial(name: str) -> tuple[Task, Machine]:

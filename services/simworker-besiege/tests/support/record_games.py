@@ -16,12 +16,14 @@ from support.lua_game import LuaGame
 
 from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_besiege import GameLog, game_start
+from buildarena_besiege.exporting.probes import height_at
 from buildarena_besiege.logs.state_log import INTERVAL_S
 from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.run import PreparedMachine, marked, prepared_machine
 from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point, besiege_turn
 from buildarena_geometry.rotations import multiply
+from buildarena_pipeline.evidence.trials import OWN, trial_named
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -94,6 +96,7 @@ def log_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
     game = LuaGame(
         references,
         version="lua52",
+        ground=lambda east, north: height_at(scenario.terrain, east, north),
         path=lambda number, update: run.root(number, update // UPDATES_PER_SAMPLE),
         burning=lambda number, update: run.burns(number, update // UPDATES_PER_SAMPLE),
     ).play(run.prepared.script, round(scenario.duration_s * 100))
@@ -139,7 +142,11 @@ def played_runs() -> dict[str, tuple[Machine, Scenario]]:
     for name in TRIALS:
         task, machine = short_trial(name)
         runs[f"{name}-short"] = (machine, task.scenario)
-    return {**runs, "calibration": tried_machine()}
+    bridge = tried_machine("support-1")
+    for name in OWN:
+        trial = trial_named(name)
+        runs[f"evening-{name}"] = (trial.machine, trial.scenario)
+    return {**runs, "calibration": tried_machine(), "calibration-support-1": bridge}
 
 
 def main() -> None:

@@ -15,6 +15,8 @@ from buildarena_pipeline.runtime.simulators.simulator import (
 )
 from buildarena_pipeline.runtime.trials import File, TrialResult
 
+_MOST_LETTERS = 400  # of why a machine was refused, in what is said of the simulator
+
 
 class TrialSource(Protocol):
     """A leased trial: where it comes from and where its outcome goes.
@@ -51,8 +53,11 @@ def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
     started = time.perf_counter()
     try:
         result = simulator.run(trial)
-    except MachineRefusedError:
-        result = TrialResult(trajectory=None, versions=dict(simulator.versions))
+    except MachineRefusedError as refusal:
+        result = TrialResult(
+            trajectory=None,
+            versions={**simulator.versions, "refused": str(refusal)[:_MOST_LETTERS]},
+        )
     return replace(result, wall_s=time.perf_counter() - started)
 
 

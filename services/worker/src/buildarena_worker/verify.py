@@ -19,7 +19,12 @@ from typing import Any, cast
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.scorers.scorer import REFUTED
-from buildarena_besiege import LogIncompleteError, MachineNotPlayableError, prepare_run
+from buildarena_besiege import (
+    LogIncompleteError,
+    MachineNotPlayableError,
+    logged_trajectory,
+    prepare_run,
+)
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.agents.workbench import bench_of, repeated
@@ -66,7 +71,7 @@ from buildarena_store import (
     Usage,
 )
 from buildarena_store.jobs.histories import Histories
-from buildarena_worker.game_trials import annotations_again, logged_trajectory
+from buildarena_worker.game_trials import annotations_again
 from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.processors import Repeated, difference, named_processor, repetitions
 from buildarena_worker.session.host import ReplayHost
@@ -353,7 +358,7 @@ class Verifier:
             prepare_run(machine, task.scenario, name="again", run_id="again")
             raise LogIncompleteError("the log of the trial was not kept")
         text = self._artifacts.get(digest).decode("utf-8", "replace")
-        return logged_trajectory(text, record.versions or {}, machine, task)
+        return logged_trajectory(text, record.versions or {}, machine, task.scenario)
 
     def _score_checks(
         self, job: Job, machine: Machine | None, records: Sequence[RolloutRecord]

@@ -96,7 +96,7 @@ def _listed() -> dict[str, HonestDesign]:
     add("canard with a short tail", "flight-2", flyers.canard, fore=10.0, behind=1)
     add("winch", "mechanisms-3", winches.lever)
     add("winch of a short arm", "mechanisms-3", winches.lever, arm=5, lasts_s=0.95)
-    add("winch of fewer weights", "mechanisms-3", winches.lever, arm=5, weights=3, lasts_s=1.15)
+    add("winch of fewer weights", "mechanisms-3", winches.lever, weights=3)
     add("four balloons", "flight-1", flyers.balloons)
     add("two balloons", "flight-1", flyers.balloons, count=2)
     add("four balloons on long arms", "flight-1", flyers.balloons, arm=4)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from buildarena_cli.client import Client
+from buildarena_cli.commands import evidence
 from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
 from buildarena_cli.lazy import new_group
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from buildarena_simulation import Trajectory
 
 app = new_group("Play machines in the game Besiege.")
+app.add_typer(evidence.app, name="evidence")
 
 
 @app.command("level")
@@ -111,9 +113,14 @@ def calibrate(
     only_try: Annotated[
         bool, typer.Option("--try", help="Only try the calibration that is there.")
     ] = False,
+    path: Annotated[
+        bool,
+        typer.Option("--path", help="Record the clicks from the game's title to its level."),
+    ] = False,
 ) -> None:
     """Find out where to click in this machine's game, and try it."""
-    options = [*(["--defaults"] if defaults else []), *(["--try"] if only_try else [])]
+    chosen = {"--defaults": defaults, "--try": only_try, "--path": path}
+    options = [option for option, wanted in chosen.items() if wanted]
     exec_module([*RUNNER, "calibrate", *options])
 
 
@@ -121,6 +128,28 @@ def calibrate(
 def doctor(*, as_json: JsonOption = False) -> None:
     """Show what this machine lacks to play the game; the exit code is 1 when anything does."""
     exec_module([*RUNNER, "doctor", *(["--json"] if as_json else [])])
+
+
+@app.command("first-evening")
+def first_evening(
+    *,
+    out: Annotated[
+        Path, typer.Option(help="Folder of the evening; steps that are done in it stay done.")
+    ] = Path("first-evening"),
+    steps: Annotated[
+        str, typer.Option(help="Only these steps, with commas between their names.")
+    ] = "",
+    repeats: Annotated[
+        int, typer.Option(help="How often each of the expert's machines is played.")
+    ] = 3,
+) -> None:
+    """Try this machine's game out step by step, and pack what it shows into one file.
+
+    A step that fails is noted, with its picture, and the next one goes on. After an interruption
+    the same command continues where it stopped; failed steps are tried again.
+    """
+    options = ["--out", str(out), "--steps", steps, "--repeats", str(repeats)]
+    exec_module([*RUNNER, "first-evening", *options])
 
 
 @app.command("agreement")

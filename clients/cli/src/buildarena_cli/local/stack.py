@@ -15,6 +15,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
+import psutil
+
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local import (
     EmbeddedPostgres,
@@ -35,7 +37,7 @@ from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
 from buildarena_pipeline.secret_files import SUFFIX
-from buildarena_store import Database
+from buildarena_store import Database, Workers
 from buildarena_store.accounts.keys import new_secret
 from buildarena_store.states import CONSTRUCT_QUEUE
 
@@ -133,6 +135,8 @@ class Stack:
         direct = self.settings.database_direct_url
         database = Database(direct or environment["BUILDARENA_DATABASE_URL"])
         database.migrate()
+        # Those of a run that was killed, which would be reported as silent for an hour.
+        Workers(database).forget_ended(socket.gethostname(), psutil.pid_exists)
         database.close()
         for program in programs(self._simulators):
             self._tell(f"starting the {program.name}")

@@ -6,20 +6,17 @@ needs to know nothing of it. Who builds must not be told what is drawn: see `doc
 
 from __future__ import annotations
 
-from random import Random
 from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, model_validator
 
 from buildarena_benchmark.fields import Document
 from buildarena_simulation import Scenario
+from buildarena_simulation.draws import between
 
 Figure = Annotated[float, Field(gt=0, le=100_000, allow_inf_nan=False)]
 Range = tuple[Figure, Figure]
 """Least and greatest; each number between is as likely."""
-
-_DIGITS: Final = 3
-"""A drawn figure has so many digits behind the point."""
 
 
 class Unknowns(Document):
@@ -64,8 +61,7 @@ def drawn_numbers(unknowns: Unknowns, seed: int) -> dict[str, float]:
     for name in NAMES:
         bounds = getattr(unknowns, name)
         if bounds is not None:
-            draw = Random(f"{name} {seed}")  # noqa: S311 - to be repeatable; the seed is the secret
-            numbers[name] = round(draw.uniform(*bounds), _DIGITS)
+            (numbers[name],) = between(name, bounds[:1], bounds[1:], seed)
     return numbers
 
 

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Final, Literal
 import numpy as np
 
 from buildarena_benchmark.fields import Document, Threshold
-from buildarena_benchmark.scorers.measures.carrying import from_below
-from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start, masses_of
+from buildarena_benchmark.scorers.measures.components import joined_to_start
 from buildarena_benchmark.scorers.measures.series import starting_block
+from buildarena_benchmark.scorers.measures.touching_down import first_touch, speeds_before
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     FORCES_NOT_MEASURED,
@@ -23,12 +23,6 @@ from buildarena_simulation.scenario import ReleasedPlacement
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
-
-_TOUCH: Final = 0.02
-"""Smallest share of the machine's weight that the ground bears when it is touched."""
-
-_LAST_SAMPLES: Final = 3
-"""The speed at landing is the greatest over so many steps before the ground is touched."""
 
 
 class GlideScoring(Document):
@@ -76,11 +70,11 @@ def judge(
         return lacking
     joined = joined_to_start(machine, trajectory)
     path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
-    touching = from_below(trajectory) > _TOUCH * masses_of(machine, trajectory, joined)
-    landed = bool(touching.any())
-    last = int(touching.argmax()) if landed else len(path) - 1
+    touch = first_touch(machine, trajectory, joined)
+    landed = touch is not None
+    last = len(path) - 1 if touch is None else touch
     flown = float(np.linalg.norm(path[last, :2] - path[0, :2]))
-    sink = _sink(machine, trajectory, joined, last)
+    sink, _ = speeds_before(machine, trajectory, joined, last)
     metrics: dict[str, Metric] = {
         "range": rounded(flown),
         "landed": landed,
@@ -95,18 +89,6 @@ def judge(
         metrics=metrics,
         deciding=Deciding(samples=last + 1, members=joined, cargo=False),
     )
-
-
-def _sink(machine: "Machine", trajectory: "Trajectory", joined: Mask, last: int) -> float:
-    """How fast the machine's mass falls in the last steps before a sample, units/s."""
-    # The step into the sample that touches may be braked by the ground already.
-    end = max(last, 2)
-    rows = slice(max(end - _LAST_SAMPLES - 1, 0), end)
-    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
-    weights = masses * joined[last]
-    height = trajectory.positions[rows, :, 2].astype(np.float64) @ weights
-    falls = -np.diff(height / max(float(weights.sum()), 1e-9)) / np.diff(trajectory.time_s[rows])
-    return float(falls.max(initial=0.0))
 
 
 SCORER: Final = Scorer(

@@ -8,6 +8,7 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo
 from buildarena_benchmark.scorers.measures.components import joined_to_start
+from buildarena_benchmark.scorers.measures.marks import MarkName, center_of_mark, lacking_mark
 from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
@@ -67,7 +68,7 @@ class PlaceScoring(Document):
     """
 
     name: Literal["place"]
-    mark: Annotated[str, Field(min_length=1, max_length=40)] = "goal"
+    mark: MarkName = "goal"
     max_distance: Threshold = 1.0
     min_carry: Threshold = 6.0
     clearance: Threshold = 2.0
@@ -84,11 +85,10 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
     """Why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo is carried from its place, but scenario.cargo has none: give cargo.at"
-    marks = {mark.name: mark for mark in scenario.marks}
-    if scoring.mark not in marks:
-        known = ", ".join(marks) or "none"
-        return f"there is no mark {scoring.mark!r} in scenario.marks: there are {known}"
-    way = np.subtract(marks[scoring.mark].center[:2], scenario.cargo.at[:2])
+    lacking = lacking_mark(scoring.mark, scenario)
+    if lacking is not None:
+        return lacking
+    way = center_of_mark(scoring.mark, scenario)[:2] - np.array(scenario.cargo.at[:2])
     if np.linalg.norm(way) + scoring.max_distance < scoring.min_carry:
         return f"the mark is nearer to the cargo than min_carry {scoring.min_carry:g}"
     if scoring.rest_s >= scenario.duration_s:
@@ -119,16 +119,14 @@ def judge(
     if lacking is not None:
         return lacking
     assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
-    mark = next(m for m in scenario.marks if m.name == scoring.mark)
+    mark = center_of_mark(scoring.mark, scenario)
     path = trajectory.cargo_position.astype(np.float64)
     joined = joined_to_start(machine, trajectory)
     base = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
     base_shift = float(np.linalg.norm(base - base[0], axis=1).max())
     loose = _loose_way(trajectory, path)
-    apart = float(np.linalg.norm(path[-1, :2] - np.array(mark.center[:2])))
-    carried = loose <= scoring.max_loose and _passes_over(
-        scoring, trajectory, path, np.array(mark.center[:2])
-    )
+    apart = float(np.linalg.norm(path[-1, :2] - mark[:2]))
+    carried = loose <= scoring.max_loose and _passes_over(scoring, trajectory, path, mark[:2])
     stays = base_shift < scoring.max_base_shift
     whole = bool(joined.all())
     lies = (

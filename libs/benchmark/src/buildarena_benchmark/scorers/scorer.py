@@ -13,7 +13,7 @@ from buildarena_simulation import Scenario
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
-    from buildarena_simulation.rollout import Decision
+    from buildarena_simulation.trial import Decision
 
 Metric = float | int | bool | None
 

@@ -248,7 +248,8 @@ class TaskDocument(Document):
         scenario: Scenario | None = info.data.get("scenario")
         if scenario is None:
             return scoring
-        problem = known_scorers()[scoring.name].infeasible(scoring, scenario)
-        if problem is not None:
-            raise ValueError(problem)
+        for world in (scenario, *scenario.ends):
+            problem = known_scorers()[scoring.name].infeasible(scoring, world)
+            if problem is not None:
+                raise ValueError(problem)
         return scoring

@@ -22,6 +22,7 @@ _HEADROOM: Final = (
     *("flight-3", "lift-4", "mechanisms-7"),
 )
 _FAMILIES: Final = ("budget-1", "repair-1", "identify-1")
+_CONTROL: Final = ("landing-1", "slalom-2", "hover-3")
 
 
 @cache
@@ -29,7 +30,7 @@ def builtin_tasks() -> Mapping[str, Task]:
     """The built-in tasks by name: the paper's nine in its order, the workshop's, then the rest."""
     folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
     tasks = {}
-    for name in (*_PAPER, *_WORKSHOP, *_HEADROOM, *_FAMILIES):
+    for name in (*_PAPER, *_WORKSHOP, *_HEADROOM, *_FAMILIES, *_CONTROL):
         text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
         tasks[name] = parse_task(text, origin=f"{name}.yaml")
     return MappingProxyType(tasks)

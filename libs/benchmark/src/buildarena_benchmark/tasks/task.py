@@ -65,6 +65,11 @@ class Task:
         """Who presses the keys."""
         return self.scenario.control.mode
 
+    @property
+    def takes_programs(self) -> bool:
+        """Whether a controller may act in place of keys."""
+        return self.scenario.senses is not None and self.control == "agent"
+
     def drawn(self, seed: int) -> Self:
         """The task as a job of this seed has it; the same for all unless something is drawn.
 

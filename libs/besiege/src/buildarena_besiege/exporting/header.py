@@ -16,7 +16,7 @@ from buildarena_geometry.blocks import Block
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from buildarena_besiege.exporting.machine_file import BlockRecord
+    from buildarena_besiege.exporting.machine_file import FileRecord
     from buildarena_geometry import KeyPress, Machine
     from buildarena_geometry.blocks import Connector
     from buildarena_geometry.rotations import Quaternion, Vector
@@ -27,7 +27,12 @@ _DIGITS: Final = 5  # decimals of a coordinate that count
 
 
 def header_lines(
-    machine: Machine, records: Sequence[BlockRecord], presses: Sequence[KeyPress]
+    machine: Machine,
+    records: Sequence[FileRecord],
+    presses: Sequence[KeyPress],
+    *,
+    plain: bool = False,
+    of_file: bool = False,
 ) -> list[str]:
     """The comment lines of a machine's script.
 
@@ -35,6 +40,8 @@ def header_lines(
         machine: The machine.
         records: Its blocks in the file.
         presses: The control sequence it is played with.
+        plain: Whether it is for no trial.
+        of_file: Whether the machine was read from a file, whose data stands in this one.
     """
     state = machine.state
     parts = {part.id: part for part in state.parts}
@@ -56,6 +63,8 @@ def header_lines(
         ],
         "structures_made": state.structures_made,
         "next_id": state.next_id,
+        **({"plain": True} if plain else {}),
+        **({"of_file": True} if of_file else {}),
     }
     return [
         "Plays a trial of BuildArena. The next line tells what the blocks of this file do not.",
@@ -86,7 +95,7 @@ def _shown(numbers: tuple[float, ...]) -> str:
     return " ".join(f"{round(number, _DIGITS) + 0.0:.{_DIGITS}f}" for number in numbers)
 
 
-def _part(part: Block | Connector, record: BlockRecord) -> dict[str, Any]:
+def _part(part: Block | Connector, record: FileRecord) -> dict[str, Any]:
     common: dict[str, Any] = {"id": part.id}
     if part.structure:
         common["structure"] = part.structure

@@ -6,7 +6,7 @@ import html
 import math
 import uuid
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Protocol
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.entries import (
@@ -35,18 +35,43 @@ _NO_SCALE: Final = (1.0, 1.0, 1.0)
 _GUID_ATTEMPTS: Final = 100
 
 
+class FileRecord(Protocol):
+    """One block of a machine file, in Besiege's components."""
+
+    @property
+    def part(self) -> str:
+        """The id of the block or connector in our machine.
+
+        "Ballast" for the cargo, "" for a block that is no part of the machine.
+        """
+
+    @property
+    def guid(self) -> str:
+        """The game's own id of it."""
+
+    @property
+    def position(self) -> Vector:
+        """Where its root is, units."""
+
+    @property
+    def rotation(self) -> Quaternion:
+        """How it is turned, (w, x, y, z)."""
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """Its data but for the script's two; empty where its own file says them."""
+
+    def lines(self, indent: str) -> Iterator[str]:
+        """Its element in a machine file."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockRecord:
-    """One block of a machine file, in Besiege's components.
+    """A block as a machine of ours says it; see `FileRecord`.
 
     Attributes:
-        part: the id of the block or connector in our machine; "Ballast" for the cargo.
         module: what it is.
-        guid: the game's own id of it.
-        position: of its root, units.
-        rotation: (w, x, y, z).
         scale: along its own axes.
-        entries: its data but for the script's two.
     """
 
     part: str
@@ -70,6 +95,21 @@ class BlockRecord:
             ("String", "bmt-lua_module", "default"),
             ("String", "bmt-lua_ref_key", self.reference_key),
         )
+
+    def lines(self, indent: str) -> Iterator[str]:
+        """Its element in a machine file."""
+        inner, innermost = indent + INDENT, indent + INDENT * 2
+        yield f'{indent}<Block id="{self.module.besiege_id}" guid="{self.guid}">'
+        yield f"{inner}<Transform>"
+        yield f"{innermost}<Position {_coordinates(self.position)} />"
+        yield f"{innermost}<Rotation {_turn(self.rotation)} />"
+        yield f"{innermost}<Scale {_coordinates(self.scale)} />"
+        yield f"{inner}</Transform>"
+        yield f"{inner}<Data>"
+        for entry in self.all_entries:
+            yield from entry_lines(entry, innermost)
+        yield f"{inner}</Data>"
+        yield f"{indent}</Block>"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,7 +181,7 @@ def parts_in_file_order(machine: Machine) -> list[Block | Connector]:
     return sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
 
 
-def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], script: str) -> str:
+def machine_text(name: str, pose: GlobalPose, records: Sequence[FileRecord], script: str) -> str:
     """A machine file's text.
 
     Args:
@@ -161,11 +201,11 @@ def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], sc
         f"{INDENT}</Global>",
         f"{INDENT}<!--The machine's additional data or modded data.-->",
         f"{INDENT}<Data>",
-        *(line for entry in global_entries(script) for line in _entry_lines(entry, INDENT * 2)),
+        *(line for entry in global_entries(script) for line in entry_lines(entry, INDENT * 2)),
         f"{INDENT}</Data>",
         f"{INDENT}<!--The machine's blocks.-->",
         f"{INDENT}<Blocks>",
-        *(line for record in records for line in _record_lines(record, INDENT * 2)),
+        *(line for record in records for line in record.lines(INDENT * 2)),
         f"{INDENT}</Blocks>",
         "</Machine>",
         "",
@@ -174,14 +214,18 @@ def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], sc
 
 
 def global_entries(script: str) -> tuple[Entry, ...]:
-    """The machine's own data: the script and where the mod keeps it."""
+    """The machine's own data: the script and where the mod keeps it, and the mods it needs."""
+    return (*script_entries(script), ("StringArray", "requiredMods", ()))
+
+
+def script_entries(script: str) -> tuple[Entry, ...]:
+    """The script and where the mod keeps it."""
     return (
         ("StringArray", "lua_files", "LuaRoot/main.lua"),
         ("StringArray", "lua_data", script),
         ("StringArray", "lua_modules_names", "default"),
         ("StringArray", "lua_modules_paths", "LuaRoot/main.lua"),
         ("Boolean", "lua", True),
-        ("StringArray", "requiredMods", ()),
     )
 
 
@@ -232,22 +276,8 @@ def _require_finite(records: Sequence[BlockRecord]) -> None:
             raise MachineNotPlayableError(f"Block {record.part} has no place in the game's world.")
 
 
-def _record_lines(record: BlockRecord, indent: str) -> Iterator[str]:
-    inner, innermost = indent + INDENT, indent + INDENT * 2
-    yield f'{indent}<Block id="{record.module.besiege_id}" guid="{record.guid}">'
-    yield f"{inner}<Transform>"
-    yield f"{innermost}<Position {_coordinates(record.position)} />"
-    yield f"{innermost}<Rotation {_turn(record.rotation)} />"
-    yield f"{innermost}<Scale {_coordinates(record.scale)} />"
-    yield f"{inner}</Transform>"
-    yield f"{inner}<Data>"
-    for entry in record.all_entries:
-        yield from _entry_lines(entry, innermost)
-    yield f"{inner}</Data>"
-    yield f"{indent}</Block>"
-
-
-def _entry_lines(entry: Entry, indent: str) -> Iterator[str]:
+def entry_lines(entry: Entry, indent: str) -> Iterator[str]:
+    """An entry's element."""
     kind, key, value = entry
     opening = f'{indent}<{kind} key="{_escaped(key)}">'
     if kind == "Vector3" and isinstance(value, tuple):

@@ -32,6 +32,15 @@ END_EVERY: Final = 25
 BLOCKS_PER_LINE: Final = 8
 """So that no line is too long for the log window."""
 
+EARLY_UPDATES: Final = 60
+"""Updates whose lines are printed again: the first copies of the window lose its oldest lines."""
+
+EARLY_AGAIN: Final = (100, 200)
+"""Updates in which they are."""
+
+MAX_EARLY_LINES: Final = 150
+"""Lines that are printed again at most: half of what the log window keeps."""
+
 _PLAIN: Final = frozenset((string.ascii_letters + string.digits + "_-.,:% ").encode())
 
 FIRST_BLOCK: Final = "0"
@@ -62,12 +71,16 @@ class Telling:
         begin: the begin line's fields after its kind.
         last_update: the trial's last update.
         blocks: what it reports, in this order.
+        probes: where it measures the ground's height, (east, north) in units.
+        ray_start: the height from which it does, units.
     """
 
     prefix: str
     begin: str
     last_update: int
     blocks: tuple[Reported, ...]
+    probes: tuple[tuple[float, float], ...] = ()
+    ray_start: float = 0.0
 
 
 def script_text(
@@ -144,6 +157,12 @@ def _telling_tables(telling: Telling) -> str:
             f"local last = {telling.last_update}",
             f"local per_line = {BLOCKS_PER_LINE}",
             f"local sample_every, end_every = {SAMPLE_EVERY}, {END_EVERY}",
+            f"local early_last, max_early = {EARLY_UPDATES}, {MAX_EARLY_LINES}",
+            f"local again = {{{', '.join(f'[{update}] = true' for update in EARLY_AGAIN)}}}",
+            f"local ray_start = {telling.ray_start!r}",
+            "local probes = {",
+            *(f"  {{{east!r}, {north!r}}}," for east, north in telling.probes),
+            "}",
             f"local factor, modulus = {FACTOR}, {MODULUS}",
             "local blocks = {",
             *rows,
@@ -188,8 +207,13 @@ local function weigh()
 end
 """
 
-# Decimals are put together from whole numbers: what %f writes depends on the computer's language.
+# Decimals are put together from whole numbers: %f ignores its precision in the mod's Lua, and what
+# it writes depends on the computer's language. Characters are summed eight at a time, two to a
+# division: calls are slow in the mod's Lua, and nothing leaves the doubles' whole numbers.
 _REPORT = """
+local floor, format, sub, byte, len = math.floor, string.format, string.sub, string.byte, string.len
+local early, early_size = {}, 0
+
 local function decimals(value)
   if value ~= value or value > 200000 or value < -200000 then
     return "nan"
@@ -199,58 +223,124 @@ local function decimals(value)
     sign = "-"
     value = -value
   end
-  local whole = math.floor(value * 10000 + 0.5)
-  local units = math.floor(whole / 10000)
-  return sign .. string.format("%d", units) .. "."
-    .. string.sub(string.format("%d", 10000 + whole - units * 10000), 2)
+  local digits = format("%d", floor(value * 10000 + 0.5))
+  local count = len(digits)
+  if count < 5 then
+    digits = sub("00000", count + 1) .. digits
+    count = 5
+  end
+  return sign .. sub(digits, 1, count - 4) .. "." .. sub(digits, count - 3)
 end
 
 local function tell(text)
   local line = prefix .. text
+  local size = len(line)
   local sum = 0
-  for i = 1, string.len(line) do
-    sum = (sum * factor + string.byte(line, i) + 1) % modulus
+  for i = 1, size - 7, 8 do
+    local a, b, c, d, e, f, g, h = byte(line, i, i + 7)
+    sum = ((sum * factor + a + 1) * factor + b + 1) % modulus
+    sum = ((sum * factor + c + 1) * factor + d + 1) % modulus
+    sum = ((sum * factor + e + 1) * factor + f + 1) % modulus
+    sum = ((sum * factor + g + 1) * factor + h + 1) % modulus
   end
-  print(line .. "," .. string.format("%d", sum))
+  for i = size - size % 8 + 1, size do
+    sum = (sum * factor + byte(line, i) + 1) % modulus
+  end
+  line = line .. "," .. format("%d", sum)
+  if updates <= early_last and early_size < max_early then
+    early_size = early_size + 1
+    early[early_size] = line
+  end
+  print(line)
 end
 
-local function entry(info, index)
-  local block = blocks[index]
-  local found = info.get_block_info(block[1])
-  local place = found.position()
-  local state = "-"
-  if block[3] then
-    state = decimals(mass)
-  elseif block[2] then
-    state = found.burning() and "1" or "0"
+local function ground(place)
+  local from = {x = place[1], y = ray_start, z = place[2], w = 0}
+  local hit = physics.raycast(from, {x = 0, y = -1, z = 0, w = 0})
+  if hit == nil then
+    return "-"
+  elseif hit.is_block then
+    return "b"
   end
-  return "," .. string.format("%d", index) .. "," .. state .. "," .. decimals(place.x)
-    .. "," .. decimals(place.y) .. "," .. decimals(place.z)
+  return decimals(hit.point.y)
+end
+
+local function measured()
+  local count = "-"
+  if entities ~= nil then
+    count = format("%d", floor(entities.count()))
+  end
+  local text = ",w," .. decimals(physics.gravity().y) .. "," .. count
+    .. "," .. format("%d", floor(screen.width())) .. "," .. format("%d", floor(screen.height()))
+  for index = 1, #probes do
+    text = text .. "," .. ground(probes[index])
+  end
+  return text
+end
+
+local level = ""
+local positions, destroyed, burning, heads, places = {}, {}, {}, {}, {}
+
+local function look_up()
+  local info = machine.get_machine_info()
+  for index = 1, #blocks do
+    local found = info.get_block_info(blocks[index][1])
+    positions[index] = found.position
+    destroyed[index] = found.destroyed
+    burning[index] = found.burning
+    heads[index] = "," .. format("%d", index) .. ","
+    places[index] = "nan,nan,nan"
+  end
+end
+
+local function entry(index)
+  if destroyed[index]() then
+    return heads[index] .. "x," .. places[index]
+  end
+  local place = positions[index]()
+  local where = decimals(place.x) .. "," .. decimals(place.y) .. "," .. decimals(place.z)
+  places[index] = where
+  local state = "-"
+  if blocks[index][3] then
+    state = decimals(mass)
+  elseif blocks[index][2] then
+    state = burning[index]() and "1" or "0"
+  end
+  return heads[index] .. state .. "," .. where
 end
 
 local function sample()
-  local info = machine.get_machine_info()
   local count = #blocks
   local parts = math.max(math.ceil(count / per_line), 1)
   for part = 1, parts do
-    local text = ",s," .. string.format("%d", updates) .. "," .. string.format("%d", part)
-      .. "," .. string.format("%d", parts)
+    local text = ",s," .. format("%d", updates) .. "," .. format("%d", part)
+      .. "," .. format("%d", parts)
     for index = (part - 1) * per_line + 1, math.min(part * per_line, count) do
-      text = text .. entry(info, index)
+      text = text .. entry(index)
     end
     tell(text)
   end
 end
 
 local function report()
+  if updates == 1 then
+    look_up()
+    level = measured()
+  end
   if updates == 1 or (updates % begin_every == 0 and updates <= last) then
     tell(",b," .. begin)
+    tell(level)
   end
   if updates % sample_every == 0 and updates <= last then
     sample()
   end
+  if again[updates] then
+    for index = 1, early_size do
+      print(early[index])
+    end
+  end
   if updates >= last and (updates - last) % end_every == 0 then
-    tell(",e," .. string.format("%d", updates))
+    tell(",e," .. format("%d", updates))
   end
 end
 """

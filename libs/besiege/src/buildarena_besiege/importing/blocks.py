@@ -7,8 +7,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from buildarena_besiege.errors import MachineFileError
-from buildarena_besiege.importing.xml_file import FileBlock, FileEntry, number_of, shown
-from buildarena_besiege.names import CARGO, key_entries
+from buildarena_besiege.game_keys import is_game_key
+from buildarena_besiege.importing.xml_file import (
+    FileBlock,
+    FileEntry,
+    is_number,
+    number_of,
+    shown,
+)
+from buildarena_besiege.names import CARGO, SETTINGS, key_entries
 from buildarena_geometry.besiege_components import besiege_offset, pose_from_besiege
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.rotations import ORIGIN
@@ -25,7 +32,7 @@ _SCRIPTING: Final = ("bmt-lua_module", "bmt-lua_ref_key")
 _ENDS: Final = ("start-position", "end-position")
 _END_ROTATIONS: Final = ("start-rotation", "end-rotation")
 _SAME: Final = 1e-6  # what a number may miss by being written in single precision
-_MOST_REMARKS: Final = 200
+_MAX_REMARKS: Final = 200
 
 
 class Remarks:
@@ -39,7 +46,7 @@ class Remarks:
         """Notes one thing."""
         if text in self._found:
             return
-        if len(self._found) >= _MOST_REMARKS:
+        if len(self._found) >= _MAX_REMARKS:
             self._further += 1
             return
         self._found[text] = None
@@ -94,20 +101,27 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
     if module is None:
         remarks.add(f"block {block.number}: no module is of the game's type {block.type}: left out")
         return None
-    where = f"block {block.number} ({module.name})"
-    scaled = any(abs(factor - 1.0) > _SAME for factor in block.scale)
-    if module.kind == "cargo" or (module.besiege_id == CARGO and scaled):
+    where = _where(block, module)
+    if module.kind == "cargo" or (module.besiege_id == CARGO and _is_scaled(block)):
         remarks.add(f"{where}: {CARGO_LEFT_OUT}")
         return None
-    if scaled:
-        remarks.add(f"{where}: Scale {_numbers(block.scale)} is read as 1 1 1")
+    for remark in _entry_remarks(block, module):
+        remarks.add(f"{where}: {remark}")
+    return read_part(block, module)
+
+
+def read_part(block: FileBlock, module: Module) -> Part:
+    """A block of a file as one of our modules.
+
+    Raises:
+        MachineFileError: A number of it is not one.
+    """
+    where = _where(block, module)
     try:
         pose = pose_from_besiege(module, block.position, block.rotation)
     except ValueError as error:
         raise MachineFileError(f"{where}: {error}") from error
     ends = _ends(block, where) if module.kind == "connector" else {}
-    for remark in _entry_remarks(block, module):
-        remarks.add(f"{where}: {remark}")
     return Part(
         number=block.number,
         guid=block.guid,
@@ -119,6 +133,37 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
         end=besiege_offset(ends.get("end-position", ORIGIN)),
         end_rotation=ends.get("end-rotation"),
     )
+
+
+def differences(block: FileBlock, module: Module) -> Iterator[str]:
+    """What a file says of a block beyond what a part of ours says: entries with their values."""
+    usual = {key: value for _, key, value in module.besiege_data}
+    lists, silent = set(key_entries(module).values()), _known_entries(module)
+    if _is_scaled(block):
+        yield f"Scale {' '.join(f'{factor:g}' for factor in block.scale)} (simulated as 1 1 1)"
+    for entry in block.entries:
+        if entry.key in silent or (entry.key == "flipped" and module.spins):
+            continue
+        if entry.key in lists:
+            if any(key not in KEYS for key in keys_of(entry)):
+                yield entry.told
+        elif entry.key not in usual:
+            yield entry.told
+        elif not _is(entry.text, usual[entry.key]):
+            yield f"{entry.told} (simulated as {usual[entry.key]})"
+
+
+def keys_of(entry: FileEntry) -> tuple[str, ...]:
+    """The keys in a list of keys."""
+    return entry.items or ((entry.text,) if entry.text else ())
+
+
+def _where(block: FileBlock, module: Module) -> str:
+    return f"block {block.number} ({module.name})"
+
+
+def _is_scaled(block: FileBlock) -> bool:
+    return any(abs(factor - 1.0) > _SAME for factor in block.scale)
 
 
 def _ends(block: FileBlock, where: str) -> dict[str, Vector]:
@@ -141,12 +186,8 @@ def _bindings(block: FileBlock, module: Module) -> Iterator[tuple[str, tuple[str
     of_action = key_entries(module)
     for action in module.actions:
         entry = entries.get(of_action.get(action, ""))
-        keys = () if entry is None else _keys(entry)
+        keys = () if entry is None else keys_of(entry)
         yield action, tuple(dict.fromkeys(key for key in keys if key in KEYS))
-
-
-def _keys(entry: FileEntry) -> tuple[str, ...]:
-    return entry.items or ((entry.text,) if entry.text else ())
 
 
 def _truth(block: FileBlock, key: str) -> bool:
@@ -154,7 +195,7 @@ def _truth(block: FileBlock, key: str) -> bool:
 
 
 def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
-    """The entries that say what a machine of ours cannot hold."""
+    """The entries that nothing is known of, and the values that are none."""
     usual = {key: value for _, key, value in module.besiege_data}
     lists, known = set(key_entries(module).values()), _known_entries(module)
     seen: set[str] = set()
@@ -165,14 +206,12 @@ def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
         if entry.key in known:
             continue
         if entry.key in lists:
-            wrong = [key for key in _keys(entry) if key not in KEYS]
+            wrong = [key for key in keys_of(entry) if not is_game_key(key)]
             yield from (f"{shown(entry.key)}: there is no key {shown(key)}" for key in wrong)
-        elif entry.key == "flipped":
-            yield from _flip_remarks(entry.text, module)
-        elif entry.key not in usual:
+        elif entry.key not in SETTINGS and entry.key not in usual:
             yield f"{shown(entry.key or entry.text)} is not understood"
-        elif not _is(entry.text, usual[entry.key]):
-            yield f"{shown(entry.key)} is {shown(entry.text)}, read as {usual[entry.key]}"
+        elif not _is_of_kind(entry):
+            yield f"{shown(entry.key)} is {shown(entry.value)}, which is no {shown(entry.kind)}"
 
 
 def _known_entries(module: Module) -> frozenset[str]:
@@ -184,11 +223,13 @@ def _known_entries(module: Module) -> frozenset[str]:
     return frozenset(_SCRIPTING)
 
 
-def _flip_remarks(text: str, module: Module) -> Iterator[str]:
-    if text.lower() not in {"true", "false"}:
-        yield f"'flipped' is {shown(text)}, read as False"
-    elif text.lower() == "true" and not module.spins:
-        yield "'flipped' is True of what does not spin"
+def _is_of_kind(entry: FileEntry) -> bool:
+    """Whether a setting's text is a value of its type."""
+    if entry.kind == "Boolean":
+        return entry.text.lower() in {"true", "false"}
+    if entry.kind in {"Integer", "Single"}:
+        return is_number(entry.text)
+    return True
 
 
 def _is(text: str, value: str | float | bool) -> bool:
@@ -200,7 +241,3 @@ def _is(text: str, value: str | float | bool) -> bool:
         return math.isclose(float(text), value, rel_tol=_SAME, abs_tol=_SAME)
     except ValueError:
         return False
-
-
-def _numbers(vector: Vector) -> str:
-    return " ".join(f"{number:g}" for number in vector)

@@ -7,7 +7,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from buildarena_besiege.errors import MachineFileError
-from buildarena_besiege.importing.blocks import CARGO_LEFT_OUT, Part, Remarks, part_of
+from buildarena_besiege.importing.additions import says_more, take_trials_key_out
+from buildarena_besiege.importing.blocks import (
+    CARGO_LEFT_OUT,
+    Part,
+    Remarks,
+    part_of,
+)
+from buildarena_besiege.importing.file_data import (
+    STORED_SCRIPT,
+    file_data_lines,
+    is_scripts,
+    with_file_data,
+)
 from buildarena_besiege.importing.own_header import (
     HeaderError,
     described_machine,
@@ -18,26 +30,23 @@ from buildarena_besiege.importing.own_header import (
 )
 from buildarena_besiege.importing.seats import Faces, Seat, ends_of, faces_of, mounts_of
 from buildarena_besiege.importing.xml_file import FileMachine, parse_file, shown
-from buildarena_besiege.names import CARGO
+from buildarena_besiege.names import CARGO, MACHINE_SETTINGS
 from buildarena_geometry import Machine, module_set
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.modules.sets import smallest_set
-from buildarena_geometry.rotations import NO_ROTATION, subtract
+from buildarena_geometry.rotations import subtract
 from buildarena_geometry.state import sub_structure_letter
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from buildarena_geometry.documents.log import LoggedState
     from buildarena_geometry.modules.module import Catalogue
 
 _VERSIONS = ("1.3", "1.4")
-_OWN_DATA = frozenset(
-    {"lua_files", "lua_data", "lua_modules_names", "lua_modules_paths", "lua", "requiredMods"}
-)
 _NO_SCRIPT = "the Lua script is not ours: what it does, and the keys it presses, are not read"
-_QUARTER = math.sqrt(0.5)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,12 +56,14 @@ class ImportedMachine:
     Attributes:
         machine: The machine.
         name: What the file calls it.
-        not_understood: What the file has and the machine cannot hold, a sentence each.
+        not_understood: What of the file is left out or not known, a sentence each.
+        file_data: What the file says beyond the machine and is stored with it, a sentence each.
     """
 
     machine: Machine
-    name: str
-    not_understood: tuple[str, ...]
+    name: str = ""
+    not_understood: tuple[str, ...] = ()
+    file_data: tuple[str, ...] = ()
 
 
 def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> ImportedMachine:
@@ -60,8 +71,8 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
 
     A file of ours comes back as the machine it was made from, as long as its blocks are where they
     were. Of any other file the connections are found by places: a block sits on the face its root
-    touches. The cargo, unknown blocks and settings that a machine of ours cannot hold are left out
-    and named.
+    touches. What it says beyond that is stored with the machine as file data, and written again by
+    `plain_machine_file`; the cargo and unknown blocks are no parts of the machine, and named.
 
     Args:
         data: The file.
@@ -81,8 +92,14 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
     if header is not None:
         machine = _as_described(header, file, parts, catalogue, remarks)
     if machine is None:
-        machine = _as_placed(parts, catalogue, header, remarks)
-    return ImportedMachine(machine=machine, name=file.name, not_understood=remarks.all())
+        machine = _as_placed(parts, file, catalogue, header, remarks)
+    restored = Machine.restored(machine)
+    return ImportedMachine(
+        machine=restored,
+        name=file.name,
+        not_understood=remarks.all(),
+        file_data=file_data_lines(restored),
+    )
 
 
 def _without_cargo(
@@ -112,12 +129,12 @@ def _without_cargo(
 def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
     if file.version not in _VERSIONS:
         remarks.add(f"bsgVersion {shown(file.version)} is read as {_VERSIONS[-1]}")
+    for sentence in file.renamed:
+        remarks.add(sentence)
     for tag in file.strays:
         remarks.add(f"the machine's {shown(tag)} is not understood")
     for entry in file.entries:
-        if entry.key == "requiredMods" and (entry.text or entry.items):
-            remarks.add(f"the machine wants mods: {shown(' '.join((entry.text, *entry.items)))}")
-        elif entry.key not in _OWN_DATA:
+        if entry.key not in MACHINE_SETTINGS and not _is_stored_script(entry.key):
             remarks.add(f"the machine's data {shown(entry.key or entry.text)} is not understood")
     script = next(
         (text_entry.text for text_entry in file.entries if text_entry.key == "lua_data"), ""
@@ -129,10 +146,11 @@ def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
         return None
     if script and header is None:
         remarks.add(_NO_SCRIPT)
-    turn = file.rotation
-    if header is None and abs(turn[0]) < 1.0 - 1e-6 and turn != NO_ROTATION:
-        remarks.add("the machine's own turn in the world is left out: tasks place machines")
     return header
+
+
+def _is_stored_script(key: str) -> bool:
+    return is_scripts(key.removeprefix(STORED_SCRIPT))
 
 
 def _as_described(
@@ -141,7 +159,7 @@ def _as_described(
     parts: Sequence[Part],
     catalogue: Catalogue,
     remarks: Remarks,
-) -> Machine | None:
+) -> LoggedState | None:
     if not is_untouched(header, file):
         remarks.add(
             "blocks were changed after the script was written: names and connections are found by "
@@ -149,34 +167,52 @@ def _as_described(
         )
         return None
     try:
-        return Machine.restored(described_machine(header, parts, catalogue))
+        logged = described_machine(header, parts, catalogue)
     except HeaderError as error:
         remarks.add(f"the script's own description is not believed: {error}")
         return None
+    ids = {part.number: header["parts"][part.guid]["id"] for part in parts}
+    machine = Machine.restored(logged)
+    if header.get("of_file") is not True and not says_more(file, header, machine, ids):
+        return logged
+    if header.get("plain") is not True:
+        take_trials_key_out(file, machine, ids)
+    return with_file_data(logged, file, ids, remarks, scripted_by_us=True)
 
 
 def _as_placed(
     parts: Sequence[Part],
+    file: FileMachine,
     catalogue: Catalogue,
     header: dict[str, Any] | None,
     remarks: Remarks,
-) -> Machine:
+) -> LoggedState:
     """The machine of a file that describes nothing but its blocks' places."""
-    document = _Placed(parts, remarks).document()
+    placed = _Placed(parts, remarks)
+    logged = _placed_machine(placed.document(), catalogue, header, remarks)
+    ours = header is not None
+    return with_file_data(logged, file, placed.ids, remarks, scripted_by_us=ours)
+
+
+def _placed_machine(
+    document: dict[str, Any],
+    catalogue: Catalogue,
+    header: dict[str, Any] | None,
+    remarks: Remarks,
+) -> LoggedState:
     if header is not None:
         document["control_sequence"] = _sound_presses(header, remarks)
     try:
-        return Machine.restored(read_machine(document, catalogue=catalogue))
+        return read_machine(document, catalogue=catalogue)
     except DocumentError as error:
         where = str(error).removeprefix("document.blocks: ")
         remarks.add(f"a document of this machine would not be read back: {where}")
     except ValueError as error:
         raise MachineFileError(f"its blocks make no machine: {error}") from error
     try:
-        logged = read_machine(document, catalogue=catalogue, overlaps=True)
+        return read_machine(document, catalogue=catalogue, overlaps=True)
     except ValueError as error:
         raise MachineFileError(f"its blocks make no machine: {error}") from error
-    return Machine.restored(logged)
 
 
 def _sound_presses(header: dict[str, Any], remarks: Remarks) -> list[dict[str, Any]]:
@@ -197,7 +233,11 @@ def _sound_presses(header: dict[str, Any], remarks: Remarks) -> list[dict[str, A
 
 
 class _Placed:
-    """A document made of parts and the faces they are found to sit on."""
+    """A document made of parts and the faces they are found to sit on.
+
+    Attributes:
+        ids: the id of each part, by its number in the file.
+    """
 
     def __init__(self, parts: Sequence[Part], remarks: Remarks) -> None:
         starts = [part for part in parts if part.module.kind == "start"]
@@ -210,13 +250,13 @@ class _Placed:
         self._starts = len(starts)
         self._letters = _letters(self._mounts, self._starts)
         self._places = {part.number: i for i, part in enumerate(self._blocks)}
-        self._ids: dict[int, str] = {}
+        self.ids: dict[int, str] = {}
         counts: dict[str, int] = {}
         for part in sorted((*self._blocks, *self._links), key=_in_file_order):
             letter = self._letter_of(part)
             counts[letter] = counts.get(letter, 0) + 1
-            self._ids[part.number] = f"{letter}_{counts[letter]}" if letter else str(counts[letter])
-        self._next = 1 if len(starts) > 1 else len(self._ids) + 1
+            self.ids[part.number] = f"{letter}_{counts[letter]}" if letter else str(counts[letter])
+        self._next = 1 if len(starts) > 1 else len(self.ids) + 1
 
     def document(self) -> dict[str, Any]:
         """The machine document, to be checked by reading it."""
@@ -248,7 +288,7 @@ class _Placed:
         return document
 
     def _roots(self) -> list[tuple[int, str]]:
-        return [(i, self._ids[self._blocks[i].number]) for i in range(self._starts)]
+        return [(i, self.ids[self._blocks[i].number]) for i in range(self._starts)]
 
     def _letter_of(self, part: Part) -> str:
         if self._starts < 2:  # noqa: PLR2004  one machine has no sub-structures
@@ -301,14 +341,14 @@ class _Placed:
 
     def _common(self, part: Part) -> dict[str, Any]:
         return {
-            "id": self._ids[part.number],
+            "id": self.ids[part.number],
             "module": part.module.name,
             "position": list(part.pose.xyz),
             "quaternion": list(part.pose.wxyz),
         }
 
     def _face(self, seat: Seat) -> list[str]:
-        return [self._ids[self._blocks[seat[0]].number], seat[1]]
+        return [self.ids[self._blocks[seat[0]].number], seat[1]]
 
 
 def _in_file_order(part: Part) -> tuple[bool, int]:

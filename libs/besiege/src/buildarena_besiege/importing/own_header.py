@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_besiege.exporting.header import HEADER_VERSION, MARK, places_digest
+from buildarena_besiege.keys import HELD_KEY
 from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
@@ -78,7 +79,8 @@ def described_machine(
             or len(described) != len(parts)
         ):
             raise HeaderError("it tells of other blocks than the file's")
-        entries = [_entry(*by_id[block_id]) for block_id in order]
+        plain = header.get("plain") is True
+        entries = [_entry(*by_id[block_id], plain=plain) for block_id in order]
         document = {
             "version": 1,
             "blocks": [entry for entry in entries if "span" not in entry],
@@ -126,7 +128,7 @@ def presses_of(header: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _entry(part: Part, described: dict[str, Any]) -> dict[str, Any]:
+def _entry(part: Part, described: dict[str, Any], *, plain: bool) -> dict[str, Any]:
     common: dict[str, Any] = {
         "id": described["id"],
         "module": part.module.name,
@@ -150,10 +152,18 @@ def _entry(part: Part, described: dict[str, Any]) -> dict[str, Any]:
         "mount": described.get("mount"),
         "lost_mount": described.get("lost_mount"),
         "flipped": part.flipped,
-        "bindings": described.get(
-            "bindings", {action: list(keys) for action, keys in part.bindings.items()}
-        ),
+        "bindings": _bindings(part, {} if plain else described.get("bindings", {})),
     }
+
+
+def _bindings(part: Part, own: dict[str, Any]) -> dict[str, list[str]]:
+    """The keys of a block's actions: the file's, without that of a trial whose cannons are held."""
+    bindings: dict[str, list[str]] = {}
+    for action, keys in part.bindings.items():
+        described = list(own.get(action, keys))
+        held = tuple(dict.fromkeys((*described, HELD_KEY)))
+        bindings[action] = described if keys == held else list(keys)
+    return bindings
 
 
 def _sources(document: dict[str, Any]) -> dict[str, Any]:

@@ -9,8 +9,10 @@ from __future__ import annotations
 import io
 import math
 import re
+import uuid
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
+from xml.etree import ElementTree as ET
 
 import defusedxml.ElementTree as SafeTree
 from defusedxml import DefusedXmlException
@@ -21,7 +23,7 @@ from buildarena_geometry.rotations import NO_ROTATION, ORIGIN, SHORTEST_QUATERNI
 from buildarena_simulation.constants import MAX_PARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from xml.etree.ElementTree import Element
 
     from buildarena_geometry.rotations import Quaternion, Vector
@@ -35,7 +37,9 @@ MAX_DEPTH: Final = 12
 MAX_ENTRIES: Final = 200
 """Most entries of one block, or of the machine itself."""
 
+_KNOWN: Final = frozenset({"Global", "Data", "Blocks"})
 _LARGEST_BLOCK_TYPE: Final = 1_000_000
+_GUID: Final = re.compile(r"[0-9A-Za-z_{}()-]{1,64}", re.ASCII)
 _NUMBER: Final = re.compile(
     r"[+-]?(\d{1,400}(\.\d{0,400})?|\.\d{1,400})([eE][+-]?\d{1,4})?", re.ASCII
 )
@@ -51,6 +55,7 @@ class FileEntry:
         text: its text, without blanks around it.
         items: the texts of its `String` elements.
         components: the texts of its X, Y and Z elements; empty if it has none.
+        inner: all texts of its elements.
     """
 
     kind: str
@@ -58,6 +63,18 @@ class FileEntry:
     text: str
     items: tuple[str, ...] = ()
     components: tuple[str, ...] = ()
+    inner: tuple[str, ...] = ()
+
+    @property
+    def value(self) -> str:
+        """What it says, as one text."""
+        return self.text or ", ".join(self.items) or " ".join(self.inner)
+
+    @property
+    def told(self) -> str:
+        """What it says, as messages have it."""
+        value = shown(self.value)[1:-1] if self.value else "empty"
+        return f"{shown(self.key)[1:-1]} {value}" if self.key else f"the text {shown(self.text)}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +89,7 @@ class FileBlock:
         rotation: (w, x, y, z).
         scale: along its own axes.
         entries: its data.
+        element: all of it, without the blanks between its elements.
     """
 
     number: int
@@ -81,18 +99,32 @@ class FileBlock:
     rotation: Quaternion
     scale: Vector
     entries: tuple[FileEntry, ...] = ()
+    element: Element = field(repr=False, compare=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FileMachine:
-    """The content of a machine file."""
+    """The content of a machine file.
+
+    Attributes:
+        name: what it calls itself.
+        version: of the format.
+        rotation: (w, x, y, z) of the whole machine in the world, Besiege's components.
+        entries: the machine's own data.
+        blocks: in the file's order, each with a guid of its own.
+        element: the rest: the file's root, its blocks taken out.
+        strays: tags beside those of every machine file.
+        renamed: which blocks got another guid, and why.
+    """
 
     name: str
     version: str
     rotation: Quaternion
     entries: tuple[FileEntry, ...]
     blocks: tuple[FileBlock, ...]
-    strays: tuple[str, ...] = field(default=())
+    element: Element = field(repr=False, compare=False)
+    strays: tuple[str, ...] = ()
+    renamed: tuple[str, ...] = ()
 
 
 def parse_file(data: bytes) -> FileMachine:
@@ -101,26 +133,41 @@ def parse_file(data: bytes) -> FileMachine:
     Raises:
         MachineFileError: It is no machine file, or breaks a bound.
     """
-    root = _tree(data)
+    root = parsed(data)
     if root.tag != "Machine":
         raise MachineFileError(f"the file's root is {shown(root.tag)}, not Machine")
-    blocks = [block for part in root.findall("Blocks") for block in part]
+    without_blanks(root)
+    rooms = root.findall("Blocks")
+    blocks = [block for room in rooms for block in room]
     if not blocks:
         raise MachineFileError("the file has no blocks")
     if len(blocks) > MAX_PARTS:
         raise MachineFileError(f"the file has {len(blocks)} blocks; at most {MAX_PARTS} are read")
+    renamed = tuple(with_own_guids(blocks))
     placed = root.find("Global")
-    known = {"Global", "Data", "Blocks"}
-    return FileMachine(
+    machine = FileMachine(
         name=root.get("name", "")[:200],
         version=root.get("bsgVersion", ""),
         rotation=NO_ROTATION if placed is None else _rotation(placed, "Global"),
-        entries=_entries(root.find("Data"), "the machine's Data"),
-        blocks=tuple(_block(block, number) for number, block in enumerate(blocks, start=1)),
-        strays=tuple(
-            dict.fromkeys(str(element.tag) for element in root if element.tag not in known)
-        ),
+        entries=read_entries(root, "the machine's Data"),
+        blocks=tuple(read_block(block, number) for number, block in enumerate(blocks, start=1)),
+        element=root,
+        strays=tuple(_strays(root)),
+        renamed=renamed,
     )
+    for room in rooms:
+        for block in list(room):
+            room.remove(block)
+            block.tail = None
+    return machine
+
+
+def without_blanks(element: Element) -> None:
+    """Takes the blanks between a file's elements out; the text of its values stays as it is."""
+    for part in element.iter():
+        if len(part) and part.text is not None:
+            part.text = part.text.strip() or None
+        part.tail = (part.tail or "").strip() or None
 
 
 def number_of(text: str, where: str) -> float:
@@ -138,13 +185,23 @@ def number_of(text: str, where: str) -> float:
     return value
 
 
+def is_number(text: str) -> bool:
+    """Whether a text is a number, "Infinity" and "NaN" as the game writes them included."""
+    return _NUMBER.fullmatch(text) is not None or text in {"Infinity", "-Infinity", "NaN"}
+
+
 def shown(text: object) -> str:
     """Any text as a short literal."""
     literal = ascii(str(text)[:60])
     return literal if len(str(text)) <= 60 else f"{literal[:-1]}…'"  # noqa: PLR2004
 
 
-def _tree(data: bytes) -> Element:
+def parsed(data: bytes) -> Element:
+    """The root of an XML text of a stranger's.
+
+    Raises:
+        MachineFileError: It is not valid XML, or breaks a bound.
+    """
     if len(data) > MAX_BYTES:
         raise MachineFileError(f"the file has {len(data):,} bytes; at most {MAX_BYTES:,} are read")
     try:
@@ -171,7 +228,34 @@ def _tree(data: bytes) -> Element:
     return root
 
 
-def _block(element: Element, number: int) -> FileBlock:
+def with_own_guids(blocks: Sequence[Element]) -> Iterator[str]:
+    """Gives blocks whose guid is another's, or none that a file can repeat, one of their own.
+
+    The new ones depend on nothing but the file: it is read alike each time.
+    """
+    used: set[str] = set()
+    for number, block in enumerate(blocks, start=1):
+        guid, own, draws = block.get("guid", ""), block.get("guid", ""), 0
+        while not _GUID.fullmatch(own) or own.lower() in used:
+            own = str(uuid.uuid5(uuid.NAMESPACE_OID, f"{number} {draws} {guid}"))
+            draws += 1
+        used.add(own.lower())
+        if own != guid:
+            block.set("guid", own)
+            if guid:
+                yield f"block {number}: the guid {shown(guid)} cannot be its own: it gets another"
+
+
+def read_block(element: Element, number: int) -> FileBlock:
+    """A block's values.
+
+    Args:
+        element: The block, without blanks between its elements.
+        number: Which of its file's blocks it is, from 1.
+
+    Raises:
+        MachineFileError: It has no type or place, a value is none, or there are too many.
+    """
     where = f"block {number}"
     if element.tag != "Block":
         raise MachineFileError(f"{where}: {shown(element.tag)} is not a Block")
@@ -184,11 +268,12 @@ def _block(element: Element, number: int) -> FileBlock:
     return FileBlock(
         number=number,
         type=int(written),
-        guid=element.get("guid", "")[:64],
+        guid=element.get("guid", ""),
         position=_vector(place, "Position", where, ORIGIN),
         rotation=_rotation(place, where),
         scale=_vector(place, "Scale", where, (1.0, 1.0, 1.0)),
-        entries=_entries(element.find("Data"), where),
+        entries=read_entries(element, where),
+        element=element,
     )
 
 
@@ -211,17 +296,38 @@ def _rotation(place: Element, where: str) -> Quaternion:
     return (w / length, x / length, y / length, z / length)
 
 
-def _entries(data: Element | None, where: str) -> tuple[FileEntry, ...]:
-    if data is None:
-        return ()
-    if len(data) > MAX_ENTRIES:
-        raise MachineFileError(f"{where}: {len(data)} entries; at most {MAX_ENTRIES} are read")
-    entries = [_entry(element) for element in data]
-    stray = (data.text or "").strip()
+def read_entries(holder: Element, where: str) -> tuple[FileEntry, ...]:
+    """The entries of a block's or a machine's data, and the texts between them.
+
+    Raises:
+        MachineFileError: There are too many.
+    """
+    rooms = holder.findall("Data")
+    count = sum(len(data) for data in rooms)
+    if count > MAX_ENTRIES:
+        raise MachineFileError(f"{where}: {count} entries; at most {MAX_ENTRIES} are read")
+    entries = [_entry(element) for data in rooms for element in data]
+    strays = [text for data in rooms for text in (data.text, *(entry.tail for entry in data))]
     # The published library writes its own "None" there by accident.
-    if stray not in {"", "None"}:
-        entries.append(FileEntry(kind="text", key="", text=stray))
+    entries += [
+        FileEntry(kind="text", key="", text=stray.strip())
+        for stray in strays
+        if stray is not None and stray.strip() not in {"", "None"}
+    ]
     return tuple(entries)
+
+
+def text_of(element: Element) -> str:
+    """An element as XML; reading it gives the same element."""
+    # A carriage return stays one only as a reference.
+    return ET.tostring(element, encoding="unicode").replace("\r", "&#13;")
+
+
+def _strays(root: Element) -> Iterator[str]:
+    """What stands beside or between that which every machine file has."""
+    yield from (str(part.tag) for part in root if part.tag not in _KNOWN)
+    for part in (root, *root.iter("Blocks")):
+        yield from (text for text in (part.text, *(inner.tail for inner in part)) if text)
 
 
 def _entry(element: Element) -> FileEntry:
@@ -235,6 +341,7 @@ def _entry(element: Element) -> FileEntry:
         text=(element.text or "").strip(),
         items=tuple(_items(element)),
         components=vector,
+        inner=tuple(text.strip() for text in element.itertext() if text.strip()),
     )
 
 

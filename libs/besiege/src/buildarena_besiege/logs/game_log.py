@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 from urllib.parse import unquote
 
 from buildarena_besiege.keys import UPDATES_PER_S
-from buildarena_besiege.logs.log_lines import LONGEST_LINE, Line, line_of
+from buildarena_besiege.logs.log_lines import LONGEST_LINE, Line, World, line_of
 from buildarena_besiege.run import marked
 
 if TYPE_CHECKING:
@@ -79,6 +79,11 @@ class GameLog:
     def begun(self) -> bool:
         """Whether the begin line was seen."""
         return any(line.kind == "b" for line in self._lines.values())
+
+    @property
+    def world(self) -> World | None:
+        """What the script measured of the level; None before."""
+        return next((line.world for line in self._lines.values() if line.kind == "w"), None)
 
     @property
     def ended(self) -> bool:

@@ -1,11 +1,13 @@
 """The lines that a script of ours prints, read one by one.
 
     ba,<run>,b,<version>,<presses>,<digest>,<sum>
+    ba,<run>,w,<gravity>,<entities>,<width>,<height>{,<ground>},<sum>
     ba,<run>,s,<update>,<part>,<parts>{,<number>,<state>,<x>,<y>,<z>},<sum>
     ba,<run>,e,<update>,<sum>
 
 A number counts the reported blocks from 1, the cargo last. A state is the cargo's mass, whether a
-cannon burns (0 or 1), or "-". Coordinates are Besiege's: x east, y up, z north.
+cannon burns (0 or 1), "x" once the game destroyed the block, or "-". Coordinates are Besiege's: x
+east, y up, z north. A ground is a height, "b" where a block is in the way, or "-" for none.
 """
 
 from __future__ import annotations
@@ -20,17 +22,19 @@ from buildarena_besiege.check_sums import check_sum
 if TYPE_CHECKING:
     from buildarena_geometry.rotations import Vector
 
-LINE_VERSION: Final = 1
 LONGEST_LINE: Final = 2000
 """Characters; a line with eight blocks far away from the origin has fewer than 500."""
 
 _NUMBER = r"(?:0|[1-9][0-9]{0,9})"
 _DECIMAL = r"(?:-?[0-9]{1,7}\.[0-9]{4}|nan)"
-_STATE = rf"(?:-|[01]|{_DECIMAL})"
+_STATE = rf"(?:-|[01x]|{_DECIMAL})"
 _ENTRY = rf",{_NUMBER},{_STATE},{_DECIMAL},{_DECIMAL},{_DECIMAL}"
 _FIELDS_OF_ENTRY: Final = 5
 _BEGIN: Final = re.compile(rf",b,({_NUMBER}),({_NUMBER}),({_NUMBER})", re.ASCII)
 _SAMPLE: Final = re.compile(rf",s,({_NUMBER}),({_NUMBER}),({_NUMBER})((?:{_ENTRY})*)", re.ASCII)
+_WORLD: Final = re.compile(
+    rf",w,({_DECIMAL}),({_NUMBER}|-),({_NUMBER}),({_NUMBER})((?:,(?:-|b|{_DECIMAL}))*)", re.ASCII
+)
 _END: Final = re.compile(rf",e,({_NUMBER})", re.ASCII)
 
 
@@ -48,16 +52,34 @@ class Entry:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class World:
+    """What the script measured in its first update.
+
+    Attributes:
+        gravity: Along the vertical, units/s²; negative downwards.
+        entities: How many things the level's editor lists; None where the mod does not say.
+        screen: (width, height) of what the game draws, pixels.
+        ground: Of each probe its height, units; "b" where a block is in the way, None without hit.
+    """
+
+    gravity: float
+    entities: int | None
+    screen: tuple[int, int]
+    ground: tuple[float | str | None, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
     """A line that counts.
 
     Attributes:
-        kind: "b", "s" or "e".
+        kind: "b", "w", "s" or "e".
         update: the script's update that it reports; 0 of a begin line.
         part: which part of a sample, from 1; 0 elsewhere.
         parts: how many parts the sample has; 0 elsewhere.
         fields: of a begin line: version, key presses, digest.
         entries: of a sample line: the entry of each block, by number.
+        world: of a line about the level: what it says.
         text: the whole line.
     """
 
@@ -68,11 +90,12 @@ class Line:
     parts: int = 0
     fields: tuple[int, ...] = ()
     entries: tuple[tuple[int, Entry], ...] = ()
+    world: World | None = None
 
     @property
     def key(self) -> tuple[int, int, int]:
         """What it reports; lines of one key must be alike. Sorts into the order of printing."""
-        return ("bse".index(self.kind), self.update, self.part)
+        return ("bwse".index(self.kind), self.update, self.part)
 
 
 def line_of(text: str, prefix: str) -> Line | None:
@@ -99,8 +122,22 @@ def _read(text: str, rest: str) -> Line | None:
         return line if sound else None
     if match := _END.fullmatch(rest):
         return Line(kind="e", text=text, update=int(match[1]))
+    if match := _WORLD.fullmatch(rest):
+        return Line(kind="w", text=text, world=_world(match))
     match = _BEGIN.fullmatch(rest)
     return match and Line(kind="b", text=text, fields=tuple(int(match[i]) for i in (1, 2, 3)))
+
+
+def _world(match: re.Match[str]) -> World:
+    fields = match[5].split(",")[1:]
+    return World(
+        gravity=_float(match[1]),
+        entities=None if match[2] == "-" else int(match[2]),
+        screen=(int(match[3]), int(match[4])),
+        ground=tuple(
+            None if field == "-" else field if field == "b" else _float(field) for field in fields
+        ),
+    )
 
 
 def _entries(text: str) -> tuple[tuple[int, Entry], ...]:

@@ -1,16 +1,17 @@
 """Logs of the published runner (CSV) as trajectories.
 
-Its lines hold one decimal, time included, so two or three samples carry one time; they are joined
-to their mean. It copied the whole log window again and again, newest line first, and may have
-cleaned the file afterwards. A number always has exactly one decimal there, which is how cut-off
-numbers are known; a cut-off position that looks like the cargo's mass is known by the mass that the
-ramp has then.
+How its numbers are written is learnt from the rows (`rows.py`). Where times have one decimal, two
+or three samples carry one time; they are joined to their mean. The runner copied the whole log
+window again and again, newest line first, and may have cleaned the file afterwards. A cut-off
+position that looks like the cargo's mass is recognised by the mass that the ramp has then. The
+first lines of a long run are often cut: where the rows after them show a fall from rest, it is
+continued backwards.
 """
 
 from __future__ import annotations
 
 import hashlib
-import re
+import math
 from collections import defaultdict
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -20,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_besiege.errors import LogIncompleteError
+from buildarena_besiege.logs.log_samples import LONGEST_GAP_S
 from buildarena_besiege.logs.resampling import (
     latest,
     require_no_gap,
@@ -27,12 +29,14 @@ from buildarena_besiege.logs.resampling import (
     sample_instants,
     stacked,
 )
-from buildarena_besiege.logs.trajectories import LONGEST_GAP_S, Samples, made_trajectory
+from buildarena_besiege.logs.rows import Row, RowFormat, learnt_format, lines_of
+from buildarena_besiege.logs.trajectories import Samples, made_trajectory
 from buildarena_besiege.names import CARGO_ID
-from buildarena_simulation.control import effective_presses
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.control import reaching
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from buildarena_geometry import Machine
     from buildarena_simulation import Scenario, Trajectory
@@ -41,35 +45,49 @@ if TYPE_CHECKING:
 EARLY_END_S: Final = 1.0
 """A published run ends by the wall clock, so by the script's own time it may end early, seconds."""
 
-_NUMBER: Final = re.compile(r"-?\d{1,7}\.\d", re.ASCII)
-_NAME: Final = re.compile(r"ID_(.{1,100})")
-_LINE_ENDS: Final = re.compile(r"\r\n|\r|\n")
-_HALF_LABEL_S: Final = 0.06
-_GRAIN: Final = 0.051
+LATE_START_S: Final = 0.4
+"""A log may begin as late as this, if its first rows show what was before them, seconds."""
+
+LATE_FALL_S: Final = 0.15
+"""What is dropped falls from this moment at the latest: the game's first steps take 0.065 s."""
+
+_ROWS_OF_A_FALL: Final = 3
+_FALL_MISFIT: Final = 0.01
+_UPDATE_S: Final = 0.01
 _JUMPING_SHARE: Final = 0.1
-_PLACE_FIELDS: Final = 5
-_STATE_FIELDS: Final = 3
-_LONGEST_ROW: Final = 300
-_SAMPLES_A_LABEL: Final = 3
 
 Floats = NDArray[np.float64]
-Row = tuple[str, ...]
 
 
 @dataclass(slots=True)
 class _BlockLog:
-    """The rows of one block: distinct values by time label, in tenths of a second."""
+    """The rows of one block: distinct values by time label."""
 
     places: dict[int, dict[tuple[float, ...], None]] = field(
         default_factory=lambda: defaultdict(dict)
     )
-    states: dict[int, dict[str, None]] = field(default_factory=lambda: defaultdict(dict))
+    masses: dict[int, dict[float, None]] = field(default_factory=lambda: defaultdict(dict))
+    burning: dict[int, bool] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class _Log:
+    """A log's rows by block, how they are written, and a sentence about an error among them."""
+
+    form: RowFormat
+    blocks: Mapping[str, _BlockLog]
+    complaint: str
+
+    def times(self, labels: Sequence[int]) -> Floats:
+        """Labels as times, seconds."""
+        return np.array(labels) * self.form.label_s
 
 
 def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) -> Trajectory:
     """The trajectory in a log of the published runner.
 
-    It may end a little before the scenario does. Blocks it does not report are not tracked.
+    It may begin a little after the scenario does, and end a little before. Blocks it does not
+    report are not tracked.
 
     Args:
         csv_text: The log: copies of the window one after the other, or cleaned.
@@ -79,31 +97,40 @@ def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) ->
     Raises:
         LogIncompleteError: It has gaps, ends too early, or is of another machine.
     """
-    reported, complaint = _read(csv_text)
+    log = _read(csv_text)
+    reported = log.blocks
     ids = tuple(block for block in machine.blocks if block in reported and reported[block].places)
     cargo = scenario.cargo
     names = [*ids, *([CARGO_ID] if cargo is not None else [])]
-    _require_reported(reported, names, complaint)
-    end_s = min(max(max(reported[name].places) for name in names) / 10, scenario.duration_s)
+    _require_reported(log, names)
+    last = max(max(reported[name].places) for name in names) * log.form.label_s
+    end_s = min(round(last, 6), scenario.duration_s)
     if end_s < scenario.duration_s - EARLY_END_S:
         raise LogIncompleteError(
-            f"The log ends at {end_s:g} s of {scenario.duration_s:g} s.{complaint}"
+            f"The log ends at {end_s:g} s of {scenario.duration_s:g} s.{log.complaint}"
         )
     instants = sample_instants(end_s)
-    series = {name: _series(reported[name], name, instants, end_s) for name in names}
-    burning = [_burning(reported[block], instants) for block in ids]
+    late_s = 0.0
+    series = {name: _Series(name, *_places(log, name)) for name in names}
+    if cargo is not None:
+        late_s = series[CARGO_ID].continue_fall(scenario.gravity, log.form)
+    positions = {name: series[name].at(instants, end_s) for name in names}
+    burning = [_burning(log, block, instants) for block in ids]
     samples = Samples(
         of_roots=False,  # the published evaluation judges the heights as they are logged
         block_ids=ids,
-        positions=stacked([series[block][0] for block in ids], (len(instants), 0, 3)),
+        positions=stacked([positions[block] for block in ids], (len(instants), 0, 3)),
         burning=np.array(burning, dtype=bool).reshape(len(ids), len(instants)).T,
-        cargo=None if cargo is None else series[CARGO_ID][0],
-        mass=None if cargo is None else _mass(reported[CARGO_ID], cargo, instants),
+        cargo=None if cargo is None else positions[CARGO_ID],
+        mass=None if cargo is None else _mass(log, cargo, instants, late_s),
         settings={
-            "effective_key_presses": effective_presses(
-                [block.bindings for block in machine.blocks.values()], machine.control_sequence
+            "effective_key_presses": len(
+                reaching(
+                    [block.bindings for block in machine.blocks.values()], machine.control_sequence
+                )
             ),
-            "longest_gap_s": round(max(gap for _, gap in series.values()), 6),
+            "longest_gap_s": round(max(block.longest_gap_s for block in series.values()), 6),
+            "begins_at_s": late_s,
             "ends_at_s": end_s,
             "lag": "not told by the log",
             "blocks_not_ours": len(set(reported) - set(machine.blocks) - {CARGO_ID}),
@@ -113,63 +140,103 @@ def published_trajectory(csv_text: str, machine: Machine, scenario: Scenario) ->
     return made_trajectory(samples, machine, scenario, version="published")
 
 
-def _require_reported(reported: dict[str, _BlockLog], names: Sequence[str], complaint: str) -> None:
-    if not names:
-        raise LogIncompleteError(f"The log tells nothing of any block of this machine.{complaint}")
-    for name in names:
-        if name not in reported or not reported[name].places:
-            raise LogIncompleteError(f"The log tells nothing of {_called(name)}.{complaint}")
-        _require_one_run(reported[name], name)
-
-
-def _series(
-    block_log: _BlockLog, name: str, instants: Floats, end_s: float
-) -> tuple[Floats, float]:
-    """A block's positions at the trajectory's instants, and the longest gap, seconds."""
-    time_s, values = _places(block_log)
-    gap = require_no_gap(
-        time_s, name=_called(name), longest_s=LONGEST_GAP_S, first_s=0.0, last_s=end_s
-    )
-    return resampled(instants, time_s, values), gap
-
-
 def looks_published(text: str) -> bool:
     """Whether a text has rows as the published runner's logs do."""
-    return any(_is_sound(row) for row in _rows(text))
+    form = learnt_format(lines_of(text))
+    return any(form.row(line) is not None for line in lines_of(text))
 
 
-def _read(text: str) -> tuple[dict[str, _BlockLog], str]:
-    """The rows of each block, and a sentence about a Lua error among them."""
-    rows = list(_rows(text))
-    reported: dict[str, _BlockLog] = defaultdict(_BlockLog)
-    for label, *fields in _trusted([row for row in rows if _is_sound(row)]):
-        match = _NAME.fullmatch(fields[0])
-        if match is None:
-            continue
-        time = round(float(label) * 10)
-        if len(fields) == _PLACE_FIELDS - 1:
-            reported[match[1]].places[time][tuple(map(float, fields[1:]))] = None
+@dataclass(slots=True)
+class _Series:
+    """Where a block was.
+
+    Attributes:
+        name: Of the block.
+        time_s: (M,) increasing, seconds.
+        values: (M, 3) the game's components, units.
+        longest_gap_s: The longest time without a row, once it was resampled.
+    """
+
+    name: str
+    time_s: Floats
+    values: Floats
+    longest_gap_s: float = 0.0
+
+    def at(self, instants: Floats, end_s: float) -> Floats:
+        """(T, 3) positions at the trajectory's instants.
+
+        Raises:
+            LogIncompleteError: A gap is too long.
+        """
+        self.longest_gap_s = require_no_gap(
+            self.time_s,
+            name=_called(self.name),
+            longest_s=LONGEST_GAP_S,
+            first_s=0.0,
+            last_s=end_s,
+        )
+        return resampled(instants, self.time_s, self.values)
+
+    def continue_fall(self, gravity: float, form: RowFormat) -> float:
+        """Adds the beginning of a fall from rest, if the rows begin late and show its rest.
+
+        Args:
+            gravity: Downward acceleration, units/s².
+            form: How exact rows are.
+
+        Returns:
+            When the rows begin, seconds.
+        """
+        first = float(self.time_s[0])
+        beginning = slice(0, _ROWS_OF_A_FALL)
+        since, height = self.time_s[beginning] - first, self.values[beginning, 1]
+        if not LONGEST_GAP_S < first <= LATE_START_S or len(since) < _ROWS_OF_A_FALL:
+            return first
+        # height = start - speed * since - gravity / 2 * since²; both unknowns by least squares
+        known = height + gravity / 2 * since**2
+        slope, start = np.polyfit(since, known, 1)
+        begun = first + float(slope) / gravity
+        misfit = np.abs(start + slope * since - known).max()
+        early_s = max(form.label_s - _UPDATE_S, 0.0) / 2  # how far a time is off at most
+        allowed = _FALL_MISFIT + 2 * form.rounding + early_s * abs(slope)
+        if not -_UPDATE_S <= begun <= LATE_FALL_S or misfit > allowed:
+            return first
+        times = np.arange(math.ceil(first * SAMPLE_RATE_HZ)) / SAMPLE_RATE_HZ
+        fallen = np.maximum(times - begun, 0.0) ** 2 - (first - begun) ** 2
+        before = np.tile(self.values[0], (len(times), 1))
+        before[:, 1] = start - gravity / 2 * fallen
+        self.time_s = np.concatenate([times, self.time_s])
+        self.values = np.concatenate([before, self.values])
+        return first
+
+
+def _require_reported(log: _Log, names: Sequence[str]) -> None:
+    if not names:
+        raise LogIncompleteError(
+            f"The log tells nothing of any block of this machine.{log.complaint}"
+        )
+    for name in names:
+        if name not in log.blocks or not log.blocks[name].places:
+            raise LogIncompleteError(f"The log tells nothing of {_called(name)}.{log.complaint}")
+        _require_one_run(log, name)
+
+
+def _read(text: str) -> _Log:
+    """The rows of each block."""
+    lines = list(lines_of(text))
+    form = learnt_format(lines)
+    blocks: dict[str, _BlockLog] = defaultdict(_BlockLog)
+    for row in _trusted([row for row in map(form.row, lines) if row is not None]):
+        block = blocks[row.name]
+        if row.burning is not None:
+            block.burning[row.label] = block.burning.get(row.label, False) or row.burning
+        elif len(row.values) == 1:
+            block.masses[row.label][row.values[0]] = None
         else:
-            reported[match[1]].states[time][fields[1]] = None
-    errors = [row for row in rows if "lua" in ",".join(row).lower()]
-    complaint = f" It speaks of an error: {', '.join(errors[0])[:200]!r}." if errors else ""
-    return reported, complaint
-
-
-def _rows(text: str) -> Iterator[Row]:
-    for line in _LINE_ENDS.split(text):
-        cut = line[: _LONGEST_ROW * 2].strip(" \t\ufeff\x00\xa0")
-        if cut:
-            yield tuple(part.strip(' \t"') for part in cut.split(","))
-
-
-def _is_sound(row: Row) -> bool:
-    """Whether every number of a row is whole."""
-    if len(row) not in {_PLACE_FIELDS, _STATE_FIELDS} or not _NAME.fullmatch(row[1]):
-        return False
-    if len(row) == _STATE_FIELDS and row[2] in {"true", "false"}:
-        return _NUMBER.fullmatch(row[0]) is not None
-    return all(_NUMBER.fullmatch(part) for part in (row[0], *row[2:]))
+            block.places[row.label][row.values] = None
+    error = next((line for line in lines if "lua" in line.lower()), None)
+    complaint = "" if error is None else f" It speaks of an error: {error[:200]!r}."
+    return _Log(form, blocks, complaint)
 
 
 def _trusted(rows: Sequence[Row]) -> Iterator[Row]:
@@ -178,7 +245,7 @@ def _trusted(rows: Sequence[Row]) -> Iterator[Row]:
     In a file that was not cleaned each copy has the newest line first; its first and last lines
     count only if another place of the file has them whole.
     """
-    times = [float(row[0]) for row in rows]
+    times = [row.label for row in rows]
     rising = sum(later > earlier for earlier, later in pairwise(times))
     falling = sum(later < earlier for earlier, later in pairwise(times))
     if falling <= rising:
@@ -196,75 +263,71 @@ def _trusted(rows: Sequence[Row]) -> Iterator[Row]:
             yield row
 
 
-def _require_one_run(block_log: _BlockLog, name: str) -> None:
-    for label, places in block_log.places.items():
-        if len(places) > _SAMPLES_A_LABEL:
+def _require_one_run(log: _Log, name: str) -> None:
+    most = max(2, math.ceil(log.form.label_s * SAMPLE_RATE_HZ))
+    for label, places in log.blocks[name].places.items():
+        if len(places) > most:
             raise LogIncompleteError(
-                f"At {label / 10:g} s the log has {len(places)} different positions of "
-                f"{_called(name)}; one run prints at most {_SAMPLES_A_LABEL}."
+                f"At {label * log.form.label_s:g} s the log has {len(places)} different positions "
+                f"of {_called(name)}; one run prints at most {most}."
             )
-    if _jumps(block_log) > _JUMPING_SHARE:
+    if _jumps(log, name) > _JUMPING_SHARE:
         raise LogIncompleteError(
             f"{_called(name).capitalize()} is at different positions at the same times: the log "
             "is of several runs."
         )
 
 
-def _jumps(block_log: _BlockLog) -> float:
+def _jumps(log: _Log, name: str) -> float:
     """The share of time labels within which a block moves more than from label to label."""
-    _, means = _places(block_log)
-    spreads = np.array(
-        [np.ptp(list(block_log.places[label]), axis=0).max() for label in sorted(block_log.places)]
-    )
+    _, means = _places(log, name)
+    places = log.blocks[name].places
+    spreads = np.array([np.ptp(list(places[label]), axis=0).max() for label in sorted(places)])
     steps = np.abs(np.diff(means, axis=0)).max(axis=1) if len(means) > 1 else np.zeros(0)
     around = np.maximum(np.append(steps, 0.0), np.append(0.0, steps))
-    return float((spreads > 2 * around + 4 * _GRAIN).mean())
+    return float((spreads > 2 * around + 4 * log.form.rounding).mean())
 
 
-def _places(block_log: _BlockLog) -> tuple[Floats, Floats]:
+def _places(log: _Log, name: str) -> tuple[Floats, Floats]:
     """Times and mean positions of a block, in order of time."""
-    labels = sorted(block_log.places)
-    means = [np.mean(list(block_log.places[label]), axis=0) for label in labels]
-    return np.array(labels) / 10, np.array(means)
+    places = log.blocks[name].places
+    labels = sorted(places)
+    return log.times(labels), np.array([np.mean(list(places[label]), axis=0) for label in labels])
 
 
-def _burning(block_log: _BlockLog, instants: Floats) -> NDArray[np.bool_]:
-    labels = sorted(
-        label for label, states in block_log.states.items() if states.keys() & {"true", "false"}
-    )
+def _burning(log: _Log, name: str, instants: Floats) -> NDArray[np.bool_]:
+    burning = log.blocks[name].burning
+    labels = sorted(burning)
     if not labels:
         return np.zeros(len(instants), dtype=bool)
-    burns = np.array(["true" in block_log.states[label] for label in labels])
-    return latest(instants, np.array(labels) / 10, burns)
+    return latest(instants, log.times(labels), np.array([burning[label] for label in labels]))
 
 
-def _mass(cargo_log: _BlockLog, cargo: Cargo, instants: Floats) -> Floats:
+def _mass(log: _Log, cargo: Cargo, instants: Floats, late_s: float) -> Floats:
     """(T,) the cargo's mass, of the rows that the scenario's ramp explains."""
-    masses: dict[int, float] = {}
-    for label, states in cargo_log.states.items():
-        time_s = label / 10
+    form, masses = log.form, {}
+    margin_s = form.label_s / 2 + _UPDATE_S
+    for label, printed in log.blocks[CARGO_ID].masses.items():
+        time_s = label * form.label_s
         low, high = (
-            cargo.mass_at(max(time_s + side * _HALF_LABEL_S, 0.0)) + side * _GRAIN
+            cargo.mass_at(max(time_s + side * margin_s, 0.0)) + side * form.rounding
             for side in (-1.0, 1.0)
         )
-        masses_of_label = [
-            float(state)
-            for state in states
-            if _NUMBER.fullmatch(state) and min(low, high) <= float(state) <= max(low, high)
-        ]
-        if masses_of_label:
-            masses[label] = sum(masses_of_label) / len(masses_of_label)
+        low, high = min(low, high), max(low, high)
+        fitting = [mass for mass in printed if low <= mass <= high]
+        if fitting:
+            masses[label] = sum(fitting) / len(fitting)
     labels = sorted(masses)
     if not labels:
         raise LogIncompleteError(
             "The log does not tell the cargo's mass as the scenario's ramp has it."
         )
-    times = np.array(labels) / 10
+    times = log.times(labels)
     require_no_gap(
         times,
         name="the cargo's mass, as the scenario's ramp has it",
         longest_s=LONGEST_GAP_S,
-        first_s=0.0,
+        first_s=late_s if late_s > LONGEST_GAP_S else 0.0,
         last_s=float(instants[-1]),
     )
     values = np.array([[masses[label]] for label in labels])

@@ -8,10 +8,17 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_besiege.errors import LogIncompleteError
-from buildarena_besiege.exporting.script import BLOCKS_PER_LINE, SAMPLE_EVERY
-from buildarena_besiege.keys import UPDATES_PER_S, cannons
-from buildarena_besiege.logs.log_lines import LINE_VERSION
+from buildarena_besiege.keys import cannons
+from buildarena_besiege.logs.late_start import proved_start
+from buildarena_besiege.logs.log_samples import (
+    filled,
+    first_seen,
+    latest,
+    level_settings,
+    log_samples,
+    reported_names,
+    require_whole,
+)
 from buildarena_besiege.logs.orientation import (
     centers_of,
     machine_rotations,
@@ -19,7 +26,7 @@ from buildarena_besiege.logs.orientation import (
     turned,
 )
 from buildarena_besiege.placement import global_pose
-from buildarena_besiege.tracking import run_digest, tracked_blocks
+from buildarena_besiege.tracking import tracked_blocks
 from buildarena_geometry.besiege_components import besiege_turn
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Quaternion
@@ -37,16 +44,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from buildarena_besiege.logs.game_log import GameLog
-    from buildarena_besiege.logs.log_lines import Line
     from buildarena_geometry import Machine
     from buildarena_simulation import Scenario
 
 ENGINE: Final = "besiege"
 READING_VERSION: Final = "1"
 """Rises with every change of how logs become trajectories."""
-
-LONGEST_GAP_S: Final = 0.2
-"""From one known sample to the next; what lies between is filled in linearly."""
 
 JOINED_DRIFT: Final = 1.0
 """A block whose distance from the starting block has changed by more is no longer joined, units."""
@@ -60,6 +63,7 @@ class Samples:
         block_ids: (N,) the tracked blocks.
         positions: (T, N, 3) Besiege's components, units.
         burning: (T, N) bool; False where not reported.
+        destroyed: (T, N) bool, whether the game destroyed the block; None where not reported.
         cargo: (T, 3) Besiege's components, units; None without cargo.
         mass: (T,) the cargo's; None without cargo.
         quaternions: (T, N, 4) world_from_block, if the log has them.
@@ -69,6 +73,7 @@ class Samples:
     block_ids: tuple[str, ...]
     positions: NDArray[np.float64]
     burning: NDArray[np.bool_]
+    destroyed: NDArray[np.bool_] | None = None
     cargo: NDArray[np.float64] | None = None
     mass: NDArray[np.float64] | None = None
     quaternions: NDArray[np.float64] | None = None
@@ -92,22 +97,25 @@ def trajectory_of(
         LogIncompleteError: Something is missing, or two lines contradict each other.
     """
     tracked = tracked_blocks(machine, scenario)
-    presses = _require_whole(log, machine, scenario, tracked)
+    presses = require_whole(log, machine, scenario, tracked)
     count = len(tracked) + (scenario.cargo is not None)
-    reported = _log_samples(log, scenario, count)
+    reported = log_samples(log, scenario, count)
     known = ~np.isnan(reported[:, :, 0]) if count else np.ones((len(reported), 0), dtype=bool)
-    filled, longest = _filled(reported, known, _names(tracked, scenario))
-    positions = filled[:, : len(tracked), 1:4]
+    late = proved_start(machine, scenario, tracked, first_seen(reported, known))
+    whole, longest = filled(reported, known, reported_names(tracked, scenario), late)
+    positions = whole[:, : len(tracked), 1:4]
     samples = Samples(
         block_ids=tracked,
         positions=positions,
-        burning=_latest(reported[:, : len(tracked), 4], known[:, : len(tracked)]) > 0.0,
-        cargo=filled[:, -1, 1:4] if scenario.cargo is not None else None,
-        mass=filled[:, -1, 4] if scenario.cargo is not None else None,
+        burning=latest(reported[:, : len(tracked), 4], known[:, : len(tracked)]) > 0.0,
+        destroyed=latest(reported[:, : len(tracked), 5], known[:, : len(tracked)]) > 0.0,
+        cargo=whole[:, -1, 1:4] if scenario.cargo is not None else None,
+        mass=whole[:, -1, 4] if scenario.cargo is not None else None,
         settings={
             "effective_key_presses": presses,
             "filled_samples": int((~known[1:]).any(axis=1).sum()) if count else 0,
             "longest_gap_s": round(longest / SAMPLE_RATE_HZ, 6),
+            **level_settings(log),
             "lag": "not told by the log",
             "run": hashlib.sha256(log.run_id.encode()).hexdigest()[:16],
             "log": hashlib.sha256(log.text().encode()).hexdigest()[:16],
@@ -137,7 +145,7 @@ def made_trajectory(
     for column, block in enumerate(hot):
         if block in ids:
             heated[:, column] = samples.burning[:, ids.index(block)]
-    pieces = pieces_of(machine, ids, samples.positions)
+    pieces = pieces_of(machine, ids, samples.positions, samples.destroyed)
     positions, quaternions, source = _poses(samples, machine, turn, pieces)
     cargo = None if samples.cargo is None else _ours(samples.cargo)
     if cargo is not None and samples.of_roots and scenario.cargo is not None:
@@ -173,17 +181,21 @@ def made_trajectory(
 
 
 def pieces_of(
-    machine: Machine, block_ids: tuple[str, ...], positions: NDArray[np.float64]
+    machine: Machine,
+    block_ids: tuple[str, ...],
+    positions: NDArray[np.float64],
+    destroyed: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.int16] | None:
     """(T, N) which piece each tracked block belongs to, as far as distances show.
 
     From the moment its distance from the first starting block differs by more than `JOINED_DRIFT`
-    from that at the start, a block is a piece of its own.
+    from that at the start, or the game destroys it, a block is a piece of its own.
 
     Args:
         machine: Gives the order of the blocks.
         block_ids: (N,) the tracked blocks.
         positions: (T, N, 3) units.
+        destroyed: (T, N) whether the game destroyed the block.
 
     Returns:
         None if no starting block is tracked.
@@ -197,104 +209,12 @@ def pieces_of(
     first = min(starts, key=lambda i: order[block_ids[i]])
     apart = np.linalg.norm(positions - positions[:, first : first + 1], axis=2)
     held = np.abs(apart - apart[0]) <= JOINED_DRIFT
+    if destroyed is not None:
+        held &= ~destroyed
     joined = np.logical_and.accumulate(held, axis=0)
     joined[:, first] = True
     own = np.array([order[block] for block in block_ids], dtype=np.int16)
     return np.where(joined, own[first], own[None, :]).astype(np.int16)
-
-
-def _require_whole(
-    log: GameLog, machine: Machine, scenario: Scenario, tracked: tuple[str, ...]
-) -> int:
-    """Refuses logs that cannot be believed; how many key presses reached something."""
-    begins = [line for line in log.lines if line.kind == "b"]
-    if not begins:
-        raise LogIncompleteError(f"The begin line of run {log.run_id} is missing.")
-    if log.disputed:
-        key = min(log.disputed)
-        raise LogIncompleteError(
-            f"Two different lines tell of the same moment, {key[1] / UPDATES_PER_S:.2f} s: "
-            "none of them is believed."
-        )
-    version, presses, digest = begins[0].fields
-    if version != LINE_VERSION:
-        raise LogIncompleteError(f"The log is of format {version}, not {LINE_VERSION}.")
-    if digest != run_digest(machine, scenario, tracked):
-        raise LogIncompleteError("The log is of another machine or another scenario.")
-    if not log.ended:
-        raise LogIncompleteError(
-            f"The end line is missing: the log ends at {log.time_s:.2f} s "
-            f"of {scenario.duration_s:g} s."
-        )
-    return presses
-
-
-def _log_samples(log: GameLog, scenario: Scenario, count: int) -> NDArray[np.float64]:
-    """(T, count, 5) the log's values: 1, position and state; NaN where it has none."""
-    reported = np.full((scenario.sample_count, count, 5), np.nan)
-    parts = max(-(-count // BLOCKS_PER_LINE), 1)
-    for line in log.lines:
-        if line.kind != "s":
-            continue
-        row, rest = divmod(line.update, SAMPLE_EVERY)
-        if rest or row >= len(reported) or line.parts != parts or not _fits(line, count):
-            raise LogIncompleteError(
-                f"The line of {line.update / UPDATES_PER_S:.2f} s tells of other blocks or moments "
-                "than this machine's."
-            )
-        for number, entry in line.entries:
-            state = 0.0 if entry.state == "-" else float(entry.state)
-            reported[row, number - 1] = (1.0, *entry.position, state)
-    return reported
-
-
-def _fits(line: Line, count: int) -> bool:
-    first = (line.part - 1) * BLOCKS_PER_LINE + 1
-    wanted = range(first, min(first + BLOCKS_PER_LINE, count + 1))
-    return [number for number, _ in line.entries] == list(wanted)
-
-
-def _filled(
-    reported: NDArray[np.float64], known: NDArray[np.bool_], names: list[str]
-) -> tuple[NDArray[np.float64], int]:
-    """The reported values with short gaps filled, and the longest gap in samples."""
-    filled, longest = reported.copy(), 0
-    rows = np.arange(len(reported))
-    most = round(LONGEST_GAP_S * SAMPLE_RATE_HZ)
-    for column, name in enumerate(names):
-        seen = np.flatnonzero(known[:, column])
-        if not len(seen):
-            raise LogIncompleteError(f"The log tells nothing of {name}.")
-        # Nothing is reported of the start itself: the first sample is one interval later.
-        bounds = np.concatenate([[0], seen, [len(reported) - 1]])
-        gaps = np.diff(bounds)
-        worst = int(gaps.argmax())
-        longest = max(longest, int(gaps[worst]))
-        if gaps[worst] > most:
-            start, end = bounds[worst] / SAMPLE_RATE_HZ, bounds[worst + 1] / SAMPLE_RATE_HZ
-            raise LogIncompleteError(
-                f"Between {start:.2f} s and {end:.2f} s nothing is told of {name}; "
-                f"gaps of up to {LONGEST_GAP_S:g} s are filled."
-            )
-        for component in range(1, reported.shape[2]):
-            filled[:, column, component] = np.interp(rows, seen, reported[seen, column, component])
-    return filled, longest
-
-
-def _latest(values: NDArray[np.float64], known: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Each column's values, where not known the last known one, or the first."""
-    latest = np.zeros(values.shape)
-    rows = np.arange(len(values))
-    for column in range(values.shape[1]):
-        seen = np.flatnonzero(known[:, column])
-        at = seen[np.maximum(np.searchsorted(seen, rows, side="right") - 1, 0)]
-        latest[:, column] = values[at, column]
-    return latest
-
-
-def _names(tracked: tuple[str, ...], scenario: Scenario) -> list[str]:
-    cargo = ["the cargo"] if scenario.cargo is not None else []
-    return [*(f"block {block}" for block in tracked), *cargo]
 
 
 def _poses(

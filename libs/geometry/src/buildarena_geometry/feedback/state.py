@@ -161,6 +161,14 @@ def detached(state: MachineState, joints: Iterable[Joint]) -> list[str]:
     return [f"Not connected to block {next(iter(state.blocks))}: {listing(loose)}."]
 
 
+def controller(state: MachineState) -> str:
+    """What acts in the trial: a program, or the keys."""
+    if not state.controller:
+        return "There is no controller; the control sequence is played."
+    count = len(state.controller.splitlines())
+    return f"The controller is set: {counted(count, 'line')}. No key press is played."
+
+
 def control_sequence(state: MachineState) -> str:
     """The control sequence, one entry a line, with the numbers `remove_control_sequence` takes."""
     return "\n".join(_press_lines(state)) or "The control sequence is empty."

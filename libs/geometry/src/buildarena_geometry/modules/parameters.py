@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeGuard
 
-from buildarena_geometry.json_values import LARGEST_INTEGER, is_storable
+from buildarena_geometry.json_values import LARGEST_INTEGER, check_controller, is_storable
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.outcomes import AttemptedBlock, Cause
 from buildarena_geometry.rotations import Vector
@@ -99,6 +99,16 @@ def _read_note(name: str, value: object) -> str:
     return "" if value is None else _read_text(name, value)
 
 
+def _read_program(name: str, value: object) -> str:
+    if not isinstance(value, str):
+        raise _malformed(name, "a text", value)
+    try:
+        check_controller(value)
+    except ValueError as error:
+        raise RefusalError(Cause.MALFORMED_ARGUMENTS, f"{name}: {error}.") from None
+    return value
+
+
 def _read_number(name: str, value: object) -> float:
     if not _is_integer(value) and not (isinstance(value, float) and math.isfinite(value)):
         raise _malformed(name, "a finite number", value)
@@ -169,6 +179,7 @@ BlockId = Annotated[str, Parameter({"type": "string"}, _read_id)]
 Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
 Key = Annotated[str, Parameter({"type": "string", "enum": list(KEYS)}, _read_text)]
 Note = Annotated[str, Parameter({"type": "string", "maxLength": LONGEST_TEXT}, _read_note)]
+ProgramText = Annotated[str, Parameter({"type": "string"}, _read_program)]
 Number = Annotated[float, Parameter({"type": "number"}, _read_number)]
 Index = Annotated[int, Parameter({"type": "integer"}, _read_index)]
 Presses = Annotated[tuple[tuple[float, str, float], ...], Parameter(_PRESSES_SCHEMA, _read_presses)]

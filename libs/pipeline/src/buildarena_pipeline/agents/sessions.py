@@ -32,6 +32,7 @@ from buildarena_pipeline.errors import PipelineError, SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.scoring import drawn_for, task_of
 from buildarena_pipeline.runtime.simulators.known import (
+    drawn_issues,
     simulation_version,
     worlds_here,
     worlds_issues,
@@ -91,6 +92,7 @@ class SessionState:
         open: Whether it takes calls.
         tests: Its test trials, those under way included.
         most_tests: Test trials that it may have.
+        programs: Whether it may set a controller.
     """
 
     job: Job
@@ -100,6 +102,7 @@ class SessionState:
     open: bool
     tests: Sequence[TriedOnce]
     most_tests: int
+    programs: bool
 
 
 class ExternalSessions:
@@ -152,6 +155,9 @@ class ExternalSessions:
             message = "1 to 80 letters, digits, dots, dashes and underscores"
             further.append(ValidationIssue(path="agent", message=message))
         chosen = chosen_task(self._context, task, simulator, further=further)
+        undrawn = drawn_issues(self._context, simulator, worlds, {"task": chosen})
+        if undrawn:
+            raise SubmissionError(undrawn)
         version = simulation_version(self._context, simulator)
         on_demand = chosen.constraints.on_demand
         track = external_track(
@@ -257,6 +263,7 @@ class ExternalSessions:
             open=job.state == JobState.RUNNING and job.queue == EXTERNAL_QUEUE,
             tests=trials_of(self._context, job_id, task) if task and task.tests else (),
             most_tests=task.tests if task else 0,
+            programs=task is not None and task.takes_programs,
         )
         self._keep_bench(job_id, len(calls), bench)
         return state

@@ -16,6 +16,7 @@ from buildarena_pipeline.errors import SubmissionError
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.runtime.simulators.known import (
+    drawn_issues,
     simulation_version,
     simulator_issues,
     worlds_here,
@@ -237,7 +238,15 @@ class Submissions:
             *worlds_issues(self._context, variant.simulator, variant.worlds),
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
-        issues = issues or self._infeasible(variant.workflow, tasks, found)
+        issues = issues or [
+            *self._infeasible(variant.workflow, tasks, found),
+            *drawn_issues(
+                self._context,
+                variant.simulator,
+                variant.worlds,
+                {path: found[name] for path, name in tasks.items()},
+            ),
+        ]
         if issues:
             raise SubmissionError(issues)
 

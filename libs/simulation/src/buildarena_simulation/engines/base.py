@@ -122,6 +122,12 @@ class Engine(Protocol):
     def set_cargo_mass(self, mass: float) -> None:
         """Changes the cargo's mass and, in proportion, its inertia."""
 
+    def blow(self, wind: FloatArray) -> None:
+        """Says what accelerates everything from now on beside gravity, (3,), units/s²."""
+
+    def push_cargo(self, change: FloatArray) -> None:
+        """Changes the cargo's velocity by (3,), units/s, without touching anything else."""
+
     def drop_rope(self, index: int) -> None:
         """Removes a rope that gave way from the world."""
 

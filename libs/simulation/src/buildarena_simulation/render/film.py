@@ -11,6 +11,7 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.render.camera import Camera
 from buildarena_simulation.render.drawing import draw
 from buildarena_simulation.render.scene import Scene
+from buildarena_simulation.rollout import world_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -53,7 +54,7 @@ def write_film(
     kind = path.suffix.lstrip(".").lower()
     if kind not in FORMATS:
         raise ValueError(f"{path.name}: a film ends in {', '.join(FORMATS)}")
-    scene = Scene(machine, scenario, trajectory)
+    scene = Scene(machine, world_of(scenario, trajectory), trajectory)
     count = len(trajectory.time_s)
     if kind == "png":
         samples = np.linspace(0, count - 1, _SHEET[0] * _SHEET[1]).round().astype(int)

@@ -5,59 +5,71 @@ import math
 import numpy as np
 
 from buildarena_geometry.modules.joints import Drive
-from buildarena_simulation.structure.model import BoolArray, FloatArray
+from buildarena_simulation.structure.model import FloatArray
 
 
 def speed_targets(
-    drive: Drive, forward: BoolArray, backward: BoolArray, *, sign: float, time_step_s: float
-) -> FloatArray:
+    drive: Drive,
+    forward: FloatArray,
+    backward: FloatArray,
+    *,
+    sign: float,
+    time_step_s: float,
+    before: float,
+) -> tuple[FloatArray, float]:
     """Speeds that a drive aims at, (S,), rad/s or units/s; NaN where it turns freely.
 
     Args:
         drive: A drive for a speed.
-        forward: (S,) whether a key for forward is held at each step.
-        backward: (S,) whether one for backward is.
+        forward: (S,) how far forward is asked for at each step, 0 to 1.
+        backward: (S,) the same of backward.
         sign: Which way forward is along the joint's axis.
         time_step_s: Length of a step, seconds.
+        before: The speed that it had come to before the first step.
+
+    Returns:
+        The speeds, and the one that it has come to.
     """
     if drive.default_mode == "forward":
         forward = np.ones_like(forward)
-    wanted = sign * drive.rate * (forward.astype(np.float64) - backward)
-    speeds = lagged(wanted[:, None], np.array([drive.lag_per_s]), time_step_s)[:, 0]
+    wanted = sign * drive.rate * (forward - backward)
+    lags = np.array([drive.lag_per_s])
+    speeds, reached = lagged(wanted[:, None], lags, time_step_s, before=np.array([before]))
+    speeds = speeds[:, 0]
     if drive.default_mode == "free":
-        speeds[~forward & ~backward] = np.nan
-    return speeds
+        speeds[(forward == 0) & (backward == 0)] = np.nan
+    return speeds, float(reached[0])
 
 
 def place_targets(
     drive: Drive,
-    forward: BoolArray,
-    backward: BoolArray,
+    forward: FloatArray,
+    backward: FloatArray,
     *,
     sign: float,
     limits: tuple[float, float] | None,
     time_step_s: float,
+    place: float,
 ) -> FloatArray:
-    """Places that a drive aims at, (S,), rad or units: its keys move them at its rate.
+    """Places that a drive aims at, (S,), rad or units: what is asked for moves them at its rate.
 
     Args:
         drive: A drive for a place.
-        forward: (S,) whether a key for forward is held at each step.
-        backward: (S,) whether one for backward is.
+        forward: (S,) how far forward is asked for at each step, 0 to 1.
+        backward: (S,) the same of backward.
         sign: Which way forward is along the joint's axis.
         limits: The smallest and largest place; None without.
         time_step_s: Length of a step, seconds.
+        place: Where it aimed before the first step.
     """
     low, high = limits or (-math.inf, math.inf)
-    move = sign * drive.rate * time_step_s * (forward.astype(np.float64) - backward)
+    move = sign * drive.rate * time_step_s * (forward - backward)
     back = drive.rate * time_step_s if drive.default_mode == "return" else 0.0
     targets = np.zeros(len(move))
-    if not (forward.any() or backward.any()):
+    if place == 0 and not (forward.any() or backward.any()):
         return targets
-    place = 0.0
-    for k, (step, pressed) in enumerate(
-        zip(move.tolist(), (forward | backward).tolist(), strict=True)
-    ):
+    asked = (forward > 0) | (backward > 0)
+    for k, (step, pressed) in enumerate(zip(move.tolist(), asked.tolist(), strict=True)):
         if pressed:
             place = min(max(place + step, low), high)
         elif back:
@@ -66,14 +78,26 @@ def place_targets(
     return targets
 
 
-def lagged(targets: FloatArray, lags: FloatArray, time_step_s: float) -> FloatArray:
-    """Speeds that follow their targets, (S, W), by first-order lags of the rates (W,), 1/s."""
+def lagged(
+    targets: FloatArray, lags: FloatArray, time_step_s: float, *, before: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Speeds that follow their targets by first-order lags.
+
+    Args:
+        targets: (S, W) at each step.
+        lags: (W,) rates, 1/s.
+        time_step_s: Length of a step, seconds.
+        before: (W,) the speeds before the first step.
+
+    Returns:
+        The speeds, (S, W), and the last of them, (W,).
+    """
     blend = np.array([1.0 - math.exp(-lag * time_step_s) for lag in lags])
     speeds = np.zeros_like(targets)
-    if not targets.any():
-        return speeds
-    current = np.zeros(targets.shape[1])
+    current = before
+    if not (targets.any() or current.any()):
+        return speeds, current
     for k, target in enumerate(targets):
         current = current + blend * (target - current)
         speeds[k] = current
-    return speeds
+    return speeds, current

@@ -7,7 +7,7 @@ import numpy as np
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import PointForces
-from buildarena_simulation.structure.model import BoolArray, FloatArray, Ropes, Structure
+from buildarena_simulation.structure.model import FloatArray, Ropes, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.own_forces import OwnForces, own_forces_of
 from buildarena_simulation.structure.vectors import cross, summed_by, turned
@@ -18,13 +18,13 @@ class Commands:
     """What the keys ask of the blocks for some time.
 
     Attributes:
-        pushing: (P,) whether each fan's key is held.
+        pushing: (P,) how far each fan is asked to push, 0 to 1.
         heights: (A,) by how much each held height was moved from where it began, units.
         kicks: (D,) force with which each block that let go pushes off, mass·unit/s².
         rests: (K,) length of each spring at rest, as a share of its built length.
     """
 
-    pushing: BoolArray
+    pushing: FloatArray
     heights: FloatArray
     kicks: FloatArray
     rests: FloatArray
@@ -52,7 +52,7 @@ class ForceField:
         """Starts without any key held."""
         table = self.table
         self.commands = Commands(
-            pushing=np.zeros(len(table.pushes), dtype=bool),
+            pushing=np.zeros(len(table.pushes)),
             heights=np.zeros(len(table.altitudes)),
             kicks=np.zeros(len(table.decouplers)),
             rests=np.ones(len(self.ropes.springs)),

@@ -43,6 +43,9 @@ class LoadModel:
         clusters: Its clusters at the start.
         motion: Their motion at the start.
         gravity: Downward acceleration, units/s².
+
+    Attributes:
+        wind: (3,) what accelerates every mass beside gravity, world frame, units/s².
     """
 
     def __init__(
@@ -55,6 +58,7 @@ class LoadModel:
     ) -> None:
         self._structure = structure
         self._weights = structure.masses * (gravity / GRAVITY)
+        self.wind: FloatArray = np.zeros(3)
         self._stiffness = StiffnessModel(structure)
         self._wrenches = np.zeros((len(structure), 6))
         self.holds: BoolArray = np.ones(len(structure.members), dtype=bool)
@@ -84,7 +88,14 @@ class LoadModel:
         self._inertial = turned_wrenches(turn, inertial) * share[:, None]
 
     def evaluate(
-        self, forces: PointForces, motion: Motion, *, elapsed_s: float, seen_s: float
+        self,
+        forces: PointForces,
+        motion: Motion,
+        *,
+        elapsed_s: float,
+        seen_s: float,
+        filter_s: float = LOAD_FILTER_S,
+        fading: float = 1.0,
     ) -> JointLoads:
         """Joint loads now.
 
@@ -93,11 +104,14 @@ class LoadModel:
             motion: The clusters' motion now.
             elapsed_s: Time since the last evaluation, seconds.
             seen_s: The part of it that the forces are the mean of, seconds.
+            filter_s: Time constant of the filter, seconds.
+            fading: Share of the filtered loads that these give way to; the rest is added to.
 
         Returns:
             The loads of all members.
         """
-        self._update(forces, motion, elapsed_s=elapsed_s, seen_s=seen_s)
+        blend = 1.0 - math.exp(-seen_s / filter_s)
+        self._update(forces, motion, elapsed_s=elapsed_s, blend=blend, fading=fading)
         clusters = self._clusters
         count = len(self.holds)
         force, moment = np.zeros(count), np.zeros(count)
@@ -155,14 +169,13 @@ class LoadModel:
         ]
 
     def _update(
-        self, forces: PointForces, motion: Motion, *, elapsed_s: float, seen_s: float
+        self, forces: PointForces, motion: Motion, *, elapsed_s: float, blend: float, fading: float
     ) -> None:
         """Filters the wrenches on the blocks and the clusters' rates of momentum."""
         clusters = self._clusters
-        blend = 1.0 - math.exp(-seen_s / LOAD_FILTER_S)
         local = self._unfiltered(forces, motion)
         to_root = self._root_rotation.transpose(0, 2, 1)
-        self._wrenches += blend * (local - self._wrenches)
+        self._wrenches += blend * (local - fading * self._wrenches)
         rate = np.concatenate(
             [
                 clusters.mass[:, None] * (motion.velocity - self._velocity),
@@ -174,7 +187,7 @@ class LoadModel:
             axis=1,
         ) / (elapsed_s * GRAVITY)
         self._velocity, self._spin = motion.velocity, motion.spin
-        self._inertial += blend * (turned_wrenches(to_root, rate) - self._inertial)
+        self._inertial += blend * (turned_wrenches(to_root, rate) - fading * self._inertial)
 
     def _unfiltered(self, forces: PointForces, motion: Motion) -> FloatArray:
         """Wrenches on the blocks now, weight included, (N, 6), in the axes of their roots."""
@@ -187,6 +200,8 @@ class LoadModel:
         )
         world /= GRAVITY
         world[:, 2] -= self._weights
+        if self.wind.any():
+            world[:, :3] += self._structure.masses[:, None] * (self.wind / GRAVITY)
         to_root = self._root_rotation.transpose(0, 2, 1)
         return turned_wrenches(to_root[clusters.cluster_of], world)
 

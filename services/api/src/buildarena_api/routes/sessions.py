@@ -181,7 +181,9 @@ def open_session(
         statement=opened.task.statement,
         limits=LimitsView.model_validate(LIMITS),
         calls=opened.job.actions,
-        tools=_tools(on_demand=opened.task.constraints.on_demand),
+        tools=_tools(
+            on_demand=opened.task.constraints.on_demand, programs=opened.task.takes_programs
+        ),
     )
 
 
@@ -197,7 +199,9 @@ def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
         job=JobView.of(state.job),
         open=state.open,
         machines=[machine_view(name, machine) for name, machine in state.machines.items()],
-        tools=_tools(on_demand=bool(state.job.track_config.get("looked_up"))),
+        tools=_tools(
+            on_demand=bool(state.job.track_config.get("looked_up")), programs=state.programs
+        ),
         limits=LimitsView.model_validate(LIMITS),
         calls=state.calls,
         bytes=state.size,
@@ -254,9 +258,10 @@ def submit_session(
     return JobView.of(job)
 
 
-def _tools(*, on_demand: bool) -> list[ToolView]:
+def _tools(*, on_demand: bool, programs: bool) -> list[ToolView]:
     return [
-        ToolView.model_validate(tool.as_document()) for tool in building_tools(on_demand=on_demand)
+        ToolView.model_validate(tool.as_document())
+        for tool in building_tools(on_demand=on_demand, programs=programs)
     ]
 
 

@@ -59,8 +59,9 @@ def get_trajectory(
     `quaternions` (w, x, y, z), `cargo_position`, `cargo_quaternion`, `cargo_mass`, `heated`,
     `pieces`, the `bearing` forces, and `joint_loads`: the largest share of its strength that each
     joint bore since the instant before, in the order of the joint peaks (not in trajectories of
-    before schema 3). Block and cannon ids, joint peaks and breaks are JSON in the schema's metadata
-    under `buildarena.trajectory`.
+    before schema 3). Of a trial with a program there are `senses` and `answers` too. Block and
+    cannon ids, joint peaks, breaks, `sense_names` and `action_names` are JSON in the schema's
+    metadata under `buildarena.trajectory`.
     """
     digest = _trajectory_hash(context, context.store.jobs.get(job_id), number)
     as_arrow = prefers(request.headers.get("accept", ""), ARROW, over=PARQUET)
@@ -89,9 +90,10 @@ def show_scene(
     `position - rotation * center`, and its bodies are given in the block's own frame.
     """
     job = context.store.jobs.get(job_id)
+    digest, seed = _tried(context, job, number)
     answer = scenes.get_or_make(
-        f"{_machine_hash(context, job, number)} {job.task} {job.task_version}",
-        lambda: _scene(context, job, number),
+        f"{digest} {seed} {job.task} {job.task_version}",
+        lambda: _scene(context, job, digest, seed),
     )
     return conditional(request, answer, "application/json")
 
@@ -104,14 +106,14 @@ def _trajectory_hash(context: Context, job: Job, number: int) -> str:
     return digest
 
 
-def _machine_hash(context: Context, job: Job, number: int) -> str | None:
-    """The machine of a rollout; before the first, the one that was built so far."""
+def _tried(context: Context, job: Job, number: int) -> tuple[str | None, int | None]:
+    """Machine and seed of a rollout; before the first, the machine that was built so far."""
     for record in context.store.rollouts.read(job.id):
         if record.number == number:
-            return record.machine_hash
+            return record.machine_hash, record.seed
     if number:
         raise ProblemError(404, f"job {job.id} has no rollout {number} yet")
-    return context.store.jobs.artifacts(job.id).get("machine")
+    return context.store.jobs.artifacts(job.id).get("machine"), None
 
 
 def _arrow(data: bytes, job_id: str) -> bytes:
@@ -132,11 +134,10 @@ def _arrow(data: bytes, job_id: str) -> bytes:
         ) from error
 
 
-def _scene(context: Context, job: Job, number: int) -> bytes:
+def _scene(context: Context, job: Job, digest: str | None, seed: int | None) -> bytes:
     task = context.tasks.exact(job.task, job.task_version)
     if task is None:
         raise ProblemError(404, f"task {job.task} is no longer at version {job.task_version}")
-    digest = _machine_hash(context, job, number)
     machine = None
     if digest is not None:
         try:
@@ -144,4 +145,4 @@ def _scene(context: Context, job: Job, number: int) -> bytes:
         except DocumentError as error:
             detail = f"job {job.id} has a machine that this version does not read: {error}"
             raise ProblemError(404, detail) from error
-    return scene_view(task.scenario, machine).model_dump_json().encode()
+    return scene_view(task.scenario.world(seed), machine).model_dump_json().encode()

@@ -8,7 +8,8 @@ from typing import Any, Final
 
 from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.runtime.trial_checks import OutcomeRefusedError, checked_trajectory
+from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
+from buildarena_pipeline.runtime.trial_checks import checked_trajectory
 from buildarena_simulation import Scenario, Trajectory
 
 SPARE_BYTES: Final = 1 << 30

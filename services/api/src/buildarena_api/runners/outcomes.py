@@ -13,8 +13,8 @@ from buildarena_api.runners.views import Fault, NamedFile, Outcome
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_pipeline.runtime.tracing import Attribute, span
+from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
 from buildarena_pipeline.runtime.trial_checks import (
-    OutcomeRefusedError,
     checked_versions,
     require_refusable,
 )

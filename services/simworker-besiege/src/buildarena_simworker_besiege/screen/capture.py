@@ -5,10 +5,12 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, Final
 
+from buildarena_simworker_besiege.errors import ScreenError
+
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-    from buildarena_simworker_besiege.screen.windows import Area
+    from buildarena_simworker_besiege.screen.window_types import Area
 
 _VISIBLE: Final = 16
 """Shades of grey, of 256, by which a pixel must change to count."""
@@ -16,18 +18,42 @@ _VISIBLE: Final = 16
 
 def picture(area: Area) -> Image:
     """A part of the screen, in shades of grey."""
-    from PIL import ImageGrab
-
-    return ImageGrab.grab(bbox=area.box).convert("L")
+    return _grabbed(area.box).convert("L")
 
 
 def screenshot() -> bytes:
-    """The whole screen as PNG."""
+    """The whole screen as PNG; raises `ScreenError` where there is none."""
+    data = io.BytesIO()
+    _grabbed(None).save(data, "PNG")
+    return data.getvalue()
+
+
+def small_picture(area: Area, width: int) -> bytes:
+    """A part of the screen as PNG, in colours, no wider than so many pixels."""
+    image = _grabbed(area.box).convert("RGB")
+    image.thumbnail((width, width))
+    data = io.BytesIO()
+    image.save(data, "PNG", optimize=True)
+    return data.getvalue()
+
+
+def is_black(image: Image) -> bool:
+    """Whether nothing is to be seen, as while the screen is locked or asleep."""
+    return not any(image.convert("L").histogram()[_VISIBLE:])
+
+
+def _grabbed(box: tuple[int, int, int, int] | None) -> Image:
+    """The screen, or a part of it.
+
+    Raises:
+        ScreenError: The system gives no picture, as while the screen is locked.
+    """
     from PIL import ImageGrab
 
-    data = io.BytesIO()
-    ImageGrab.grab().save(data, "PNG")
-    return data.getvalue()
+    try:
+        return ImageGrab.grab(bbox=box)
+    except OSError as error:
+        raise ScreenError(f"the screen shows nothing, as while it is locked: {error}") from error
 
 
 def difference(first: Image, second: Image) -> float:

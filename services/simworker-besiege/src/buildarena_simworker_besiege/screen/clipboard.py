@@ -5,16 +5,23 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from typing import Any, Final, Protocol
 
-from buildarena_simworker_besiege.errors import NotSetUpError
+from buildarena_simworker_besiege.errors import NotSetUpError, ScreenError
 
 HAND_OVER_S: Final = 2.0
 """How long another program may take to hand over what it copied."""
 
 
+TRIES: Final = 10
+TRY_AGAIN_S: Final = 0.1
+"""On Windows one program at a time has the clipboard; others, such as its history, soon let go."""
+
+
 class Clipboard(Protocol):
-    """Text that programs hand to each other."""
+    """Text that programs hand to each other; what cannot be reached raises `ScreenError`."""
 
     def put(self, text: str) -> None:
         """Puts a text there."""
@@ -44,16 +51,25 @@ class _SystemClipboard:
         self._clip: Any = pyperclip
 
     def put(self, text: str) -> None:
-        try:
-            self._clip.copy(text)
-        except self._clip.PyperclipException as error:
-            raise NotSetUpError(f"the clipboard cannot be used: {error}") from error
+        self._reached(lambda: self._clip.copy(text))
 
     def get(self) -> str | None:
-        return str(self._clip.paste())
+        return str(self._reached(self._clip.paste))
 
     def close(self) -> None:
         pass
+
+    def _reached(self, act: Callable[[], Any]) -> Any:
+        for left in reversed(range(TRIES)):
+            try:
+                return act()
+            except (self._clip.PyperclipException, OSError) as error:
+                if not left:
+                    raise ScreenError(
+                        f"the clipboard cannot be reached, as another program keeps it: {error}"
+                    ) from error
+                time.sleep(TRY_AGAIN_S)
+        return None
 
 
 class _X11Clipboard:
@@ -75,8 +91,11 @@ class _X11Clipboard:
             stderr=subprocess.DEVNULL,
         )
         assert self._owner.stdin is not None  # noqa: S101 - it was asked for
-        self._owner.stdin.write(text.encode())
-        self._owner.stdin.close()
+        try:
+            self._owner.stdin.write(text.encode())
+            self._owner.stdin.close()
+        except OSError as error:
+            raise ScreenError(f"the clipboard cannot be reached: {error}") from error
 
     def get(self) -> str | None:
         try:

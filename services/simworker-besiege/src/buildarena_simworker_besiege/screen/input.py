@@ -10,12 +10,16 @@ import time
 from pathlib import Path
 from typing import Any, Final
 
-from buildarena_simworker_besiege.errors import DesktopError, NotSetUpError
+from buildarena_simworker_besiege.errors import DesktopError, NotSetUpError, ScreenError
 from buildarena_simworker_besiege.screen.clipboard import open_clipboard
 
 MODIFIERS: Final = ("ctrl", "shift", "alt", "command", "win")
 SELECT: Final = "command" if sys.platform == "darwin" else "ctrl"
 """The modifier of "select all" and "copy"."""
+KEY_S: Final = 0.05
+"""How long a key of a shortcut stays down, and from one to the next: three frames of a game."""
+COPY_S: Final = 1.0
+"""How long a copy may take to be in the clipboard."""
 SENTINEL: Final = "nothing was copied"
 """Put into the clipboard before copying: when it is still there, nothing was copied."""
 
@@ -82,13 +86,22 @@ class ScreenInput:
         with _stopped_by_hand(self._gui):
             self._gui.press(key)
 
-    def hotkey(self, *keys: str) -> None:
-        """Presses keys together; whatever happens, none stays down."""
+    def hotkey(self, modifier: str, *keys: str) -> None:
+        """Presses keys, each for a moment, while a modifier is down; whatever happens, none stays.
+
+        A game that looks at its keys once a frame misses those that go down and up in between.
+        """
         with _stopped_by_hand(self._gui):
             try:
-                self._gui.hotkey(*keys)
-            finally:
+                self._gui.keyDown(modifier)
                 for key in keys:
+                    self.wait(KEY_S)
+                    self._gui.keyDown(key)
+                    self.wait(KEY_S)
+                    self._gui.keyUp(key)
+                self.wait(KEY_S)
+            finally:
+                for key in (*keys, modifier):
                     self._gui.keyUp(key)
 
     def write(self, text: str) -> None:
@@ -98,28 +111,38 @@ class ScreenInput:
 
     def release_all(self) -> None:
         """Releases all keys and buttons that a runner that died may have held."""
-        for key in MODIFIERS:
-            self._gui.keyUp(key)
-        self._gui.mouseUp()
+        with _stopped_by_hand(self._gui):
+            for key in MODIFIERS:
+                self._gui.keyUp(key)
+            self._gui.mouseUp()
 
     def close(self) -> None:
         """Releases keys and clipboard."""
-        self.release_all()
-        self._clipboard.close()
+        try:
+            self.release_all()
+        finally:
+            self._clipboard.close()
 
     def clear_clipboard(self) -> None:
         """Marks the clipboard, so that a later copy can be recognised."""
         self._clipboard.put(SENTINEL)
 
     def copy_all(self) -> str | None:
-        """Selects and copies everything where the keyboard is; None when nothing was copied."""
+        """Selects and copies everything where the keyboard is; None when nothing was copied.
+
+        The copy follows the selection at once: a text that grows from its top moves on under the
+        selection, and loses its end.
+        """
         self.clear_clipboard()
-        self.hotkey(SELECT, "a")
-        self.wait(0.2)
-        self.hotkey(SELECT, "c")
-        self.wait(0.2)
-        text = self._clipboard.get()
-        return None if text is None or text == SENTINEL else text
+        self.hotkey(SELECT, "a", "c")
+        ends = time.monotonic() + COPY_S / self._pace
+        while True:
+            text = self._clipboard.get()
+            if text is not None and text != SENTINEL:
+                return text
+            if time.monotonic() >= ends:
+                return None
+            self.wait(KEY_S)
 
 
 def _need_no_authority() -> None:
@@ -131,7 +154,11 @@ def _need_no_authority() -> None:
 
 
 class _stopped_by_hand:  # noqa: N801 - reads as a statement
-    """Turns PyAutoGUI's fail-safe, the mouse in the screen's corner, into our own error."""
+    """Turns what PyAutoGUI raises into our own errors.
+
+    Its fail-safe is the mouse in the screen's corner; everything else is a screen that does not
+    take what is pressed, as while it is locked.
+    """
 
     def __init__(self, gui: Any) -> None:
         self._gui = gui
@@ -140,5 +167,8 @@ class _stopped_by_hand:  # noqa: N801 - reads as a statement
         return None
 
     def __exit__(self, kind: type[BaseException] | None, error: object, _: object) -> None:
-        if kind is not None and issubclass(kind, self._gui.FailSafeException):
+        if kind is None or not issubclass(kind, Exception) or issubclass(kind, DesktopError):
+            return
+        if issubclass(kind, self._gui.FailSafeException):
             raise DesktopError("somebody moved the mouse into the screen's corner to stop")
+        raise ScreenError(f"mouse and keyboard cannot be used: {error or kind.__name__}")

@@ -6,8 +6,13 @@ from typing import TYPE_CHECKING, Final
 
 from buildarena_simworker_besiege.errors import GameGoneError
 from buildarena_simworker_besiege.screen.calibration import Calibration
-from buildarena_simworker_besiege.screen.capture import difference, picture
-from buildarena_simworker_besiege.screen.windows import Area, Windows
+from buildarena_simworker_besiege.screen.capture import (
+    difference,
+    is_black,
+    picture,
+    small_picture,
+)
+from buildarena_simworker_besiege.screen.window_types import Area, Windows
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -22,14 +27,12 @@ class View:
     """The window of one game.
 
     Args:
-        title: Part of its title.
         calibration: Where its places are.
-        windows: The screen's windows.
+        windows: Finds it.
     """
 
-    def __init__(self, title: str, calibration: Calibration, windows: Windows) -> None:
-        self._title = title
-        self._places = calibration.positions
+    def __init__(self, calibration: Calibration, windows: Windows) -> None:
+        self._calibration = calibration
         self._windows = windows
 
     def point(self, place: str) -> tuple[int, int]:
@@ -39,7 +42,14 @@ class View:
             GameGoneError: There is no window.
         """
         window = self._window()
-        x, y = self._places[place]
+        pixels = self._calibration.pixels.get(place)
+        if pixels is not None:
+            return (window.left + pixels[0], window.top + pixels[1])
+        return self.at(*self._calibration.positions[place])
+
+    def at(self, x: float, y: float) -> tuple[int, int]:
+        """Where fractions of the window are on the screen, pixels."""
+        window = self._window()
         return (window.left + round(x * window.width), window.top + round(y * window.height))
 
     def patch(self, place: str) -> Image:
@@ -59,8 +69,24 @@ class View:
         """All that the window shows."""
         return picture(self._window())
 
+    def small(self, width: int) -> bytes:
+        """All that the window shows as PNG, no wider than so many pixels."""
+        return small_picture(self._window(), width)
+
+    def size_finding(self) -> str | None:
+        """What is wrong with the window's size; None where it is as calibrated, and shows much."""
+        window = self._window()
+        size, wanted = (window.width, window.height), self._calibration.window
+        if wanted is not None and size != wanted:
+            return (
+                f"the window is {size[0]}x{size[1]}, and was calibrated at {wanted[0]}x{wanted[1]}"
+            )
+        if is_black(self.whole()):
+            return "the window is black, as while the screen is locked or asleep"
+        return None
+
     def _window(self) -> Area:
-        window = self._windows.find(self._title)
+        window = self._windows.find()
         if window is None:
-            raise GameGoneError(f"there is no window with {self._title!r} in its title")
+            raise GameGoneError(f"there is no {self._windows.wanted}")
         return window

@@ -6,11 +6,11 @@ the pixels near what was clicked, the log.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_besiege import GameLog, GameRun, level_file, trajectory_of
+from buildarena_besiege import GameLog, GameRun, level_file, level_finding, trajectory_of
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 from buildarena_simworker_besiege.desktop import RunLog
@@ -18,16 +18,23 @@ from buildarena_simworker_besiege.errors import (
     DesktopError,
     GameGoneError,
     LevelClosedError,
+    ScreenError,
     StepFailedError,
+    WrongLevelError,
 )
+from buildarena_simworker_besiege.game_lock import GameLock, screen_name
+from buildarena_simworker_besiege.installed import installed
 from buildarena_simworker_besiege.log_sources import LogFile
 from buildarena_simworker_besiege.process import GameProcess
+from buildarena_simworker_besiege.screen.actions import ScreenActions
 from buildarena_simworker_besiege.screen.calibration import Calibration
 from buildarena_simworker_besiege.screen.capture import difference, screenshot
-from buildarena_simworker_besiege.screen.input import SELECT, ScreenInput
-from buildarena_simworker_besiege.screen.steps import ATTEMPTS, take_step, wait_for
+from buildarena_simworker_besiege.screen.game_start import start_game
+from buildarena_simworker_besiege.screen.input import ScreenInput
+from buildarena_simworker_besiege.screen.machine_list import load_by_name, save_by_name
+from buildarena_simworker_besiege.screen.steps import ATTEMPTS, wait_for
 from buildarena_simworker_besiege.screen.view import View
-from buildarena_simworker_besiege.screen.windows import Windows
+from buildarena_simworker_besiege.screen.window_types import Windows
 from buildarena_simworker_besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker_besiege.traces import Traces
 
@@ -58,16 +65,22 @@ class WindowDesktop:
     ) -> None:
         self._settings = settings
         self._limits = settings.time_limits
-        self._view = View(settings.title, calibration, windows)
+        self._calibration = calibration
+        self._lock = GameLock(screen_name())
+        self._view = View(calibration, windows)
         self._input = screen_input
         self._windows = windows
         self._process = GameProcess(settings)
+        self._actions = ScreenActions(
+            self._view, screen_input, windows, self._limits, self.is_alive
+        )
         self._traces = Traces(settings.state)
         self._log_file = None if settings.log_file is None else LogFile(settings.log_file)
         self._empty: Image | None = None
         self._level: bytes | None = None
         self._loaded_changed = 0.0
         self._panel_shown = False
+        self._early_copies: list[str] = []
 
     @property
     def puts_down(self) -> bool:
@@ -75,7 +88,8 @@ class WindowDesktop:
         return True
 
     def require_able(self, run: GameRun) -> None:
-        """Checks that the run's level is open, or can be opened."""
+        """Checks that the calibrated game is played, with the run's level open or to be opened."""
+        installed(self._settings.folder).require(self._calibration.installed)
         if self._settings.opens_levels:
             return
         wanted = level_digest(run.level)
@@ -98,7 +112,10 @@ class WindowDesktop:
         elif left:
             self._tidy()
         self._level = run.level
-        self._to_front()
+        self._actions.to_front()
+        self._actions.step(
+            "look at the window", self._windows.raise_, self._view.size_finding, attempts=1
+        )
         self._empty = self._view.whole()
 
     def load(self, run: GameRun) -> None:
@@ -107,25 +124,81 @@ class WindowDesktop:
         if folder is None or not folder.is_dir():
             raise DesktopError(f"the folder of machine files {folder} does not exist")
         self._traces.put(folder / f"{run.name}.bsg", run.machine_file)
-        self._by_attempts(lambda: self._load_by_name(run.name))
+        self._actions.by_attempts(lambda: self._load(run.name))
         if run.set_ground:
-            self._click("set_ground")
+            self._actions.click("set_ground")
             self._input.wait(0.5)
 
+    def save(self, name: str) -> bytes:
+        """Has the game save the machine that is loaded; the file is removed again.
+
+        Raises:
+            DesktopError: It does not.
+        """
+        folder = self._settings.machines_folder
+        if folder is None:
+            raise DesktopError("the folder of machine files is not set")
+        file = folder / f"{name}.bsg"
+        file.unlink(missing_ok=True)
+        try:
+            return save_by_name(self._actions, name, file)
+        finally:
+            file.unlink(missing_ok=True)
+
     def start(self, run: GameRun) -> None:
-        """Shows the Lua panel and starts."""
-        del run  # each line of the log names its run
+        """Starts, and shows the mod's log until the run's begin line is in it.
+
+        The log is drawn only once something was printed, and nobody can see whether the mod's panel
+        is shown before: Ctrl+L is right if the begin line can be copied afterwards, and pressed
+        once more if not.
+        """
+        self._early_copies.clear()
         if self._log_file is not None:
             self._log_file.skip()
-        else:
-            self._opened("show the Lua panel", None, "log_window")
-            self._panel_shown = True
         self._input.wait(0.3)
-        self._click("start")
+        self._actions.click("start")
+        if self._log_file is None:
+            self._actions.step(
+                "show the log",
+                lambda: self._input.hotkey("ctrl", "l"),
+                lambda: self._no_begin_line(run),
+                timeout_s=self._limits.begin_s / ATTEMPTS,
+            )
+            self._panel_shown = True
+
+    def _no_begin_line(self, run: GameRun) -> str | None:
+        text = self.read_log()
+        self._early_copies.append(text)
+        begun = GameLog(run.run_id)
+        begun.read(text)
+        return None if begun.begun else "the begin line of the run is not in what was copied"
 
     def new_log(self, run: GameRun) -> GameLog:
-        """An empty log that collects the run's lines."""
-        return GameLog(run.run_id)
+        """A log that collects the run's lines, with what was copied as it started."""
+        log = GameLog(run.run_id)
+        for text in self._early_copies:
+            log.read(text)
+        return log
+
+    def require_level(self, run: GameRun, log: RunLog) -> None:
+        """Checks what the run's script measured: the level, and the size the game draws to."""
+        world = log.world if isinstance(log, GameLog) else None
+        if world is None:
+            return
+        wanted = self._calibration.screen
+        if wanted is not None and world.screen != wanted:
+            raise ScreenError(
+                f"the game draws {_size(world.screen)}, and was calibrated at {_size(wanted)}"
+            )
+        finding = level_finding(world, run.scenario)
+        if finding is not None and self._settings.opens_levels:
+            raise WrongLevelError(f"another level is open than the task's: {finding}")
+        if finding is not None:
+            opened = self._settings.level or "the sandbox"
+            raise LevelClosedError(
+                f"BUILDARENA_BESIEGE_LEVEL says that the level of {opened} is open, and it is not: "
+                f"{finding}; open it in the game"
+            )
 
     def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
         """The run's trajectory from its lines."""
@@ -137,40 +210,48 @@ class WindowDesktop:
         """A copy of the log window, or what the file brought."""
         if self._log_file is not None:
             return self._log_file.read()
-        self._click("log_window")
+        self._actions.click("log_window")
         return self._input.copy_all() or ""
+
+    def print_lines(self, run: GameRun) -> None:
+        """Loads and starts a machine and shows the mod's log, for a person to point at."""
+        self.prepare(run)
+        self.load(run)
+        self._actions.click("start")
+        self._input.wait(1.0)
+        self._input.hotkey("ctrl", "l")
+        self._panel_shown = True
 
     def stop(self) -> None:
         """Stops the simulation: its lines come to an end."""
         if self._log_file is None:
-            self._step("stop the simulation", self._click_start, self._still_moves)
+            self._actions.step("stop the simulation", self._click_start, self._still_moves)
         else:
             self._click_start()
 
     def clear(self) -> None:
         """Deletes the machine, until the window looks as it did without one."""
-        self._click("empty_space")
+        self._actions.click("empty_space")
         self._input.wait(0.3)
         if self._panel_shown:
             self._input.hotkey("ctrl", "l")
             self._panel_shown = False
             self._input.wait(0.3)
-        self._step("delete the machine", self._delete, self._still_there)
+        self._actions.step("delete the machine", self._delete, self._still_there)
         self._traces.remove()
 
     def recover(self) -> None:
         """Closes dialogs and takes the keyboard back."""
-        self._input.release_all()
-        self._input.press("escape")
-        self._input.wait(0.2)
-        self._windows.raise_(self._settings.title)
-        self._input.wait(0.2)
+        self._actions.recover()
 
     def is_alive(self) -> bool:
-        """Whether the game has a window, and runs, if it was started here."""
-        if self._process.can_start and not self._process.is_running():
+        """Whether the game has a window; one that a person started is taken as it is."""
+        if self._windows.find() is None:
             return False
-        return self._windows.find(self._settings.title) is not None
+        if self._process.can_start and not self._process.is_running():
+            self._process.adopt(self._windows.process())
+            return self._process.is_running()
+        return True
 
     def restart(self) -> None:
         """Kills the game and starts it again with the level it had."""
@@ -187,31 +268,28 @@ class WindowDesktop:
         """The whole screen."""
         return screenshot()
 
+    def window_picture(self, width: int) -> bytes:
+        """What the game's window alone shows (PNG), no wider than so many pixels."""
+        return self._view.small(width)
+
     def close(self) -> None:
         """Lets go of the keys, and ends the game if it was started here."""
-        self._input.close()
-        self._process.kill()
-        self._traces.remove()
+        try:
+            with suppress(DesktopError):
+                self._input.close()
+        finally:
+            if self._process.started:
+                self._process.kill()
+            self._traces.remove()
+            self._lock.release()
 
     def _start_anew(self, level: bytes | None) -> None:
-        self._process.kill()
-        self._process.start(level)
         self._panel_shown = False
-        title = self._settings.title
-        finding = wait_for(lambda: self._no_window(title), timeout_s=self._limits.start_s)
-        if finding is not None:
-            raise GameGoneError(
-                f"the game showed no window with {title!r} in its title within "
-                f"{self._limits.start_s:.0f} s: {finding}"
-            )
-        self._input.wait(1.0)
+        start_game(self._process, self._actions, level, self._calibration.path)
 
-    def _no_window(self, title: str) -> str | None:
-        if not self._process.is_running():
-            raise GameGoneError(f"the game ended as it started: {self._process.last_words()}")
-        if self._windows.find(title) is None:
-            return f"what it printed is in {self._process.output}"
-        return None
+    def _load(self, name: str) -> None:
+        load_by_name(self._actions, name)
+        self._saw_machine(name)
 
     def _open_level(self) -> str:
         """Digest of the level that the owner says is open."""
@@ -225,73 +303,15 @@ class WindowDesktop:
             )
         return level_digest(level_file(task.scenario))
 
-    def _to_front(self) -> None:
-        title = self._settings.title
-        self._step(
-            "bring the game to the front",
-            lambda: self._windows.raise_(title),
-            lambda: None if self._windows.is_active(title) else "another window has the keyboard",
-        )
-        self._input.wait(0.5)
-
     def _tidy(self) -> None:
         """Takes out of a game what a dead runner left, by hand."""
         self.recover()
-        self._click("empty_space")
-        self._click("delete")
+        self._actions.click("empty_space")
+        self._actions.click("delete")
         self._input.wait(0.5)
-        self._click("confirm")
+        self._actions.click("confirm")
         self._input.wait(0.5)
         self._input.press("escape")
-
-    def _load_by_name(self, name: str) -> None:
-        """Opens the list of machines, types the name, loads; a failure leaves the list closed."""
-        self._opened("open the list of machines", "open_folder", "name_box")
-        self._type_name(name)
-        panel = self._view.patch("name_box")
-        self._step(
-            f"load the machine {name}",
-            lambda: self._click("open_machine"),
-            lambda: (
-                None
-                if self._view.differs("name_box", panel)
-                else "the list of machines stayed open, so the game did not find or read its file"
-            ),
-            timeout_s=self._limits.load_s,
-            attempts=1,
-        )
-        self._saw_machine(name)
-
-    def _type_name(self, name: str) -> None:
-        def retype() -> None:
-            self._click("name_box")
-            self._input.wait(0.5)
-            self._input.hotkey(SELECT, "a")
-            self._input.wait(0.2)
-            self._input.press("backspace")
-            self._input.wait(0.2)
-            self._input.write(name)
-            self._input.wait(0.1 * len(name))
-
-        def read_back() -> str | None:
-            typed = self._input.copy_all()
-            if typed is not None and typed != name and typed.casefold() == name:
-                self._input.press("capslock")
-            return None if typed == name else f"{typed!r} stands there instead"
-
-        self._step(f"type the name {name}", retype, read_back, timeout_s=0.0, attempts=1)
-
-    def _by_attempts(self, act: Callable[[], None]) -> None:
-        """Does something of several steps again from its beginning when one of them fails."""
-        for left in reversed(range(ATTEMPTS)):
-            try:
-                act()
-            except StepFailedError:
-                if not left:
-                    raise
-                self.recover()
-            else:
-                return
 
     def _saw_machine(self, name: str) -> None:
         """Notes how much a loaded machine changes the window."""
@@ -313,13 +333,13 @@ class WindowDesktop:
         return "the window does not look as it did without a machine"
 
     def _delete(self) -> None:
-        self._click("delete")
+        self._actions.click("delete")
         self._input.wait(0.5)
-        self._click("confirm")
+        self._actions.click("confirm")
         self._input.wait(0.5)
 
     def _click_start(self) -> None:
-        self._click("start")
+        self._actions.click("start")
         self._input.wait(0.5)
 
     def _still_moves(self) -> str | None:
@@ -327,45 +347,6 @@ class WindowDesktop:
         self._input.wait(0.7)
         return None if before == self.read_log() else "lines are still added to the log"
 
-    def _opened(self, name: str, click: str | None, seen_at: str) -> None:
-        """Opens a panel: with a click, or by Ctrl+L; the patch where it lies changes."""
-        before = self._view.patch(seen_at)
 
-        def act() -> None:
-            if self._view.differs(seen_at, before):
-                return
-            if click is None:
-                self._input.hotkey("ctrl", "l")
-            else:
-                self._click(click)
-
-        self._step(
-            name,
-            act,
-            lambda: (
-                None
-                if self._view.differs(seen_at, before)
-                else "nothing changed in the window where it should appear"
-            ),
-        )
-
-    def _step(
-        self,
-        name: str,
-        act: Callable[[], None],
-        finding: Callable[[], str | None],
-        *,
-        timeout_s: float | None = None,
-        attempts: int = ATTEMPTS,
-    ) -> None:
-        def alive() -> str | None:
-            if not self.is_alive():
-                raise GameGoneError(f"{name}: the game is gone")
-            return finding()
-
-        limit = self._limits.effect_s if timeout_s is None else timeout_s
-        take_step(name, act, alive, timeout_s=limit, recover=self.recover, attempts=attempts)
-
-    def _click(self, place: str) -> None:
-        self._input.click(*self._view.point(place))
-        self._input.wait(0.1)
+def _size(size: tuple[int, int]) -> str:
+    return f"{size[0]}x{size[1]}"

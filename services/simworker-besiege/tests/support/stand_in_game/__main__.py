@@ -1,12 +1,17 @@
 """Starts the stand-in game: `python -m stand_in_game --machines DIR --games DIR`."""
 
 import argparse
+import ctypes
 import sys
 from pathlib import Path
+from xml.etree.ElementTree import ParseError
 
 from stand_in_game.faults import FaultError, Faults, read_faults
 from stand_in_game.game import Game, Settings
+from stand_in_game.levels import Level
 from stand_in_game.report import Report
+
+_PR_SET_NAME = 15
 
 
 def main() -> int:
@@ -19,11 +24,16 @@ def main() -> int:
             faults = read_faults(options.faults_once)
             options.faults_once.unlink()
         if options.level:
-            Path(options.level).read_bytes()
-    except (FaultError, ValueError, OSError) as error:
+            Level(options.level)
+    except (FaultError, ValueError, OSError, ParseError) as error:
         sys.stderr.write(f"stand_in_game: {error}\n")
         return 2
-    settings = Settings(games=options.games, speed=options.speed, log_file=options.log_file)
+    settings = Settings(
+        games=options.games,
+        speed=options.speed,
+        log_file=options.log_file,
+        level=options.level or None,
+    )
     game, report = Game(settings, Faults(faults)), Report(options.report)
     # Each imported where it is used: a headless game runs where there is no toolkit.
     if options.headless:
@@ -32,8 +42,14 @@ def main() -> int:
         return Headless(game, report, ip=options.ip, port=options.port).run()
     from stand_in_game.window import Window
 
-    Window(game, options.machines, report).run()
+    _take_name()
+    Window(game, options.machines, report, title=options.title_screen).run()
     return 0
+
+
+def _take_name() -> None:
+    """The process is called as the game's, by which the runner knows it."""
+    ctypes.CDLL(None).prctl(_PR_SET_NAME, b"Besiege", 0, 0, 0)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -42,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--machines", type=Path, default=Path(), metavar="DIR", help="the SavedMachines folder")
     add("--games", type=Path, required=True, metavar="DIR", help="the golden logs")
     add("--level", metavar="FILE", help="a level (.blv); else the flat sandbox")
+    add("--title-screen", action="store_true", help="begin there: two clicks lead to the level")
     add("--speed", type=float, default=1.0, help="game time over the wall clock")
     add("--faults-once", type=Path, metavar="FILE", help="faults of this start; then deleted")
     add("--report", type=Path, metavar="FILE", help="kept up to date with what the game does")

@@ -10,6 +10,8 @@ POINTS: Final = (
     "open_folder",
     "name_box",
     "open_machine",
+    "open_save",
+    "save_machine",
     "set_ground",
     "lua_panel",
     "start",
@@ -36,6 +38,7 @@ KINDS: Final[Mapping[str, tuple[str, tuple[str, ...]]]] = {
     "lost_lines": ("start", ("share",)),
     "lag": ("start", ("slowness",)),
     "log_scrolled": ("copy", ("lines",)),
+    "resize": ("open_folder", ("width", "height")),
 }
 """Per kind: where it strikes when that is not told, and its options."""
 

@@ -7,8 +7,11 @@ from typing import Final
 
 from stand_in_game.faults import Fault, Faults
 from stand_in_game.golden import UPDATES_PER_S, GameFileError, Run, read_run
+from stand_in_game.levels import Level
 from stand_in_game.log_window import LogWindow
+from stand_in_game.saving import saved_file
 
+GRAVITY: Final = -32.81
 _LONGEST_FRAME_S: Final = 0.25
 """A frame that took longer than this makes the game lag instead of jump."""
 
@@ -22,12 +25,16 @@ class Settings:
         speed: game time over the wall clock.
         load_s: how long a machine takes to load, game time.
         log_file: where the log is written as well.
+        level: the level file that is open; None for the flat sandbox.
+        screen: what the game says of its window's size, pixels.
     """
 
     games: Path
     speed: float = 1.0
     load_s: float = 0.3
     log_file: Path | None = None
+    level: str | None = None
+    screen: tuple[int, int] = (1280, 800)
 
 
 class Game:
@@ -37,7 +44,10 @@ class Game:
         self.settings, self.faults = settings, faults
         self._draw = random.Random(0)
         self.log = LogWindow(settings.log_file)
+        self.level = Level(settings.level)
+        self.screen = settings.screen
         self.machine_name: str | None = None
+        self.file = b""
         self.run: Run | None = None
         self.grounded = self.simulating = False
         self.message = ""
@@ -52,9 +62,15 @@ class Game:
         except GameFileError as error:
             self.message = str(error)
             return False
+        self.file = path.read_bytes()
         self.machine_name, self.message, self.grounded = path.stem, "", False
         self.counts["loads"] += 1
         return True
+
+    def save(self, path: Path) -> None:
+        """Saves the machine that is loaded, as the game writes files."""
+        if self.file:
+            path.write_bytes(saved_file(self.file, path.stem))
 
     def set_ground(self) -> None:
         """Puts the machine on the floor."""
@@ -94,9 +110,18 @@ class Game:
         while self._update < int(self._clock_s * UPDATES_PER_S + 1e-6):
             self._update += 1
             if not self._failed:
-                printed += self.run.printed(self._update)
+                printed += self.run.printed(self._update, self._world())
             printed += self._errors()
         self.log.append(printed, self._run_faults)
+
+    def _world(self) -> str:
+        """What the script measures in its first update: gravity, entities, screen, ground."""
+        assert self.run is not None
+        heights = [self.level.ground(*place) for place in self.run.probes]
+        size = (len(self.level.boxes), *self.screen)
+        return ",".join(
+            [f"w,{GRAVITY:.4f}", *map(str, size), *(f"{height:.4f}" for height in heights)]
+        )
 
     @property
     def time_s(self) -> float:

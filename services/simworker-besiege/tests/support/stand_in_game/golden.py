@@ -15,6 +15,10 @@ UPDATES_PER_S: Final = 100
 BEGIN_EVERY: Final = 50
 END_EVERY: Final = 25
 """Updates after which the script prints its begin line, or its end line, once more."""
+EARLY: Final = 60
+AGAIN: Final = (100, 200)
+MAX_EARLY: Final = 150
+"""Updates whose lines are printed again, those in which they are, and how many lines at most."""
 
 _TEXT: Final = 'local {} = "([^"]*)"'
 
@@ -32,21 +36,35 @@ class Run:
         lines: by update, what is printed then.
         last: the run's last update; its end is told again and again from then on.
         states: what a game without a window says every 0.2 s.
+        probes: where the script measures the ground, east and north.
     """
 
     mark: str
     lines: dict[int, list[str]]
     last: int
     states: tuple[str, ...]
+    probes: tuple[tuple[float, float], ...] = ()
 
-    def printed(self, update: int) -> list[str]:
-        """What the script prints at an update."""
-        lines = self.lines.get(update, [])
-        if update and update % BEGIN_EVERY == 0:
-            lines = [*self.lines[0], *lines]
+    def printed(self, update: int, world: str) -> list[str]:
+        """What the script prints at an update.
+
+        Args:
+            update: The script's update.
+            world: What it measured of the level.
+        """
+        lines = self._once(update, world)
+        if update in AGAIN and update <= self.last:
+            early = [line for at in range(EARLY + 1) for line in self._once(at, world)]
+            lines += early[:MAX_EARLY]
+        return [self._whole(line) for line in lines]
+
+    def _once(self, update: int, world: str) -> list[str]:
+        lines = [] if update == 0 else list(self.lines.get(update, []))
+        if update == 1 or (update and update % BEGIN_EVERY == 0 and update <= self.last):
+            lines = [*self.lines[0], world, *lines]
         if update > self.last and (update - self.last) % END_EVERY == 0:
             lines = [f"e,{self.last}"]
-        return [self._whole(line) for line in lines]
+        return lines
 
     def _whole(self, line: str) -> str:
         text, total = f"{self.mark},{line}", 0
@@ -68,16 +86,26 @@ def read_run(path: Path, games: Path) -> Run:
         if first == f"b,{begin}":
             states = tuple(line for line in rest if line.startswith("GameStat:"))
             lines = [line for line in rest if not line.startswith("GameStat:")]
-            return _run(mark, [first, *lines], states)
+            return _run(mark, [first, *lines], states, _probes(script))
     raise GameFileError(f"no game was recorded of {path.stem}, whose log begins with {begin!r}")
 
 
-def _run(mark: str, lines: list[str], states: tuple[str, ...]) -> Run:
+def _run(
+    mark: str, lines: list[str], states: tuple[str, ...], probes: tuple[tuple[float, float], ...]
+) -> Run:
     by_update: dict[int, list[str]] = {}
     for line in lines:
         kind, update, *_ = line.split(",")
+        if kind == "w":  # of the level in which it was recorded
+            continue
         by_update.setdefault(0 if kind == "b" else int(update), []).append(line)
-    return Run(mark=mark, lines=by_update, last=max(by_update), states=states)
+    return Run(mark=mark, lines=by_update, last=max(by_update), states=states, probes=probes)
+
+
+def _probes(script: str) -> tuple[tuple[float, float], ...]:
+    block = re.search(r"local probes = \{(.*?)\n\}", script, re.DOTALL)
+    rows = re.findall(r"\{([-0-9.e]+), ([-0-9.e]+)\}", block[1]) if block else []
+    return tuple((float(east), float(north)) for east, north in rows)
 
 
 def _text(script: str, name: str) -> str:

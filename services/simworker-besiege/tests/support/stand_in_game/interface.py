@@ -11,16 +11,22 @@ from stand_in_game.layout import (
     CONFIRM_ITEMS,
     CONFIRM_PANEL,
     DIALOG_ITEMS,
+    LEVELS_ITEMS,
     LOAD_ITEMS,
     LOAD_PANEL,
-    LUA_ITEMS,
-    LUA_PANEL,
+    TITLE_ITEMS,
     TOOLBAR,
     Box,
+    log_panel,
+    log_text,
+    lua_panel,
 )
 
 Focus = Literal["name", "log"] | None
+Scene = Literal["title", "levels", "level"]
 LONGEST_NAME = 60
+CARET = "\u200b"
+"""The name box's own, which is copied with its text: a space without width."""
 
 
 class Screen(Protocol):
@@ -65,17 +71,24 @@ class Interface:
     machines: Path
     screen: Screen
     load_panel: bool = False
+    saving: bool = False
+    """Whether the panel is open for saving."""
     loading: bool = False
     confirm: bool = False
     lua_panel: bool = False
     dialog: str = ""
     focus: Focus = None
-    log_selected: bool = False
+    log_selected: int = 0
+    """How many characters of the log, from its newest on."""
+    scene: Scene = "level"
+    size: tuple[int, int] = (1280, 800)
     name_box: NameBox = field(default_factory=NameBox)
 
     @property
     def phase(self) -> str:
-        """What is going on: build, load panel, confirm or simulating."""
+        """What is going on: title, levels, build, load panel, confirm or simulating."""
+        if self.scene != "level":
+            return self.scene
         if self.game.simulating:
             return "simulating"
         if self.confirm:
@@ -86,11 +99,24 @@ class Interface:
         """What a click hits: an item's name, "panel" or "empty"."""
         if self.dialog:
             return _item(DIALOG_ITEMS, x, y) or "panel"
+        if self.scene != "level":
+            items = TITLE_ITEMS if self.scene == "title" else LEVELS_ITEMS
+            return _item(items, x, y) or "empty"
+        return self._mods_item(x, y) or self._games_item(x, y)
+
+    def _mods_item(self, x: float, y: float) -> str:
+        """The mod draws over everything of the game."""
+        if not self.lua_panel:
+            return ""
+        lines = self.game.log.count
+        if lines and log_panel(self.size).holds(x, y):
+            return "log_window" if log_text(self.size, lines).holds(x, y) else "panel"
+        return "panel" if lua_panel(self.size).holds(x, y) else ""
+
+    def _games_item(self, x: float, y: float) -> str:
         if self.confirm:
             found = _item(CONFIRM_ITEMS, x, y)
             return found or ("panel" if CONFIRM_PANEL.holds(x, y) else "beside")
-        if self.lua_panel and LUA_PANEL.holds(x, y):
-            return _item(LUA_ITEMS, x, y) or "panel"
         if self.load_panel and LOAD_PANEL.holds(x, y):
             return _item(LOAD_ITEMS, x, y) or "panel"
         return _item(TOOLBAR, x, y) or "empty"
@@ -103,7 +129,7 @@ class Interface:
         if item in ("panel", "beside"):
             return
         if item == "log_window":
-            self.focus, self.log_selected = "log", False
+            self.focus, self.log_selected = "log", 0
             self._strike("log_window")
             return
         if item == "name_box":
@@ -119,7 +145,7 @@ class Interface:
         """Does what a key does."""
         if keysym == "Escape":
             self._close()
-        elif self.dialog or self.confirm:
+        elif self.dialog or self.confirm or self.scene != "level":
             return
         elif control:
             self._shortcut(keysym.lower())
@@ -146,10 +172,23 @@ class Interface:
             return
         self._strike("open_folder")
         if not self.dialog:
-            self.load_panel = not self.load_panel
+            self.load_panel, self.saving = not self.load_panel, False
+
+    def _open_save(self) -> None:
+        if self.game.simulating or self.game.run is None:
+            return
+        self._strike("open_save")
+        if not self.dialog:
+            self.load_panel, self.saving = not self.load_panel, True
 
     def _open_machine(self) -> None:
         if self.loading:
+            return
+        if self.saving:
+            self._strike("save_machine")
+            if not self.dialog:
+                self.game.save(self.machines / f"{self.name_box.text}.bsg")
+                self.load_panel, self.focus = False, None
             return
         seconds = self.game.settings.load_s / self.game.settings.speed
         for fault in self._strike("open_machine"):
@@ -191,6 +230,12 @@ class Interface:
             self.game.delete()
             self.confirm = False
 
+    def _to_levels(self) -> None:
+        self.scene = "levels"
+
+    def _to_level(self) -> None:
+        self.scene = "level"
+
     def _cancelled(self) -> None:
         self.confirm = False
 
@@ -206,6 +251,8 @@ class Interface:
 
     def _shortcut(self, key: str) -> None:
         if key == "l":
+            if self.focus == "log":  # a text that has the keyboard takes every shortcut
+                return
             self._strike("lua_panel")
             if not self.dialog:
                 self.lua_panel = not self.lua_panel
@@ -213,7 +260,7 @@ class Interface:
         elif self.focus == "name":
             self._name_shortcut(key)
         elif self.focus == "log" and key == "a":
-            self.log_selected = True
+            self.log_selected = len(self.game.log.text())
         elif self.focus == "log" and key == "c" and self.log_selected:
             self._copy_log()
 
@@ -221,7 +268,7 @@ class Interface:
         if key == "a":
             self.name_box.selected = True
         elif key == "c" and self.name_box.selected:
-            self._copy(self.name_box.text)
+            self._copy(self.name_box.text + CARET)
         elif key == "v":
             self.name_box.type("".join(filter(str.isprintable, self.screen.paste())))
 
@@ -229,7 +276,8 @@ class Interface:
         struck = self._strike("copy")
         below = sum(int(f.number("lines", 50)) for f in struck if f.kind == "log_scrolled")
         if not self.dialog:
-            self._copy(self.game.log.text(below=below))
+            # What was printed since it was selected pushes the oldest lines out of the selection.
+            self._copy(self.game.log.text(below=below)[: self.log_selected])
 
     def _copy(self, text: str) -> None:
         self.game.counts["copies"] += 1
@@ -258,8 +306,11 @@ _CLICKS: dict[str, Callable[[Interface], None]] = {
     "start": Interface.toggle_simulation,
     "open_folder": Interface._open_folder,
     "open_machine": Interface._open_machine,
+    "open_save": Interface._open_save,
     "set_ground": Interface._set_ground,
     "delete": Interface._delete,
     "confirm": Interface._confirmed,
     "cancel": Interface._cancelled,
+    "to_levels": Interface._to_levels,
+    "to_level": Interface._to_level,
 }

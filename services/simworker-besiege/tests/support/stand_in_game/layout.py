@@ -27,6 +27,7 @@ def around(x: float, y: float, width: float, height: float) -> Box:
 TOOLBAR: Final = {
     "start": around(0.021, 0.016, 0.036, 0.030),
     "open_folder": around(0.202, 0.035, 0.034, 0.040),
+    "open_save": around(0.236, 0.035, 0.030, 0.040),
     "set_ground": around(0.403, 0.0185, 0.060, 0.032),
     "delete": around(0.707, 0.038, 0.034, 0.040),
 }
@@ -36,8 +37,8 @@ LOAD_ITEMS: Final = {
     "name_box": around(0.476, 0.215, 0.190, 0.040),
     "open_machine": around(0.638, 0.209, 0.090, 0.046),
 }
-LUA_PANEL: Final = Box(0.040, 0.090, 0.360, 0.400)
-LUA_ITEMS: Final = {"log_window": Box(0.050, 0.130, 0.350, 0.390)}
+TITLE_ITEMS: Final = {"to_levels": around(0.500, 0.550, 0.200, 0.080)}
+LEVELS_ITEMS: Final = {"to_level": around(0.800, 0.450, 0.160, 0.200)}
 CONFIRM_PANEL: Final = Box(0.380, 0.420, 0.640, 0.640)
 CONFIRM_ITEMS: Final = {
     "confirm": around(0.538, 0.586, 0.080, 0.050),
@@ -45,3 +46,27 @@ CONFIRM_ITEMS: Final = {
 }
 DIALOG_PANEL: Final = Box(0.300, 0.300, 0.700, 0.600)
 DIALOG_ITEMS: Final = {"dialog_ok": around(0.500, 0.540, 0.080, 0.050)}
+
+
+LINE_HEIGHT: Final = 18
+"""Of a line in the log, pixels."""
+
+
+def lua_panel(size: tuple[int, int]) -> Box:
+    """The mod's panel, which Ctrl+L shows and hides: pixels, whatever the window's size."""
+    return _pixels((6, 70, 206, 324), size)
+
+
+def log_panel(size: tuple[int, int]) -> Box:
+    """The mod's log, drawn beside the panel once something was printed."""
+    return _pixels((274, 70, 774, 670), size)
+
+
+def log_text(size: tuple[int, int], lines: int) -> Box:
+    """The text in the log: as high as its lines, as far as they are seen."""
+    return _pixels((284, 124, 764, 124 + min(lines * LINE_HEIGHT, 536)), size)
+
+
+def _pixels(corners: tuple[int, int, int, int], size: tuple[int, int]) -> Box:
+    left, top, right, bottom = corners
+    return Box(left / size[0], top / size[1], right / size[0], bottom / size[1])

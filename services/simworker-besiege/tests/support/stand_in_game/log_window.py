@@ -8,8 +8,8 @@ from typing import Final
 
 from stand_in_game.faults import Fault
 
-KEPT: Final = 400
-"""Lines that the window keeps."""
+KEPT: Final = 301
+"""Lines that the window keeps: one goes when there are more than 300."""
 
 
 class LogWindow:
@@ -35,6 +35,11 @@ class LogWindow:
         """Empties it, as a new simulation does."""
         self._lines.clear()
         self.version += 1
+
+    @property
+    def count(self) -> int:
+        """How many lines there are; without any the window is not drawn."""
+        return len(self._lines)
 
     def text(self, *, below: int = 0) -> str:
         """All its lines.

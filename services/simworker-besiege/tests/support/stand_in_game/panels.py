@@ -13,24 +13,31 @@ from stand_in_game.layout import (
     CONFIRM_PANEL,
     DIALOG_ITEMS,
     DIALOG_PANEL,
+    LEVELS_ITEMS,
+    LINE_HEIGHT,
     LOAD_ITEMS,
     LOAD_PANEL,
-    LUA_ITEMS,
-    LUA_PANEL,
+    TITLE_ITEMS,
     TOOLBAR,
     Box,
+    log_panel,
+    log_text,
+    lua_panel,
 )
 
 MACHINE: Final = Box(0.400, 0.450, 0.700, 0.700)
 ON_GROUND: Final = Box(0.400, 0.600, 0.700, 0.850)
 _WORDS: Final = {
     "open_folder": "Load",
+    "open_save": "Save",
     "set_ground": "Set ground",
     "delete": "Clear",
     "open_machine": "Open",
     "confirm": "Yes",
     "cancel": "No",
     "dialog_ok": "OK",
+    "to_levels": "Play",
+    "to_level": "Sandbox",
 }
 
 
@@ -38,14 +45,23 @@ class Panels:
     """Draws what lies over the world."""
 
     def __init__(self, canvas: tk.Canvas, size: tuple[int, int]) -> None:
-        self._canvas, (self._width, self._height) = canvas, size
+        self._canvas = canvas
+        self.resize(size)
         points = max(7, self._height // 66)
         self._font = Font(family="DejaVu Sans", size=-points)
         self._small = Font(family="DejaVu Sans Mono", size=-max(6, self._height // 80))
 
+    def resize(self, size: tuple[int, int]) -> None:
+        """Draws for a window of another size from now on."""
+        self._width, self._height = size
+
     def draw(self, shown: Interface) -> None:
         """Draws everything anew."""
         self._canvas.delete("panel")
+        if shown.scene != "level":
+            self._box(Box(0.0, 0.0, 1.0, 1.0), "#31475e")
+            self._buttons(TITLE_ITEMS if shown.scene == "title" else LEVELS_ITEMS)
+            return
         if shown.game.run is not None:
             self._box(MACHINE if not shown.game.grounded else ON_GROUND, "#8a5a2b")
         self._bar(shown)
@@ -69,7 +85,7 @@ class Panels:
         if simulating:
             self._text(0.06, 0.035, f"{shown.game.time_s:6.2f} s", color="#f2ead8")
             return
-        for name in ("open_folder", "set_ground", "delete"):
+        for name in ("open_folder", "open_save", "set_ground", "delete"):
             on = (name == "open_folder" and shown.load_panel) or (
                 name == "set_ground" and shown.game.grounded
             )
@@ -81,39 +97,46 @@ class Panels:
 
     def _load(self, shown: Interface) -> None:
         self._box(LOAD_PANEL, "#e6dcc6")
-        self._text(0.385, 0.155, "Load a machine")
+        self._text(0.385, 0.155, "Save the machine" if shown.saving else "Load a machine")
         focused = shown.focus == "name"
         self._box(LOAD_ITEMS["name_box"], "#fffdf6", edge="#d07a26" if focused else "#8a8172")
         if shown.name_box.selected:
             self._box(Box(0.386, 0.203, 0.566, 0.228), "#bcd3f0", edge="")
         caret = "|" if focused else ""
         self._text(0.390, 0.215, shown.name_box.text + caret)
-        self._button(LOAD_ITEMS["open_machine"], "…" if shown.loading else "Open")
+        word = "Save" if shown.saving else "Open"
+        self._button(LOAD_ITEMS["open_machine"], "…" if shown.loading else word)
         known = sorted(path.stem for path in shown.machines.glob("*.bsg"))[:7]
         for row, name in enumerate(known):
             self._text(0.390, 0.262 + 0.021 * row, name, font=self._small)
 
     def _lua(self, shown: Interface) -> None:
-        self._box(LUA_PANEL, "#2a2d33")
-        self._text(0.052, 0.110, "Lua", color="#d7dae0")
-        window = LUA_ITEMS["log_window"]
+        """The mod's panel, and its log once something was printed."""
+        size = (self._width, self._height)
+        panel = lua_panel(size)
+        self._box(panel, "#2a2d33")
+        self._text(panel.left + 0.01, panel.top + 0.02, "Lua Scripting", color="#d7dae0")
+        log, window = shown.game.log, log_panel(size)
+        if not log.count:
+            return
+        self._box(window, "#2a2d33")
+        self._text(window.left + 0.01, window.top + 0.02, "Log", color="#d7dae0")
+        text = log_text(size, log.count)
         focused = shown.focus == "log"
         fill = "#2b4262" if shown.log_selected and focused else "#17191d"
-        self._box(window, fill, edge="#d07a26" if focused else "#555a63")
-        row_height = self._small.metrics("linespace") / self._height
-        rows = int((window.bottom - window.top) / row_height) - 1
-        columns = int((window.right - window.left) * self._width / self._small.measure("0")) - 2
-        newest = shown.game.log.text().split("\n")[:rows]
-        lines = "\n".join(line[:columns] for line in newest)
-        self._canvas.create_text(
-            (window.left + 0.004) * self._width,
-            (window.top + 0.006) * self._height,
-            text=lines,
-            anchor="nw",
-            fill="#c8e0c0",
-            font=self._small,
-            tags="panel",
-        )
+        self._box(text, fill, edge="#d07a26" if focused else "#555a63")
+        rows = round((text.bottom - text.top) * self._height / LINE_HEIGHT)
+        columns = int((text.right - text.left) * self._width / self._small.measure("0")) - 2
+        for row, line in enumerate(log.text().split("\n")[:rows]):
+            self._canvas.create_text(
+                (text.left + 0.004) * self._width,
+                text.top * self._height + (row + 0.5) * LINE_HEIGHT,
+                text=line[:columns],
+                anchor="w",
+                fill="#c8e0c0",
+                font=self._small,
+                tags="panel",
+            )
 
     def _buttons(self, items: dict[str, Box]) -> None:
         for name, box in items.items():

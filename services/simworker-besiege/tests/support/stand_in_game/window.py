@@ -13,10 +13,11 @@ from stand_in_game.breakage import Breakage
 from stand_in_game.faults import Fault
 from stand_in_game.game import Game
 from stand_in_game.interface import Interface
+from stand_in_game.ownership import sign
 from stand_in_game.panels import Panels
 from stand_in_game.report import Report
 
-TITLE: Final = "Besiege (stand-in)"
+TITLE: Final = "Besiege"
 SIZE: Final = (1280, 800)
 """Width and height, pixels."""
 FRAMES_PER_S: Final = 30.0
@@ -28,8 +29,8 @@ _MODIFIERS: Final = ("Control", "Shift", "Alt", "Super", "Meta")
 class Window:
     """The window with everything in it."""
 
-    def __init__(self, game: Game, machines: Path, report: Report) -> None:
-        self._game, self._report = game, report
+    def __init__(self, game: Game, machines: Path, report: Report, *, title: bool = False) -> None:
+        self._game, self._report, self._size = game, report, SIZE
         self._root = tk.Tk(className="Besiege")
         self._root.title(TITLE)
         width, height = SIZE
@@ -38,7 +39,7 @@ class Window:
         self._canvas = tk.Canvas(self._root, width=width, height=height, highlightthickness=0)
         self._canvas.pack()
         self._breakage = Breakage(self._root)
-        self._shown = Interface(game, machines, self)
+        self._shown = Interface(game, machines, self, scene="title" if title else "level")
         self._panels = Panels(self._canvas, SIZE)
         self._modifiers: set[str] = set()
         self._caps_lock = False
@@ -51,6 +52,7 @@ class Window:
         """Shows the window until it is closed."""
         # The report says that the game is there: clicks must reach it from then on.
         self._root.wait_visibility(self._canvas)
+        sign(self._root)
         self._root.after(0, self._frame_due)
         try:
             self._root.mainloop()
@@ -77,7 +79,17 @@ class Window:
         if fault.kind in ("freeze", "crash"):
             # Whoever watches learns of it now or never.
             self._report.write(self._state())
+        if fault.kind == "resize":
+            self._resize((round(fault.number("width", 1100)), round(fault.number("height", 700))))
         self._breakage.strike(fault)
+
+    def _resize(self, size: tuple[int, int]) -> None:
+        """The window as somebody dragged it; what lies in it moves along, all but the mod's."""
+        width, height = self._size = self._shown.size = self._game.screen = size
+        self._root.geometry(f"{width}x{height}+0+0")
+        self._canvas.config(width=width, height=height)
+        self._panels.resize(size)
+        self._drawn = None
 
     def _bind(self) -> None:
         self._canvas.bind("<ButtonPress-1>", self._mouse_down)
@@ -90,7 +102,7 @@ class Window:
         self._root.protocol("WM_DELETE_WINDOW", self._root.destroy)
 
     def _fractions(self, event: tk.Event[tk.Misc]) -> tuple[float, float]:
-        width, height = SIZE
+        width, height = self._size
         return event.x / width, event.y / height
 
     def _mouse_down(self, event: tk.Event[tk.Misc]) -> None:

@@ -7,9 +7,8 @@ does the next thing.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.builtin.designs.design import Design
@@ -41,7 +40,7 @@ def reply(request: Request) -> Completion:
         "guidance": lambda: _guide(design, situation),
         "builder": lambda: _build(design, situation, request),
         "engineer": lambda: _act(_whole_script(design), situation.own_actions),
-        "controller": lambda: Completion(text=json.dumps(_control(design, situation))),
+        "controller": lambda: Completion(text=_control(design, situation)),
     }
     speak = speakers.get(situation.role)
     return speak() if speak else Completion(text=DONE)
@@ -105,8 +104,10 @@ def _whole_script(design: Design) -> Sequence[Action]:
     return next(iter(design.parts.values())).actions
 
 
-def _control(design: Design, situation: Situation) -> Mapping[str, Any] | None:
-    return design.control if design.steer is None else design.steer(situation.trials)
+def _control(design: Design, situation: Situation) -> str:
+    if design.program:
+        return f"```lua\n{design.program}```"
+    return json.dumps(design.steer(situation.trials) if design.steer else design.control)
 
 
 def _drawing(design: Design, situation: Situation) -> str:

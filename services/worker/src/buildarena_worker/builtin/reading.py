@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 from buildarena_environment.tools import LOOKUPS
 from buildarena_worker.builtin.designs.design import Seen
@@ -90,8 +91,13 @@ def _trials(messages: Sequence[Message]) -> list[Seen]:
     for said, heard in pairwise(messages):
         figures = figures_of(heard.text)
         if said.role == "assistant" and heard.role == "user" and figures:
-            seen.append(Seen(program=json.loads(said.text), measured=figures))
+            seen.append(Seen(program=_keys_of(said.text), measured=figures))
     return seen
+
+
+def _keys_of(text: str) -> Mapping[str, Any]:
+    """The keys that an answer presses; none where it is a program."""
+    return json.loads(text) if text.startswith("{") else {}
 
 
 def figures_of(text: str) -> dict[str, float]:

@@ -12,6 +12,7 @@ from buildarena_environment.trials import score_text
 from buildarena_geometry import Catalogue, Machine, Outcome, ToolDefinition
 from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
+from buildarena_simulation import Trajectory
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Completion, Message, Request
@@ -133,15 +134,17 @@ class Session:
             )
         return completion
 
-    def told(self, record: RolloutRecord) -> str:
-        """A rollout's result in words, made from its score and its trajectory."""
+    def told(self, record: RolloutRecord, trajectory: Trajectory | None) -> str:
+        """A rollout's result in words, made from its score and its trajectory, if it has one."""
         measured = Score(
             success=bool(record.success),
             indicator=record.indicator or 0.0,
             metrics=record.metrics or {},
             flags=tuple(record.flags or ()),
         )
-        return score_text(self.task, measured, self.host.trajectory(record))
+        text = score_text(self.task, measured, trajectory)
+        refused = (record.versions or {}).get("refused")
+        return text if refused is None else f"{text} It was not tried to the end: {refused}."
 
     def record(
         self,

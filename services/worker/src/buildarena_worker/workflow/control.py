@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from buildarena_benchmark.flags import is_disqualified
+from buildarena_environment.briefing import programs_told
 from buildarena_environment.world import units_text
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.feedback.modules import module_text
 from buildarena_geometry.json_texts import read_json
 from buildarena_pipeline.runtime.scoring import best_rollout
+from buildarena_simulation.controllers.program import Program
+from buildarena_simulation.errors import ControllerFailed
 from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Dialogue, Role
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
+from buildarena_worker.workflow.traces import rendered_piloting, rendered_trace
 
 ATTEMPTS = 3
 """Attempts of a transport session; the best counts. Source: the paper's task details."""
@@ -25,14 +28,21 @@ PROGRAM_TURNS = 5
 """Answers the controller may need for one attempt; an unreadable one costs a turn, not a trial."""
 _KEEP = re.compile(r"\A[\s*_`'\"]*KEEP[\s*_`'\".!]*\Z")
 """An answer that keeps the best trial instead of trying again."""
-STILL = 0.02
-"""Closer than this to where it ends, it has stopped, units."""
+_WHERE_PROGRAMS_STAND = "a program stands between a line of ```lua and one of ```"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Program:
+    """What the controller answered.
+
+    Attributes:
+        machine: The machine with it.
+        presses: The key presses; None where the machine has a controller, which acts in their
+            place.
+    """
+
     machine: Machine
-    presses: Sequence[KeyPress]
+    presses: Sequence[KeyPress] | None
 
 
 class _ProgramError(ValueError):
@@ -66,6 +76,8 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         powered=_powered(machine),
         modules=driven_modules(session, machine),
     )
+    if task.takes_programs:
+        opening += "\n\n" + pack.say("control_programs", contract=programs_told(task))
     if task.tests:
         opening += "\n\n" + pack.say("control_tests", tests=str(task.tests))
     dialogue = Dialogue(session, phase="control", opening=opening)
@@ -102,14 +114,19 @@ def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
     """What the controller reads after a trial: how it went, and whether to improve or to keep."""
     frame = "control_success" if _succeeded([record]) else "control_again"
     tests = session.task.tests
-    return session.pack.say(
+    trajectory = session.host.trajectory(record)
+    said = session.pack.say(
         "control_tested" if tests else frame,
         trial=str(attempt),
         trials=str(tests or ATTEMPTS),
         left=str(tests - attempt),
         trajectory=rendered_trace(record.trace or ()),
-        result=session.told(record),
+        result=session.told(record, trajectory),
     )
+    if trajectory is None or trajectory.piloting is None or session.machine is None:
+        return said
+    table = rendered_piloting(trajectory.piloting, session.machine.controller)
+    return f"{said}\n\n{session.pack.say('program_trace', trace=table)}"
 
 
 def driven_modules(session: Session, machine: Machine) -> str:
@@ -140,7 +157,7 @@ def _program(
         if keeps and _KEEP.search(text) is not None:
             return None
         try:
-            return _read_program(machine, text)
+            return _read_answer(machine, text, programs=session.task.takes_programs)
         except _ProgramError as unusable:
             error = unusable
             dialogue.remark(controller, session.pack.say("program_again", error=str(error)))
@@ -172,9 +189,44 @@ def _powered(machine: Machine) -> str:
     return "\n".join(rows)
 
 
-def _read_program(machine: Machine, text: str) -> _Program:
-    data = _json_object(text)
+def _read_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
+    """What an answer says the machine shall do: the last program in it, or its key presses."""
     driven = Machine.from_document(machine.to_document())
+    written = _last_program(text) if programs else None
+    if written is not None:
+        try:
+            Program(written)
+        except ControllerFailed as failure:
+            raise _ProgramError(failure.reason) from failure
+        outcome = driven.act("set_controller", {"program": written})
+        if not outcome.ok:
+            raise _ProgramError(outcome.text)
+        return _Program(machine=driven, presses=None)
+    try:
+        return _read_keys(driven, text)
+    except _ProgramError as error:
+        if programs:
+            raise _ProgramError(f"{error}; {_WHERE_PROGRAMS_STAND}") from error
+        raise
+
+
+def _last_program(text: str) -> str | None:
+    """The last block of Lua in a text; None without one that has an end."""
+    found: str | None = None
+    inside: list[str] | None = None
+    for line in text.splitlines(keepends=True):
+        mark = "".join(line.split()).lower()
+        if inside is None:
+            inside = [] if mark == "```lua" else None
+        elif mark == "```":
+            found, inside = "".join(inside), None
+        else:
+            inside.append(line)
+    return found
+
+
+def _read_keys(driven: Machine, text: str) -> _Program:
+    data = _json_object(text)
     bindings = data.get("control_config")
     if not isinstance(bindings, list) or not bindings:
         raise _ProgramError("control_config must be a list with at least one entry")
@@ -212,21 +264,6 @@ def _press(press: object) -> object:
     if not isinstance(press, dict):
         return press
     return {name: value for name, value in press.items() if name != "motion_action"}
-
-
-def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
-    """Rows of time and position; where nothing moves any more, one line says so.
-
-    Args:
-        trace: Rows of time, seconds, and x, y, z, units.
-    """
-    moving = len(trace)
-    while moving > 1 and math.dist(trace[moving - 2][1:], trace[-1][1:]) < STILL:
-        moving -= 1
-    rows = [", ".join(f"{value:.2f}" for value in row) for row in trace[:moving]]
-    if moving < len(trace):
-        rows.append(f"It stays there until {trace[-1][0]:g} s.")
-    return "\n".join(rows) or "(none)"
 
 
 def _json_object(text: str) -> dict[str, Any]:

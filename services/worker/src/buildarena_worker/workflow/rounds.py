@@ -101,7 +101,7 @@ def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
 
 def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
     """Adds a failed round's result, and the analyst's advice, to what the next round reads."""
-    result = session.told(played.record)
+    result = session.told(played.record, session.host.trajectory(played.record))
     session.additions.append(session.pack.say("round_result", round=str(number), result=result))
     if loop.analyst:
         advice = analyse(session, played.machine, played.record, number=number, result=result)

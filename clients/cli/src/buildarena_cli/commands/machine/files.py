@@ -138,7 +138,11 @@ def import_file(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Read a machine file of the game's, and tell what of it was not understood."""
+    """Read a machine file of the game's, and tell what it says beyond the machine.
+
+    Keys and settings that a machine here does not have are stored with it, change no trial, and
+    stand in the game's file again when the machine is exported without a task.
+    """
     with shown_errors():
         imported = read_imported(file)
         if out is not None:
@@ -148,12 +152,15 @@ def import_file(
         facts = {
             "name": imported.name,
             **_facts(imported.machine),
+            "file_data": list(imported.file_data),
             "not_understood": list(imported.not_understood),
         }
         if as_json:
             print_json(facts)
             return
         _print_size(facts)
+        for line in imported.file_data:
+            say(f"stored: {line}")
         for remark in imported.not_understood:
             say(remark)
         if not imported.not_understood:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
     chosen_task,
+    controlled,
     film,
     progress_bar,
     read_machine,
@@ -29,9 +31,12 @@ from buildarena_cli.terminal.output import (
 )
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from buildarena_benchmark import Score, Task
     from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+    from buildarena_simulation import Piloting, Trajectory
 
 TaskName = Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")]
 
@@ -42,7 +47,9 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     engine: Annotated[str | None, typer.Option(help="pybullet or mujoco.")] = None,
     seed: Annotated[
         int | None,
-        typer.Option(help="Vary the start a little, by this seed, as a fair repetition would."),
+        typer.Option(
+            help="Vary the start a little, and draw what the task leaves to it, by this seed."
+        ),
     ] = None,
     seeds: Annotated[
         int | None,
@@ -58,6 +65,14 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     trajectory: Annotated[
         Path | None, typer.Option(help="Write the trajectory (.parquet), for `render`.")
     ] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(help="Write what its program sensed and asked for, 25 rows a second (.csv)."),
+    ] = None,
+    controller: Annotated[
+        Path | None,
+        typer.Option(help="A program (.lua) that acts in place of its keys: docs/control.md."),
+    ] = None,
     dialect: DialectOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
@@ -68,7 +83,6 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
         ENGINES,
         UnknownEngineError,
         require_engine,
-        write_trajectory,
     )
 
     with shown_errors():
@@ -77,11 +91,19 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
             require_engine(engine)
         except UnknownEngineError as error:
             raise CommandError(f"{error}{did_you_mean(engine, ENGINES)}") from error
-        options = {"--seed": seed, "--video": video, "--trajectory": trajectory}
+        options = {
+            "--seed": seed,
+            "--video": video,
+            "--trajectory": trajectory,
+            "--trace": trace,
+        }
         single = [option for option, value in options.items() if value is not None]
         if seeds is not None and single:
             raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
         chosen, machine = chosen_task(task), read_machine(file, dialect)
+        if controller is not None:
+            machine = controlled(machine, controller)
+        _require_program(machine, trace)
         broken = broken_constraint(chosen, machine)
         if broken is not None:
             warn(f"not simulated: {broken[0]}: {broken[1]}")
@@ -93,10 +115,7 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
             result = failed_score(chosen, machine)
         else:
             result = score(chosen, machine, rollout)
-            if trajectory is not None:
-                trajectory.write_bytes(write_trajectory(rollout))
-            if video is not None:
-                film(machine, chosen, rollout, video)
+            _write_files(machine, chosen, rollout, trajectory=trajectory, trace=trace, video=video)
         if as_json:
             print_json(score_report(chosen, result, rollout))
         else:
@@ -119,6 +138,41 @@ def render(
         if missing:
             raise CommandError(f"{trajectory}: block {missing[0]} is not in {file}")
         film(machine, chosen, rollout, video)
+
+
+def _require_program(machine: Machine, trace: Path | None) -> None:
+    if trace is not None and not machine.controller:
+        raise CommandError("--trace is of a program, and the machine has none: --controller")
+
+
+def _write_files(
+    machine: Machine,
+    task: Task,
+    rollout: Trajectory,
+    *,
+    trajectory: Path | None,
+    trace: Path | None,
+    video: Path | None,
+) -> None:
+    """Writes what was asked for of a trial."""
+    from buildarena_simulation import write_trajectory
+
+    if trajectory is not None:
+        trajectory.write_bytes(write_trajectory(rollout))
+    if trace is not None and rollout.piloting is not None:
+        _write_trace(rollout.time_s, rollout.piloting, trace)
+    if video is not None:
+        film(machine, task, rollout, video)
+
+
+def _write_trace(time_s: NDArray[np.float64], piloting: Piloting, file: Path) -> None:
+    """A row for each tick: the time, what was sensed, what was asked for."""
+    with file.open("w", newline="", encoding="utf-8") as out:
+        rows = csv.writer(out)
+        rows.writerow(["t", *piloting.sense_names, *piloting.action_names])
+        for tick in range(len(time_s) - 1):
+            values = [*piloting.senses[tick].tolist(), *piloting.answers[tick].tolist()]
+            rows.writerow([f"{value:.6g}" for value in (float(time_s[tick]), *values)])
 
 
 def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> Trajectory | None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.components import Mask
-from buildarena_simulation.control import PRESSES, held_during, read_presses
+from buildarena_simulation.control import PRESSES, channel, held_during, read_presses
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, KeyPress, Machine
@@ -44,12 +44,17 @@ def held(
     block: "Block", action: str | None, presses: "Sequence[KeyPress]", trajectory: "Trajectory"
 ) -> Mask:
     """At which samples a key of one of a block's actions is held, (T,)."""
-    keys = block.bindings.get(action, ()) if action else ()
+    keys = keys_of(block, action) if action else ()
     return held_during(presses, keys, np.asarray(trajectory.time_s))
+
+
+def keys_of(block: "Block", action: str) -> tuple[str, ...]:
+    """What asks for a block's action: its keys, and a controller's name for it."""
+    return (*block.bindings.get(action, ()), channel(block.id, action))
 
 
 def _motor_keys(block: "Block") -> set[str]:
     motor = block.module.motor
     if motor is None:
         return set()
-    return {key for way in (motor.forward, motor.backward) for key in block.bindings.get(way, ())}
+    return {key for way in (motor.forward, motor.backward) for key in keys_of(block, way)}

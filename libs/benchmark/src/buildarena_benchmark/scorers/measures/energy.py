@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_benchmark.scorers.measures.commands import presses_of
+from buildarena_benchmark.scorers.measures.commands import keys_of, presses_of
 from buildarena_benchmark.scorers.measures.components import masses_of_blocks
 from buildarena_benchmark.scorers.measures.series import Series, release_speed
 
@@ -28,8 +28,8 @@ def gains_energy(
     """Whether machine and cargo have more energy than they had, and the growing cargo brought.
 
     Energies are those of the blocks' and the cargo's centres, of motion and height. Where
-    something drives the machine (a key, a balloon, a spring), or not all of it was recorded, that
-    is not known, and it does not.
+    something drives the machine (a key, a balloon, a spring, wind), or not all of it was recorded,
+    that is not known, and it does not.
 
     Args:
         scenario: Gives gravity, and the speed at the release.
@@ -74,11 +74,13 @@ def _is_driven(scenario: "Scenario", machine: "Machine", trajectory: "Trajectory
     blocks = machine.blocks.values()
     if any(_drives_itself(block) for block in blocks):
         return True
+    if scenario.gusts is not None:
+        return True
     if any(link.module.spring for link in machine.connectors.values()):
         return True
     if scenario.control.mode == "held":
         return any(block.module.thrust for block in blocks)
-    bound = {key for block in blocks for keys in block.bindings.values() for key in keys}
+    bound = {key for block in blocks for action in block.bindings for key in keys_of(block, action)}
     pressed = {press.key for press in presses_of(machine, trajectory)}
     return scenario.control.mode == "agent" and bool(bound & pressed)
 

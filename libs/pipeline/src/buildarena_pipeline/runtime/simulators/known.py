@@ -8,10 +8,11 @@ version from the settings, and any other simulator from the workers that bring i
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from buildarena_benchmark import ValidationIssue
+from buildarena_benchmark import Task, ValidationIssue
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE, SimulatorKind
@@ -118,6 +119,31 @@ def worlds_issues(context: Context, name: str, asked: int | None) -> list[Valida
         f"{', '.join(able)}"
     )
     return [ValidationIssue(path="worlds", message=message, choices=("0",))]
+
+
+def drawn_issues(
+    context: Context, name: str, asked: int | None, tasks: Mapping[str, Task]
+) -> list[ValidationIssue]:
+    """An issue for each task that is scored in drawn worlds where machines are tried in none.
+
+    Args:
+        context: The process' connections.
+        name: The simulator's name.
+        asked: For how many worlds somebody asks; None for the service's default.
+        tasks: By their paths in what was submitted.
+    """
+    if worlds_here(context, name, asked):
+        return []
+    able = ", ".join(n for n, info in known_simulators(context).items() if info.repeatable)
+    return [
+        ValidationIssue(
+            path=path,
+            message=f"{task.name} is scored in worlds that differ: ask for `worlds` of 1 or more, "
+            f"on a simulator that can vary them: {able}",
+        )
+        for path, task in tasks.items()
+        if task.scenario.draws
+    ]
 
 
 def simulator_issues(

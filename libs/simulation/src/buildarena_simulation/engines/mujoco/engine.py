@@ -73,6 +73,7 @@ class MujocoEngine:
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
         self._targets: FloatArray | None = None
+        self._wind = np.zeros(3)
 
     @property
     def time_step_s(self) -> float:
@@ -128,6 +129,7 @@ class MujocoEngine:
             holds=self._holds,
         )
         self._model = mujoco.MjModel.from_xml_string(mjcf_of(self._world, state, self._settings()))
+        self._model.opt.gravity[:2] = self._wind[:2]
         self._data = mujoco.MjData(self._model)
         self._addresses = addresses_in(self._model, self._world, clusters, solids, self._rope_alive)
         self._tendons = Tendons(
@@ -161,6 +163,16 @@ class MujocoEngine:
         model.dof_invweight0[:6] = self._dof_invweight_times_mass / mass
         self._cargo_mass = mass
         self._wheels.bear(model, self._mass + mass)
+
+    def push_cargo(self, change: FloatArray) -> None:
+        """See `Engine`."""
+        self._data.qvel[:3] += change
+        self._keep_cargo_state()
+
+    def blow(self, wind: FloatArray) -> None:
+        """See `Engine`."""
+        self._wind = wind
+        self._model.opt.gravity[:2] = wind[:2]
 
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""

@@ -9,6 +9,7 @@ import itertools
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 from pathlib import Path
@@ -176,6 +177,18 @@ class PyBulletEngine:
         """See `Engine`."""
         self._cargo_mass = mass
         pybullet.changeDynamics(self._cargo, -1, mass=mass, **self._client)
+
+    def blow(self, wind: FloatArray) -> None:
+        """See `Engine`."""
+        east, north = wind[:2].tolist()
+        pybullet.setGravity(east, north, -self._world.gravity, **self._client)
+
+    def push_cargo(self, change: FloatArray) -> None:
+        """See `Engine`."""
+        if self._cargo is not None:
+            cargo = self.cargo()
+            pushed = replace(cargo, velocity=cargo.velocity + change)
+            put_cargo(self._client, self._cargo, pushed)
 
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""

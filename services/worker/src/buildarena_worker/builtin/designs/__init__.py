@@ -11,6 +11,7 @@ from buildarena_worker.builtin.designs import (
     arms,
     bridges,
     flyers,
+    piloted,
     repairs,
     risers,
     rockets,
@@ -46,6 +47,9 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "budget-1": lambda seed: bridges.light_beam(seed, gap=10),
     "repair-1": repairs.repaired_car,
     "identify-1": risers.riser,
+    "landing-1": piloted.lander,
+    "slalom-2": piloted.gate_finder,
+    "hover-3": piloted.keeper,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

@@ -47,6 +47,7 @@ class Design:
         parts: Sub-structures by name, in building order.
         assembly: Actions that put several sub-structures together.
         control: The controller's answer, for tasks that are driven.
+        program: The controller's answer in its place, for tasks that take programs: Lua.
         steer: What it answers after the trials it has seen, where that depends on them.
     """
 
@@ -54,4 +55,5 @@ class Design:
     parts: Mapping[str, PartDesign]
     assembly: Sequence[Action] = ()
     control: Mapping[str, Any] | None = None
+    program: str = ""
     steer: Callable[[Sequence[Seen]], Mapping[str, Any]] | None = None

@@ -1,0 +1,127 @@
+"""Where a script measures the ground, and what it must find there if the right level is open.
+
+A script sends rays down beside the machine. The places are chosen so that the flat sandbox and the
+gaps of built-in bridges differ at some of them; a scenario with terrain adds the middles of its
+boxes and both sides of their edges.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from buildarena_simulation import Scenario
+    from buildarena_simulation.scenario import TerrainBox
+
+MAX_PROBES: Final = 40
+"""So that the line that reports them is no longer than a sample's."""
+
+RAY_ABOVE: Final = 20.0
+"""Height at which a ray begins above the highest terrain, units."""
+
+_EASTS: Final = (-12.0, 12.0)
+_NORTHS: Final = (-25.0, -12.0, -7.0, -3.75, 0.0, 3.75, 7.0, 12.0, 25.0)
+"""Clear of machines, and on both sides of the edges of gaps of 5 to 45 units."""
+
+_CLEAR_OF_EDGES: Final = 0.6
+"""Nearer to an edge a height is not judged: it may be that of either side, units."""
+
+_BESIDE_EDGES: Final = 1.25
+"""How far from an edge the ground is measured on either side, units."""
+
+_ASIDE: Final = 0.4
+"""How far from a box's middle, as a share of its width: bridges are narrow."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Probe:
+    """A place where the ground's height is known.
+
+    Attributes:
+        east: World frame, units.
+        north: World frame, units.
+        height: Of the terrain, or of the ground at 0, units.
+    """
+
+    east: float
+    north: float
+    height: float
+
+
+def level_probes(scenario: Scenario) -> tuple[Probe, ...]:
+    """The places at which a trial measures its level, in the order of its report.
+
+    Args:
+        scenario: Its terrain; without any, the ground is flat.
+    """
+    terrain = scenario.terrain
+    places = {(east, north): _CLEAR_OF_EDGES for north in _NORTHS for east in _EASTS}
+    for box in terrain:
+        half = min(box.size[:2]) / 2
+        places.setdefault((box.center[0], box.center[1]), min(_CLEAR_OF_EDGES, half / 2))
+    for box in terrain:
+        east = box.center[0] + _ASIDE * box.size[0]
+        for north in _beside_edges(box):
+            places.setdefault((east, north), _CLEAR_OF_EDGES)
+    probes = (
+        Probe(east=east, north=north, height=height_at(terrain, east, north))
+        for (east, north), margin in places.items()
+        if _clear(terrain, east, north, margin)
+    )
+    return tuple(itertools.islice(probes, MAX_PROBES))
+
+
+def ray_start(scenario: Scenario) -> float:
+    """The height at which a trial's rays begin, units."""
+    highest = max((probe.height for probe in level_probes(scenario)), default=0.0)
+    return highest + RAY_ABOVE
+
+
+def height_at(terrain: tuple[TerrainBox, ...], east: float, north: float) -> float:
+    """The height of the uppermost terrain at a place, 0 where there is only the ground; units."""
+    return max((top for box in terrain for top in _tops(box, east, north)), default=0.0)
+
+
+def _tops(box: TerrainBox, east: float, north: float) -> Iterator[float]:
+    """Where a vertical line leaves a box upwards; nothing if it misses the box."""
+    if abs(east - box.center[0]) > box.size[0] / 2:
+        return
+    turn = math.radians(box.slope_deg)
+    ahead = north - box.center[1]
+    # In the box's own axes the line is (n, u) = ahead·(cos, -sin) + h·(sin, cos).
+    across, along = ahead * math.cos(turn), -ahead * math.sin(turn)
+    low, high = -math.inf, math.inf
+    for start, step, half in (
+        (across, math.sin(turn), box.size[1] / 2),
+        (along, math.cos(turn), box.size[2] / 2),
+    ):
+        if abs(step) < 1e-9:  # noqa: PLR2004 - the line runs along these faces
+            if abs(start) > half:
+                return
+            continue
+        ends = sorted(((-half - start) / step, (half - start) / step))
+        low, high = max(low, ends[0]), min(high, ends[1])
+    if low <= high:
+        yield box.center[2] + high
+
+
+def _beside_edges(box: TerrainBox) -> Iterator[float]:
+    """On both sides of a box's southern and northern edge."""
+    for edge in (-1.0, 1.0):
+        for beside in (-_BESIDE_EDGES, _BESIDE_EDGES):
+            yield box.center[1] + edge * box.size[1] / 2 + beside
+
+
+def _clear(terrain: tuple[TerrainBox, ...], east: float, north: float, margin: float) -> bool:
+    """Whether the ground rises nowhere near by as steeply as at an edge."""
+    own = height_at(terrain, east, north)
+    near = itertools.product((-margin, 0.0, margin), repeat=2)
+    return all(
+        abs(height_at(terrain, east + aside, north + ahead) - own) <= 2 * margin
+        for aside, ahead in near
+    )

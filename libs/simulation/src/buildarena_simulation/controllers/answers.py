@@ -1,0 +1,94 @@
+"""What a controller asks for: names of actions, of all blocks or of one, and how far."""
+
+import difflib
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_simulation.control import Bindings, Levels, channel
+from buildarena_simulation.errors import ControllerFailed
+
+if TYPE_CHECKING:
+    from buildarena_simulation.structure.model import FloatArray, Structure
+
+_NEAR: Final = 3
+
+
+class Channels:
+    """The names that a machine's controller may answer.
+
+    Args:
+        structure: The machine.
+        bindings: The actions of each part, the blocks and then the springs.
+        ids: (N + K,) their ids.
+    """
+
+    def __init__(self, structure: "Structure", bindings: Bindings, ids: Sequence[str]) -> None:
+        self._opposites = _opposites(structure)
+        self._named: dict[str, list[tuple[int, str]]] = {}
+        self.names: dict[tuple[int, str], str] = {}
+        for part, actions in enumerate(bindings):
+            for action in actions:
+                self._named.setdefault(action, []).append((part, action))
+                self.names[part, action] = channel(ids[part], action)
+        self._named.update((name, [key]) for key, name in self.names.items())
+
+    def levels(self, answers: Mapping[str, float]) -> dict[tuple[int, str], float]:
+        """How far each action of each part is asked for, 0 to 1; what is missing is not.
+
+        A name of one block counts in place of the name of all. Below 0 an action is its opposite.
+
+        Args:
+            answers: What the program answered; beyond -1 and 1 it counts as those.
+
+        Raises:
+            ControllerFailed: There is no such name; the message has those that are near.
+        """
+        asked: dict[tuple[int, str], float] = {}
+        for name in sorted(answers, key=lambda name: ("." in name, name)):
+            for key in self._parts_of(name):
+                asked[key] = min(max(answers[name], -1.0), 1.0)
+        levels: dict[tuple[int, str], float] = {}
+        for (part, action), share in asked.items():
+            wanted = action if share >= 0 else self._opposites.get((part, action))
+            if wanted is not None:
+                levels[part, wanted] = max(abs(share), levels.get((part, wanted), 0.0))
+        return levels
+
+    def _parts_of(self, name: str) -> list[tuple[int, str]]:
+        parts = self._named.get(name)
+        if parts is not None:
+            return parts
+        near = difflib.get_close_matches(name, self._named, n=_NEAR, cutoff=0.4)
+        names = near or sorted({action for _, action in self.names})
+        shown = ", ".join(names) or "none: no block of this machine has an action"
+        raise ControllerFailed(f"there is no action {name[:60]!r}; there is {shown}")
+
+
+def constant(levels: Mapping[tuple[int, str], float], count: int) -> Levels:
+    """The same levels for some steps, as schedules are planned from."""
+    none = np.zeros(count)
+
+    def level(part: int, action: str) -> "FloatArray":
+        share = levels.get((part, action), 0.0)
+        return np.full(count, share) if share else none
+
+    return level
+
+
+def _opposites(structure: "Structure") -> dict[tuple[int, str], str]:
+    """The action that does the opposite of another, for those that have one."""
+    opposites: dict[tuple[int, str], str] = {}
+    for index, part in enumerate(structure.parts):
+        module = part.module
+        drive = module.joint.drive if module.joint else None
+        pairs = [
+            (module.motor.forward, module.motor.backward) if module.motor else None,
+            (drive.forward, drive.backward) if drive else None,
+            (module.altitude.rise, module.altitude.sink) if module.altitude else None,
+        ]
+        for forward, backward in filter(None, pairs):
+            if forward is not None and backward is not None:
+                opposites[index, forward], opposites[index, backward] = backward, forward
+    return opposites

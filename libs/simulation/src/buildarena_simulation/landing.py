@@ -1,0 +1,128 @@
+"""A cargo that lands on a machine: it bounces, and the blow reaches the joints.
+
+Engines let a box come to rest where it lands. In the game it bounces off, and what it lands on
+feels the blow almost at once. Both are worked out here, for all engines alike. An engine may need
+several intervals to stop a cargo; what they show is added up.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from buildarena_simulation.constants import BOUNCE_MASS, CARGO_BOUNCE, MIN_LANDING_SPEED
+from buildarena_simulation.engines.base import CargoPose
+from buildarena_simulation.structure.contacts import CARGO, ContactForces
+from buildarena_simulation.structure.model import FloatArray
+
+_MIN_CHANGE: Final = 0.25
+"""A change of velocity in one interval below it is none of a landing, units/s."""
+
+_MIN_SHARE: Final = 0.5
+"""Of what stopped the cargo: what less of it came from the machine is no landing on it."""
+
+_UPWARDS: Final = 0.7
+"""Share of a landing that stops a fall; a cargo that slides against a wall does not land."""
+
+_LEFT: Final = 0.1
+"""Share of its speed with which a cargo may still approach when its landing is over."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Landing:
+    """A blow between cargo and machine, so far.
+
+    Attributes:
+        change: (3,) by which it changed the cargo's velocity, units/s.
+        blow: Share of what the cargo pressed in the last interval that the blow was.
+        first: Whether it began in that interval.
+        bounce: Share of its speed beyond the least with which the cargo bounces off.
+        leaving: Speed with which the cargo moves off at its end; below 0 if it still approaches.
+    """
+
+    change: FloatArray
+    blow: float
+    first: bool
+    bounce: float
+    leaving: float
+
+    @property
+    def over(self) -> bool:
+        """Whether the cargo has been stopped."""
+        return self.leaving >= -_LEFT * float(np.linalg.norm(self.change))
+
+    @property
+    def counts(self) -> bool:
+        """Whether it was fast enough to be one."""
+        return float(np.linalg.norm(self.change)) >= MIN_LANDING_SPEED
+
+    @property
+    def _approach(self) -> float:
+        """Speed with which the cargo came, units/s."""
+        return float(np.linalg.norm(self.change)) - self.leaving
+
+    @property
+    def _rebound(self) -> float:
+        """Speed with which it bounces off, units/s."""
+        return self.bounce * max(self._approach - MIN_LANDING_SPEED, 0.0)
+
+    @property
+    def stress(self) -> float:
+        """By how much more the bounce makes what the bodies exert on each other."""
+        return 1.0 + self.blow * self._rebound / self._approach
+
+    @property
+    def fading(self) -> float:
+        """The share of the filtered loads that gives way to those of the last interval."""
+        return 1.0 if self.first else 1.0 - self.blow
+
+    @property
+    def bounced(self) -> FloatArray:
+        """(3,) what the cargo's velocity gains by bouncing off, units/s."""
+        size = float(np.linalg.norm(self.change))
+        return self.change * ((self._rebound - self.leaving) / size)
+
+
+def landing_of(
+    contacts: ContactForces,
+    before: CargoPose,
+    now: CargoPose,
+    *,
+    so_far: Landing | None,
+    mass: float,
+    machine_mass: float,
+    gravity: float,
+    interval_s: float,
+) -> Landing | None:
+    """How a cargo lands on a machine in an interval; None if it does not.
+
+    Args:
+        contacts: The machine's, mean of the interval.
+        before: The cargo at the start of the interval.
+        now: The cargo at its end.
+        so_far: Its landing up to the start of the interval.
+        mass: The cargo's.
+        machine_mass: The whole machine's.
+        gravity: Downward acceleration, units/s².
+        interval_s: Length of the interval, seconds.
+    """
+    weight = np.array([0.0, 0.0, gravity * interval_s])
+    stopped = now.velocity - before.velocity + weight
+    pressed = float(np.linalg.norm(contacts.force[contacts.other == CARGO].sum(axis=0)))
+    if pressed < _MIN_SHARE * mass * float(np.linalg.norm(stopped)) / interval_s:
+        return None
+    begun = so_far is not None and not so_far.over
+    # What holds a cargo up is no blow: it rests for half of the interval in which it lands.
+    change = stopped - weight * (1.0 if begun else 0.5)
+    speed = float(np.linalg.norm(change))
+    if speed < _MIN_CHANGE or change[2] < _UPWARDS * speed:
+        return None
+    total = change if so_far is None or so_far.over else so_far.change + change
+    size = float(np.linalg.norm(total))
+    return Landing(
+        change=total,
+        blow=min(mass * speed / interval_s / pressed, 1.0),
+        first=not begun,
+        bounce=CARGO_BOUNCE / (1.0 + machine_mass / BOUNCE_MASS),
+        leaving=float(now.velocity @ total) / size,
+    )

@@ -1,0 +1,116 @@
+"""From what is asked for to commands: of a whole trial at once, or of one tick after the other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from buildarena_simulation.control import (
+    Bindings,
+    DriveState,
+    KeyHold,
+    Levels,
+    Schedule,
+    key_levels,
+    plan_schedule,
+    reaching,
+)
+from buildarena_simulation.force_control import ForceSchedule, ForceState, plan_forces
+from buildarena_simulation.scenario import Control
+from buildarena_simulation.structure.force_field import ForceField
+from buildarena_simulation.structure.grips import grips_of
+from buildarena_simulation.structure.model import FloatArray, Structure
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Keys:
+    """Keys that are pressed whatever happens.
+
+    Attributes:
+        bindings: The keys of each part's actions.
+        presses: The control sequence.
+        count: Whether anybody presses them in this trial.
+    """
+
+    bindings: Bindings
+    presses: Sequence[KeyHold]
+    count: bool
+
+    def levels(self, times: FloatArray) -> Levels:
+        """What they ask for at some times, (S,), seconds."""
+        return key_levels(self.bindings, self.presses if self.count else (), times)
+
+    def holds(self) -> list[KeyHold]:
+        """The presses that reach some block's action."""
+        return reaching(self.bindings, self.presses)
+
+    def piloting(self) -> None:
+        """What a program sensed and asked for: there is none."""
+
+    def settings(self) -> dict[str, str]:
+        """What a trajectory keeps of who acts; of keys nothing beside `holds`."""
+        return {}
+
+
+class Planner:
+    """Plans steps that follow each other.
+
+    Args:
+        structure: The machine.
+        field: What its blocks exert by themselves; None where none does.
+        control: Who acts.
+        time_step_s: Length of a step, seconds.
+
+    Attributes:
+        first: The first step that is planned.
+        drives: Commands of the planned steps.
+        forces: The same to blocks that exert forces; None where none does.
+    """
+
+    drives: Schedule
+    forces: ForceSchedule | None = None
+
+    def __init__(
+        self, structure: Structure, field: ForceField | None, control: Control, time_step_s: float
+    ) -> None:
+        self._structure, self._control, self._time_step_s = structure, control, time_step_s
+        self._table = None if field is None else field.table
+        self._drive_state = DriveState.still(structure)
+        self._force_state = (
+            None if self._table is None else ForceState.still(structure, self._table)
+        )
+        self._grips = grips_of(structure)
+        self.first = 0
+
+    def times(self, first: int, count: int) -> FloatArray:
+        """When some steps begin, (S,), seconds."""
+        return self._time_step_s * np.arange(first, first + count, dtype=np.float64)
+
+    def plan(self, levels: Levels, first: int, count: int) -> None:
+        """Plans the steps after those planned before.
+
+        Args:
+            levels: What is asked for in them.
+            first: The first of them.
+            count: How many.
+        """
+        self.first, times = first, self.times(first, count)
+        self.drives = plan_schedule(
+            self._structure,
+            levels,
+            self._drive_state,
+            control=self._control,
+            times=times,
+            time_step_s=self._time_step_s,
+        )
+        if self._table is not None and self._force_state is not None:
+            self.forces = plan_forces(
+                self._structure,
+                self._table,
+                levels,
+                self._force_state,
+                grips=self._grips,
+                control=self._control,
+                times=times,
+                time_step_s=self._time_step_s,
+            )

@@ -1,0 +1,219 @@
+"""One trial as it runs: commands, steps, loads, samples."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from buildarena_simulation.breaking import BreakingModel
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.control import recoil
+from buildarena_simulation.controllers.answers import constant
+from buildarena_simulation.controllers.pilot import Pilot
+from buildarena_simulation.controllers.senses import Seen
+from buildarena_simulation.engines.base import Engine, World
+from buildarena_simulation.force_control import ForceSchedule
+from buildarena_simulation.gusts import Wind
+from buildarena_simulation.holding import Holding
+from buildarena_simulation.placement import Start
+from buildarena_simulation.planning import Keys, Planner
+from buildarena_simulation.recording import Recorder
+from buildarena_simulation.scenario import Scenario
+from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_simulation.structure.motion import Motion, at_rest
+
+_PROGRESS_EVERY = 10
+_FINER = 2
+"""Into how many a step is divided where an interval is repeated."""
+
+Decision = Callable[[np.ndarray | None], bool]
+"""Whether a trial is decided, from the cargo's position (3,) as it is recorded; None without."""
+
+
+class Trial:
+    """The state of one running trial.
+
+    Args:
+        world: The machine and what is around it.
+        scenario: What it is put through.
+        engine: The engine, with that world.
+        start: Where machine and cargo start.
+        wind: What blows; None where nothing does.
+
+    Attributes:
+        breaking: What the joints bear, and which broke.
+        recorder: What was seen.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        scenario: Scenario,
+        engine: Engine,
+        start: Start,
+        wind: Wind | None = None,
+    ) -> None:
+        structure = world.structure
+        self._structure, self._scenario, self._engine = structure, scenario, engine
+        self._field, self._wind = world.field, wind
+        self._let_go = np.zeros(0 if world.field is None else len(world.field.table.seats), bool)
+        holds = np.ones(len(structure.members), dtype=bool)
+        clusters = find_clusters(structure, holds)
+        motion = at_rest(clusters, start.position, start.rotation)
+        if start.velocity.any():
+            motion = replace(motion, velocity=motion.velocity + start.velocity)
+        engine.enter(clusters, motion)
+        self._interval_s = engine.time_step_s * engine.steps_per_evaluation
+        self.breaking = BreakingModel(world, clusters, motion, interval_s=self._interval_s)
+        if any(part.module.grip for part in structure.parts):
+            self.breaking.holding = Holding(world)
+        self.recorder = Recorder(structure, scenario)
+        self._blown_up = False
+
+    def run(
+        self,
+        commander: Keys | Pilot,
+        until: Decision | None,
+        on_progress: Callable[[float], None] | None,
+    ) -> None:
+        """Runs it to its end, or until it is decided.
+
+        Args:
+            commander: Who acts.
+            until: Ends the trial after the first sample for which it is true.
+            on_progress: Called now and then with the share of the trial that is done.
+
+        Raises:
+            ControllerFailed: The controller did.
+        """
+        engine, scenario = self._engine, self._scenario
+        per_sample = round(1 / (SAMPLE_RATE_HZ * engine.time_step_s))
+        chunks = range(0, per_sample, engine.steps_per_evaluation)
+        samples = scenario.sample_count - 1
+        steps = samples * per_sample
+        planner = Planner(self._structure, self._field, scenario.control, engine.time_step_s)
+        self._sample(0.0)
+        if isinstance(commander, Keys):
+            planner.plan(commander.levels(planner.times(0, steps)), 0, steps)
+        for sample in range(samples):
+            if isinstance(commander, Pilot):
+                levels = constant(commander.levels(self._seen(sample / SAMPLE_RATE_HZ)), per_sample)
+                planner.plan(levels, sample * per_sample, per_sample)
+            for offset in chunks:
+                step = sample * per_sample + offset
+                row = step - planner.first
+                if planner.forces is not None:
+                    self._command(planner.forces, row, step)
+                targets = planner.drives.targets[row : row + engine.steps_per_evaluation]
+                self._advance(targets, planner.drives.firing[row], step)
+            self._sample((sample + 1) / SAMPLE_RATE_HZ)
+            if until is not None and until(self.recorder.cargo_now):
+                return
+            if on_progress and (sample % _PROGRESS_EVERY == 0 or sample + 1 == samples):
+                on_progress((sample + 1) / samples)
+
+    def _seen(self, time_s: float) -> Seen:
+        """What a controller can be told of now."""
+        breaking = self.breaking
+        wheels = len(self._structure.wheels)
+        return Seen(
+            time_s=time_s,
+            clusters=breaking.clusters,
+            motion=breaking.motion,
+            cargo=self._engine.cargo() if self._scenario.cargo else None,
+            on_wheels=breaking.bearing.now[len(breaking.bearing.now) - wheels :],
+        )
+
+    def _command(self, schedule: ForceSchedule, row: int, step: int) -> None:
+        """Tells the blocks that exert forces by themselves what is asked of them."""
+        field = self._field
+        if field is None:
+            return
+        table = field.table
+        asked = schedule.let_go[row] & ~self._let_go
+        kicks = np.zeros(len(asked))
+        if asked.any() and not self._blown_up:
+            self._let_go |= asked
+            held = self.breaking.let_go(
+                self._engine, table.seats[asked], time_s=step * self._engine.time_step_s
+            )
+            # The push lasts one interval, so that the loads that it makes are seen.
+            kicks[asked] = held * table.impulse[asked] / self._interval_s
+        field.commands = schedule.at(row, kicks)
+        holding, breaking = self.breaking.holding, self.breaking
+        if holding is not None and not self._blown_up:
+            cargo = self._engine.cargo() if self._scenario.cargo else None
+            if holding.update(
+                breaking.clusters,
+                breaking.motion,
+                cargo,
+                grab=schedule.grab[row],
+                release=schedule.release[row],
+                time_s=step * self._engine.time_step_s,
+            ):
+                self._hold(holding)
+
+    def _hold(self, holding: Holding) -> None:
+        self._engine.hold(holding.holds)
+        self._engine.enter(self.breaking.clusters, self.breaking.motion)
+
+    def _advance(self, targets: np.ndarray, firing: np.ndarray, step: int) -> None:
+        if self._blown_up:
+            return
+        engine, cargo = self._engine, self._scenario.cargo
+        time_s = step * engine.time_step_s
+        if self._wind is not None:
+            wind = self._wind.at(time_s + self._interval_s / 2)
+            engine.blow(wind)
+            self.breaking.blow(wind)
+        mass = cargo.mass_at(time_s) if cargo else None
+        if mass is not None:
+            engine.set_cargo_mass(mass)
+        thrusts = recoil(self._structure, firing, self.recorder.heated_now)
+        before, place = self.breaking.motion, engine.cargo() if cargo else None
+        engine.advance(targets, thrusts)
+        motion = engine.motion()
+        if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
+            # Nothing more can be known; the samples say so and the scorer flags them.
+            self._blown_up = True
+            self.breaking.motion = motion
+            return
+        holding = self.breaking.holding
+        slipped = holding is not None and holding.follow(
+            engine, time_s=time_s + self._interval_s, interval_s=self._interval_s
+        )
+
+        def repeat_finer() -> Motion:
+            finer = np.repeat(targets, _FINER, axis=0)
+            engine.enter(self.breaking.clusters, before, cargo=place, finer=_FINER)
+            engine.advance(finer, thrusts)
+            if holding is not None:
+                holding.read(engine)
+            return engine.motion()
+
+        self.breaking.follow(
+            engine,
+            motion,
+            thrusts,
+            time_s=time_s + self._interval_s,
+            cargo_mass=mass,
+            cargo_before=place,
+            repeat_finer=None if slipped else repeat_finer,
+        )
+        if slipped and holding is not None:
+            self._hold(holding)
+        landing = self.breaking.landing
+        if landing is not None and landing.counts and landing.over:
+            engine.push_cargo(landing.bounced)
+
+    def _sample(self, time_s: float) -> None:
+        cargo = self._scenario.cargo
+        self.recorder.record(
+            time_s,
+            self.breaking.motion,
+            self.breaking.clusters,
+            self._engine.cargo() if cargo else None,
+            cargo.mass_at(time_s) if cargo else None,
+            bearing=self.breaking.bearing.now,
+            loads=self.breaking.taken_loads(),
+        )

@@ -1,0 +1,113 @@
+"""Machines that programs control: a car with two sides, and a craft of four fans."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib import resources
+from typing import Final
+
+from buildarena_worker.builtin.designs.design import Design, PartDesign
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
+
+_LENGTH, _TRACK = 3, 2
+_ARM: Final = 2
+_GRAVITY: Final = 32.81
+_FAN_PUSH: Final = 3.25
+"""What a fan pushes, in masses that it would hold up."""
+_WOOD_MASS, _FAN_MASS = 0.3, 0.5
+
+
+def gate_finder(seed: int) -> Design:
+    """A short, wide car that turns by driving its sides apart, towards the next gate."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("middle of the spine")
+    front = draft.row(middle, NORTH, _LENGTH // 2)[-1]
+    back = draft.row(middle, SOUTH, _LENGTH // 2)[-1]
+    sides: dict[str, list[str]] = {"left": [], "right": []}
+    for base in (front, back):
+        for way, name in ((EAST, "right"), (WEST, "left")):
+            sides[name].append(draft.wheel(draft.row(base, way, _TRACK)[-1], way))
+    return Design(
+        overall="A car on four powered wheels that steers by driving its sides apart.",
+        parts={
+            "car": PartDesign(
+                description="A spine of 3 blocks, two cross members with two wheels each",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=_program(
+            "gates",
+            left=_listed(sides["left"]),
+            right=_listed(sides["right"]),
+            keen=f"{1.0 + 0.02 * (seed % 5):g}",
+        ),
+    )
+
+
+def lander(seed: int) -> Design:
+    """Four fans on a cross: it tilts towards the mark, and sinks the slower the lower it is."""
+    return _craft("landing", keen=0.6 + 0.01 * (seed % 5))
+
+
+def keeper(seed: int) -> Design:
+    """The same craft; what pushes it off its place for long it learns to lean against."""
+    return _craft("place", keen=3.0 + 0.05 * (seed % 5))
+
+
+def _craft(program: str, *, keen: float) -> Design:
+    """A cross with a fan at the end of each arm, and the program that flies it."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("middle of the cross")
+    fans = {}
+    for name, way in (("north", NORTH), ("east", EAST), ("south", SOUTH), ("west", WEST)):
+        fans[name] = draft.attach(draft.row(middle, way, _ARM)[-1], UP, "Flying Block")
+    # Turned about a level axis: two fans, two arms of wood, and a little for what has a size.
+    inertia = 2 * _FAN_MASS * _ARM**2 + 2 * _WOOD_MASS * sum(k * k for k in range(1, _ARM + 1)) + 1
+    return Design(
+        overall="A cross with a fan at the end of each arm, which flies by how they differ.",
+        parts={
+            "craft": PartDesign(
+                description=f"Four arms of {_ARM} blocks, a fan on each end that pushes up",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=_program("flying", **_quoted(fans), **_figures(draft, inertia))
+        + _program(program, keen=f"{keen:g}"),
+    )
+
+
+def _figures(draft: Draft, inertia: float) -> Mapping[str, str]:
+    return {
+        "arm": f"{_ARM}",
+        "mass": f"{float(draft.machine.mass):g}",
+        "inertia": f"{inertia:g}",
+        "push": f"{_FAN_PUSH * _GRAVITY:g}",
+        "gravity": f"{_GRAVITY:g}",
+    }
+
+
+def _quoted(ids: Mapping[str, str]) -> dict[str, str]:
+    return {name: f'"{block}"' for name, block in ids.items()}
+
+
+def _listed(ids: Sequence[str]) -> str:
+    return "{ " + ", ".join(f'"{block}"' for block in ids) + " }"
+
+
+def _program(name: str, **places: str) -> str:
+    """The text of a program, with its places filled: `$name` in comments and figures."""
+    text = _text(name)
+    for place, value in places.items():
+        text = text.replace(f"${place}", value)
+    return text
+
+
+@cache
+def _text(name: str) -> str:
+    text = resources.files(__package__).joinpath("programs", f"{name}.lua").read_text("utf-8")
+    # The first two lines say whose the file is.
+    return text.split("\n", 2)[2]

@@ -1,0 +1,61 @@
+"""What a controller reads of a trial: where things were, and what its program sensed and did."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from buildarena_simulation import Piloting
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+STILL: Final = 0.02
+"""Closer than this to where it ends, it has stopped, units."""
+ROWS_PER_S: Final = 2
+MAX_SENSES: Final = 24
+MAX_ANSWERS: Final = 12
+_NAME: Final = re.compile(r"\w+")
+
+
+def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
+    """Rows of time and position; where nothing moves any more, one line says so.
+
+    Args:
+        trace: Rows of time, seconds, and x, y, z, units.
+    """
+    moving = len(trace)
+    while moving > 1 and math.dist(trace[moving - 2][1:], trace[-1][1:]) < STILL:
+        moving -= 1
+    rows = [", ".join(f"{value:.2f}" for value in row) for row in trace[:moving]]
+    if moving < len(trace):
+        rows.append(f"It stays there until {trace[-1][0]:g} s.")
+    return "\n".join(rows) or "(none)"
+
+
+def rendered_piloting(piloting: Piloting, program: str) -> str:
+    """A table of what a program sensed and asked for, twice a second.
+
+    Of senses those are in it whose names the program has in its text, the first ones where they
+    are many.
+
+    Args:
+        piloting: What it sensed and asked for.
+        program: Its text.
+    """
+    words = set(_NAME.findall(program))
+    senses = [
+        k for k, name in enumerate(piloting.sense_names) if words.issuperset(_NAME.findall(name))
+    ][:MAX_SENSES]
+    heads = ["t", *(piloting.sense_names[k] for k in senses), *piloting.action_names[:MAX_ANSWERS]]
+    figures = np.hstack([piloting.senses[:-1, senses], piloting.answers[:-1, :MAX_ANSWERS]])
+    rows = []
+    for k in range(len(figures)):
+        tick = round(k * SAMPLE_RATE_HZ / ROWS_PER_S)
+        if tick >= len(figures):
+            break
+        told = ", ".join(f"{value:.2f}" for value in figures[tick])
+        rows.append(f"{tick / SAMPLE_RATE_HZ:g}, {told}")
+    return "\n".join([", ".join(heads), *rows])

@@ -1,0 +1,227 @@
+"""The controller of a workflow may write a program where its task offers senses."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from support.machines.piloted import experts_machine
+from support.player import Player
+from support.servers.live_api import changed
+from support.stages import work
+
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_geometry import Machine
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
+from buildarena_pipeline.errors import SubmissionError
+from buildarena_pipeline.submission.submission import Submissions
+from buildarena_simulation import simulate
+from buildarena_worker.builtin import BuiltinClient
+from buildarena_worker.session.messages import Completion, Request
+from buildarena_worker.wiring import verification_runner
+from buildarena_worker.workflow.control import PROGRAM_TURNS
+from buildarena_worker.workflow.traces import MAX_ANSWERS, MAX_SENSES, rendered_piloting
+
+TASK = "landing-1"
+FALLS = "function control() return {} end"
+KEYS = json.dumps(
+    {
+        "control_design": "Push.",
+        "control_config": [{"block": "4", "action": "fly", "keys": ["Alpha1"]}],
+        "control_sequence": [{"time": 1.0, "key": "Alpha1", "hold_for": 1.0}],
+    }
+)
+
+
+def fenced(program: str, before: str = "", after: str = "") -> str:
+    return f"{before}```lua\n{program}\n```{after}"
+
+
+class Answering:
+    """The expert, whose controller gives some answers in turn, the last one forever."""
+
+    def __init__(self, *answers: str) -> None:
+        self._otherwise, self.answers = BuiltinClient("expert").complete, list(answers)
+        self.read: list[str] = []
+
+    def complete(self, request: Request, options: object = None) -> Completion:
+        del options
+        if not request.messages[0].text.startswith("# Role: controller"):
+            return self._otherwise(request)
+        self.read.append(request.messages[-1].text)
+        kept = self.answers if len(self.answers) == 1 else [self.answers.pop(0)]
+        return Completion(text=kept[0])
+
+
+def answered(*answers: str, task: str = TASK):
+    model = Answering(*answers)
+    return Player()(task=task, client=model, workflow="builder"), model
+
+
+@pytest.mark.samples(3)
+@pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
+@pytest.mark.parametrize("task", ["landing-1", "slalom-2", "hover-3"])
+def test_the_expert_writes_programs_in_every_workflow(play, task, workflow) -> None:
+    played = play(task=task, workflow=workflow, seed=3)
+    assert played.suspended, played.failure
+    assert played.suspended.controls is None
+    assert "function control(t, sense)" in played.suspended.machine.controller
+
+
+def test_a_controller_reads_the_contract_and_what_its_task_offers() -> None:
+    _, model = answered(fenced(FALLS))
+    told = model.read[0]
+    assert "## Program" in told
+    for words in ("control(t, sense)", "sense.marks[name]", "place 0.05", "0.04 s old"):
+        assert words in told, words
+    assert "sense.gates" not in told
+    _, model = answered(KEYS, task="flight-1")
+    assert "## Program" not in model.read[0]
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        fenced(FALLS),
+        fenced(FALLS, "It falls.\n", "\nThat is all."),
+        f"```Lua\n{FALLS}\n```",
+        fenced("function control() return 1 end", "No, not this:\n", "\nbut this:\n")
+        + "\n"
+        + fenced(FALLS),
+        f"  ```lua\n{FALLS}\n  ```",
+    ],
+)
+def test_the_last_program_of_an_answer_counts(answer) -> None:
+    played, _ = answered(answer)
+    assert played.suspended, played.failure
+    assert played.suspended.machine.controller.strip() == FALLS
+
+
+def test_an_answer_of_a_hundred_thousand_beginnings_is_read() -> None:
+    """Each is looked at once: a search for the end of each would not end in a day."""
+    played, _ = answered("```lua\n" * 100_000 + FALLS, fenced(FALLS))
+    assert played.suspended, played.failure
+
+
+def test_keys_are_an_answer_too() -> None:
+    played, _ = answered(KEYS)
+    assert played.suspended.machine.controller == ""
+    assert [press.key for press in played.suspended.controls] == ["Alpha1"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [
+        (fenced("function control( return {} end"), "line 1"),
+        (fenced("x = 1"), "control"),
+        (fenced("while true do end"), "instructions"),
+        (fenced("error('stop')"), "stop"),
+        (fenced("-- " + "x" * 70_000), "65,536"),
+        (fenced(""), "control"),
+        ("function control() return end", "no JSON object; a program stands between"),
+        (f"```\n{FALLS}\n```", "between a line of ```lua and"),
+    ],
+)
+def test_a_program_that_cannot_be_read_costs_a_turn_and_no_trial(answer, told) -> None:
+    played, model = answered(answer, fenced(FALLS))
+    assert played.suspended, played.failure
+    assert len(model.read) == 2
+    assert told in model.read[1]
+    assert "Nothing was tried." in model.read[1]
+
+
+def test_who_never_writes_one_that_can_be_read_has_not_built() -> None:
+    played, model = answered(fenced("function control("))
+    assert len(model.read) == PROGRAM_TURNS
+    assert played.failure.reason == "control_invalid"
+
+
+def test_a_program_is_no_answer_where_keys_alone_count() -> None:
+    played, model = answered(fenced(FALLS), KEYS.replace('"4"', '"2"'), task="flight-1")
+    assert len(model.read) >= 2
+    assert "That can't be used: " in model.read[1]
+    assert "```lua" not in model.read[1]
+    assert played.suspended is None or played.suspended.machine.controller == ""
+
+
+def test_a_job_is_scored_over_the_worlds_that_its_trials_drew(context, submissions) -> None:
+    job, _ = submissions.submit_job(
+        JobSpec(task=TASK, model="builtin/expert", workflow="builder", worlds=2)
+    )
+    work(context)
+    job = context.store.jobs.get(job.id)
+    assert job.metrics["worlds"] == 2
+    assert job.metrics["robustness"] == 1.0
+    records = context.store.rollouts.read(job.id)
+    varied = [record for record in records if record.seed is not None]
+    task = builtin_tasks()[TASK]
+    assert len({r.trajectory_hash for r in records}) == len(varied) + 1
+    for record in varied:
+        stored = json.loads(context.artifacts.get(record.machine_hash))
+        machine = Machine.from_document(stored)
+        again = simulate(machine, task.scenario, record.engine, seed=record.seed)
+        assert score(task, machine, again).indicator == record.indicator
+    (check,) = context.store.verifications.request([job.id]).ids.values()
+    runner = verification_runner(context)
+    while runner.process_one():
+        pass
+    assert context.store.verifications.get(check).verdict == "verified"
+
+
+def test_a_failing_program_is_told_in_its_own_words(context, submissions, monkeypatch) -> None:
+    """Each of its three trials ends at the program's line; the job has the sentence."""
+    model = Answering(fenced("function control(t) return t > 1 and nothing.here or {} end"))
+    monkeypatch.setattr(BuiltinClient, "complete", model.complete)
+    job, _ = submissions.submit_job(
+        JobSpec(task=TASK, model="builtin/expert", workflow="builder", worlds=2)
+    )
+    work(context)
+    job = context.store.jobs.get(job.id)
+    assert (job.outcome, job.indicator) == ("unsuccessful", 0.0)
+    assert "worlds" not in (job.metrics or {})
+    assert "line 1, tick 26" in job.manifest["simulator"]["refused"]
+    assert any("line 1, tick 26" in text for text in model.read[1:])
+
+
+@pytest.mark.parametrize("asked", [{"worlds": 0}, {"simulator": "besiege"}])
+def test_a_job_of_no_world_is_refused_where_worlds_decide(context, asked) -> None:
+    with changed(context, besiege_game="1.0", besiege_mod="1.0", worlds=4) as own:
+        submissions = Submissions(own, load_registry())
+        spec = {"tasks": ["lift-1", TASK], "models": ["builtin/idle"], "samples": 1, **asked}
+        with pytest.raises(SubmissionError) as caught:
+            submissions.plan(SweepSpec(**spec))
+        (issue,) = caught.value.issues
+        assert issue.path == "tasks[1]"
+        assert "ask for `worlds` of 1 or more" in issue.message
+        assert "mujoco" in issue.message
+
+
+def test_a_table_tells_what_a_program_sensed_and_asked_for() -> None:
+    task = builtin_tasks()[TASK]
+    machine = experts_machine(task)
+    piloting = simulate(machine, task.scenario, "mujoco").piloting
+    head, *rows = rendered_piloting(piloting, machine.controller).splitlines()
+    columns = head.split(", ")
+    assert columns[0] == "t"
+    assert {"position.z", "velocity.z", "body_spin.x", "marks.goal.relative.y"} <= set(columns)
+    assert set(columns) >= set(piloting.action_names)
+    assert len(columns) <= 1 + MAX_SENSES + MAX_ANSWERS
+    assert [row.split(", ")[0] for row in rows[:4]] == ["0", "0.48", "1", "1.52"]
+    assert len({len(row.split(", ")) for row in (head, *rows)}) == 1
+    assert len(rows) == 60
+    blind = rendered_piloting(piloting, "function control(t) return {} end")
+    assert blind.splitlines()[0].split(", ") == ["t", *piloting.action_names]
+
+
+def test_a_controller_reads_that_table_after_its_trial(context, submissions, monkeypatch) -> None:
+    program = "function control(t, sense) return { fly = 0.3 - 0.01 * sense.velocity.z } end"
+    model = Answering(fenced(program))
+    monkeypatch.setattr(BuiltinClient, "complete", model.complete)
+    submissions.submit_job(JobSpec(task=TASK, model="builtin/expert", workflow="builder", worlds=1))
+    work(context)
+    assert len(model.read) == 3
+    assert "sensed and asked for" not in model.read[0]
+    for told in model.read[1:]:
+        table = told.partition("What the program sensed and asked for, twice a second:")[2]
+        assert table.strip().splitlines()[0].startswith("t, velocity.z, ")
