@@ -41,7 +41,10 @@ def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
     ]
     calls += [call(ASSEMBLY, *action) for action in design.assembly]
     whole = ASSEMBLY if design.assembly else MAIN
-    return calls + [call(whole, *action) for action in _control(answer)]
+    calls += [call(whole, *action) for action in _control(answer)]
+    if design.program:
+        calls.append(call(whole, "set_controller", {"program": design.program}))
+    return calls
 
 
 def call(machine: str, tool: str, arguments: Any) -> Call:

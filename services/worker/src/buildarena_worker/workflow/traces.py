@@ -7,8 +7,6 @@ import re
 from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-
 from buildarena_simulation import Piloting
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -50,12 +48,13 @@ def rendered_piloting(piloting: Piloting, program: str) -> str:
         k for k, name in enumerate(piloting.sense_names) if words.issuperset(_NAME.findall(name))
     ][:MAX_SENSES]
     heads = ["t", *(piloting.sense_names[k] for k in senses), *piloting.action_names[:MAX_ANSWERS]]
-    figures = np.hstack([piloting.senses[:-1, senses], piloting.answers[:-1, :MAX_ANSWERS]])
     rows = []
-    for k in range(len(figures)):
+    ticks = len(piloting.answers) - 1
+    for k in range(ticks):
         tick = round(k * SAMPLE_RATE_HZ / ROWS_PER_S)
-        if tick >= len(figures):
+        if tick >= ticks:
             break
-        told = ", ".join(f"{value:.2f}" for value in figures[tick])
+        figures = [*piloting.senses[tick, senses], *piloting.answers[tick, :MAX_ANSWERS]]
+        told = ", ".join(f"{value:.2f}" for value in figures)
         rows.append(f"{tick / SAMPLE_RATE_HZ:g}, {told}")
     return "\n".join([", ".join(heads), *rows])
