@@ -89,8 +89,8 @@ def test_nonsense_is_answered_inside_the_spaces() -> None:
         observation, reward, terminated, truncated, info = environment.step(action)
         assert observation in space
         assert (reward, terminated, truncated, info["accepted"]) == (0.0, False, False, False)
-    observation, *_ = environment.step("x" * 2001)
-    assert observation == "the call has 2,001 characters: at most 2,000 are read"
+    observation, *_ = environment.step("x" * 80_001)
+    assert observation == "the call has 80,001 characters: at most 80,000 are read"
     with pytest.raises(InvalidAction, match="an action is text, not int"):
         environment.step(3)
     assert observed("\N{SNOWMAN}!") == "?!"

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from buildarena_geometry import kernels  # noqa: F401 -- before numpy
+
+# isort: split
+
 import os
 import sys
 from collections.abc import Callable

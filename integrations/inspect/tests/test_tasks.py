@@ -49,7 +49,7 @@ def test_all_tasks_end_to_end_score_as_the_library_does(run) -> None:
     for sample in log.samples:
         trial = tried(sample.id, "mujoco")
         told = sample.scores["success"].metadata
-        assert sample.scores["success"].value == "C"
+        assert sample.scores["success"].value == "C", sample.id
         assert sample.scores["indicator"].value == trial.score.indicator
         assert (told["success"], told["flags"]) == (True, list(trial.score.flags))
         assert told["metrics"] == dict(trial.score.metrics)

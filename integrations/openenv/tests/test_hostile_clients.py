@@ -11,8 +11,8 @@ import psutil
 import pytest
 import websockets
 
+from buildarena_environment import LONGEST_CALL
 from buildarena_openenv import BuildAction, BuildClient
-from buildarena_openenv.models import MAX_ARGUMENTS
 
 START = {"type": "step", "data": {"tool": "start", "arguments": {}}}
 
@@ -45,9 +45,9 @@ async def said(socket, message) -> dict:
         ({"tool": 7}, "tool"),
         ({"tool": "x" * 101}, "tool"),
         ({"tool": "start", "arguments": []}, "arguments"),
-        ({"tool": "start", "arguments": {"note": "x" * MAX_ARGUMENTS}}, "arguments"),
+        ({"tool": "start", "arguments": {"note": "x" * LONGEST_CALL}}, "arguments"),
         ({"tool": "start", "machine": "main"}, "machine"),
-        ({"tool": "start", "metadata": {"x": "y" * MAX_ARGUMENTS}}, "metadata"),
+        ({"tool": "start", "metadata": {"x": "y" * LONGEST_CALL}}, "metadata"),
     ],
 )
 def test_a_malformed_call_is_an_error_that_names_the_place(server, data, problem) -> None:

@@ -12,6 +12,7 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from buildarena_benchmark import Task
 from buildarena_environment import (
     DEFAULT_STEPS,
+    LONGEST_CALL,
     Answer,
     Environment,
     EpisodeOverError,
@@ -21,7 +22,7 @@ from buildarena_environment import (
     call_text,
 )
 from buildarena_gymnasium.pictures import Picture, picture_of
-from buildarena_gymnasium.spaces import ACTION_SPACE, MAX_ACTION, OBSERVATION_SPACE, observed
+from buildarena_gymnasium.spaces import ACTION_SPACE, OBSERVATION_SPACE, observed
 from buildarena_simulation import DEFAULT_ENGINE
 
 OPTIONS: Final = ("state", "start_seed")
@@ -84,7 +85,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         self._varied_start = varied_start
         self._begun = False
         # Every instance samples by itself.
-        self.action_space = type(ACTION_SPACE)(MAX_ACTION, charset=ACTION_SPACE.character_set)
+        self.action_space = type(ACTION_SPACE)(LONGEST_CALL, charset=ACTION_SPACE.character_set)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -128,7 +129,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         if not isinstance(action, str):
             raise InvalidAction(f"an action is text, not {type(action).__name__}")
         try:
-            answer = call_text(self.environment, action, longest=MAX_ACTION)
+            answer = call_text(self.environment, action, longest=LONGEST_CALL)
         except EpisodeOverError as over:
             raise ResetNeeded(str(over)) from over
         return (

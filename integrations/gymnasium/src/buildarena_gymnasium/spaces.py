@@ -10,8 +10,8 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import read_from_shared_memory, write_to_shared_memory
 
-MAX_ACTION: Final = 2_000
-"""Characters of a call; the longest one of the built-in expert has 152."""
+from buildarena_environment import LONGEST_CALL
+
 MAX_OBSERVATION: Final = 32_768
 """Characters of an answer; a briefing has about 6,500."""
 CUT: Final = " [cut]"
@@ -27,7 +27,7 @@ class AnswerText(spaces.Text):
     """
 
 
-ACTION_SPACE: Final = spaces.Text(MAX_ACTION, charset=frozenset(_PRINTABLE))
+ACTION_SPACE: Final = spaces.Text(LONGEST_CALL, charset=frozenset(_PRINTABLE))
 """A tool call as JSON, which can escape any other character."""
 OBSERVATION_SPACE: Final = AnswerText(
     MAX_OBSERVATION, min_length=0, charset=frozenset(_PRINTABLE + "\n°²·—…")

@@ -9,15 +9,15 @@ from inspect_ai.tool import ToolDef, ToolError, ToolParams
 from inspect_ai.tool._tool_canonical import set_tool_canonical_arguments
 from inspect_ai.util import JSONSchema
 
-from buildarena_environment import EpisodeOverError, NothingToSubmitError, tools_of_models
+from buildarena_environment import EpisodeOverError, NothingToSubmitError
 from buildarena_environment.tools import SUBMIT
 from buildarena_geometry import ToolDefinition
 from buildarena_inspect.building import Building
 
 
 def building_tools(building: Building) -> list[ToolDef]:
-    """All actions, each on this building."""
-    return [_action(tool, building) for tool in tools_of_models() if tool is not SUBMIT]
+    """All actions that the task has, each on this building."""
+    return [_action(tool, building) for tool in building.environment.tools if tool is not SUBMIT]
 
 
 def submit_tool(building: Building) -> ToolDef:

@@ -9,9 +9,9 @@ from openenv.core.env_server.types import Action, Observation, State
 from pydantic import Field, field_validator
 from pydantic_core import PydanticCustomError
 
+from buildarena_environment import LONGEST_CALL
+
 MAX_NAME: Final = 100
-MAX_ARGUMENTS: Final = 20_000
-"""Characters of a call's arguments as JSON; the built-in expert's longest have about 120."""
 
 
 class BuildAction(Action):
@@ -26,11 +26,11 @@ class BuildAction(Action):
     @classmethod
     def _bounded(cls, value: dict[str, Any]) -> dict[str, Any]:
         size = len(json.dumps(value, default=str))
-        if size > MAX_ARGUMENTS:
+        if size > LONGEST_CALL:
             raise PydanticCustomError(
                 "too_large",
                 "as JSON it has {size} characters: at most {most} are read",
-                {"size": size, "most": MAX_ARGUMENTS},
+                {"size": size, "most": LONGEST_CALL},
             )
         return value
 

@@ -8,10 +8,10 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 
 from buildarena_benchmark import references
-from buildarena_environment.calls import Answer, call, call_text, read_call
-from buildarena_environment.environment import (
+from buildarena_environment.calls import LONGEST_CALL, Answer, call, call_text, read_call
+from buildarena_environment.environment import Environment
+from buildarena_environment.episodes import (
     DEFAULT_STEPS,
-    Environment,
     Limits,
     Observation,
     Step,
@@ -36,6 +36,7 @@ from buildarena_environment.workbench import Workbench
 __all__ = [
     "ASSEMBLY",
     "DEFAULT_STEPS",
+    "LONGEST_CALL",
     "MAIN",
     "REWARDS",
     "Answer",

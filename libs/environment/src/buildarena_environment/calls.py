@@ -13,6 +13,8 @@ from buildarena_geometry.json_texts import read_json
 
 EXAMPLE: Final = '{"tool": "start", "arguments": {}}'
 """A call as text."""
+LONGEST_CALL: Final = 80_000
+"""Characters that an adapter reads of a call: JSON that quotes the longest program has room."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
