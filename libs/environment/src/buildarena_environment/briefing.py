@@ -43,7 +43,8 @@ _CONTROL: Final = {
 
 _PROGRAMS: Final = (
     "You may write a program that senses and acts in place of key presses: `set_controller`, on "
-    "the machine that is simulated, before you submit. {contract}\n\n"
+    "the machine that is simulated, before you submit; `test_controller` asks what it would do. "
+    "{contract}\n\n"
     "Without a program, keys are played: `change_control_key` binds them, `add_control_sequence` "
     "presses them."
 )

@@ -85,7 +85,7 @@ class Pilot:
 
     def piloting(self) -> Piloting:
         """What it sensed and asked for at every instant of the trial, the last one too."""
-        senses = tuple(_flat(self._sensing.layout))
+        senses = tuple(flat_names(self._sensing.layout))
         asked = sorted({key for levels in self._asked for key in levels})
         count = len(self._sensed)
         sensed = np.full((count + 1, len(senses)), np.nan, dtype=np.float32)
@@ -118,10 +118,10 @@ class Pilot:
             self._since.setdefault(key, time_s)
 
 
-def _flat(layout: Mapping[str, Any], path: str = "") -> Iterator[str]:
+def flat_names(layout: Mapping[str, Any], path: str = "") -> Iterator[str]:
     """The names of all numbers of a layout, which counts them in this order."""
     for name, what in layout.items():
         if isinstance(what, Mapping):
-            yield from _flat(what, f"{path}{name}.")
+            yield from flat_names(what, f"{path}{name}.")
         else:
             yield f"{path}{name}"
