@@ -35,7 +35,7 @@ class Channels:
         self._named.update((name, [key]) for key, name in self.names.items())
 
     def axes(self) -> dict[str, float]:
-        """The least number for each action of each part: -1 for the first of two opposites, else 0."""
+        """The least number for each action: -1 for the first of two opposites, otherwise 0."""
         axes: dict[str, float] = {}
         for (part, action), name in self.names.items():
             opposite = self._opposites.get((part, action))
