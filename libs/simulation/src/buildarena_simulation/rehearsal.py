@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_simulation.controllers.answers import Channels
-from buildarena_simulation.controllers.pilot import flat_names
+from buildarena_simulation.controllers.pilot import Pilot
 from buildarena_simulation.controllers.program import Program
-from buildarena_simulation.controllers.senses import TICK_S, Seen, Sensing
+from buildarena_simulation.controllers.senses import TICK_S, Seen
 from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
@@ -71,28 +70,28 @@ def rehearsed(
         MachineNotSimulable: There is no machine to act on.
     """
     structure = structure_of(machine)
-    exact = Senses(offers=scenario.senses.offers) if scenario.senses else Senses(offers=())
+    exact = Senses(offers=scenario.senses.offers) if scenario.senses else None
     scenario = scenario.model_copy(update={"senses": exact})
     program = Program(text, most_s=MAX_REHEARSAL_S)
-    sensing = Sensing(structure, scenario, program.sensors, seed=0)
-    program.senses_are(sensing.layout)
-    channels = Channels(structure, bindings_of(machine), part_ids(machine))
-    names = {name: place for place, name in enumerate(flat_names(sensing.layout))}
+    ids, bindings = part_ids(machine), bindings_of(machine)
+    pilot = Pilot(structure, bindings, ids, scenario, program.sensors, seed=0)
+    program.senses_are(pilot.layout)
+    names = {name: place for place, name in enumerate(pilot.sense_names)}
     words = set(_NAME.findall(text))
     shown = [name for name in names if words.issuperset(_NAME.findall(name))]
-    values = sensing.read(_at_start(structure, scenario))
+    values = pilot.senses(_at_start(structure, scenario))
     began, now, answers = time.process_time(), -TICK_S, []
     for tick, changes in enumerate(ticks):
         now = changes.get(TIME, now + TICK_S)
         for name, value in changes.items():
             if name != TIME:
                 values[_place(names, name)] = value
-        levels = channels.levels(program.answer(tick, now, values))
+        levels = pilot.levels(values, program.answer(tick, now, values))
         answers.append(
             Answered(
                 time_s=now,
                 senses={name: values[names[name]] for name in shown},
-                actions={channels.names[key]: level for key, level in levels.items()},
+                actions={pilot.action_names[key]: level for key, level in levels.items()},
             )
         )
         if time.process_time() - began > MAX_REHEARSAL_S:
