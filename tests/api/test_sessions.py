@@ -286,7 +286,7 @@ def test_what_a_submission_would_try_can_be_had_and_tried_before(api, session) -
 
 
 def test_a_program_is_set_and_asked_in_a_session(api) -> None:
-    opened = api.post("/v1/sessions", json={**OPEN, "task": "landing-1"}).json()
+    opened = api.post("/v1/sessions", json={**OPEN, "task": "landing-1", "worlds": 1}).json()
     assert "`test_controller` asks what it would do" in opened["briefing"]
     act(api, opened["id"], "start", START)
     fan = {**ATTACH, "face": "E", "new_block": "Flying Block"}
