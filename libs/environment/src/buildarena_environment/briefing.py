@@ -200,13 +200,14 @@ def programs_told(task: Task) -> str:
     assert senses is not None  # noqa: S101 - it takes programs
     kinds = json.loads(file_text("senses.json"))
     lines = [f"- {kinds[kind]}" for kind in kinds if kind in senses.offers]
-    late = (
-        f" What you sense is {senses.delay_ticks * TICK_S:g} s old." if senses.delay_ticks else ""
-    )
+    accuracy = []
+    if senses.delay_ticks:
+        accuracy.append(f"What you sense is {senses.delay_ticks * TICK_S:g} s old.")
     noise = ", ".join(f"{kind} {sigma:g}" for kind, sigma in senses.noise.items() if sigma)
-    exact = f" Standard deviations of its noise: {noise}." if noise else ""
+    if noise:
+        accuracy.append(f"Standard deviations of its noise: {noise}.")
     return Template(file_text("controller.md")).substitute(
-        senses="\n".join(lines), accuracy=f"{late}{exact}"
+        senses="\n".join(lines), accuracy=" ".join(accuracy)
     )
 
 
