@@ -141,10 +141,30 @@ local function random(low, high)
   return low + floor(share * (high - low + 1))
 end
 
-local own_math = { random = random, pi = math.pi, huge = math.huge }
+-- What interpreters do each in their own way; the game's has a `fmod`, `modf` and `huge` of its own.
+local atan2, log, abs, ceil, infinite = math.atan2, math.log, math.abs, math.ceil, 1 / 0
+local own_math = { random = random, pi = math.pi, huge = infinite }
+
+function own_math.atan(y, x) return atan2(y, x or 1) end
+
+function own_math.log(x, base)
+  if base == nil then return log(x) end
+  return log(x) / log(base)
+end
+
+function own_math.fmod(a, b)
+  local rest = abs(a) % abs(b)
+  return a < 0 and -rest or rest
+end
+
+function own_math.modf(x)
+  if abs(x) == infinite then return x, 0 end
+  local whole = x < 0 and ceil(x) or floor(x)
+  return whole, x - whole
+end
+
 for _, name in raw_ipairs({
-  "abs", "acos", "asin", "atan", "ceil", "cos", "exp", "floor", "fmod", "log", "max", "min", "modf",
-  "sin", "sqrt", "tan",
+  "abs", "acos", "asin", "ceil", "cos", "exp", "floor", "max", "min", "sin", "sqrt", "tan",
 }) do
   own_math[name] = math[name]
 end
