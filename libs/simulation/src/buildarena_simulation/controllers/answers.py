@@ -22,10 +22,15 @@ class Channels:
         structure: The machine.
         bindings: The actions of each part, the blocks and then the springs.
         ids: (N + K,) their ids.
+
+    Attributes:
+        names: What each action of each part is called, see `channel`.
+        opposites: The action that does the opposite of another, for those that have one.
     """
 
     def __init__(self, structure: "Structure", bindings: Bindings, ids: Sequence[str]) -> None:
-        self._opposites = _opposites(structure)
+        self.opposites = _opposites(structure)
+        self._switches = _switches(structure)
         self._named: dict[str, list[tuple[int, str]]] = {}
         self.names: dict[tuple[int, str], str] = {}
         for part, actions in enumerate(bindings):
@@ -51,10 +56,14 @@ class Channels:
                 asked[key] = min(max(answers[name], -1.0), 1.0)
         levels: dict[tuple[int, str], float] = {}
         for (part, action), share in asked.items():
-            wanted = action if share >= 0 else self._opposites.get((part, action))
+            wanted = action if share >= 0 else self.opposites.get((part, action))
             if wanted is not None:
                 levels[part, wanted] = max(abs(share), levels.get((part, wanted), 0.0))
         return levels
+
+    def takes_share(self, part: int, action: str) -> bool:
+        """Whether an action may be asked for in part; others are on above a half."""
+        return (part, action) not in self._switches
 
     def _parts_of(self, name: str) -> list[tuple[int, str]]:
         parts = self._named.get(name)
@@ -75,6 +84,21 @@ def constant(levels: Mapping[tuple[int, str], float], count: int) -> Levels:
         return np.full(count, share) if share else none
 
     return level
+
+
+def _switches(structure: "Structure") -> set[tuple[int, str]]:
+    """The actions that are only on or off."""
+    switches = {
+        (len(structure) + k, spring.contract)
+        for k, spring in enumerate(structure.ropes.spring_of)
+        if spring.contract is not None
+    }
+    for index, part in enumerate(structure.parts):
+        if part.module.decouple is not None:
+            switches.add((index, part.module.decouple.action))
+        if part.module.grip is not None:
+            switches |= {(index, part.module.grip.grab), (index, part.module.grip.release)}
+    return switches
 
 
 def _opposites(structure: "Structure") -> dict[tuple[int, str], str]:

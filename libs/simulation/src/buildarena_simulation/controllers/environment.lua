@@ -33,6 +33,14 @@ end
 
 local function hook() spend(STEP) end
 
+-- What stands in place of the senses of a program that shall read none.
+local looked = false
+local function look()
+  looked = true
+  raw_error("it reads a sense", 2)
+end
+local nothing = setmetatable({}, { __index = look, __newindex = look, __len = look })
+
 -- Numbers, then texts, then true and false.
 local RANK = { number = 1, string = 2, boolean = 3 }
 local function before(a, b)
@@ -44,6 +52,7 @@ end
 
 local function sorted_keys(t)
   if raw_type(t) ~= "table" then raw_error("a table is expected, got " .. raw_type(t), 3) end
+  if t == nothing then look() end
   local keys, n = {}, 0
   for key in raw_next, t do
     if not RANK[raw_type(key)] then
@@ -237,6 +246,13 @@ end
 function driver.senses_are(source)
   make_senses = raw_assert(read(source, "=senses", "t", {}))()
 end
+
+function driver.sense_nothing()
+  make_senses = function() return nothing end
+  latest = {}
+end
+
+function driver.looked() return looked end
 
 function driver.take(...)
   latest = { ... }
