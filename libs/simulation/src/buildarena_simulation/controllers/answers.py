@@ -25,19 +25,20 @@ class Channels:
 
     Attributes:
         names: What each action of each part is called, see `channel`.
+        named: The actions of parts that each name is for.
         opposites: The action that does the opposite of another, for those that have one.
     """
 
     def __init__(self, structure: "Structure", bindings: Bindings, ids: Sequence[str]) -> None:
         self.opposites = _opposites(structure)
         self._switches = _switches(structure)
-        self._named: dict[str, list[tuple[int, str]]] = {}
+        self.named: dict[str, list[tuple[int, str]]] = {}
         self.names: dict[tuple[int, str], str] = {}
         for part, actions in enumerate(bindings):
             for action in actions:
-                self._named.setdefault(action, []).append((part, action))
+                self.named.setdefault(action, []).append((part, action))
                 self.names[part, action] = channel(ids[part], action)
-        self._named.update((name, [key]) for key, name in self.names.items())
+        self.named.update((name, [key]) for key, name in self.names.items())
 
     def levels(self, answers: Mapping[str, float]) -> dict[tuple[int, str], float]:
         """How far each action of each part is asked for, 0 to 1; what is missing is not.
@@ -66,10 +67,10 @@ class Channels:
         return (part, action) not in self._switches
 
     def _parts_of(self, name: str) -> list[tuple[int, str]]:
-        parts = self._named.get(name)
+        parts = self.named.get(name)
         if parts is not None:
             return parts
-        near = difflib.get_close_matches(name, self._named, n=_NEAR, cutoff=0.4)
+        near = difflib.get_close_matches(name, self.named, n=_NEAR, cutoff=0.4)
         names = near or sorted({action for _, action in self.names})
         shown = ", ".join(names) or "none: no block of this machine has an action"
         raise ControllerFailed(f"there is no action {name[:60]!r}; there is {shown}")

@@ -36,6 +36,11 @@ class Pilot:
         scenario: What the machine is put through.
         seed: Of the program's random numbers and of the noise.
 
+    Attributes:
+        program: The program.
+        sensing: What it is told.
+        channels: What it may ask for.
+
     Raises:
         ControllerFailed: The program cannot be read, names a block that there is not, or the
             scenario takes none.
@@ -54,10 +59,10 @@ class Pilot:
         if scenario.senses is None or scenario.control.mode != "agent":
             raise ControllerFailed("this trial offers no senses: it takes keys alone")
         self._text = text
-        self._program = Program(text, seed=seed)
-        self._sensing = Sensing(structure, scenario, self._program.sensors, seed=seed)
-        self._program.senses_are(self._sensing.layout)
-        self._channels = Channels(structure, bindings, ids)
+        self.program = Program(text, seed=seed)
+        self.sensing = Sensing(structure, scenario, self.program.sensors, seed=seed)
+        self.program.senses_are(self.sensing.layout)
+        self.channels = Channels(structure, bindings, ids)
         self._tick = 0
         self._since: dict[tuple[int, str], float] = {}
         self._holds: list[KeyHold] = []
@@ -70,12 +75,15 @@ class Pilot:
         Raises:
             ControllerFailed: It fails, takes too much, or names an action that there is not.
         """
-        values = self._sensing.read(seen)
-        levels = self._channels.levels(self._program.answer(self._tick, seen.time_s, values))
+        return self.levels_of(self.sensing.read(seen), seen.time_s)
+
+    def levels_of(self, values: list[float], time_s: float) -> dict[tuple[int, str], float]:
+        """What it asks for where these are its senses, in the order of the layout; see `levels`."""
+        levels = self.channels.levels(self.program.answer(self._tick, time_s, values))
         self._sensed.append(values)
         self._asked.append(levels)
         self._tick += 1
-        self._note(seen.time_s, {key for key, share in levels.items() if share > 0})
+        self._note(time_s, {key for key, share in levels.items() if share > 0})
         return levels
 
     def holds(self) -> list[KeyHold]:
@@ -83,9 +91,14 @@ class Pilot:
         self._note(self._tick * TICK_S, set())
         return sorted(self._holds, key=lambda hold: (hold.time_s, hold.key))
 
+    @property
+    def sense_names(self) -> tuple[str, ...]:
+        """What each number that it senses is called."""
+        return tuple(_flat(self.sensing.layout))
+
     def piloting(self) -> Piloting:
         """What it sensed and asked for at every instant of the trial, the last one too."""
-        senses = tuple(_flat(self._sensing.layout))
+        senses = self.sense_names
         asked = sorted({key for levels in self._asked for key in levels})
         count = len(self._sensed)
         sensed = np.full((count + 1, len(senses)), np.nan, dtype=np.float32)
@@ -96,7 +109,7 @@ class Pilot:
         return Piloting(
             sense_names=senses,
             senses=sensed,
-            action_names=tuple(self._channels.names[key] for key in asked),
+            action_names=tuple(self.channels.names[key] for key in asked),
             answers=answers,
         )
 
@@ -110,7 +123,7 @@ class Pilot:
             self._holds.append(
                 KeyPress(
                     time_s=round(since, 6),
-                    key=self._channels.names[key],
+                    key=self.channels.names[key],
                     hold_for_s=round(time_s - since, 6),
                 )
             )

@@ -51,7 +51,8 @@ Layout = Mapping[str, "Layout | int"]
 
 
 @cache
-def _environment() -> bytes:
+def environment_text() -> bytes:
+    """The Lua in which programs run, here and in the scripts of the game."""
     return files(__package__).joinpath("environment.lua").read_bytes()
 
 
@@ -89,8 +90,8 @@ class Program:
         Args:
             layout: The names; the program sees tables of tables.
         """
-        source = f"return function(v) return {_constructor(layout)} end"
-        self._guarded(lambda: self._driver["senses_are"](source.encode("latin-1", "replace")))
+        source = layout_source(layout).encode("latin-1", "replace")
+        self._guarded(lambda: self._driver["senses_are"](source))
 
     def sense_nothing(self) -> None:
         """Lets the program see no senses: it fails where it reads one, and `looked` is true."""
@@ -194,7 +195,7 @@ def _started(seed: int, most_s: float) -> Any:
         max_memory=MAX_MEMORY_BYTES,
     )
     return runtime.execute(
-        _environment(), seed, MAX_INSTRUCTIONS, MAX_INSTRUCTIONS_IN_ALL, most_s, MAX_TEXTS_S
+        environment_text(), seed, MAX_INSTRUCTIONS, MAX_INSTRUCTIONS_IN_ALL, most_s, MAX_TEXTS_S
     )
 
 
@@ -219,6 +220,11 @@ def _newer_syntax(data: bytes, failure: ControllerFailed) -> str | None:
     lines = data.splitlines()
     line = lines[failure.line - 1] if failure.line <= len(lines) else b""
     return _ATTRIBUTES if re.search(rb"<\s*(const|close)\s*>", line) else near
+
+
+def layout_source(layout: Layout) -> str:
+    """Lua that gives a function from the list of a tick's numbers to the program's tables."""
+    return f"return function(v) return {_constructor(layout)} end"
 
 
 def _constructor(layout: Layout) -> str:
