@@ -47,6 +47,26 @@ def test_export_and_import_are_each_others_opposite(machine, tmp_path) -> None:
     assert "Everything was understood." in run("machine", "import", file).stdout
 
 
+CONTROL = Path(__file__).parents[2] / "examples/control"
+
+
+def test_a_program_goes_into_the_script_and_comes_back(tmp_path) -> None:
+    machine, task = CONTROL / "car.machine.json", CONTROL / "to-the-mark.yaml"
+    own, file = tmp_path / "own.json", tmp_path / "m.bsg"
+    program = CONTROL / "to-the-mark.lua"
+    words = ("machine", "export", machine, "--out", file, "--controller", program)
+    done = run(*words, "--task", task)
+    assert done.exit_code == 0, done.output
+    back = run("machine", "import", file, "--out", own)
+    assert "Everything was understood." in back.stdout
+    controlled = Machine.from_document(json.loads(own.read_text()))
+    assert controlled.controller == program.read_text(encoding="utf-8")
+    refused = run(*words)
+    assert (refused.exit_code, "name a task" in refused.stderr) == (1, True)
+    refused = run(*words, "--task", "transport-1")
+    assert (refused.exit_code, "takes keys alone" in refused.stderr) == (1, True)
+
+
 def test_other_keys_may_be_pressed(machine, tmp_path) -> None:
     controls = tmp_path / "controls.json"
     controls.write_text('[{"time": 2, "key": "Alpha2", "hold_for": 1.5}]', encoding="utf-8")

@@ -207,7 +207,7 @@ def test_a_program_acts_in_place_of_keys(run, tmp_path) -> None:
     wrong = tmp_path / "wrong.lua"
     wrong.write_text("function control(t, sense)\n  return { forwards = sense.goal.x }\nend\n")
     failed = controlled(run, wrong, task)
-    assert "line 2, tick 0 (0.00 s): attempt to index a nil value (field 'goal')" in failed.stderr
+    assert "line 2, tick 0 (0.00 s): attempt to index field 'goal' (a nil value)" in failed.stderr
     wrong.write_text("function control(t, sense) return { spining_forward = 1 } end")
     assert "there is spinning_forward" in controlled(run, wrong, task).stderr
     refused = controlled(run, CONTROL / "to-the-mark.lua", "transport-1")

@@ -114,7 +114,7 @@ def test_random_numbers_come_from_the_seed() -> None:
 @pytest.mark.parametrize(
     ("body", "words", "line"),
     [
-        ("local x = sense.nothing.y", "attempt to index a nil value (field 'nothing')", 2),
+        ("local x = sense.nothing.y", "attempt to index field 'nothing' (a nil value)", 2),
         ("\n\nerror('no way up')", "no way up", 4),
         ("error({ secret = 1 })", "it threw a table", None),
         ("error()", "it threw a nil", None),
@@ -126,8 +126,8 @@ def test_random_numbers_come_from_the_seed() -> None:
         ("local n = 'a' for i = 1, 9 do n = n .. n end return { [n] = 1 }", "than 100 bytes", None),
         ("return { a = 0/0 }", "what it answers for a is no number", None),
         ("for k in pairs({ [{}] = 1 }) do end", "a table with a table as a key has no order", 2),
-        ("local s = ('x'):rep(9)", "attempt to index a string value", 2),
-        ("return { a = '1' + 1 }", "attempt to perform arithmetic on a string value", 2),
+        ("local s = ('x'):rep(9)", "attempt to index constant 'x' (a string value)", 2),
+        ("return { a = 'x' + 1 }", "attempt to perform arithmetic on a string value", 2),
         ("local x = table.concat({}, '', 1, 1e9)", "table.concat joins 1000 texts at most", 2),
         ("local x = table.unpack({}, 1, 1e9)", "table.unpack gives 250 values at most", 2),
         ("local t = {} for i = 1, 600 do t['n' .. i] = 1 end return t", "than 500 names", None),
@@ -154,13 +154,81 @@ def test_a_program_that_fails_names_tick_and_line(body, words, line) -> None:
         ("sensors = 5\nfunction control() end", "sensors is no list of block ids"),
         ("sensors = { {} }\nfunction control() end", "sensors is no list of block ids"),
         ("sensors = {} for i = 1, 200 do sensors[i] = i end function control() end", "than 100"),
-        ("(" * 300, "overflow"),
+        ("(" * 300, "too many C levels"),
         ("\ud800", "the controller failed, line 1"),
     ],
 )  # fmt: skip
 def test_a_program_that_cannot_be_read_says_why(text, words) -> None:
     with pytest.raises(ControllerFailed, match=re.escape(words)):
         Program(text)
+
+
+@pytest.mark.parametrize(
+    ("newer", "instead"),
+    [
+        ("local x = 5 // 2", "//: write math.floor(a / b)"),
+        ("local x = 5 & 2", "write * and / by powers of two"),
+        ("local x = 5 | 2", "write * and / by powers of two"),
+        ("local x = 5 ~ 2", "write * and / by powers of two"),
+        ("local x = ~2", "write * and / by powers of two"),
+        ("local x = 5 << 2", "write * and / by powers of two"),
+        ("local x = 5 >> 2", "write * and / by powers of two"),
+        ("local x <const> = 5", "<const> and <close>: write the name alone"),
+        ("local x < close > = nil", "<const> and <close>: write the name alone"),
+        ("local x = '\\u{41}'", "\\u: write the bytes"),
+    ],
+)
+def test_what_the_games_lua_does_not_have_is_refused_with_what_to_write(newer, instead) -> None:
+    with pytest.raises(ControllerFailed, match=re.escape(instead)) as caught:
+        Program(control(newer))
+    assert caught.value.line == 2
+    assert "programs are Lua 5.2, which has no" in caught.value.reason
+
+
+@pytest.mark.parametrize("wrong", ["x = 5 /", "x = = 2", "x = 5 // = 2", "local x <const = 2"])
+def test_what_no_lua_has_is_refused_as_lua_does(wrong) -> None:
+    with pytest.raises(ControllerFailed) as caught:
+        Program(control(wrong))
+    assert "write" not in caught.value.reason
+
+
+def test_what_5_2_has_may_be_used() -> None:
+    text = """local n = 0
+    for i = 1, 4 do
+      if i % 2 == 0 then goto continue end
+      n = n + i
+      ::continue::
+    end
+    return { ["\\x6e\\z
+      "] = n, ["#" .. #"\\195\\164"] = 1 }"""
+    assert answered(control(text)) == [{"n": 4.0, "#2": 1.0}]
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        ("6 / 2", "3"),
+        ("3.0", "3"),
+        ("2 ^ 53", "9.007199254741e+15"),
+        ("9007199254740993", "9.007199254741e+15"),
+        ("math.floor(2.5)", "2"),
+        ("7 % 0", "-nan"),
+        ("7 % -3", "-2"),
+        ("math.fmod(-7, 3)", "-1"),
+        ("math.fmod(7, -3)", "1"),
+        ("math.modf(-2.5)", "-2"),
+        ("select(2, math.modf(-2.5))", "-0.5"),
+        ("math.modf(math.huge)", "inf"),
+        ("math.log(8, 2)", "3"),
+        ("math.atan(1)", "0.78539816339745"),
+        ("math.atan(-1, -1)", "-2.3561944901923"),
+        ("math.huge", "inf"),
+        ("math.tointeger or math.type or math.ult or math.maxinteger", "nil"),
+    ],
+)
+def test_numbers_are_doubles_and_no_more(number, text) -> None:
+    ((name, _),) = answered(control(f"return {{ [tostring(({number}))] = 1 }}"))[0].items()
+    assert name.lstrip("-") == text.lstrip("-") if "nan" in text else name == text
 
 
 def _endless() -> dict[str, str]:

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from buildarena_geometry.rotations import rotate
+
 Path = Callable[[int, int], tuple[float, float, float]]
 """Where block number i of the file is after n updates, Besiege's components."""
+
+Turn = Callable[[int, int], tuple[float, float, float, float]]
+"""How that block is turned, (w, x, y, z) in Besiege's components."""
 
 Ground = Callable[[float, float], float | str | None]
 """The ground's height at a place east and north; "b" where a block is in the way, None for none."""
 
 VERSIONS = ("lua51", "lua52", "lua53", "lua54", "lua55", "luajit21")
+
+
+def as_built(_i: int, _n: int) -> tuple[float, float, float, float]:
+    return (1.0, 0.0, 0.0, 0.0)
 
 
 def golden_path(i: int, n: int) -> tuple[float, float, float]:
@@ -41,6 +51,7 @@ class LuaGame:
     references: dict[object, int]
     version: str = "lua54"
     path: Path = golden_path
+    turn: Turn = as_built
     burning: Callable[[int, int], bool] = golden_burning
     destroyed: Callable[[int, int], bool] = lambda _i, _n: False
     ground: Ground = flat_ground
@@ -125,8 +136,21 @@ class LuaGame:
             assert not self.destroyed(number, self.updates), "the game has no such block any more"
             return self._vector(runtime, self.path(number, self.updates))
 
+        def axis(own):
+            def told():
+                assert not self.destroyed(number, self.updates)
+                turn = self.turn(number, self.updates)
+                size = math.sqrt(sum(part * part for part in turn))
+                w, x, y, z = (part / size for part in turn)
+                return self._vector(runtime, rotate((w, x, y, z), own))
+
+            return told
+
         return runtime.table_from(
             {
+                "right": axis((1.0, 0.0, 0.0)),
+                "up": axis((0.0, 1.0, 0.0)),
+                "forward": axis((0.0, 0.0, 1.0)),
                 "position": position,
                 "burning": lambda: self.burning(number, self.updates),
                 "destroyed": lambda: self.destroyed(number, self.updates),

@@ -21,6 +21,7 @@ from buildarena_besiege.logs.state_log import StateLog
 from buildarena_besiege.logs.stored import logged_trajectory
 from buildarena_besiege.logs.telemetry import read_telemetry, telemetry_log, telemetry_trajectory
 from buildarena_besiege.logs.trajectories import trajectory_of
+from buildarena_besiege.open_loop import TimedMachine, machine_with_timeline, timeline_of
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start
 
@@ -33,12 +34,14 @@ __all__ = [
     "MachineFileError",
     "MachineNotPlayableError",
     "StateLog",
+    "TimedMachine",
     "file_data_lines",
     "game_start",
     "level_file",
     "level_finding",
     "logged_trajectory",
     "looks_published",
+    "machine_with_timeline",
     "plain_machine_file",
     "prepare_run",
     "published_trajectory",
@@ -49,5 +52,6 @@ __all__ = [
     "run_ids",
     "telemetry_log",
     "telemetry_trajectory",
+    "timeline_of",
     "trajectory_of",
 ]

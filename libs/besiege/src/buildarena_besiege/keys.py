@@ -21,6 +21,9 @@ UPDATES_PER_S: Final = 100
 HELD_KEY: Final = "Alpha1"
 """The key that fires every cannon of a trial whose cannons are held."""
 
+_OWN_KEYS: Final = (*KEYS, *(f"Joystick{j}Button{b}" for j in range(1, 9) for b in range(20)))
+"""What a trial with a program presses: keys that nobody types, and more than machines have."""
+
 _LATEST_S: Final = 1e6
 """A hold ends here at the latest, seconds; no trial lasts as long."""
 
@@ -102,6 +105,24 @@ def bindings_of(machine: Machine, control: Control | None) -> dict[str, dict[str
             action = block.module.thrust.action
             bindings[action] = (*bindings.get(action, ()), HELD_KEY)
         bound[block.id] = bindings
+    return bound
+
+
+def channel_keys(machine: Machine) -> dict[str, dict[str, tuple[str, ...]]]:
+    """A key of its own for each action of each block, as a trial with a program has them.
+
+    Raises:
+        MachineNotPlayableError: There are more actions than keys.
+    """
+    actions = [(block.id, action) for block in machine.blocks.values() for action in block.bindings]
+    if len(actions) > len(_OWN_KEYS):
+        raise MachineNotPlayableError(
+            f"the machine's blocks have {len(actions)} actions; in the game a program has "
+            f"{len(_OWN_KEYS)} keys for them"
+        )
+    bound: dict[str, dict[str, tuple[str, ...]]] = {block: {} for block in machine.blocks}
+    for (block_id, action), key in zip(actions, _OWN_KEYS, strict=False):
+        bound[block_id][action] = (key,)
     return bound
 
 

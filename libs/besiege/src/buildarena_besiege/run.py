@@ -12,8 +12,15 @@ from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.header import header_lines
 from buildarena_besiege.exporting.level import level_file
 from buildarena_besiege.exporting.machine_file import CargoBox, Guids, block_records, machine_text
+from buildarena_besiege.exporting.pilot import pilot_lua
 from buildarena_besiege.exporting.probes import level_probes, ray_start
-from buildarena_besiege.exporting.script import FIRST_BLOCK, Reported, Telling, script_text
+from buildarena_besiege.exporting.script import (
+    FIRST_BLOCK,
+    Reported,
+    Telling,
+    reference_lua,
+    script_text,
+)
 from buildarena_besiege.importing.rewriting import (
     has_file_data,
     restored_records,
@@ -24,6 +31,7 @@ from buildarena_besiege.keys import (
     bindings_of,
     bound_presses,
     cannons,
+    channel_keys,
     held_edges,
     key_edges,
 )
@@ -62,7 +70,7 @@ class GameRun:
         key_changes: What the script does to keys: time in seconds, key, whether it goes down.
         scenario: What the machine is put through.
         needs_script: Whether a score needs what only the script does or reports: the cargo's
-            growing mass, or which cannons burn.
+            growing mass, which cannons burn, or what a program asks for.
         block_ids: The ids of the file's blocks in its order, by their guids; the cargo's is
             "Ballast".
         bindings: The keys of each block's actions in this trial, by block id.
@@ -102,6 +110,7 @@ class PreparedMachine:
         script: Its script.
         tracked: Ids of the blocks the script reports, the cargo apart.
         edges: When the script presses and lets go of keys.
+        piloted: Whether the machine's program acts in their place.
     """
 
     pose: GlobalPose
@@ -109,6 +118,7 @@ class PreparedMachine:
     script: str
     tracked: tuple[str, ...] = ()
     edges: tuple[Edge, ...] = ()
+    piloted: bool = False
 
 
 def prepare_run(
@@ -135,6 +145,7 @@ def prepare_run(
 
     Raises:
         MachineNotPlayableError: The game cannot take the machine, or play the scenario.
+        ControllerFailed: The machine's program cannot be read, or the scenario takes none.
         ValueError: The name or the run's id cannot be used.
     """
     _require_name(name)
@@ -161,9 +172,13 @@ def prepare_run(
             (edge.update / UPDATES_PER_S, edge.key, edge.down) for edge in prepared.edges
         ),
         scenario=scenario,
-        needs_script=scenario.cargo is not None or scenario.control.mode == "held",
+        needs_script=scenario.cargo is not None
+        or scenario.control.mode == "held"
+        or prepared.piloted,
         block_ids={record.guid: record.part for record in prepared.records},
-        bindings=bindings_of(machine, scenario.control),
+        bindings=channel_keys(machine)
+        if prepared.piloted
+        else bindings_of(machine, scenario.control),
     )
 
 
@@ -192,6 +207,10 @@ def plain_machine_file(
     """
     _require_name(name)
     _require_playable(machine)
+    if machine.controller:
+        raise MachineNotPlayableError(
+            "a program acts in a task's trial alone, whose senses it is told: name a task"
+        )
     presses = tuple(machine.control_sequence if controls is None else controls)
     keys = bindings_of(machine, None)
     edges = key_edges(bound_presses(presses, machine))
@@ -217,7 +236,10 @@ def prepared_machine(
     presses = tuple(machine.control_sequence if controls is None else controls)
     control = None if scenario is None else scenario.control
     effective = bound_presses(presses, machine)
+    piloted = scenario is not None and bool(machine.controller) and controls is None
     played = effective if control is None or control.mode == "agent" else ()
+    if piloted:
+        played = ()
     edges = key_edges(played)
     if control is not None and control.mode == "held":
         edges = held_edges(machine, control)
@@ -225,7 +247,8 @@ def prepared_machine(
     if scenario is not None and scenario.cargo is not None:
         root = cargo_root(machine, scenario.cargo.drop_height)
         box = CargoBox(size=scenario.cargo.size, root=root)
-    records = block_records(machine, Guids(new_guid), keys=bindings_of(machine, control), cargo=box)
+    keys = channel_keys(machine) if piloted else bindings_of(machine, control)
+    records = block_records(machine, Guids(new_guid), keys=keys, cargo=box)
     tracked = () if scenario is None else tracked_blocks(machine, scenario)
     references = {record.part: record.reference_key for record in records}
     references[records[0].part] = FIRST_BLOCK
@@ -239,9 +262,14 @@ def prepared_machine(
             probes=tuple((probe.east, probe.north) for probe in level_probes(scenario)),
             ray_start=ray_start(scenario),
         )
+    pilot = ""
+    if scenario is not None and piloted:
+        named = {part: reference_lua(reference) for part, reference in references.items()}
+        pilot = pilot_lua(machine, scenario, records, named)
     script = script_text(
-        header_lines(machine, records, presses),
+        header_lines(machine, records, presses, piloted=piloted),
         edges,
+        pilot=pilot,
         cargo=None if scenario is None else scenario.cargo,
         cargo_reference=references.get(CARGO_ID, ""),
         telling=telling,
@@ -252,6 +280,7 @@ def prepared_machine(
         script=script,
         tracked=tracked,
         edges=tuple(edges),
+        piloted=piloted,
     )
 
 
@@ -290,8 +319,6 @@ def _reported(
 def _require_playable(machine: Machine) -> None:
     if not machine.blocks:
         raise MachineNotPlayableError("The machine has no blocks.")
-    if machine.controller:
-        raise MachineNotPlayableError("the game plays keys, no controller: use another engine")
     if machine.part_count > MAX_PARTS:
         raise MachineNotPlayableError(
             f"The machine has {machine.part_count} parts; more than {MAX_PARTS} are not played."
@@ -321,5 +348,7 @@ def _require_sayable(scenario: Scenario) -> None:
         raise MachineNotPlayableError("the game lets no machine go in the air: use another engine")
     if scenario.cargo is not None and scenario.cargo.at is not None:
         raise MachineNotPlayableError("the game's cargo falls onto the machine: use another engine")
+    if scenario.gusts is not None:
+        raise MachineNotPlayableError("the game has no gusts: use another engine")
     if scenario.gravity != GRAVITY or scenario.drive_strength != 1:
         raise MachineNotPlayableError("the game has one gravity and drives of one strength")

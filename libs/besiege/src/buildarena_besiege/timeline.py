@@ -93,10 +93,13 @@ def control_timeline(
                 continue
             (active.add if on else active.discard)((block_id, action))
             channel = channel_of(machine, block_id, action)
-            value = 1.0 if on else 0.0
-            block = numbers[block_id]
-            events.append({"time": time_s, "block": block, "channel": channel, "value": value})
+            events.append(event(time_s, numbers[block_id], channel, 1.0 if on else 0.0))
     return {"schema": SCHEMA, "events": events}
+
+
+def event(time_s: float, block: int, channel: str, value: float) -> dict[str, Any]:
+    """One entry of a timeline: from a time on, a channel of a block has a value, 0 to 1."""
+    return {"time": time_s, "block": block, "channel": channel, "value": value}
 
 
 def channel_of(machine: Machine, block_id: str, action: str) -> str:
@@ -105,7 +108,10 @@ def channel_of(machine: Machine, block_id: str, action: str) -> str:
     Raises:
         MachineNotPlayableError: None is known.
     """
-    module = machine.blocks[block_id].module
+    part = machine.blocks.get(block_id)
+    if part is None:
+        raise MachineNotPlayableError(f"no channel is known of {action} of connector {block_id}")
+    module = part.module
     entry = key_entries(module).get(action, "")
     channel = _OF_TYPE.get((module.besiege_id, entry)) or _CHANNELS.get(entry)
     if channel is None:

@@ -59,6 +59,8 @@ def begin_fields(
 def run_digest(machine: Machine, scenario: Scenario, tracked: tuple[str, ...]) -> int:
     """A number by which a log is known to be of this machine and scenario."""
     places = [f"{part.id} {part.module.name}" for part in machine.state.parts]
+    if machine.controller:
+        places.append(machine.controller)
     return zlib.crc32("\n".join([scenario.model_dump_json(), *tracked, "", *places]).encode())
 
 

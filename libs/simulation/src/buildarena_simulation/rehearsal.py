@@ -91,7 +91,7 @@ def rehearsed(
             Answered(
                 time_s=now,
                 senses={name: values[names[name]] for name in shown},
-                actions={pilot.action_names[key]: level for key, level in levels.items()},
+                actions={pilot.channels.names[key]: level for key, level in levels.items()},
             )
         )
         if time.process_time() - began > MAX_REHEARSAL_S:

@@ -72,8 +72,9 @@ class HeadlessDesktop:
         """Checks that the run needs no script."""
         if run.needs_script:
             raise PermanentError(
-                "a headless game runs no script: it cannot make a cargo heavier or tell whether a "
-                "cannon burns, which this task needs; run it in a game with a window",
+                "a headless game runs no script: it cannot make a cargo heavier, tell whether a "
+                "cannon burns or ask a program, which this trial needs; run it in a game with a "
+                "window",
                 reason="needs_script",
             )
 

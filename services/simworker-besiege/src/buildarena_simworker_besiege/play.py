@@ -11,7 +11,7 @@ from typing import Final
 import structlog
 
 from buildarena_besiege import GameRun, LogIncompleteError
-from buildarena_simulation import Trajectory
+from buildarena_simulation import MachineNotSimulable, Trajectory
 from buildarena_simworker_besiege.desktop import Desktop, RunLog
 from buildarena_simworker_besiege.errors import (
     DesktopError,
@@ -86,6 +86,7 @@ def play(
 
     Raises:
         RunFailedError: No attempt came to an end.
+        MachineNotSimulable: The machine's program failed.
     """
     faults: list[str] = []
     screenshots: list[bytes] = []
@@ -105,6 +106,8 @@ def play(
             screenshots += _pictures(desktop)
             _start_clean(desktop, faults)
             continue
+        except MachineNotSimulable:  # its program failed, in a run that ended as others do
+            raise
         except BaseException:
             _start_clean(desktop, faults)
             raise

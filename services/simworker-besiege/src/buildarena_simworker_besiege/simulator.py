@@ -18,6 +18,7 @@ from buildarena_pipeline.runtime.simulators.simulator import (
     TrialRequest,
     TrialResult,
 )
+from buildarena_simulation import MachineNotSimulable
 from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import NeedsPersonError, NotSetUpError
 from buildarena_simworker_besiege.game_simulator import GameSimulator
@@ -73,7 +74,7 @@ class BesiegeSimulator(GameSimulator):
                 require_held=trial.require_held,
                 limits=self._settings.time_limits,
             )
-        except MachineNotPlayableError as error:
+        except (MachineNotPlayableError, MachineNotSimulable) as error:
             raise MachineRefusedError(str(error)) from error
         except NeedsPersonError as error:
             raise SimulatorFaultError(str(error), delay_s=PERSON_WAIT_S, endless=True) from error

@@ -6,7 +6,7 @@ game says these lines again under the id of the run that it plays.
 """
 
 import gzip
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,6 +55,9 @@ class Recorded:
 
     def turn(self, number: int, sample: int) -> tuple[float, ...]:
         """How that block is turned, (w, x, y, z) in Besiege's components."""
+        if self.prepared.records[number].part == CARGO_ID:
+            of_cargo = besiege_turn(_plain(self.trajectory.cargo_quaternion[sample]))
+            return multiply(of_cargo, self.prepared.records[number].rotation)
         column = self._column(self.prepared.records[number].part)
         turned = _matrix(self.trajectory.quaternions[sample, column]) @ self._began(column)
         return multiply(
@@ -88,18 +91,41 @@ def recorded(machine: Machine, scenario: Scenario) -> Recorded:
     )
 
 
-def log_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
-    """What the run's script prints, each line once, without the run's mark and the check sum."""
+def between(told: Callable[[int, int], tuple[float, ...]], samples: int) -> Any:
+    """Where, or how, a block is at an update: between the trajectory's samples in a line."""
+
+    def at(number: int, update: int) -> Any:
+        sample, rest = divmod(update, UPDATES_PER_SAMPLE)
+        first, second = (np.array(told(number, min(k, samples - 1))) for k in (sample, sample + 1))
+        if len(first) == len("wxyz") and first @ second < 0:  # the same turn
+            second = -second
+        return tuple((first + (second - first) * rest / UPDATES_PER_SAMPLE).tolist())
+
+    return at
+
+
+def game_of(run: Recorded, scenario: Scenario) -> LuaGame:
+    """The run's script, played in a game whose blocks move as the engine has it."""
     records = run.prepared.records
     references: dict[Any, int] = {r.reference_key: i for i, r in enumerate(records)}
     references[0] = references.pop(records[0].reference_key)
-    game = LuaGame(
+    smooth = run.prepared.piloted
+    samples = scenario.sample_count
+    return LuaGame(
         references,
         version="lua52",
         ground=lambda east, north: height_at(scenario.terrain, east, north),
-        path=lambda number, update: run.root(number, update // UPDATES_PER_SAMPLE),
+        path=between(run.root, samples)
+        if smooth
+        else lambda number, update: run.root(number, update // UPDATES_PER_SAMPLE),
+        turn=between(run.turn, samples),
         burning=lambda number, update: run.burns(number, update // UPDATES_PER_SAMPLE),
     ).play(run.prepared.script, round(scenario.duration_s * 100))
+
+
+def log_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
+    """What the run's script prints, each line once, without the run's mark and the check sum."""
+    game = game_of(run, scenario)
     log = GameLog(RUN)
     log.read("\n".join(game.lines))
     for line in log.lines:
@@ -133,7 +159,12 @@ def _quaternion(matrix: np.ndarray) -> tuple[float, float, float, float]:
     from scipy.spatial.transform import Rotation
 
     x, y, z, w = Rotation.from_matrix(matrix).as_quat()
-    return (float(w), float(x), float(y), float(z))
+    return _plain((w, x, y, z))
+
+
+def _plain(quaternion: Any) -> tuple[float, float, float, float]:
+    w, x, y, z = map(float, quaternion)
+    return (w, x, y, z)
 
 
 def played_runs() -> dict[str, tuple[Machine, Scenario]]:

@@ -33,6 +33,7 @@ def header_lines(
     *,
     plain: bool = False,
     of_file: bool = False,
+    piloted: bool = False,
 ) -> list[str]:
     """The comment lines of a machine's script.
 
@@ -42,6 +43,7 @@ def header_lines(
         presses: The control sequence it is played with.
         plain: Whether it is for no trial.
         of_file: Whether the machine was read from a file, whose data stands in this one.
+        piloted: Whether its program acts, which has keys of its own in the file.
     """
     state = machine.state
     parts = {part.id: part for part in state.parts}
@@ -65,6 +67,8 @@ def header_lines(
         "next_id": state.next_id,
         **({"plain": True} if plain else {}),
         **({"of_file": True} if of_file else {}),
+        **({"controller": machine.controller} if machine.controller else {}),
+        **({"piloted": True} if piloted else {}),
     }
     return [
         "Plays a trial of BuildArena. The next line tells what the blocks of this file do not.",

@@ -7,11 +7,11 @@ dot; with a colon the table itself would become the first argument.
 
 from __future__ import annotations
 
-import string
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from buildarena_besiege.check_sums import FACTOR, MODULUS
+from buildarena_besiege.exporting.lua_texts import lua_text
 from buildarena_besiege.keys import UPDATES_PER_S
 
 if TYPE_CHECKING:
@@ -40,8 +40,6 @@ EARLY_AGAIN: Final = (100, 200)
 
 MAX_EARLY_LINES: Final = 150
 """Lines that are printed again at most: half of what the log window keeps."""
-
-_PLAIN: Final = frozenset((string.ascii_letters + string.digits + "_-.,:% ").encode())
 
 FIRST_BLOCK: Final = "0"
 """How the script names the machine's first block; the mod gives that one no reference key."""
@@ -90,6 +88,7 @@ def script_text(
     cargo: Cargo | None = None,
     cargo_reference: str = "",
     telling: Telling | None = None,
+    pilot: str = "",
 ) -> str:
     """A trial's script.
 
@@ -99,13 +98,16 @@ def script_text(
         cargo: The cargo whose mass grows, if there is one.
         cargo_reference: The cargo's reference key.
         telling: What is reported; nothing if left out.
+        pilot: What lets a program act in place of the edges, see `pilot_lua`.
     """
     parts = [*(f"-- {line}" for line in header), _STATE, _keys(edges)]
     if cargo is not None:
         parts.append(_cargo(cargo, cargo_reference))
     if telling is not None:
         parts += [_telling_tables(telling), _REPORT]
-    calls = ["  updates = updates + 1", "  move_keys()"]
+    if pilot:
+        parts.append(pilot)
+    calls = ["  updates = updates + 1", "  pilot()" if pilot else "  move_keys()"]
     if cargo is not None:
         calls.insert(1, "  weigh()")
     if telling is not None:
@@ -113,14 +115,6 @@ def script_text(
     play = "  cargo = machine.get_refs_control(cargo_key)" if cargo is not None else ""
     parts.append(_ENDING.replace("--PLAY--", play).replace("--CALLS--", "\n".join(calls)))
     return "\n".join(part.strip("\n") for part in parts) + "\n"
-
-
-def lua_text(text: str) -> str:
-    """A Lua string that means the text, whatever it holds."""
-    safe = "".join(
-        chr(byte) if byte in _PLAIN else f"\\{byte:03d}" for byte in text.encode("utf-8", "replace")
-    )
-    return f'"{safe}"'
 
 
 def _keys(edges: Sequence[Edge]) -> str:
@@ -172,7 +166,12 @@ def _telling_tables(telling: Telling) -> str:
 
 
 def _reference(block: Reported) -> str:
-    return FIRST_BLOCK if block.reference == FIRST_BLOCK else lua_text(block.reference)
+    return reference_lua(block.reference)
+
+
+def reference_lua(reference: str) -> str:
+    """What the script calls a block, as Lua."""
+    return FIRST_BLOCK if reference == FIRST_BLOCK else lua_text(reference)
 
 
 _STATE = """

@@ -14,7 +14,7 @@ from buildarena_besiege.exporting.machine_file import (
     machine_text,
 )
 from buildarena_besiege.importing.xml_file import is_number, without_blanks
-from buildarena_besiege.keys import HELD_KEY, bindings_of
+from buildarena_besiege.keys import HELD_KEY, bindings_of, channel_keys
 from buildarena_besiege.names import key_entries
 from buildarena_besiege.placement import AS_BUILT
 
@@ -42,7 +42,8 @@ def says_more(
         machine: The machine of both.
         ids: The parts of the machine by the numbers of the file's blocks; others are the task's.
     """
-    bindings = bindings_of(machine, None)
+    piloted = header.get("piloted") is True
+    bindings = channel_keys(machine) if piloted else bindings_of(machine, None)
     records = block_records(machine, Guids(), keys=bindings)
     of_part = {record.part: record for record in records}
     plain = header.get("plain") is True

@@ -80,13 +80,15 @@ def described_machine(
         ):
             raise HeaderError("it tells of other blocks than the file's")
         plain = header.get("plain") is True
-        entries = [_entry(*by_id[block_id], plain=plain) for block_id in order]
+        piloted = header.get("piloted") is True
+        entries = [_entry(*by_id[block_id], plain=plain, piloted=piloted) for block_id in order]
         document = {
             "version": 1,
             "blocks": [entry for entry in entries if "span" not in entry],
             "joints": [],
             "connectors": [entry for entry in entries if "span" in entry],
             "control_sequence": presses_of(header),
+            **({"controller": header["controller"]} if "controller" in header else {}),
             "structures": [
                 {"letter": letter, "source": source, "root": root}
                 for letter, source, root in header["structures"]
@@ -128,7 +130,7 @@ def presses_of(header: dict[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _entry(part: Part, described: dict[str, Any], *, plain: bool) -> dict[str, Any]:
+def _entry(part: Part, described: dict[str, Any], *, plain: bool, piloted: bool) -> dict[str, Any]:
     common: dict[str, Any] = {
         "id": described["id"],
         "module": part.module.name,
@@ -147,12 +149,15 @@ def _entry(part: Part, described: dict[str, Any], *, plain: bool) -> dict[str, A
             "end": described["end"],
             "span": described["span"],
         }
+    bindings = described.get("bindings", {})
+    if not piloted:
+        bindings = _bindings(part, {} if plain else bindings)
     return {
         **common,
         "mount": described.get("mount"),
         "lost_mount": described.get("lost_mount"),
         "flipped": part.flipped,
-        "bindings": _bindings(part, {} if plain else described.get("bindings", {})),
+        "bindings": bindings,
     }
 
 

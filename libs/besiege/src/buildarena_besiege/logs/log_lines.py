@@ -3,11 +3,15 @@
     ba,<run>,b,<version>,<presses>,<digest>,<sum>
     ba,<run>,w,<gravity>,<entities>,<width>,<height>{,<ground>},<sum>
     ba,<run>,s,<update>,<part>,<parts>{,<number>,<state>,<x>,<y>,<z>},<sum>
+    ba,<run>,p,<update>,<part>,<parts>{,<figure>},<sum>
+    ba,<run>,f,<update>,<sum>
     ba,<run>,e,<update>,<sum>
 
-A number counts the reported blocks from 1, the cargo last. A state is the cargo's mass, whether a
-cannon burns (0 or 1), "x" once the game destroyed the block, or "-". Coordinates are Besiege's: x
-east, y up, z north. A ground is a height, "b" where a block is in the way, or "-" for none.
+Lines of kind p are of a program: what it sensed, and then how far each action was asked for, with
+six decimals; f says that it failed. A number counts the reported blocks from 1, the cargo last. A
+state is the cargo's mass, whether a cannon burns (0 or 1), "x" once the game destroyed the block,
+or "-". Coordinates are Besiege's: x east, y up, z north. A ground is a height, "b" where a block is
+in the way, or "-" for none.
 """
 
 from __future__ import annotations
@@ -35,6 +39,10 @@ _SAMPLE: Final = re.compile(rf",s,({_NUMBER}),({_NUMBER}),({_NUMBER})((?:{_ENTRY
 _WORLD: Final = re.compile(
     rf",w,({_DECIMAL}),({_NUMBER}|-),({_NUMBER}),({_NUMBER})((?:,(?:-|b|{_DECIMAL}))*)", re.ASCII
 )
+_FIGURES: Final = re.compile(
+    rf",p,({_NUMBER}),({_NUMBER}),({_NUMBER})((?:,-?[0-9]{{1,10}}\.[0-9]{{6}})*)", re.ASCII
+)
+_FAILED: Final = re.compile(rf",f,({_NUMBER})", re.ASCII)
 _END: Final = re.compile(rf",e,({_NUMBER})", re.ASCII)
 
 
@@ -73,12 +81,13 @@ class Line:
     """A line that counts.
 
     Attributes:
-        kind: "b", "w", "s" or "e".
+        kind: "b", "w", "s", "p", "f" or "e".
         update: the script's update that it reports; 0 of a begin line.
-        part: which part of a sample, from 1; 0 elsewhere.
-        parts: how many parts the sample has; 0 elsewhere.
+        part: which part of a sample or of a program's figures, from 1; 0 elsewhere.
+        parts: how many parts those have; 0 elsewhere.
         fields: of a begin line: version, key presses, digest.
         entries: of a sample line: the entry of each block, by number.
+        figures: of a line of a program: what it says.
         world: of a line about the level: what it says.
         text: the whole line.
     """
@@ -90,12 +99,13 @@ class Line:
     parts: int = 0
     fields: tuple[int, ...] = ()
     entries: tuple[tuple[int, Entry], ...] = ()
+    figures: tuple[float, ...] = ()
     world: World | None = None
 
     @property
     def key(self) -> tuple[int, int, int]:
         """What it reports; lines of one key must be alike. Sorts into the order of printing."""
-        return ("bwse".index(self.kind), self.update, self.part)
+        return ("bwspfe".index(self.kind), self.update, self.part)
 
 
 def line_of(text: str, prefix: str) -> Line | None:
@@ -120,6 +130,13 @@ def _read(text: str, rest: str) -> Line | None:
         entries = _entries(match[4])
         line = Line(kind="s", text=text, update=update, part=part, parts=parts, entries=entries)
         return line if sound else None
+    if match := _FIGURES.fullmatch(rest):
+        update, part, parts = (int(match[i]) for i in (1, 2, 3))
+        figures = tuple(map(float, match[4].split(",")[1:]))
+        line = Line(kind="p", text=text, update=update, part=part, parts=parts, figures=figures)
+        return line if 1 <= part <= parts and update > 0 else None
+    if match := _FAILED.fullmatch(rest):
+        return Line(kind="f", text=text, update=int(match[1]))
     if match := _END.fullmatch(rest):
         return Line(kind="e", text=text, update=int(match[1]))
     if match := _WORLD.fullmatch(rest):

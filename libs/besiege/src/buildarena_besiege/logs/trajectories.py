@@ -25,6 +25,7 @@ from buildarena_besiege.logs.orientation import (
     placed_quaternions,
     turned,
 )
+from buildarena_besiege.logs.piloted import piloted_again
 from buildarena_besiege.placement import global_pose
 from buildarena_besiege.tracking import tracked_blocks
 from buildarena_geometry.besiege_components import besiege_turn
@@ -32,6 +33,7 @@ from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Quaternion
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.trajectory import (
+    Piloting,
     Setting,
     Trajectory,
     rounded_positions,
@@ -68,6 +70,7 @@ class Samples:
         mass: (T,) the cargo's; None without cargo.
         quaternions: (T, N, 4) world_from_block, if the log has them.
         of_roots: Whether positions are those of the blocks' roots; otherwise of their centres.
+        piloting: What a program sensed and asked for; None where none acted.
     """
 
     block_ids: tuple[str, ...]
@@ -78,6 +81,7 @@ class Samples:
     mass: NDArray[np.float64] | None = None
     quaternions: NDArray[np.float64] | None = None
     of_roots: bool = True
+    piloting: Piloting | None = None
     settings: Mapping[str, Setting] = field(default_factory=dict)
 
 
@@ -94,10 +98,13 @@ def trajectory_of(
         mod: Version of the mod that runs the script.
 
     Raises:
-        LogIncompleteError: Something is missing, or two lines contradict each other.
+        LogIncompleteError: Something is missing, two lines contradict each other, or the
+            machine's program does not answer again what the log says it did.
+        ControllerFailed: The machine's program failed.
     """
     tracked = tracked_blocks(machine, scenario)
     presses = require_whole(log, machine, scenario, tracked)
+    pilot = piloted_again(log, machine, scenario)
     count = len(tracked) + (scenario.cargo is not None)
     reported = log_samples(log, scenario, count)
     known = ~np.isnan(reported[:, :, 0]) if count else np.ones((len(reported), 0), dtype=bool)
@@ -111,8 +118,10 @@ def trajectory_of(
         destroyed=latest(reported[:, : len(tracked), 5], known[:, : len(tracked)]) > 0.0,
         cargo=whole[:, -1, 1:4] if scenario.cargo is not None else None,
         mass=whole[:, -1, 4] if scenario.cargo is not None else None,
+        piloting=None if pilot is None else pilot.piloting(),
         settings={
-            "effective_key_presses": presses,
+            **({} if pilot is None else pilot.settings()),
+            "effective_key_presses": presses if pilot is None else len(pilot.holds()),
             "filled_samples": int((~known[1:]).any(axis=1).sum()) if count else 0,
             "longest_gap_s": round(longest / SAMPLE_RATE_HZ, 6),
             **level_settings(log),
@@ -168,6 +177,7 @@ def made_trajectory(
         pieces=pieces,
         joint_peaks=(),
         breaks=(),
+        piloting=samples.piloting,
         engine=ENGINE,
         engine_version=version,
         simulation_version=READING_VERSION,

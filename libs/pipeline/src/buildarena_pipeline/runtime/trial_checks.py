@@ -100,6 +100,8 @@ def checked_trajectory(
     if simulator == BESIEGE:
         same("engine_version", trajectory.engine_version, version)
         _require_game(trajectory, machine, scenario)
+        if piloted:
+            _require_program(trajectory, machine)
     else:
         same("simulation_version", trajectory.simulation_version, version)
         _require_engine(trajectory, machine, world, seed)
@@ -158,9 +160,7 @@ def _require_presses(
 ) -> None:
     """Checks that the keys were pressed that this run has, and no others."""
     if machine.controller and controls is None:
-        # What a program asks for is known only by running it, which verification does.
-        wanted = controller_digest(machine.controller)
-        require(trajectory.settings.get(CONTROLLER) == wanted, "its controller is another one")
+        _require_program(trajectory, machine)
         return
     asked: Sequence[KeyHold] = machine.control_sequence if controls is None else controls
     control = scenario.control
@@ -169,6 +169,12 @@ def _require_presses(
     presses = ended_presses(asked, control)
     wanted = written_presses(reaching(bindings_of(machine), presses))
     require(trajectory.settings.get(PRESSES) == wanted, "its key presses are another run's")
+
+
+def _require_program(trajectory: Trajectory, machine: Machine) -> None:
+    # What a program asks for is known only by running it, which verification does.
+    wanted = controller_digest(machine.controller)
+    require(trajectory.settings.get(CONTROLLER) == wanted, "its controller is another one")
 
 
 def _tracked(structure: Structure, scenario: Scenario) -> tuple[str, ...]:

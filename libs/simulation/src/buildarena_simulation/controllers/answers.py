@@ -22,23 +22,29 @@ class Channels:
         structure: The machine.
         bindings: The actions of each part, the blocks and then the springs.
         ids: (N + K,) their ids.
+
+    Attributes:
+        names: What each action of each part is called, see `channel`.
+        named: The actions of parts that each name is for.
+        opposites: The action that does the opposite of another, for those that have one.
     """
 
     def __init__(self, structure: "Structure", bindings: Bindings, ids: Sequence[str]) -> None:
-        self._opposites = _opposites(structure)
-        self._named: dict[str, list[tuple[int, str]]] = {}
+        self.opposites = _opposites(structure)
+        self._switches = _switches(structure)
+        self.named: dict[str, list[tuple[int, str]]] = {}
         self.names: dict[tuple[int, str], str] = {}
         for part, actions in enumerate(bindings):
             for action in actions:
-                self._named.setdefault(action, []).append((part, action))
+                self.named.setdefault(action, []).append((part, action))
                 self.names[part, action] = channel(ids[part], action)
-        self._named.update((name, [key]) for key, name in self.names.items())
+        self.named.update((name, [key]) for key, name in self.names.items())
 
     def axes(self) -> dict[str, float]:
         """The least number for each action: -1 for the first of two opposites, otherwise 0."""
         axes: dict[str, float] = {}
         for (part, action), name in self.names.items():
-            opposite = self._opposites.get((part, action))
+            opposite = self.opposites.get((part, action))
             if opposite is None:
                 axes[name] = 0.0
             elif self.names.get((part, opposite)) not in axes:
@@ -62,16 +68,20 @@ class Channels:
                 asked[key] = min(max(answers[name], -1.0), 1.0)
         levels: dict[tuple[int, str], float] = {}
         for (part, action), share in asked.items():
-            wanted = action if share >= 0 else self._opposites.get((part, action))
+            wanted = action if share >= 0 else self.opposites.get((part, action))
             if wanted is not None:
                 levels[part, wanted] = max(abs(share), levels.get((part, wanted), 0.0))
         return levels
 
+    def takes_share(self, part: int, action: str) -> bool:
+        """Whether an action may be asked for in part; others are on above a half."""
+        return (part, action) not in self._switches
+
     def _parts_of(self, name: str) -> list[tuple[int, str]]:
-        parts = self._named.get(name)
+        parts = self.named.get(name)
         if parts is not None:
             return parts
-        near = difflib.get_close_matches(name, self._named, n=_NEAR, cutoff=0.4)
+        near = difflib.get_close_matches(name, self.named, n=_NEAR, cutoff=0.4)
         names = near or sorted({action for _, action in self.names})
         shown = ", ".join(names) or "none: no block of this machine has an action"
         raise ControllerFailed(f"there is no action {name[:60]!r}; there is {shown}")
@@ -86,6 +96,21 @@ def constant(levels: Mapping[tuple[int, str], float], count: int) -> Levels:
         return np.full(count, share) if share else none
 
     return level
+
+
+def _switches(structure: "Structure") -> set[tuple[int, str]]:
+    """The actions that are only on or off."""
+    switches = {
+        (len(structure) + k, spring.contract)
+        for k, spring in enumerate(structure.ropes.spring_of)
+        if spring.contract is not None
+    }
+    for index, part in enumerate(structure.parts):
+        if part.module.decouple is not None:
+            switches.add((index, part.module.decouple.action))
+        if part.module.grip is not None:
+            switches |= {(index, part.module.grip.grab), (index, part.module.grip.release)}
+    return switches
 
 
 def _opposites(structure: "Structure") -> dict[tuple[int, str], str]:

@@ -33,6 +33,14 @@ end
 
 local function hook() spend(STEP) end
 
+-- What stands in place of the senses of a program that shall read none.
+local looked = false
+local function look()
+  looked = true
+  raw_error("it reads a sense", 2)
+end
+local nothing = setmetatable({}, { __index = look, __newindex = look, __len = look })
+
 -- Numbers, then texts, then true and false.
 local RANK = { number = 1, string = 2, boolean = 3 }
 local function before(a, b)
@@ -44,6 +52,7 @@ end
 
 local function sorted_keys(t)
   if raw_type(t) ~= "table" then raw_error("a table is expected, got " .. raw_type(t), 3) end
+  if t == nothing then look() end
   local keys, n = {}, 0
   for key in raw_next, t do
     if not RANK[raw_type(key)] then
@@ -141,10 +150,30 @@ local function random(low, high)
   return low + floor(share * (high - low + 1))
 end
 
-local own_math = { random = random, pi = math.pi, huge = math.huge }
+-- What interpreters do each in their own way; the game's has a `fmod`, `modf` and `huge` of its own.
+local atan2, log, abs, ceil, infinite = math.atan2, math.log, math.abs, math.ceil, 1 / 0
+local own_math = { random = random, pi = math.pi, huge = infinite }
+
+function own_math.atan(y, x) return atan2(y, x or 1) end
+
+function own_math.log(x, base)
+  if base == nil then return log(x) end
+  return log(x) / log(base)
+end
+
+function own_math.fmod(a, b)
+  local rest = abs(a) % abs(b)
+  return a < 0 and -rest or rest
+end
+
+function own_math.modf(x)
+  if abs(x) == infinite then return x, 0 end
+  local whole = x < 0 and ceil(x) or floor(x)
+  return whole, x - whole
+end
+
 for _, name in raw_ipairs({
-  "abs", "acos", "asin", "atan", "ceil", "cos", "exp", "floor", "fmod", "log", "max", "min", "modf",
-  "sin", "sqrt", "tan",
+  "abs", "acos", "asin", "ceil", "cos", "exp", "floor", "max", "min", "sin", "sqrt", "tan",
 }) do
   own_math[name] = math[name]
 end
@@ -217,6 +246,13 @@ end
 function driver.senses_are(source)
   make_senses = raw_assert(read(source, "=senses", "t", {}))()
 end
+
+function driver.sense_nothing()
+  make_senses = function() return nothing end
+  latest = {}
+end
+
+function driver.looked() return looked end
 
 function driver.take(...)
   latest = { ... }

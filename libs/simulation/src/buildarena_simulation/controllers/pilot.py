@@ -39,9 +39,10 @@ class Pilot:
 
     Attributes:
         layout: The names of what it senses, as `Program.senses_are` takes them.
+        sensing: What makes its senses.
+        channels: What may be asked of it.
         sense_names: The same as a trajectory has them, in the order of the numbers.
         axes: See `Channels.axes`.
-        action_names: Names of the actions of each part.
 
     Raises:
         ControllerFailed: The machine has no such block, or the scenario offers no senses.
@@ -58,12 +59,11 @@ class Pilot:
         seed: int,
     ) -> None:
         _require_senses(scenario)
-        self._sensing = Sensing(structure, scenario, sensors, seed=seed)
-        self._channels = Channels(structure, bindings, ids)
-        self.layout = self._sensing.layout
+        self.sensing = Sensing(structure, scenario, sensors, seed=seed)
+        self.channels = Channels(structure, bindings, ids)
+        self.layout = self.sensing.layout
         self.sense_names = tuple(_flat(self.layout))
-        self.axes = self._channels.axes()
-        self.action_names = self._channels.names
+        self.axes = self.channels.axes()
         self._tick = 0
         self._since: dict[tuple[int, str], float] = {}
         self._holds: list[KeyHold] = []
@@ -72,7 +72,7 @@ class Pilot:
 
     def senses(self, seen: Seen) -> list[float]:
         """What is sensed at a tick, to be read once in each."""
-        return self._sensing.read(seen)
+        return self.sensing.read(seen)
 
     def levels(
         self, values: Sequence[float], answers: Mapping[str, float]
@@ -86,7 +86,7 @@ class Pilot:
         Raises:
             ControllerFailed: There is no such action.
         """
-        levels = self._channels.levels(answers)
+        levels = self.channels.levels(answers)
         self._sensed.append(list(values))
         self._asked.append(levels)
         self._note({key for key, share in levels.items() if share > 0})
@@ -111,7 +111,7 @@ class Pilot:
         return Piloting(
             sense_names=senses,
             senses=sensed,
-            action_names=tuple(self.action_names[key] for key in asked),
+            action_names=tuple(self.channels.names[key] for key in asked),
             answers=answers,
         )
 
@@ -129,7 +129,7 @@ class Pilot:
         """An action that was asked for until now."""
         return KeyPress(
             time_s=round(since, 6),
-            key=self.action_names[key],
+            key=self.channels.names[key],
             hold_for_s=round(self._tick / SAMPLE_RATE_HZ - since, 6),
         )
 
@@ -144,6 +144,9 @@ class ProgramPilot(Pilot):
         ids: Ids of the parts.
         scenario: What the machine is put through.
         seed: Of the program's random numbers and of the noise.
+
+    Attributes:
+        program: The program.
 
     Raises:
         ControllerFailed: The program cannot be read, names a block that there is not, or the
@@ -162,9 +165,9 @@ class ProgramPilot(Pilot):
     ) -> None:
         _require_senses(scenario)
         self._text = text
-        self._program = Program(text, seed=seed)
-        super().__init__(structure, bindings, ids, scenario, self._program.sensors, seed=seed)
-        self._program.senses_are(self.layout)
+        self.program = Program(text, seed=seed)
+        super().__init__(structure, bindings, ids, scenario, self.program.sensors, seed=seed)
+        self.program.senses_are(self.layout)
 
     def answered(self, seen: Seen) -> dict[tuple[int, str], float]:
         """What it asks for until the next tick; see `Channels.levels`.
@@ -172,8 +175,11 @@ class ProgramPilot(Pilot):
         Raises:
             ControllerFailed: It fails, takes too much, or names an action that there is not.
         """
-        values = self.senses(seen)
-        return self.levels(values, self._program.answer(self._tick, seen.time_s, values))
+        return self.answered_to(self.senses(seen), seen.time_s)
+
+    def answered_to(self, values: list[float], time_s: float) -> dict[tuple[int, str], float]:
+        """The same where these are its senses, in the order of the layout."""
+        return self.levels(values, self.program.answer(self._tick, time_s, values))
 
     def settings(self) -> dict[str, str]:
         """Which program acted."""

@@ -1,16 +1,17 @@
-"""A controller's program: Lua 5.4 from a stranger, within bounds of text, memory and time."""
+"""A controller's program: Lua 5.2 from a stranger, within bounds of text, memory and time.
+
+It is the Lua of the game's script mod: numbers are doubles and no more, so that a program answers
+alike in our engines and in the game.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES
 from buildarena_simulation.errors import ControllerFailed
-
-if TYPE_CHECKING:
-    pass
 
 MAX_MEMORY_BYTES: Final = 8 * 1024 * 1024
 MAX_INSTRUCTIONS: Final = 100_000
@@ -36,12 +37,22 @@ _BOUNDS: Final = {
     "memory": f"it took more than {MAX_MEMORY_BYTES // 2**20} MiB of memory",
 }
 
+_BITS: Final = "&, |, ~, << and >>: write * and / by powers of two"
+_NEWER: Final = {
+    "'/'": "//: write math.floor(a / b)",
+    **dict.fromkeys(("'&'", "'|'", "'~'", "'<'", "'>'"), _BITS),
+    r"'\u'": r"\u: write the bytes, as in \195\164",
+}
+"""What later versions of Lua have, by the token at which 5.2 stumbles, and what to write for it."""
+_ATTRIBUTES: Final = "<const> and <close>: write the name alone"
+
 Layout = Mapping[str, "Layout | int"]
 """Names of senses: each a further layout, or which of the numbers it is, from 0."""
 
 
 @cache
-def _environment() -> bytes:
+def environment_text() -> bytes:
+    """The Lua in which programs run, here and in the scripts of the game."""
     return files(__package__).joinpath("environment.lua").read_bytes()
 
 
@@ -70,7 +81,7 @@ class Program:
         self._time_s = 0.0
         self._clock_s = 0.0
         self._driver = self._guarded(lambda: _started(seed, most_s))
-        self._require(self._guarded(lambda: self._driver["read"](data)))
+        self._read(data)
         self.sensors = self._listed()
 
     def senses_are(self, layout: Layout) -> None:
@@ -79,8 +90,17 @@ class Program:
         Args:
             layout: The names; the program sees tables of tables.
         """
-        source = f"return function(v) return {_constructor(layout)} end"
-        self._guarded(lambda: self._driver["senses_are"](source.encode("latin-1", "replace")))
+        source = layout_source(layout).encode("latin-1", "replace")
+        self._guarded(lambda: self._driver["senses_are"](source))
+
+    def sense_nothing(self) -> None:
+        """Lets the program see no senses: it fails where it reads one, and `looked` is true."""
+        self._driver["sense_nothing"]()
+
+    @property
+    def looked(self) -> bool:
+        """Whether it tried to read a sense where there are none."""
+        return bool(self._driver["looked"]())
 
     def answer(self, tick: int, time_s: float, values: Sequence[float]) -> dict[str, float]:
         """What the program answers at a tick: names and numbers, as it gave them.
@@ -104,6 +124,17 @@ class Program:
             answers[name] = number
         return answers
 
+    def _read(self, data: bytes) -> None:
+        try:
+            self._require(self._guarded(lambda: self._driver["read"](data)))
+        except ControllerFailed as failure:
+            newer = _newer_syntax(data, failure)
+            if newer is None:
+                raise
+            raise ControllerFailed(
+                f"programs are Lua 5.2, which has no {newer}", line=failure.line
+            ) from None
+
     def _asked(self, time_s: float, values: Sequence[float]) -> Any:
         driver = self._driver
         driver["take"](*values[:_PER_CALL])
@@ -122,7 +153,7 @@ class Program:
 
     def _guarded(self, call: Any) -> Any:
         """What a call gives; whatever goes wrong inside of Lua is the program's failure."""
-        from lupa.lua54 import LuaError
+        from lupa.lua52 import LuaError
 
         try:
             return call()
@@ -154,7 +185,7 @@ class Program:
 
 
 def _started(seed: int, most_s: float) -> Any:
-    from lupa.lua54 import LuaRuntime
+    from lupa.lua52 import LuaRuntime
 
     runtime: LuaRuntime = LuaRuntime(
         unpack_returned_tuples=True,
@@ -164,8 +195,36 @@ def _started(seed: int, most_s: float) -> Any:
         max_memory=MAX_MEMORY_BYTES,
     )
     return runtime.execute(
-        _environment(), seed, MAX_INSTRUCTIONS, MAX_INSTRUCTIONS_IN_ALL, most_s, MAX_TEXTS_S
+        environment_text(), seed, MAX_INSTRUCTIONS, MAX_INSTRUCTIONS_IN_ALL, most_s, MAX_TEXTS_S
     )
+
+
+def _newer_syntax(data: bytes, failure: ControllerFailed) -> str | None:
+    """What a text that 5.2 refuses has of later versions; None where those refuse it too."""
+    from lupa.lua54 import LuaError, LuaRuntime
+
+    near = next((what for token, what in _NEWER.items() if f"near {token}" in str(failure)), None)
+    if near is None or failure.line is None:
+        return None
+    runtime: LuaRuntime = LuaRuntime(
+        register_eval=False,
+        register_builtins=False,
+        encoding="latin-1",
+        max_memory=MAX_MEMORY_BYTES,
+    )
+    try:
+        compiled = runtime.compile(data)  # and never run
+    except (LuaError, MemoryError):
+        return None
+    del compiled
+    lines = data.splitlines()
+    line = lines[failure.line - 1] if failure.line <= len(lines) else b""
+    return _ATTRIBUTES if re.search(rb"<\s*(const|close)\s*>", line) else near
+
+
+def layout_source(layout: Layout) -> str:
+    """Lua that gives a function from the list of a tick's numbers to the program's tables."""
+    return f"return function(v) return {_constructor(layout)} end"
 
 
 def _constructor(layout: Layout) -> str:

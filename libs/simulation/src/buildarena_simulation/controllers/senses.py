@@ -58,6 +58,10 @@ class Sensing:
 
     Attributes:
         layout: The names, as `Program.senses_are` takes them.
+        offers: The kinds of senses, in the order of their numbers.
+        blocks: Indices of the blocks that the program listed.
+        moving: Indices of the blocks of which joints tell.
+        noise: Of each number, its standard deviation.
 
     Raises:
         ControllerFailed: The machine has no such block.
@@ -68,7 +72,7 @@ class Sensing:
     ) -> None:
         self._structure, self._scenario = structure, scenario
         self._senses = scenario.senses or Senses(offers=())
-        self._offers = [kind for kind in get_args(SenseKind) if self._is_offered(kind)]
+        self.offers = [kind for kind in get_args(SenseKind) if self._is_offered(kind)]
         ids = structure.block_ids
         unknown = next((block for block in sensors if block not in ids), None)
         if unknown is not None:
@@ -76,17 +80,17 @@ class Sensing:
                 f"sensors names block {unknown[:40]!r}; the machine has {', '.join(ids[:_SHOWN])}"
                 + (", …" if len(ids) > _SHOWN else "")
             )
-        self._blocks = [ids.index(block) for block in dict.fromkeys(sensors)]
-        self._told = np.array([0, *self._blocks])
-        self._moving = [
+        self.blocks = [ids.index(block) for block in dict.fromkeys(sensors)]
+        self._told = np.array([0, *self.blocks])
+        self.moving = [
             index
             for index, part in enumerate(structure.parts)
             if part.physics.joint_type in MOVING_JOINTS and index not in structure.wheels
         ]
-        self._count, self._noise = 0, list[float]()
+        self._count, self.noise = 0, list[float]()
         self.layout = self._laid_out()
         self._draw = np.random.default_rng([seed, 2])
-        self._noisy = np.array(self._noise)
+        self._noisy = np.array(self.noise)
         self._past: deque[FloatArray] = deque(maxlen=self._senses.delay_ticks + 1)
         self._clusters: Clusters | None = None
         self._seats: dict[int, tuple[int, int]] = {}
@@ -112,8 +116,8 @@ class Sensing:
             "gates": partial(self._places_layout, self._scenario.gates),
         }
         # The starting block's own pose has no name of its own: `sense.position`.
-        named = self._pose() if "pose" in self._offers else {}
-        return named | {kind: layouts[kind]() for kind in self._offers if kind != "pose"}
+        named = self._pose() if "pose" in self.offers else {}
+        return named | {kind: layouts[kind]() for kind in self.offers if kind != "pose"}
 
     def _is_offered(self, kind: SenseKind) -> bool:
         """Whether the scenario offers a kind of senses, and has what it is about."""
@@ -122,15 +126,15 @@ class Sensing:
         return kind in self._senses.offers and bool(about.get(kind, True))
 
     def _blocks_layout(self) -> dict[str, Any]:
-        return {self._structure.parts[block].id: self._pose() for block in self._blocks}
+        return {self._structure.parts[block].id: self._pose() for block in self.blocks}
 
     def _joints_layout(self) -> dict[str, Any]:
         return {
             self._structure.parts[index].id: {
-                _place_of(self._structure, index): self._number("joint"),
+                place_of(self._structure, index): self._number("joint"),
                 "speed": self._number("joint_speed"),
             }
-            for index in self._moving
+            for index in self.moving
         }
 
     def _wheels_layout(self) -> dict[str, Any]:
@@ -166,7 +170,7 @@ class Sensing:
         return {axis: self._number(noise) for axis in _AXES}
 
     def _number(self, noise: str = "") -> int:
-        self._noise.append(self._senses.noise.get(noise, 0.0))  # type: ignore[call-overload]
+        self.noise.append(self._senses.noise.get(noise, 0.0))  # type: ignore[call-overload]
         self._count += 1
         return self._count - 1
 
@@ -182,12 +186,12 @@ class Sensing:
             "marks": lambda: _places((mark.center for mark in self._scenario.marks), own),
             "gates": lambda: _places(((*g.center, 0.0) for g in self._scenario.gates), own),
         }
-        for kind in self._offers:
+        for kind in self.offers:
             yield from values[kind]()
 
     def _joint_values(self, seen: Seen) -> Iterator[float]:
-        for index in self._moving:
-            sign = _forwards(self._structure, index)
+        for index in self.moving:
+            sign = forwards(self._structure, index)
             sides = self._seats.get(index)
             place, speed = _joint(self._structure, seen, index, sides) if sides else (0.0, 0.0)
             yield from (sign * place, sign * speed)
@@ -196,7 +200,7 @@ class Sensing:
         for index, force in zip(self._structure.wheels.tolist(), seen.on_wheels, strict=True):
             sides = self._seats.get(index)
             outward = _relative_spin(self._structure, seen, index, sides) if sides else 0.0
-            yield _forwards(self._structure, index) * outward
+            yield forwards(self._structure, index) * outward
             yield float(force > _TOUCHES)
 
     def _poses(self, seen: Seen) -> FloatArray:
@@ -226,12 +230,13 @@ def _places(centers: Iterable[Sequence[float]], own: FloatArray) -> Iterator[flo
         yield from (np.array(center) - own).tolist()
 
 
-def _forwards(structure: Structure, index: int) -> float:
+def forwards(structure: Structure, index: int) -> float:
     """The sign that makes what grows where a block's forward action moves it."""
     return -1.0 if structure.parts[index].forward_is_clockwise else 1.0
 
 
-def _place_of(structure: Structure, index: int) -> str:
+def place_of(structure: Structure, index: int) -> str:
+    """What a program is told of where a block is on its seat: a length or an angle."""
     return "length" if structure.parts[index].physics.joint_type == "slider" else "angle"
 
 
@@ -264,7 +269,7 @@ def _joint(
     own, base = sides
     motion, axis = seen.motion, structure.joints.axes[index]
     back = motion.rotation[base].T
-    if _place_of(structure, index) == "angle":
+    if place_of(structure, index) == "angle":
         turn = back @ motion.rotation[own]
         lever = np.array(
             [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]

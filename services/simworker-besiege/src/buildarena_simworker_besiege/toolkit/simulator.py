@@ -26,7 +26,7 @@ from buildarena_pipeline.runtime.simulators.simulator import (
     TrialRequest,
     TrialResult,
 )
-from buildarena_simulation import Trajectory
+from buildarena_simulation import MachineNotSimulable, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simworker_besiege.errors import DesktopError
 from buildarena_simworker_besiege.game_simulator import GameSimulator
@@ -92,7 +92,7 @@ class ToolkitSimulator(GameSimulator):
         for _ in range(ATTEMPTS):
             try:
                 played = self._attempt(trial)
-            except MachineNotPlayableError as error:
+            except (MachineNotPlayableError, MachineNotSimulable) as error:
                 raise MachineRefusedError(str(error)) from error
             except (DesktopError, LogIncompleteError, OSError) as error:
                 log.warning("toolkit_run_failed", error=str(error))
@@ -189,8 +189,9 @@ def _require_able(run: GameRun, settings: BesiegeSettings) -> None:
     """
     if run.needs_script:
         raise PermanentError(
-            "the toolkit's telemetry tells poses only: it does not make a cargo heavier or tell "
-            "whether a cannon burns, which this task needs; run it in a game with a window",
+            "the toolkit's telemetry tells poses only: it does not make a cargo heavier, tell "
+            "whether a cannon burns or ask a program, which this trial needs; run it in a game "
+            "with a window",
             reason="needs_script",
         )
     if run.level is not None and not settings.opens_levels:

@@ -12,6 +12,7 @@ from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
     chosen_task,
+    controlled,
     read_imported,
     read_machine,
     shown_errors,
@@ -86,23 +87,31 @@ def export(
         Path | None,
         typer.Option(help="For a .bsg: press these keys, a JSON list, in place of its own."),
     ] = None,
+    *,
+    controller: Annotated[
+        Path | None,
+        typer.Option(help="For a .bsg: a program (.lua) in place of the machine's own."),
+    ] = None,
     dialect: DialectOption = None,
 ) -> None:
     """Write a machine as a 3D model, a drawing, a machine document or the game's file.
 
     With a task the game's file (.bsg) is one for that task's trial: placed, with cargo, its keys
-    pressed and its motion told in the game's log. Without, it is the machine as it was built.
+    pressed, or its program asked, and its motion told in the game's log. Without, it is the machine
+    as it was built.
     """
     from buildarena_geometry.export import machine_glb, machine_svg
 
     with shown_errors():
         if out.suffix not in FORMATS:
             raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
-        options = {"--task": task, "--controls": controls}
+        options = {"--task": task, "--controls": controls, "--controller": controller}
         for option, value in options.items():
             if value is not None and out.suffix != ".bsg":
                 raise CommandError(f"{option} is for .bsg files, not for {out}")
         machine = read_machine(file, dialect)
+        if controller is not None:
+            machine = controlled(machine, controller)
         if out.suffix == ".glb":
             out.write_bytes(machine_glb(machine))
         elif out.suffix == ".svg":
