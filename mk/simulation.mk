@@ -1,4 +1,4 @@
-.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-processors bench-game bench-control bench-worlds \
+.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-processors bench-game bench-control bench-worlds bench-repeats \
 	game-evidence evidence-machines
 
 bench-simulation: $(STAMP) ## Measures the simulation and the engines' agreement; JSON in .buildarena/
@@ -22,6 +22,9 @@ bench-control: $(STAMP) ## What a controller costs: a tick, and a trial beside o
 
 bench-worlds: $(STAMP) ## Who passes in fifty drawn worlds of each task for programs; half an hour
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_worlds --json .buildarena/bench-worlds.json
+
+bench-repeats: $(STAMP) ## Whether 200 trials with programs repeat to the byte, and how far engines' senses are apart
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_repeats --json .buildarena/bench-repeats.json
 
 game-evidence: $(STAMP) ## Writes the tables of assumptions and of agreement with the game in the documents
 	@$(TEST_PYTHON) -m benchmarks.simulation.game_evidence
