@@ -15,6 +15,7 @@ SOURCES = [
     *sorted((ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/catalogue").glob("*.yaml")),
     *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").glob("*.py")),
     *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").rglob("*.lua")),
+    ROOT / "integrations/gymnasium/src/buildarena_gymnasium/machines.json",
     ROOT / "docs/expert.md",
     PAGE,
 ]

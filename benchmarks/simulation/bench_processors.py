@@ -45,7 +45,9 @@ def main() -> int:
         return 1
     kinds = {f"by default on {name}": as_on(name) for name in names}
     if not options.default_only:
-        kinds |= {f"chosen {name}": {kernels.CHOICE: name} for name in names[1:]}
+        kinds |= {
+            f"chosen {name}": {kernels.CHOICE: name} for name in names if name != kernels.PINNED
+        }
     started = time.monotonic()
     with ThreadPoolExecutor(options.processes) as pool:
         runs = list(pool.map(partial(lines, options.trials), kinds.values()))

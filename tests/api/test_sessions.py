@@ -266,3 +266,38 @@ def test_nonsense_is_refused_and_kept(api, session, arguments) -> None:
 
 def test_an_unknown_session_is_not_found(api) -> None:
     assert act(api, "job_x", "start", START).status_code == 404
+
+
+def test_what_a_submission_would_try_can_be_had_and_tried_before(api, session) -> None:
+    path = f"/v1/sessions/{session}/machine"
+    early = api.get(path)
+    assert early.status_code == 409
+    assert "there is no machine to simulate" in early.json()["detail"]
+    act(api, session, "start", START)
+    act(api, session, "attach_block_to", ATTACH)
+    document = api.get(path).json()
+    assert [block["module"] for block in document["blocks"]] == [
+        "Starting Block",
+        "Small Wooden Block",
+    ]
+    tried = api.post("/v1/machines/trials?task=support-1", content=json.dumps(document))
+    assert tried.status_code == 202
+    assert act(api, session, "attach_block_to", {**ATTACH, "face": "B"}).json()["ok"]
+
+
+def test_a_program_is_set_and_asked_in_a_session(api) -> None:
+    opened = api.post("/v1/sessions", json={**OPEN, "task": "landing-1", "worlds": 1}).json()
+    assert "`test_controller` asks what it would do" in opened["briefing"]
+    act(api, opened["id"], "start", START)
+    fan = {**ATTACH, "face": "E", "new_block": "Flying Block"}
+    assert act(api, opened["id"], "attach_block_to", fan).json()["ok"]
+    program = "function control(t, sense) return { fly = sense.velocity.z < -1 and 1 or 0 } end"
+    assert act(api, opened["id"], "set_controller", {"program": program}).json()["ok"]
+    ticks = [{"velocity.z": -0.5}, {"velocity.z": -2}]
+    answers = act(api, opened["id"], "test_controller", {"ticks": ticks}).json()["feedback"]
+    assert [line.split(" and does ")[1] for line in answers.splitlines()] == [
+        "nothing.",
+        "2.fly 1.",
+    ]
+    (main,) = api.get(f"/v1/sessions/{opened['id']}").json()["machines"]
+    assert main["controller"] == program

@@ -90,3 +90,91 @@ def test_a_program_that_fails_in_its_trial_is_a_failure_of_the_machine(environme
     done = environment.submit()
     assert (done.trial.reason, done.trial.counts) == ("controller_failed", False)
     assert "there is no action 'spinning'; there is spinning_" in done.report
+
+
+LOOKING = """
+local seen = 0
+function control(t, sense)
+  seen = seen + 1
+  return { spinning_forward = sense.marks.goal.relative.y > 1 and seen / 4 or 0 }
+end
+"""
+
+
+def test_a_program_is_asked_without_a_trial(environment) -> None:
+    environment.reset()
+    built(environment)
+    machine = environment.submitted().to_document()
+    assert environment.step("test_controller").feedback.startswith("There is no program yet")
+    assert environment.step("set_controller", {"program": LOOKING}).ok
+    alone = environment.step("test_controller")
+    goal = environment.task.scenario.marks[0].center
+    assert alone.ok
+    assert f"t 0 s: it senses marks.goal.relative.y {goal[1]:g} and does" in alone.feedback
+    assert "spinning_forward 0.25" in alone.feedback
+    ticks = [{}, {"t": 1.5, "marks.goal.relative.y": 0.5}, {"marks.goal.relative.y": 20}, {}]
+    first, second, third, fourth = environment.step(
+        "TEST_CONTROLLER", {"ticks": ticks}
+    ).feedback.splitlines()
+    assert "spinning_forward 0.25" in first
+    assert second == "t 1.5 s: it senses marks.goal.relative.y 0.5 and does nothing."
+    assert third.startswith("t 1.54 s: it senses marks.goal.relative.y 20 and does")
+    assert "spinning_forward 0.75" in third
+    assert "spinning_forward 1" in fourth
+    assert environment.step("set_controller", {"program": ""}).ok
+    assert environment.submitted().to_document()["blocks"] == machine["blocks"]
+
+
+def test_what_it_would_do_is_what_it_does(environment) -> None:
+    environment.reset()
+    built(environment)
+    assert environment.step("set_controller", {"program": PROGRAM}).ok
+    told = environment.step("test_controller").feedback
+    piloting = environment.submit().trial.trajectory.piloting
+    done = dict(zip(piloting.action_names, piloting.answers[0], strict=True))
+    for name, level in done.items():
+        if level:
+            assert f"{name} {level:.3g}" in told
+
+
+@pytest.mark.parametrize(
+    ("program", "arguments", "words"),
+    [
+        (LOOKING, {"ticks": []}, "These are no ticks: ticks is a list of at most 20 objects"),
+        (LOOKING, {"ticks": [{}] * 21}, "at most 20"),
+        (LOOKING, {"ticks": "now"}, "at most 20"),
+        (LOOKING, {"ticks": [3]}, "ticks[0] is no object"),
+        (LOOKING, {"ticks": [{}, {"t": "1"}]}, "ticks[1].t is no number"),
+        (LOOKING, {"ticks": [{"t": float("nan")}]}, "ticks[0].t is no number"),
+        (LOOKING, {"ticks": [{"t": True}]}, "ticks[0].t is no number"),
+        (LOOKING, {"ticks": [{"t": 10**400}]}, "ticks[0].t is no number"),
+        (LOOKING, {"tick": []}, "There is no argument 'tick'"),
+        (LOOKING, [1], "takes an object of arguments"),
+        (
+            LOOKING,
+            {"ticks": [{"marks.gaol.relative.y": 2}]},
+            "there is no sense 'marks.gaol.relative.y'; there is marks.goal.relative.y",
+        ),
+        ("function control() return { spinning = 1 } end", {}, "there is no action 'spinning'"),
+        ("function control() error('lost') end", {}, "line 1"),
+        ("function control() while true do end end", {}, "100,000 instructions"),
+        (
+            "function control() for k = 1, 24000 do end return {} end",
+            {"ticks": [{}] * 20},
+            "t 0.76 s",
+        ),
+    ],
+)
+def test_a_test_that_goes_wrong_says_why(environment, program, arguments, words) -> None:
+    environment.reset()
+    built(environment)
+    assert environment.step("set_controller", {"program": program}).ok
+    step = environment.step("test_controller", arguments)
+    assert step.ok == words.startswith("t 0")
+    assert words in step.feedback
+
+
+def test_a_task_without_senses_tests_no_program() -> None:
+    environment = Environment("transport-1")
+    assert "test_controller" not in [tool.name for tool in environment.tools]
+    assert "takes keys alone" in environment.step("test_controller").feedback

@@ -46,8 +46,23 @@ def test_a_system_that_does_not_describe_its_processor_leaves_the_choice(tmp_pat
 def test_what_is_pinned_ignores_the_libraries_own_variables() -> None:
     names = tuple(kernels.LADDER)
     environment = {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V4"}
-    assert kernels.pin(environment, names) == "SkylakeX"
-    assert environment == {"OPENBLAS_CORETYPE": "SkylakeX"}
+    assert kernels.pin(environment, names) == "Haswell"
+    assert environment.pop("OPENBLAS_CORETYPE") == "Haswell"
+    assert "X86_V4" in environment.pop("NPY_DISABLE_CPU_FEATURES").split()
+    assert not environment
+
+
+@pytest.mark.parametrize(("lacks", "pinned"), [(1, "Haswell"), (2, "Sandybridge"), (3, "Nehalem")])
+def test_a_processor_without_the_usual_ones_has_the_first_that_it_can_run(lacks, pinned) -> None:
+    environment = {"NPY_DISABLE_CPU_FEATURES": "X86_V4"}
+    assert kernels.pin(environment, tuple(kernels.LADDER)[lacks:]) == pinned
+    assert environment == {"OPENBLAS_CORETYPE": pinned}
+
+
+def test_the_widest_kernels_can_be_chosen() -> None:
+    environment = {kernels.CHOICE: "SkylakeX", "NPY_DISABLE_CPU_FEATURES": "X86_V4"}
+    assert kernels.pin(environment, tuple(kernels.LADDER)) == "SkylakeX"
+    assert environment == {kernels.CHOICE: "SkylakeX", "OPENBLAS_CORETYPE": "SkylakeX"}
 
 
 @pytest.mark.parametrize("name", list(kernels.LADDER)[1:])

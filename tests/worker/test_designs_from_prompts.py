@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from support.player import Played, Player
 from support.providers.engineer import Engineer
+from support.providers.flying_engineer import FlyingEngineer
 
 from buildarena_benchmark import Task, builtin_tasks, score
 from buildarena_simulation import ENGINES, simulate
@@ -69,3 +70,25 @@ def test_a_lighter_cargo_takes_fewer_motors() -> None:
         for machine in (built(another_winch(mass, 6)).suspended.machine for mass in (20, 14))
     ]
     assert motors == [4, 3]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("workflow", ["builder", "guidance-builder", "five-role"])
+def test_the_words_on_programs_are_enough_to_land_in_any_world(workflow, engine) -> None:
+    task = builtin_tasks()["landing-1"]
+    played = Player()(task=task, client=FlyingEngineer(), workflow=workflow)
+    assert played.suspended, played.failure
+    assert played.suspended.controls is None
+    machine = played.suspended.machine
+    for seed in (None, 1, 2):
+        trajectory = simulate(machine, task.scenario, engine, seed=seed)
+        assert score(task, machine, trajectory).success, seed
+
+
+def test_without_data_sheets_nobody_can_compute_how_to_fly() -> None:
+    played = Player()(
+        task="landing-1", client=FlyingEngineer(), workflow="builder", data_sheets=False
+    )
+    assert isinstance(played.result, LookupError)
+    assert "does not say" in str(played.result)

@@ -200,6 +200,7 @@ class Client:
 
     open_session = _call(Api.open_session)
     session = _call(Api.session)
+    session_machine = _call(Api.session_machine)
     call_tool = _call(Api.call_tool)
     test_session = _call(Api.test_session)
     submit_session = _call(Api.submit_session)

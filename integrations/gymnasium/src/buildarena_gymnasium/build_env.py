@@ -18,10 +18,10 @@ from buildarena_environment import (
     EpisodeOverError,
     Limits,
     Snapshot,
-    Trial,
     call_text,
 )
 from buildarena_gymnasium.pictures import Picture, picture_of
+from buildarena_gymnasium.scores import score_told
 from buildarena_gymnasium.spaces import ACTION_SPACE, OBSERVATION_SPACE, observed
 from buildarena_simulation import DEFAULT_ENGINE
 
@@ -166,21 +166,5 @@ class BuildEnv(gymnasium.Env[str, str]):
 def _info(answer: Answer) -> dict[str, Any]:
     info: dict[str, Any] = {"accepted": answer.accepted, "worth": answer.reward}
     if answer.trial is not None:
-        info["score"] = _score(answer.trial)
+        info["score"] = score_told(answer.trial)
     return info
-
-
-def _score(trial: Trial) -> dict[str, Any]:
-    """The score in types that vector environments stack; metrics without a value are left out."""
-    metrics = {
-        name: value if isinstance(value, str) else float(value)
-        for name, value in trial.score.metrics.items()
-        if value is not None
-    }
-    return {
-        "success": trial.score.success,
-        "indicator": float(trial.score.indicator),
-        "metrics": metrics,
-        "flags": list(trial.score.flags),
-        "reason": trial.reason or "",
-    }

@@ -1,4 +1,4 @@
-"""Pictures of what an episode has built."""
+"""Pictures of what an episode has built, and of what drives."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from buildarena_environment import Environment, NothingToSubmitError
-from buildarena_simulation import MachineNotSimulable
+from buildarena_geometry import Machine
+from buildarena_simulation import MachineNotSimulable, Scenario, Trajectory
 from buildarena_simulation.render.still import SIZE, still_png
 
 Picture = NDArray[np.uint8]
@@ -22,5 +23,14 @@ def picture_of(environment: Environment) -> Picture:
         png = still_png(environment.submitted(), environment.task.scenario)
     except (NothingToSubmitError, MachineNotSimulable):
         return np.full((SIZE[1], SIZE[0], 3), 255, dtype=np.uint8)
+    return _read(png)
+
+
+def picture_at(machine: Machine, scenario: Scenario, trajectory: Trajectory) -> Picture:
+    """A machine and what is around it at the last instant of a trajectory."""
+    return _read(still_png(machine, scenario, trajectory))
+
+
+def _read(png: bytes) -> Picture:
     with Image.open(io.BytesIO(png)) as image:
         return np.asarray(image.convert("RGB"), dtype=np.uint8)

@@ -5,24 +5,40 @@ from __future__ import annotations
 import gymnasium
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_gymnasium.machines import fixed_machines
 
 NAMESPACE = "BuildArena"
+_BUILDS = "buildarena_gymnasium.build_env:BuildEnv"
+_DRIVES = "buildarena_gymnasium.drive_env:DriveEnv"
 
 
 def ids() -> tuple[str, ...]:
-    """Ids of all environments, such as ``BuildArena/Support-1-v0``, in the order of the tasks."""
+    """Ids of all that build, such as ``BuildArena/Support-1-v0``, in the order of the tasks."""
     return tuple(_id(task) for task in builtin_tasks())
+
+
+def drive_ids() -> tuple[str, ...]:
+    """Ids of those that drive a fixed machine, such as ``BuildArena/Drive-Hover-3-v0``.
+
+    ``BuildArena/Drive-v0`` is one of them by its argument `task`.
+    """
+    return tuple(_id(f"drive-{task}") for task in fixed_machines())
 
 
 def register_all() -> None:
     """Registers those that are not yet."""
-    for task in builtin_tasks():
-        if _id(task) not in gymnasium.registry:
-            # No max_episode_steps: Gymnasium's own limit would end an episode without a trial.
-            gymnasium.register(
-                _id(task), "buildarena_gymnasium.build_env:BuildEnv", kwargs={"task": task}
-            )
+    # No max_episode_steps: Gymnasium's own limit would end an episode without a trial.
+    for name, task in zip(ids(), builtin_tasks(), strict=True):
+        _register(name, _BUILDS, task=task)
+    for name, task in zip(drive_ids(), fixed_machines(), strict=True):
+        _register(name, _DRIVES, task=task)
+    _register(_id("drive"), _DRIVES)
 
 
-def _id(task: str) -> str:
-    return f"{NAMESPACE}/{task.capitalize()}-v0"
+def _register(name: str, entry_point: str, **arguments: str) -> None:
+    if name not in gymnasium.registry:
+        gymnasium.register(name, entry_point, kwargs=arguments)
+
+
+def _id(name: str) -> str:
+    return f"{NAMESPACE}/{'-'.join(map(str.capitalize, name.split('-')))}-v0"

@@ -43,7 +43,8 @@ _CONTROL: Final = {
 
 _PROGRAMS: Final = (
     "You may write a program that senses and acts in place of key presses: `set_controller`, on "
-    "the machine that is simulated, before you submit. {contract}\n\n"
+    "the machine that is simulated, before you submit; `test_controller` asks what it would do. "
+    "{contract}\n\n"
     "Without a program, keys are played: `change_control_key` binds them, `add_control_sequence` "
     "presses them."
 )
@@ -199,13 +200,14 @@ def programs_told(task: Task) -> str:
     assert senses is not None  # noqa: S101 - it takes programs
     kinds = json.loads(file_text("senses.json"))
     lines = [f"- {kinds[kind]}" for kind in kinds if kind in senses.offers]
-    late = (
-        f" What you sense is {senses.delay_ticks * TICK_S:g} s old." if senses.delay_ticks else ""
-    )
+    accuracy = []
+    if senses.delay_ticks:
+        accuracy.append(f"What you sense is {senses.delay_ticks * TICK_S:g} s old.")
     noise = ", ".join(f"{kind} {sigma:g}" for kind, sigma in senses.noise.items() if sigma)
-    exact = f" Standard deviations of its noise: {noise}." if noise else ""
+    if noise:
+        accuracy.append(f"Standard deviations of its noise: {noise}.")
     return Template(file_text("controller.md")).substitute(
-        senses="\n".join(lines), accuracy=f"{late}{exact}"
+        senses="\n".join(lines), accuracy=" ".join(accuracy)
     )
 
 

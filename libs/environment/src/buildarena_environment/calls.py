@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from buildarena_environment.environment import Environment, Submission
+from buildarena_environment.environment import Environment
+from buildarena_environment.episodes import Submission
 from buildarena_environment.errors import CallError, NothingToSubmitError
 from buildarena_environment.tools import MAIN, SUBMIT
 from buildarena_environment.trials import Trial

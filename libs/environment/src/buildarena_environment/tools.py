@@ -13,6 +13,7 @@ from buildarena_geometry import (
     object_schema,
     tool_definitions,
 )
+from buildarena_simulation.rehearsal import MAX_TICKS
 
 MAIN: Final = "main"
 """What a machine is called where no name is given."""
@@ -42,19 +43,38 @@ MACHINE: Final = {
 LOOKUPS: Final = tuple(tool.name for tool in tool_definitions([LOOKUP]))
 """Names of the tools that modules are looked up with."""
 (SET_CONTROLLER,) = (tool.name for tool in tool_definitions([PROGRAM]))
+TEST_CONTROLLER: Final = ToolDefinition(
+    name="test_controller",
+    description="Ask the machine's program what it would do, without a trial: at the start, or "
+    "with senses that you name. Nothing changes.",
+    parameters=object_schema(
+        {
+            "ticks": {
+                "type": "array",
+                "maxItems": MAX_TICKS,
+                "items": {"type": "object", "additionalProperties": {"type": "number"}},
+                "description": "One object a tick, one tick after the other: what is different "
+                'from then on, such as {"position.z": 4.5, "marks.goal.relative.x": -2, "t": 1}; '
+                "t is the time in seconds. Left out: one tick at the start.",
+            }
+        }
+    ),
+    group=PROGRAM,
+)
+"""What builders have beside the tool that sets a program."""
 
 
 def building_tools(
     *, on_demand: bool = False, programs: bool = False
 ) -> tuple[ToolDefinition, ...]:
-    """All actions of the geometry library, as they are.
+    """All actions of the geometry library, as they are, and the test of a program.
 
     Args:
         on_demand: Whether the task has its modules looked up, and there are tools for that.
         programs: Whether it takes programs in place of keys.
     """
     further = [LOOKUP] * on_demand + [PROGRAM] * programs
-    return tool_definitions((*GROUPS, *further))
+    return (*tool_definitions((*GROUPS, *further)), *[TEST_CONTROLLER] * programs)
 
 
 def tools_of_models(

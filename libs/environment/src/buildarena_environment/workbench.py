@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING, Any, Final, Self
 
 from buildarena_environment.errors import NothingToSubmitError
 from buildarena_environment.given import acting
-from buildarena_environment.tools import ASSEMBLY, LOOKUPS, SET_CONTROLLER
+from buildarena_environment.programs import asked, program_tool, refused_program
+from buildarena_environment.tools import ASSEMBLY, LOOKUPS, TEST_CONTROLLER
 from buildarena_geometry import Cause, Machine, Refused
 from buildarena_geometry.modules.names import CaselessNames
-from buildarena_simulation import ControllerFailed
-from buildarena_simulation.controllers.program import Program
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Task
@@ -24,9 +23,6 @@ if TYPE_CHECKING:
 NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 """What a machine may be called."""
 _LOOKUPS: Final = CaselessNames(LOOKUPS)
-_READ_S: Final = 0.02
-"""Processor time for which a program may keep others waiting while it is read."""
-_PROGRAMS: Final = CaselessNames([SET_CONTROLLER])
 
 
 class Workbench:
@@ -70,29 +66,16 @@ class Workbench:
                 cause=Cause.UNKNOWN_ACTION,
                 text=f"There is no action {tool} in this task, which tells its modules.",
             )
-        if isinstance(tool, str) and _PROGRAMS.find(tool) is not None:
-            refusal = self._refused_program(arguments)
+        on_program = program_tool(tool)
+        if on_program is not None:
+            refusal = refused_program(self._task, on_program, arguments)
             if refusal is not None:
                 return refusal
         made = self.machine(machine)
+        if on_program == TEST_CONTROLLER.name:
+            return asked(self._task, made, arguments)
         act = made.act if self._task is None else acting(self._task, made)
         return act(tool, arguments)
-
-    def _refused_program(self, arguments: Any) -> Refused | None:
-        """Why a program cannot act here: the task takes none, or it cannot be read."""
-        if self._task is not None and not self._task.takes_programs:
-            return Refused(
-                cause=Cause.UNKNOWN_ACTION,
-                text=f"There is no action {SET_CONTROLLER} in this task, which takes keys alone.",
-            )
-        text = arguments.get("program") if isinstance(arguments, Mapping) else None
-        if not isinstance(text, str) or not text:
-            return None
-        try:
-            Program(text, most_s=_READ_S)
-        except ControllerFailed as failure:
-            return Refused(cause=Cause.MALFORMED_ARGUMENTS, text=f"Not set: {failure.reason}.")
-        return None
 
     def machine(self, name: str) -> Machine:
         """The machine with a name; where there was none an empty one, or the one that is given."""

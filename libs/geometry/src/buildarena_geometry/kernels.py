@@ -2,10 +2,10 @@
 
 OpenBLAS chooses its kernels when numpy loads it, by the processor or by ``OPENBLAS_CORETYPE``, and
 numpy its own vector loops, by the processor or by ``NPY_DISABLE_CPU_FEATURES``. Kernels differ in
-the order of sums, so in the last bit, and a trial amplifies it. What is pinned is the first of
-`LADDER` that the processor has, whatever those variables say, or what ``BUILDARENA_BLAS_KERNELS``
-names: so that workers on several kinds of processors agree, or a trial is repeated as it was run
-elsewhere. Child processes inherit it. This module must come before numpy.
+the order of sums, so in the last bit, and a trial amplifies it. What is pinned, whatever those
+variables say, is `USUAL`, so that all processors since 2013 agree, or what
+``BUILDARENA_BLAS_KERNELS`` names: so that a trial is repeated as it was run elsewhere. Child
+processes inherit it. This module must come before numpy.
 """
 
 import os
@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Final
 
 CHOICE: Final = "BUILDARENA_BLAS_KERNELS"
-"""The variable that names other kernels than the processor's first."""
+"""The variable that names other kernels than the usual ones."""
 
 LADDER: Final[Mapping[str, frozenset[str]]] = MappingProxyType(
     {
@@ -33,6 +33,9 @@ LADDER: Final[Mapping[str, frozenset[str]]] = MappingProxyType(
 They are those in the wheels of numpy and scipy, without the one for processors that numpy no longer
 runs on.
 """
+
+USUAL: Final = "Haswell"
+"""What is pinned wherever the processor has it; an older one has the first that it can run."""
 
 _PROCESSOR: Final = Path("/proc/cpuinfo")
 _WIDER: Final = (
@@ -68,7 +71,7 @@ def pin(environment: MutableMapping[str, str], names: tuple[str, ...]) -> str | 
 
     Returns:
         The kernels; None where none are known, and OpenBLAS chooses. A choice that is not among
-        the names leaves the first of them, with a warning.
+        the names leaves the usual ones, with a warning.
     """
     chosen = environment.get(CHOICE) or None
     if chosen is not None and chosen not in names:
@@ -77,7 +80,7 @@ def pin(environment: MutableMapping[str, str], names: tuple[str, ...]) -> str | 
         )
         warnings.warn(f"{CHOICE} is {chosen!r}; this machine runs {known}", stacklevel=2)
         chosen = None
-    chosen = chosen or next(iter(names), None)
+    chosen = chosen or (USUAL if USUAL in names else next(iter(names), None))
     if chosen is None:
         return None
     environment["OPENBLAS_CORETYPE"] = chosen

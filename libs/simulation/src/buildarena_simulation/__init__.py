@@ -8,6 +8,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 
 from buildarena_simulation.constants import DEFAULT_ENGINE
+from buildarena_simulation.driving import Drive, pilot_of
 from buildarena_simulation.engines.registry import ALL_ENGINES, ENGINES, engine_version
 from buildarena_simulation.errors import (
     BuildarenaSimulationError,
@@ -39,6 +40,7 @@ __all__ = [
     "Break",
     "BuildarenaSimulationError",
     "ControllerFailed",
+    "Drive",
     "Event",
     "JointPeak",
     "MachineNotSimulable",
@@ -49,6 +51,7 @@ __all__ = [
     "TrajectoryFormatError",
     "UnknownEngineError",
     "engine_version",
+    "pilot_of",
     "processor",
     "read_trajectory",
     "require_engine",

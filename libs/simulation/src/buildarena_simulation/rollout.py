@@ -1,8 +1,10 @@
 """One trial: a machine put through a scenario by an engine."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING, Final
+from weakref import finalize
 
 from buildarena_simulation.clearance import require_clear_start
 from buildarena_simulation.constants import DEFAULT_ENGINE
@@ -15,7 +17,7 @@ from buildarena_simulation.control import (
     varied_presses,
     written_presses,
 )
-from buildarena_simulation.controllers.pilot import Pilot
+from buildarena_simulation.controllers.pilot import Pilot, ProgramPilot
 from buildarena_simulation.engines.base import World
 from buildarena_simulation.engines.registry import ENGINES, create_engine, engine_version
 from buildarena_simulation.errors import (
@@ -28,7 +30,7 @@ from buildarena_simulation.machine import bindings_of, part_ids, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.planning import Keys
 from buildarena_simulation.processor import warn_if_late
-from buildarena_simulation.scenario import Scenario
+from buildarena_simulation.scenario import Control, Scenario
 from buildarena_simulation.structure.force_field import field_of
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.threads import single_threaded
@@ -104,7 +106,7 @@ def simulate(
     if machine.controller and controls is None:
         ids = part_ids(machine)
         world = scenario.world(seed)
-        pilot = Pilot(machine.controller, structure, bindings, ids, world, seed=seed or 0)
+        pilot = ProgramPilot(machine.controller, structure, bindings, ids, world, seed=seed or 0)
     return simulate_structure(
         structure,
         scenario,
@@ -127,7 +129,7 @@ def simulate_structure(
     *,
     bindings: Bindings = (),
     controls: Sequence[KeyHold] = (),
-    pilot: Pilot | None = None,
+    pilot: ProgramPilot | None = None,
     start: Start | None = None,
     seed: int | None = None,
     substeps: int = 1,
@@ -149,63 +151,134 @@ def simulate_structure(
         until: See `simulate`.
         on_progress: Called now and then with the share of the trial that is done.
     """
-    unvaried, placed = scenario, start is not None
-    scenario = scenario.world(seed)
-    if start is None:
-        start = start_of(structure, scenario, seed)
-    else:
-        _check_start(start, scenario, seed)
-    require_clear_start(structure, scenario, start)
-    world = World(
-        structure=structure,
-        ground=True,
-        terrain=scenario.terrain,
-        cargo=start.cargo,
-        gravity=scenario.gravity,
-        drive_strength=scenario.drive_strength,
-        substeps=substeps,
-        field=field_of(structure, drive_strength=scenario.drive_strength),
-    )
+    control = scenario.control  # no seed draws it
     if seed is not None:
-        controls, control = varied_presses(controls, scenario.control, seed)
-        scenario = scenario.model_copy(update={"control": control})
+        controls, control = varied_presses(controls, control, seed)
     commander = pilot or Keys(
         bindings=bindings,
-        presses=ended_presses(controls, scenario.control),
-        count=scenario.control.mode == "agent",
+        presses=ended_presses(controls, control),
+        count=control.mode == "agent",
     )
-    warn_if_late()
-    adapter = create_engine(engine, world)
-    try:
-        with single_threaded():
-            wind = None if scenario.gusts is None else Wind(scenario.gusts, seed or 0)
-            trial = Trial(world, scenario, adapter, start, wind)
-            trial.run(commander, until, on_progress)
-        holds = commander.holds()
-        return trial.recorder.finished(
-            breaking=trial.breaking,
-            piloting=commander.piloting(),
-            engine=engine,
-            engine_version=engine_version(engine),
-            simulation_version=SIMULATION_VERSION,
-            settings={
-                **adapter.settings,
-                "gravity": scenario.gravity,
-                **_unusual(scenario),
-                "effective_key_presses": len(holds),
-                PRESSES: written_presses(holds),
-                **({} if seed is None else {SEED: seed}),
-                **({"start": start_digest(start)} if placed else {}),
-                **commander.settings(),
-                "scenario": hashlib.sha256(unvaried.model_dump_json().encode()).hexdigest()[:16],
-            },
+    rollout = Rollout(
+        structure, scenario, engine, control=control, start=start, seed=seed, substeps=substeps
+    )
+    with closing(rollout):
+        with rollout.running():
+            rollout.trial.run(commander, until, on_progress)
+        return rollout.trajectory(commander)
+
+
+class Rollout:
+    """A trial that was set up and not yet run.
+
+    Args:
+        structure: The machine as arrays.
+        scenario: What it is put through.
+        engine: Name of the engine.
+        control: Who acts when, in place of what the scenario says.
+        start: See `simulate`.
+        seed: See `simulate`.
+        substeps: See `simulate`.
+
+    Attributes:
+        trial: The trial, to be run within `running`.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        scenario: Scenario,
+        engine: str,
+        *,
+        control: Control | None = None,
+        start: Start | None = None,
+        seed: int | None = None,
+        substeps: int = 1,
+    ) -> None:
+        self._engine_name, self._seed, self._unvaried = engine, seed, scenario
+        self._placed = start is not None
+        self._scenario = scenario = scenario.world(seed)
+        if start is None:
+            start = start_of(structure, scenario, seed)
+        else:
+            _check_start(start, scenario, seed)
+        require_clear_start(structure, scenario, start)
+        world = World(
+            structure=structure,
+            ground=True,
+            terrain=scenario.terrain,
+            cargo=start.cargo,
+            gravity=scenario.gravity,
+            drive_strength=scenario.drive_strength,
+            substeps=substeps,
+            field=field_of(structure, drive_strength=scenario.drive_strength),
         )
-    except BuildarenaSimulationError:
-        raise
-    except Exception as error:
-        raise SimulationError(f"{engine} failed: {error}") from error
-    finally:
-        adapter.close()
+        if control is not None:
+            scenario = scenario.model_copy(update={"control": control})
+        self._start = start
+        warn_if_late()
+        self._adapter = create_engine(engine, world)
+        self._ending = finalize(self, self._adapter.close)
+        try:
+            with self.running():
+                wind = None if scenario.gusts is None else Wind(scenario.gusts, seed or 0)
+                self.trial = Trial(world, scenario, self._adapter, start, wind)
+        except BaseException:
+            self.close()
+            raise
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Within it the engine may step.
+
+        Raises:
+            SimulationError: The engine failed.
+        """
+        with self._failing(), single_threaded():
+            yield
+
+    def trajectory(self, commander: Keys | Pilot) -> Trajectory:
+        """What was recorded until now.
+
+        Args:
+            commander: Who acted.
+        """
+        seed = self._seed
+        scenario = hashlib.sha256(self._unvaried.model_dump_json().encode()).hexdigest()[:16]
+        with self._failing():
+            holds = commander.holds()
+            return self.trial.recorder.finished(
+                breaking=self.trial.breaking,
+                piloting=commander.piloting(),
+                engine=self._engine_name,
+                engine_version=engine_version(self._engine_name),
+                simulation_version=SIMULATION_VERSION,
+                settings={
+                    **self._adapter.settings,
+                    "gravity": self._scenario.gravity,
+                    **_unusual(self._scenario),
+                    "effective_key_presses": len(holds),
+                    PRESSES: written_presses(holds),
+                    **({} if seed is None else {SEED: seed}),
+                    **({"start": start_digest(self._start)} if self._placed else {}),
+                    **commander.settings(),
+                    "scenario": scenario,
+                },
+            )
+
+    def close(self) -> None:
+        """Ends the engine's world; once is enough, and a rollout that nobody has ends its own."""
+        self._ending()
+
+    @contextmanager
+    def _failing(self) -> Iterator[None]:
+        """What goes wrong inside is the engine's failure, unless it has a name of ours."""
+        try:
+            yield
+        except BuildarenaSimulationError:
+            raise
+        except Exception as error:
+            raise SimulationError(f"{self._engine_name} failed: {error}") from error
 
 
 def world_of(scenario: Scenario, trajectory: Trajectory) -> Scenario:

@@ -1,6 +1,6 @@
 """One trial as it runs: commands, steps, loads, samples."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +9,7 @@ from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import recoil
 from buildarena_simulation.controllers.answers import constant
-from buildarena_simulation.controllers.pilot import Pilot
+from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.senses import Seen
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.force_control import ForceSchedule
@@ -41,6 +41,7 @@ class Trial:
         wind: What blows; None where nothing does.
 
     Attributes:
+        has_blown_up: Whether the engine knows no numbers any more; nothing moves from there on.
         breaking: What the joints bear, and which broke.
         recorder: What was seen.
     """
@@ -68,11 +69,20 @@ class Trial:
         if any(part.module.grip for part in structure.parts):
             self.breaking.holding = Holding(world)
         self.recorder = Recorder(structure, scenario)
-        self._blown_up = False
+        self.has_blown_up = False
+        self._per_sample = round(1 / (SAMPLE_RATE_HZ * engine.time_step_s))
+        self._planner = Planner(structure, self._field, scenario.control, engine.time_step_s)
+        self._tick, self._ticks = 0, scenario.sample_count - 1
+        self._sample(0.0)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the last tick has passed."""
+        return self._tick >= self._ticks
 
     def run(
         self,
-        commander: Keys | Pilot,
+        commander: Keys | ProgramPilot,
         until: Decision | None,
         on_progress: Callable[[float], None] | None,
     ) -> None:
@@ -86,38 +96,43 @@ class Trial:
         Raises:
             ControllerFailed: The controller did.
         """
-        engine, scenario = self._engine, self._scenario
-        per_sample = round(1 / (SAMPLE_RATE_HZ * engine.time_step_s))
-        chunks = range(0, per_sample, engine.steps_per_evaluation)
-        samples = scenario.sample_count - 1
-        steps = samples * per_sample
-        planner = Planner(self._structure, self._field, scenario.control, engine.time_step_s)
-        self._sample(0.0)
+        steps = self._ticks * self._per_sample
         if isinstance(commander, Keys):
-            planner.plan(commander.levels(planner.times(0, steps)), 0, steps)
-        for sample in range(samples):
-            if isinstance(commander, Pilot):
-                levels = constant(commander.levels(self._seen(sample / SAMPLE_RATE_HZ)), per_sample)
-                planner.plan(levels, sample * per_sample, per_sample)
-            for offset in chunks:
-                step = sample * per_sample + offset
-                row = step - planner.first
-                if planner.forces is not None:
-                    self._command(planner.forces, row, step)
-                targets = planner.drives.targets[row : row + engine.steps_per_evaluation]
-                self._advance(targets, planner.drives.firing[row], step)
-            self._sample((sample + 1) / SAMPLE_RATE_HZ)
+            levels = commander.levels(self._planner.times(0, steps))
+            self._planner.plan(levels, 0, steps)
+        while not self.is_over:
+            if isinstance(commander, ProgramPilot):
+                self.ask(commander.answered(self.seen()))
+            self.pass_tick()
             if until is not None and until(self.recorder.cargo_now):
                 return
-            if on_progress and (sample % _PROGRESS_EVERY == 0 or sample + 1 == samples):
-                on_progress((sample + 1) / samples)
+            if on_progress and (self._tick % _PROGRESS_EVERY == 1 or self.is_over):
+                on_progress(self._tick / self._ticks)
 
-    def _seen(self, time_s: float) -> Seen:
-        """What a controller can be told of now."""
+    def ask(self, levels: Mapping[tuple[int, str], float]) -> None:
+        """Says what is asked for in the next tick; see `Channels.levels`."""
+        count = self._per_sample
+        self._planner.plan(constant(levels, count), self._tick * count, count)
+
+    def pass_tick(self) -> None:
+        """Lets a tick pass with what was asked for."""
+        engine, planner = self._engine, self._planner
+        for offset in range(0, self._per_sample, engine.steps_per_evaluation):
+            step = self._tick * self._per_sample + offset
+            row = step - planner.first
+            if planner.forces is not None:
+                self._command(planner.forces, row, step)
+            targets = planner.drives.targets[row : row + engine.steps_per_evaluation]
+            self._advance(targets, planner.drives.firing[row], step)
+        self._tick += 1
+        self._sample(self._tick / SAMPLE_RATE_HZ)
+
+    def seen(self) -> Seen:
+        """What there is to be sensed now."""
         breaking = self.breaking
         wheels = len(self._structure.wheels)
         return Seen(
-            time_s=time_s,
+            time_s=self._tick / SAMPLE_RATE_HZ,
             clusters=breaking.clusters,
             motion=breaking.motion,
             cargo=self._engine.cargo() if self._scenario.cargo else None,
@@ -132,7 +147,7 @@ class Trial:
         table = field.table
         asked = schedule.let_go[row] & ~self._let_go
         kicks = np.zeros(len(asked))
-        if asked.any() and not self._blown_up:
+        if asked.any() and not self.has_blown_up:
             self._let_go |= asked
             held = self.breaking.let_go(
                 self._engine, table.seats[asked], time_s=step * self._engine.time_step_s
@@ -141,7 +156,7 @@ class Trial:
             kicks[asked] = held * table.impulse[asked] / self._interval_s
         field.commands = schedule.at(row, kicks)
         holding, breaking = self.breaking.holding, self.breaking
-        if holding is not None and not self._blown_up:
+        if holding is not None and not self.has_blown_up:
             cargo = self._engine.cargo() if self._scenario.cargo else None
             if holding.update(
                 breaking.clusters,
@@ -158,7 +173,7 @@ class Trial:
         self._engine.enter(self.breaking.clusters, self.breaking.motion)
 
     def _advance(self, targets: np.ndarray, firing: np.ndarray, step: int) -> None:
-        if self._blown_up:
+        if self.has_blown_up:
             return
         engine, cargo = self._engine, self._scenario.cargo
         time_s = step * engine.time_step_s
@@ -175,7 +190,7 @@ class Trial:
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
             # Nothing more can be known; the samples say so and the scorer flags them.
-            self._blown_up = True
+            self.has_blown_up = True
             self.breaking.motion = motion
             return
         holding = self.breaking.holding

@@ -53,6 +53,7 @@ class BenchMachineView(BaseModel):
     name: str
     parts: list[BenchPartView]
     control_sequence: list[PressView]
+    controller: str = Field(description="The program that acts in place of it, Lua; empty for none")
     sub_structures: list[SubStructureView] = Field(description="Of an assembly")
     available: list[str] = Field(description="Machines that an assembly can be put together from")
     mass: float = Field(description="Mass units")
@@ -76,6 +77,7 @@ def machine_view(name: str, machine: Machine) -> BenchMachineView:
             PressView(time_s=one.time_s, key=one.key, hold_for_s=one.hold_for_s)
             for one in machine.control_sequence
         ],
+        controller=machine.controller,
         sub_structures=[
             SubStructureView(letter=one.letter, source=one.source)
             for one in machine.sub_structures.values()

@@ -44,6 +44,10 @@ class Sessions(Sender):
         """A session: its machines, its tools, and how much is left."""
         return cast("SessionView", await self.get(at("sessions", session_id)))
 
+    async def session_machine(self, session_id: str) -> Any:
+        """The document of the machine that a submission would try now."""
+        return await self.get(at("sessions", session_id, "machine"))
+
     async def call_tool(
         self,
         session_id: str,

@@ -2,21 +2,18 @@ import { Alert, Button, FileButton, Group, List, Select, Stack, Text, Title } fr
 import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { SimulatorSelect, useSimulator } from "../../parts/SimulatorSelect";
-import { Link } from "@tanstack/react-router";
 import { lazy, Suspense, useState, type DragEvent } from "react";
-import { job as jobQuery, tasks as tasksQuery } from "../../api/queries";
+import { tasks as tasksQuery } from "../../api/queries";
 import { bytes, number } from "../../format";
-import { OutcomeBadge } from "../../parts/Outcome";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
-import { Answered, Loading } from "../../parts/States";
-import { Result } from "../workbench/Result";
+import { Loading } from "../../parts/States";
+import { Tried } from "../workbench/Tried";
 import { useLook, useTrial, type Check, type Dropped } from "./files";
 
 const FileScene = lazy(() => import("../../scene/FileScene"));
 const GlbScene = lazy(() => import("../../scene/GlbScene"));
 const FIRST = "support-1";
-const ASK_EVERY_MS = 1_000;
 
 /** A machine from a file: looked at, checked, tried. */
 export default function MachinePage() {
@@ -234,27 +231,5 @@ function Try({
         </Text>
       )}
     </>
-  );
-}
-
-function Tried({ id }: { id: string }) {
-  const query = useQuery({
-    ...jobQuery(id),
-    refetchInterval: (asked) => (asked.state.data?.state === "done" ? false : ASK_EVERY_MS),
-  });
-  return (
-    <Answered query={query} rows={6}>
-      {(job) => (
-        <Stack gap="sm">
-          <Group gap="sm" role="status">
-            <OutcomeBadge value={job.outcome ?? job.state} />
-            <Link to="/jobs/$id" params={{ id }}>
-              The whole job
-            </Link>
-          </Group>
-          {job.state === "done" && <Result job={job} />}
-        </Stack>
-      )}
-    </Answered>
   );
 }

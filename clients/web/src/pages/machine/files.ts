@@ -63,8 +63,8 @@ async function lookedAt(file: File, task: string | null): Promise<Dropped> {
 export const useLook = () =>
   useMutation({ mutationFn: ({ file, task }: { file: File; task: string | null }) => lookedAt(file, task) });
 
-export const useTrial = () =>
-  useMutation({
-    mutationFn: ({ file, ...query }: { file: File; task: string; simulator: string }) =>
-      sent<JobView>("/v1/machines/trials", query, file),
-  });
+/** A machine's file put through a task's trial, on no leaderboard. */
+export const triedFile = ({ file, ...query }: { file: File; task: string; simulator: string }) =>
+  sent<JobView>("/v1/machines/trials", query, file);
+
+export const useTrial = () => useMutation({ mutationFn: triedFile });

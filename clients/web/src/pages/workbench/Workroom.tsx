@@ -29,6 +29,7 @@ import { AttachPanel } from "./AttachPanel";
 import { FeedbackLog } from "./FeedbackLog";
 import { KeysPanel } from "./KeysPanel";
 import { PartPanel } from "./PartPanel";
+import { ProgramPanel, takesPrograms } from "./ProgramPanel";
 import {
   ASSEMBLY,
   MAIN,
@@ -106,6 +107,7 @@ export function Workroom({ view }: { view: SessionView }) {
               <Tabs.Tab value="attach">Attach</Tabs.Tab>
               <Tabs.Tab value="part">Part</Tabs.Tab>
               <Tabs.Tab value="keys">Keys</Tabs.Tab>
+              {takesPrograms(view) && <Tabs.Tab value="program">Program</Tabs.Tab>}
               <Tabs.Tab value="tools">All tools</Tabs.Tab>
             </Tabs.List>
             <Tabs.Panel value="attach" pt="sm">
@@ -116,6 +118,9 @@ export function Workroom({ view }: { view: SessionView }) {
             </Tabs.Panel>
             <Tabs.Panel value="keys" pt="sm">
               <KeysPanel hand={hand} view={view} duration={document.scenario?.duration_s ?? DURATION_S} />
+            </Tabs.Panel>
+            <Tabs.Panel value="program" pt="sm">
+              <ProgramPanel key={hand.machine} hand={hand} view={view} />
             </Tabs.Panel>
             <Tabs.Panel value="tools" pt="sm">
               <ToolsPanel hand={hand} view={view} />

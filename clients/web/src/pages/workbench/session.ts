@@ -31,6 +31,7 @@ const EMPTY: Bench = {
   name: MAIN,
   parts: [],
   control_sequence: [],
+  controller: "",
   sub_structures: [],
   available: [],
   mass: 0,

@@ -15,7 +15,7 @@ from buildarena_besiege.names import CARGO_ID
 from buildarena_geometry.besiege_components import besiege_point
 from buildarena_geometry.rotations import rotate
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.controllers.pilot import Pilot
+from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.program import (
     MAX_ANSWERS,
     MAX_INSTRUCTIONS,
@@ -47,14 +47,14 @@ SEED: Final = 0
 """Of a program's random numbers and of the noise in the game, whose worlds no seed varies."""
 
 
-def pilot_of(machine: Machine, scenario: Scenario) -> Pilot:
+def pilot_of(machine: Machine, scenario: Scenario) -> ProgramPilot:
     """A machine's program, read for a trial in the game.
 
     Raises:
         ControllerFailed: It cannot be read, or the scenario takes none.
         MachineNotPlayableError: The scenario offers a sense that the game cannot tell.
     """
-    pilot = Pilot(
+    pilot = ProgramPilot(
         machine.controller,
         structure_of(machine),
         bindings_of(machine),
@@ -72,7 +72,7 @@ def pilot_of(machine: Machine, scenario: Scenario) -> Pilot:
     return pilot
 
 
-def _channels(pilot: Pilot) -> list[tuple[tuple[str, str], str]]:
+def _channels(pilot: ProgramPilot) -> list[tuple[tuple[str, str], str]]:
     """The block, the action and the name of each channel, in the order of their numbers."""
     return [
         ((name.removesuffix(f".{action}"), action), name)
@@ -80,7 +80,7 @@ def _channels(pilot: Pilot) -> list[tuple[tuple[str, str], str]]:
     ]
 
 
-def channel_names(pilot: Pilot) -> list[str]:
+def channel_names(pilot: ProgramPilot) -> list[str]:
     """The names of all actions of blocks, in the order in which a log tells of them."""
     return [name for _, name in _channels(pilot)]
 
@@ -138,7 +138,7 @@ def pilot_lua(
     )
 
 
-def _channel_tables(machine: Machine, pilot: Pilot) -> dict[str, str]:
+def _channel_tables(machine: Machine, pilot: ProgramPilot) -> dict[str, str]:
     keys, channels = channel_keys(machine), pilot.channels
     order = sorted(channels.names)
     number = {key: index for index, key in enumerate(order, 1)}
@@ -171,7 +171,7 @@ class _SenseWriter:
         self,
         machine: Machine,
         scenario: Scenario,
-        pilot: Pilot,
+        pilot: ProgramPilot,
         records: Sequence[BlockRecord],
         references: Mapping[str, str],
     ) -> None:

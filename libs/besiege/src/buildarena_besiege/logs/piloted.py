@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from buildarena_besiege.logs.game_log import GameLog
     from buildarena_geometry import Machine
     from buildarena_simulation import Scenario
-    from buildarena_simulation.controllers.pilot import Pilot
+    from buildarena_simulation.controllers.pilot import ProgramPilot
 
 ALIKE: Final = 1.001e-6
 """By how much an answer in the log may miss that of the program here: its last decimal."""
@@ -21,7 +21,7 @@ ALIKE: Final = 1.001e-6
 _TICK_UPDATES: Final = UPDATES_PER_S // SAMPLE_RATE_HZ
 
 
-def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> Pilot | None:
+def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> ProgramPilot | None:
     """A machine's program after it was asked again what it was asked in the game.
 
     Args:
@@ -50,7 +50,7 @@ def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> Pilot |
             raise LogIncompleteError(
                 f"The log does not tell all that the program sensed and answered at {time_s:.2f} s."
             )
-        levels = pilot.levels_of(figures[:sense_count], time_s)
+        levels = pilot.answered_to(figures[:sense_count], time_s)
         answers = zip(order, figures[sense_count:], strict=False)
         if update in failed or any(abs(levels.get(key, 0.0) - n) > ALIKE for key, n in answers):
             raise LogIncompleteError(

@@ -40,6 +40,17 @@ class Channels:
                 self.names[part, action] = channel(ids[part], action)
         self.named.update((name, [key]) for key, name in self.names.items())
 
+    def axes(self) -> dict[str, float]:
+        """The least number for each action: -1 for the first of two opposites, otherwise 0."""
+        axes: dict[str, float] = {}
+        for (part, action), name in self.names.items():
+            opposite = self.opposites.get((part, action))
+            if opposite is None:
+                axes[name] = 0.0
+            elif self.names.get((part, opposite)) not in axes:
+                axes[name] = -1.0
+        return axes
+
     def levels(self, answers: Mapping[str, float]) -> dict[tuple[int, str], float]:
         """How far each action of each part is asked for, 0 to 1; what is missing is not.
 

@@ -1,4 +1,4 @@
-"""A controller at work in a trial: at every tick it is told, and asks."""
+"""Who acts in a trial, a program or somebody outside: at every tick it is told, and asks."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,10 +7,11 @@ from typing import Any, Final
 import numpy as np
 
 from buildarena_geometry.blocks import KeyPress
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import Bindings, KeyHold
 from buildarena_simulation.controllers.answers import Channels
 from buildarena_simulation.controllers.program import Program
-from buildarena_simulation.controllers.senses import TICK_S, Seen, Sensing
+from buildarena_simulation.controllers.senses import Seen, Sensing
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.model import Structure
@@ -26,20 +27,125 @@ def controller_digest(text: str) -> str:
 
 
 class Pilot:
-    """A program, a machine and a trial.
+    """What a machine senses in a trial, and what is asked of it, tick after tick.
 
     Args:
-        text: The program.
         structure: The machine.
         bindings: The actions of each part.
         ids: Ids of the parts.
         scenario: What the machine is put through.
-        seed: Of the program's random numbers and of the noise.
+        sensors: Ids of further blocks that are told of.
+        seed: Of the noise.
 
     Attributes:
-        program: The program.
-        sensing: What it is told.
-        channels: What it may ask for.
+        sensing: Makes what it senses.
+        channels: What may be asked for.
+        layout: The names of what it senses, as `Program.senses_are` takes them.
+        sense_names: The same as a trajectory has them, in the order of the numbers.
+        axes: See `Channels.axes`.
+        action_names: Names of the actions of each part.
+
+    Raises:
+        ControllerFailed: The machine has no such block, or the scenario offers no senses.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        bindings: Bindings,
+        ids: Sequence[str],
+        scenario: Scenario,
+        sensors: Sequence[str] = (),
+        *,
+        seed: int,
+    ) -> None:
+        _require_senses(scenario)
+        self.sensing = Sensing(structure, scenario, sensors, seed=seed)
+        self.channels = Channels(structure, bindings, ids)
+        self.layout = self.sensing.layout
+        self.sense_names = tuple(_flat(self.layout))
+        self.axes = self.channels.axes()
+        self.action_names = self.channels.names
+        self._tick = 0
+        self._since: dict[tuple[int, str], float] = {}
+        self._holds: list[KeyHold] = []
+        self._sensed: list[list[float]] = []
+        self._asked: list[dict[tuple[int, str], float]] = []
+
+    def senses(self, seen: Seen) -> list[float]:
+        """What is sensed at a tick, to be read once in each."""
+        return self.sensing.read(seen)
+
+    def levels(
+        self, values: Sequence[float], answers: Mapping[str, float]
+    ) -> dict[tuple[int, str], float]:
+        """What is asked for until the next tick; see `Channels.levels`.
+
+        Args:
+            values: What was sensed.
+            answers: What was answered to it.
+
+        Raises:
+            ControllerFailed: There is no such action.
+        """
+        levels = self.channels.levels(answers)
+        self._sensed.append(list(values))
+        self._asked.append(levels)
+        self._note({key for key, share in levels.items() if share > 0})
+        self._tick += 1
+        return levels
+
+    def holds(self) -> list[KeyHold]:
+        """When each action was asked for, as holds of a key of its own, see `channel`."""
+        lasting = (self._hold(key, since) for key, since in self._since.items())
+        return sorted([*self._holds, *lasting], key=lambda hold: (hold.time_s, hold.key))
+
+    def piloting(self) -> Piloting:
+        """What it sensed and asked for at every instant of the trial, the last one too."""
+        senses = self.sense_names
+        asked = sorted({key for levels in self._asked for key in levels})
+        count = len(self._sensed)
+        sensed = np.full((count + 1, len(senses)), np.nan, dtype=np.float32)
+        sensed[:count] = np.array(self._sensed).reshape(count, len(senses))
+        answers = np.zeros((count + 1, len(asked)), dtype=np.float32)
+        for row, levels in zip(answers, self._asked, strict=False):
+            row[:] = [levels.get(key, 0.0) for key in asked]
+        return Piloting(
+            sense_names=senses,
+            senses=sensed,
+            action_names=tuple(self.action_names[key] for key in asked),
+            answers=answers,
+        )
+
+    def settings(self) -> dict[str, str]:
+        """What a trajectory keeps of who acts; of one outside nothing beside `piloting`."""
+        return {}
+
+    def _note(self, asked: set[tuple[int, str]]) -> None:
+        for key in [key for key in self._since if key not in asked]:
+            self._holds.append(self._hold(key, self._since.pop(key)))
+        for key in asked:
+            self._since.setdefault(key, self._tick / SAMPLE_RATE_HZ)
+
+    def _hold(self, key: tuple[int, str], since: float) -> KeyHold:
+        """An action that was asked for until now."""
+        return KeyPress(
+            time_s=round(since, 6),
+            key=self.action_names[key],
+            hold_for_s=round(self._tick / SAMPLE_RATE_HZ - since, 6),
+        )
+
+
+class ProgramPilot(Pilot):
+    """A program that acts.
+
+    Args:
+        text: The program.
+        structure: See `Pilot`, as the others.
+        bindings: The actions of each part.
+        ids: Ids of the parts.
+        scenario: What the machine is put through.
+        seed: Of the program's random numbers and of the noise.
 
     Raises:
         ControllerFailed: The program cannot be read, names a block that there is not, or the
@@ -56,79 +162,32 @@ class Pilot:
         *,
         seed: int,
     ) -> None:
-        if scenario.senses is None or scenario.control.mode != "agent":
-            raise ControllerFailed("this trial offers no senses: it takes keys alone")
+        _require_senses(scenario)
         self._text = text
-        self.program = Program(text, seed=seed)
-        self.sensing = Sensing(structure, scenario, self.program.sensors, seed=seed)
-        self.program.senses_are(self.sensing.layout)
-        self.channels = Channels(structure, bindings, ids)
-        self._tick = 0
-        self._since: dict[tuple[int, str], float] = {}
-        self._holds: list[KeyHold] = []
-        self._sensed: list[list[float]] = []
-        self._asked: list[dict[tuple[int, str], float]] = []
+        self._program = Program(text, seed=seed)
+        super().__init__(structure, bindings, ids, scenario, self._program.sensors, seed=seed)
+        self._program.senses_are(self.layout)
 
-    def levels(self, seen: Seen) -> dict[tuple[int, str], float]:
+    def answered(self, seen: Seen) -> dict[tuple[int, str], float]:
         """What it asks for until the next tick; see `Channels.levels`.
 
         Raises:
             ControllerFailed: It fails, takes too much, or names an action that there is not.
         """
-        return self.levels_of(self.sensing.read(seen), seen.time_s)
+        return self.answered_to(self.senses(seen), seen.time_s)
 
-    def levels_of(self, values: list[float], time_s: float) -> dict[tuple[int, str], float]:
-        """What it asks for where these are its senses, in the order of the layout; see `levels`."""
-        levels = self.channels.levels(self.program.answer(self._tick, time_s, values))
-        self._sensed.append(values)
-        self._asked.append(levels)
-        self._tick += 1
-        self._note(time_s, {key for key, share in levels.items() if share > 0})
-        return levels
-
-    def holds(self) -> list[KeyHold]:
-        """When each action was asked for, as holds of a key of its own, see `channel`."""
-        self._note(self._tick * TICK_S, set())
-        return sorted(self._holds, key=lambda hold: (hold.time_s, hold.key))
-
-    @property
-    def sense_names(self) -> tuple[str, ...]:
-        """What each number that it senses is called."""
-        return tuple(_flat(self.sensing.layout))
-
-    def piloting(self) -> Piloting:
-        """What it sensed and asked for at every instant of the trial, the last one too."""
-        senses = self.sense_names
-        asked = sorted({key for levels in self._asked for key in levels})
-        count = len(self._sensed)
-        sensed = np.full((count + 1, len(senses)), np.nan, dtype=np.float32)
-        sensed[:count] = np.array(self._sensed).reshape(count, len(senses))
-        answers = np.zeros((count + 1, len(asked)), dtype=np.float32)
-        for row, levels in zip(answers, self._asked, strict=False):
-            row[:] = [levels.get(key, 0.0) for key in asked]
-        return Piloting(
-            sense_names=senses,
-            senses=sensed,
-            action_names=tuple(self.channels.names[key] for key in asked),
-            answers=answers,
-        )
+    def answered_to(self, values: Sequence[float], time_s: float) -> dict[tuple[int, str], float]:
+        """The same where these are its senses, in the order of the layout."""
+        return self.levels(values, self._program.answer(self._tick, time_s, values))
 
     def settings(self) -> dict[str, str]:
-        """What a trajectory keeps of who acts."""
+        """Which program acted."""
         return {CONTROLLER: controller_digest(self._text)}
 
-    def _note(self, time_s: float, asked: set[tuple[int, str]]) -> None:
-        for key in [key for key in self._since if key not in asked]:
-            since = self._since.pop(key)
-            self._holds.append(
-                KeyPress(
-                    time_s=round(since, 6),
-                    key=self.channels.names[key],
-                    hold_for_s=round(time_s - since, 6),
-                )
-            )
-        for key in asked:
-            self._since.setdefault(key, time_s)
+
+def _require_senses(scenario: Scenario) -> None:
+    if scenario.senses is None or scenario.control.mode != "agent":
+        raise ControllerFailed("this trial offers no senses: it takes keys alone")
 
 
 def _flat(layout: Mapping[str, Any], path: str = "") -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""One picture of a machine at the start of its trial."""
+"""One picture of a machine at a moment of its trial."""
 
 import io
 from typing import TYPE_CHECKING, Final
@@ -21,12 +21,15 @@ SIZE: Final = (480, 320)
 """Width and height of a picture, pixels."""
 
 
-def still_png(machine: "Machine", scenario: "Scenario") -> bytes:
-    """A picture of a machine, without cargo, where its trial puts it.
+def still_png(
+    machine: "Machine", scenario: "Scenario", trajectory: Trajectory | None = None
+) -> bytes:
+    """A picture of a machine, without cargo where its trial puts it.
 
     Args:
         machine: The machine.
         scenario: What it is put through.
+        trajectory: Shows its last instant in place of the start.
 
     Returns:
         A PNG file; the same machine and scenario give the same picture.
@@ -34,12 +37,12 @@ def still_png(machine: "Machine", scenario: "Scenario") -> bytes:
     Raises:
         MachineNotSimulable: It has no blocks, or too many.
     """
-    scene = Scene(machine, scenario, _standing(machine, scenario))
+    scene = Scene(machine, scenario, trajectory or _standing(machine, scenario))
     camera = Camera.looking_at(
-        scene.focus(0), distance=2.2 * scene.reach(), size=SIZE, azimuth_deg=scene.azimuth_deg
+        scene.focus(-1), distance=2.2 * scene.reach(), size=SIZE, azimuth_deg=scene.azimuth_deg
     )
     out = io.BytesIO()
-    draw(scene.at(0), camera, size=SIZE, caption="").save(out, format="PNG", optimize=True)
+    draw(scene.at(-1), camera, size=SIZE, caption="").save(out, format="PNG", optimize=True)
     return out.getvalue()
 
 

@@ -13,7 +13,7 @@ from buildarena_api.dependencies import ContextDep, ExternalDep
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
-from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError
+from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError, Workbench
 from buildarena_environment.tools import building_tools
 from buildarena_pipeline.agents.briefing import LIMITS
 from buildarena_pipeline.agents.sessions import SessionClosedError
@@ -208,6 +208,15 @@ def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
         tests=[TestTrialView.model_validate(test) for test in state.tests],
         most_tests=state.most_tests,
     )
+
+
+@router.get("/{session_id}/machine", responses=problem_responses(404, 409, 503))
+def session_machine(session_id: str, sessions: ExternalDep) -> dict[str, Any]:
+    """The machine that a submission would try now, as a document: try it, and build on."""
+    try:
+        return Workbench.holding(sessions.view(session_id).machines).submitted().to_document()
+    except NothingToSubmitError as error:
+        raise ProblemError(409, str(error)) from error
 
 
 @router.post("/{session_id}/calls", responses=problem_responses(404, 409, 422, 503))

@@ -29,7 +29,17 @@ def reply(request: Request) -> Completion:
     situation = read_situation(request)
     if situation.task not in DESIGNS:
         return Completion(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
-    design = _design(situation.task, request.seed)
+    return answered(_design(situation.task, request.seed), situation, request)
+
+
+def answered(design: Design, situation: Situation, request: Request) -> Completion:
+    """What somebody who has a design says or does next, in any role.
+
+    Args:
+        design: What is to be built.
+        situation: How far the work is.
+        request: What is answered.
+    """
     looking = _look_up(design, situation, request)
     if looking is not None:
         return looking

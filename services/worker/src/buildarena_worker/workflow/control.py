@@ -12,6 +12,7 @@ from buildarena_environment.briefing import programs_told
 from buildarena_environment.world import units_text
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.feedback.modules import module_text
+from buildarena_geometry.feedback.words import point
 from buildarena_geometry.json_texts import read_json
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_simulation.controllers.program import Program
@@ -77,7 +78,12 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         modules=driven_modules(session, machine),
     )
     if task.takes_programs:
-        opening += "\n\n" + pack.say("control_programs", contract=programs_told(task))
+        opening += "\n\n" + pack.say(
+            "control_programs",
+            contract=programs_told(task),
+            mass=f"{float(machine.mass):g}",
+            center=point(tuple(machine.center_of_mass.tolist())),
+        )
     if task.tests:
         opening += "\n\n" + pack.say("control_tests", tests=str(task.tests))
     dialogue = Dialogue(session, phase="control", opening=opening)

@@ -1,0 +1,53 @@
+import type { Browser } from "playwright-core";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { expectNoSeriousFault, launched, opened, URL_OF_SERVICE } from "./browser";
+
+const LONG_MS = 90_000;
+let browser: Browser;
+beforeAll(async () => {
+  browser = await launched();
+});
+afterAll(() => browser.close());
+
+it(
+  "a program is set, asked what it would do, and tried live",
+  async () => {
+    const post = async (to: string, body: unknown): Promise<{ id: string }> =>
+      (await (
+        await fetch(`${URL_OF_SERVICE}${to}`, {
+          method: "POST",
+          headers: { "Content-Type": "application/json" },
+          body: JSON.stringify(body),
+        })
+      ).json()) as { id: string };
+    const ask = { task: "landing-1", agent: `lua-${process.pid}`, seed: 0, simulator: "mujoco", kind: "human" };
+    const { id } = await post("/v1/sessions", ask);
+    await post(`/v1/sessions/${id}/calls`, { tool: "start", arguments: {} });
+    const fan = { base_block: "1", face: "E", new_block: "Flying Block" };
+    await post(`/v1/sessions/${id}/calls`, { tool: "attach_block_to", arguments: fan });
+    const page = await opened(browser, `/build?session=${id}`);
+    await page.getByRole("tab", { name: "Program" }).click();
+    const text = page.getByLabel("Program, in Lua");
+    await text.fill("function control(");
+    await page.getByRole("button", { name: "Set the program" }).click();
+    await page.getByText(/Not set: the controller failed, line 1/).waitFor();
+    expect(await text.inputValue()).toBe("function control(");
+    await text.fill("function control(t, sense)\n  return { fly = sense.position.z > 20 and 0.75 or 0 }\nend");
+    await page.getByRole("button", { name: "Set the program" }).click();
+    await page.locator("[data-told=accepted]").waitFor();
+    await page.getByRole("button", { name: "What would it do?" }).click();
+    await page.locator("[data-told=accepted]").waitFor();
+    await page.getByText(/it senses position.z 5\d.* and does .*0.75/).waitFor();
+    await expectNoSeriousFault(page);
+    await page.getByRole("button", { name: "Try it as it stands" }).click();
+    const trial = page.getByRole("region", { name: "Live trial" });
+    await trial.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
+    await trial.getByRole("region", { name: "Program" }).waitFor();
+    // The session goes on, and a reload finds the program.
+    await page.reload();
+    await page.getByRole("tab", { name: "Program" }).click();
+    expect(await page.getByLabel("Program, in Lua").inputValue()).toContain("0.75");
+    await page.close();
+  },
+  LONG_MS * 2,
+);

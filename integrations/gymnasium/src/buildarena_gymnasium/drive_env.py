@@ -1,0 +1,229 @@
+"""A fixed machine as an environment of Gymnasium: whoever acts is its controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import InvalidAction, ResetNeeded
+from numpy.typing import NDArray
+
+from buildarena_benchmark import Task, broken_constraint, score
+from buildarena_environment import Progress, Trial, UnknownChoiceError
+from buildarena_environment.choices import checked_simulator, chosen_task, reference_of
+from buildarena_environment.rewards import DEFAULT_WEIGHTS, TERMINAL, checked_weights, weighed
+from buildarena_geometry import Machine
+from buildarena_gymnasium.machines import fixed_machine, fixed_machines
+from buildarena_gymnasium.pictures import Picture, picture_at
+from buildarena_gymnasium.scores import score_told
+from buildarena_simulation import DEFAULT_ENGINE, Drive, SimulationError, pilot_of
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+Figures = NDArray[np.float64]
+
+TASK: Final = "hover-3"
+MAX_WORLD_SEED: Final = 2**31
+
+
+class DriveEnv(gymnasium.Env[Figures, Figures]):
+    """A task whose machine is built already, and whose controller is whoever acts.
+
+    A step is a tick of 0.04 s. An observation is what a program is told at it: the same numbers,
+    noise and delay. An action is what a program answers: a share for each action of a block, from 0
+    to 1, or from -1 where below 0 is its opposite; what is beyond counts as the bound. The last
+    tick ends the episode with the trial's score; a machine that blows up truncates it there.
+    ``info["time_s"]`` is the time; the reward comes with the last step.
+
+    Args:
+        task: The task, or the name of a built-in one; its scenario offers senses.
+        machine: What is driven; by default the built-in expert's machine for the task.
+        simulator: Name of the engine.
+        rewards: Weights of `success` and `indicator`; success alone by default.
+        reference: The indicator that is worth 1; the task's reference where there is one.
+        varied_worlds: Whether an episode without a seed has a world that is drawn from the
+            environment's random numbers; by default it has the exact one.
+        render_mode: ``rgb_array`` for pictures of the machine.
+
+    Attributes:
+        sense_names: The names of an observation's numbers: "marks.goal.relative.x".
+        action_names: The names of an action's: "7.spinning_forward".
+        machine: What is driven.
+        trial: The trial of the episode that ended, with score and trajectory; None before.
+
+    Raises:
+        UnknownChoiceError: Task, simulator or a reward does not exist, or the task has no machine.
+        ValueError: The task offers no senses, the machine breaks one of its constraints, a number
+            is out of range, or there is no such render mode.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": SAMPLE_RATE_HZ}  # noqa: RUF012 - as Gymnasium declares it
+
+    def __init__(
+        self,
+        task: Task | str = TASK,
+        *,
+        machine: Machine | None = None,
+        simulator: str = DEFAULT_ENGINE,
+        rewards: Mapping[str, float] | None = None,
+        reference: float | None = None,
+        varied_worlds: bool = False,
+        render_mode: str | None = None,
+    ) -> None:
+        modes = self.metadata["render_modes"]
+        if render_mode is not None and render_mode not in modes:
+            raise ValueError(f"there is no render mode {render_mode!r}: choose from {modes}")
+        self.render_mode = render_mode
+        self.task, self.simulator = chosen_task(task), checked_simulator(simulator)
+        self.weights = _terminal(DEFAULT_WEIGHTS if rewards is None else rewards)
+        self.reference = reference_of(
+            self.task, reference, needed=self.weights.get("indicator", 0.0) != 0
+        )
+        if self.task.scenario.senses is None:
+            offering = ", ".join(fixed_machines())
+            raise ValueError(f"{self.task.name} offers no senses: choose from {offering}")
+        self.machine = machine or fixed_machine(self.task.name)
+        broken = broken_constraint(self.task, self.machine)
+        if broken is not None:
+            raise ValueError(f"this is no machine for {self.task.name}: {broken[1]}")
+        pilot = pilot_of(self.machine, self.task.scenario)
+        self.sense_names, self.action_names = pilot.sense_names, tuple(pilot.axes)
+        self.observation_space = spaces.Box(
+            -np.inf, np.inf, (len(self.sense_names),), dtype=np.float64
+        )
+        least = np.array(list(pilot.axes.values()))
+        self.action_space = spaces.Box(least, np.ones_like(least), dtype=np.float64)
+        self.trial: Trial | None = None
+        self._varied_worlds = varied_worlds
+        self._seed: int | None = None
+        self._drive: Drive | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Figures, dict[str, Any]]:
+        """Begins an episode.
+
+        Args:
+            seed: Draws the world, as the seed of a trial does, and later ones that are drawn;
+                None for the exact world, or one that is drawn (`varied_worlds`).
+            options: There are none.
+
+        Raises:
+            ValueError: There is no such option.
+            SimulationError: The simulator failed; the same may be tried again.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise ValueError(f"there is no option {next(iter(options))!r}: there are none")
+        self._seed = seed
+        if seed is None and self._varied_worlds:
+            self._seed = int(self.np_random.integers(MAX_WORLD_SEED))
+        self.close()
+        self.trial = None
+        self._drive = Drive(self.machine, self.task.scenario, self.simulator, seed=self._seed)
+        drawn = {} if self._seed is None else {"world_seed": self._seed}
+        return np.array(self._drive.senses), {"time_s": 0.0, **drawn}
+
+    def step(self, action: Figures) -> tuple[Figures, float, bool, bool, dict[str, Any]]:
+        """Lets a tick pass.
+
+        Args:
+            action: (A,) as `action_names` are.
+
+        Raises:
+            ResetNeeded: The episode has ended, or none has begun.
+            InvalidAction: The action is not so many numbers; the episode stands where it did.
+            SimulationError: The simulator failed, and the episode is lost.
+        """
+        drive = self._drive
+        if drive is None:
+            raise ResetNeeded("no episode is under way: call reset first")
+        answers = self._answers(action)
+        try:
+            drive.step(answers)
+            if drive.is_over:
+                self._finish(drive)
+        except SimulationError:
+            self.close()
+            raise
+        info: dict[str, Any] = {"time_s": drive.time_s}
+        reward = 0.0
+        if self.trial is not None:
+            info["score"] = score_told(self.trial)
+            reward = self._worth(self.trial)
+        ended = drive.is_over
+        return np.array(drive.senses), reward, ended and not drive.is_cut, drive.is_cut, info
+
+    def render(self) -> Picture | None:
+        """The machine as it is now, (320, 480, 3) uint8, or as its last episode ended.
+
+        Raises:
+            ResetNeeded: No episode has begun.
+        """
+        if self.render_mode is None:
+            return None
+        trajectory = None if self.trial is None else self.trial.trajectory
+        if self._drive is not None:
+            trajectory = self._drive.trajectory()
+        if trajectory is None:
+            raise ResetNeeded("no episode has begun: call reset first")
+        return picture_at(self.machine, self.task.scenario.world(self._seed), trajectory)
+
+    def close(self) -> None:
+        """Ends the episode that is under way, without a score."""
+        if self._drive is not None:
+            self._drive.close()
+            self._drive = None
+
+    def _finish(self, drive: Drive) -> None:
+        trajectory = drive.trajectory()
+        self.close()
+        self.trial = Trial(score=score(self.task, self.machine, trajectory), trajectory=trajectory)
+
+    def _worth(self, trial: Trial) -> float:
+        return weighed(
+            self.weights,
+            Progress(
+                task=self.task,
+                reference=self.reference,
+                machine=self.machine,
+                changes=0,
+                refused=0,
+                trial=trial,
+            ),
+        )
+
+    def _answers(self, action: object) -> dict[str, float]:
+        """The action by names."""
+        names = self.action_names
+        try:
+            numbers = np.asarray(action)
+        except ValueError:
+            numbers = np.asarray(None)
+        if numbers.shape != (len(names),) or numbers.dtype.kind not in "fiub":
+            raise InvalidAction(
+                f"an action is {len(names)} numbers, of {', '.join(names)}; not {_kind_of(action)}"
+            )
+        answers = dict(zip(names, numbers.astype(np.float64).tolist(), strict=True))
+        for name, value in answers.items():
+            if np.isnan(value):
+                raise InvalidAction(f"the action for {name} is not a number")
+        return answers
+
+
+def _terminal(rewards: Mapping[str, float]) -> Mapping[str, float]:
+    """The weights, if the trial decides all of them."""
+    for name in rewards:
+        if name not in TERMINAL:
+            raise UnknownChoiceError("reward", name, sorted(TERMINAL))
+    return checked_weights(rewards)
+
+
+def _kind_of(action: object) -> str:
+    if isinstance(action, np.ndarray):
+        return f"an array of {action.dtype} of shape {action.shape}"
+    if isinstance(action, Sequence) and not isinstance(action, str):
+        return f"a {type(action).__name__} of {len(action)}"
+    return type(action).__name__

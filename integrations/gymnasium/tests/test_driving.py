@@ -1,0 +1,341 @@
+"""Episodes in which the agent is the controller of a fixed machine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import InvalidAction, ResetNeeded
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+import buildarena_gymnasium
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_environment import UnknownChoiceError
+from buildarena_gymnasium import DriveEnv
+from buildarena_gymnasium.machines import fixed_machine, fixed_machines
+from buildarena_simulation import Drive, SimulationError, simulate, write_trajectory
+from buildarena_simulation.controllers.program import Program
+from buildarena_simulation.trial import Trial
+
+IDS = buildarena_gymnasium.drive_ids()
+HOVER = builtin_tasks()["hover-3"]
+SHORT = replace(HOVER, scenario=HOVER.scenario.model_copy(update={"duration_s": 6.0}))
+TICKS = 150
+
+
+def short(**arguments) -> DriveEnv:
+    return DriveEnv(SHORT, **{"simulator": "mujoco", **arguments})
+
+
+def rising(environment: gymnasium.Env) -> np.ndarray:
+    return np.full(environment.action_space.shape, 0.37)
+
+
+def to_the_end(environment: gymnasium.Env, action: np.ndarray | None = None) -> list:
+    """Every step of the episode that has begun."""
+    steps, ended = [], False
+    while not ended:
+        steps.append(environment.step(rising(environment) if action is None else action))
+        ended = steps[-1][2] or steps[-1][3]
+    return steps
+
+
+def written(trajectory) -> bytes:
+    """The whole of it, but for which program acted."""
+    settings = {name: value for name, value in trajectory.settings.items() if name != "controller"}
+    return write_trajectory(replace(trajectory, settings=settings))
+
+
+def test_each_task_that_takes_programs_can_be_driven() -> None:
+    piloted = [name for name, task in builtin_tasks().items() if task.scenario.senses]
+    assert list(fixed_machines()) == piloted
+    assert IDS[-1] == "BuildArena/Drive-Hover-3-v0"
+    assert len(IDS) == len(piloted)
+    usual = gymnasium.make("buildarena_gymnasium:BuildArena/Drive-v0").unwrapped
+    assert usual.task.name == "hover-3"
+    assert gymnasium.make("BuildArena/Drive-v0", task="slalom-2").unwrapped.task.level == 2
+
+
+@pytest.mark.parametrize("name", IDS)
+@pytest.mark.filterwarnings("ignore:.*A Box observation space m")  # places have no bounds
+def test_gymnasiums_checker_is_content(name) -> None:
+    check_env(gymnasium.make(name, simulator="mujoco", render_mode="rgb_array").unwrapped)
+
+
+@pytest.mark.filterwarnings("ignore:.*A Box observation space m")
+def test_the_checker_is_content_with_drawn_worlds() -> None:
+    check_env(gymnasium.make(IDS[-1], varied_worlds=True).unwrapped)
+
+
+def test_spaces_have_names() -> None:
+    craft = short()
+    assert craft.observation_space.shape == (len(craft.sense_names),)
+    assert craft.sense_names[:3] == ("position.x", "position.y", "position.z")
+    assert craft.action_names == ("4.fly", "7.fly", "10.fly", "13.fly")
+    assert (craft.action_space.low == 0).all()
+    car = gymnasium.make(IDS[1]).unwrapped
+    assert {name.partition(".")[2] for name in car.action_names} == {"spinning_forward"}
+    assert (car.action_space.low == -1).all()
+    assert (car.action_space.high == 1).all()
+    assert "gates.gate 8.relative.y" in car.sense_names
+
+
+@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
+@pytest.mark.parametrize("seed", [None, 3])
+def test_what_a_program_answers_makes_its_trial(engine, seed, experts, monkeypatch) -> None:
+    (program,) = (
+        call["arguments"]["program"]
+        for call in experts["hover-3"]["calls"]
+        if call["tool"] == "set_controller"
+    )
+    answers, answer = [], Program.answer
+
+    def listened(*tick) -> dict[str, float]:
+        answers.append(answer(*tick))
+        return answers[-1]
+
+    monkeypatch.setattr(Program, "answer", listened)
+    machine = fixed_machine("hover-3").with_controller(program)
+    trajectory = simulate(machine, SHORT.scenario, engine, seed=seed)
+    assert len(answers) == TICKS
+
+    environment = short(simulator=engine)
+    seen, _ = environment.reset(seed=seed)
+    for tick, named in enumerate(answers):
+        assert np.array_equal(seen.astype(np.float32), trajectory.piloting.senses[tick])
+        action = np.array([named[name] for name in environment.action_names])
+        seen, _, terminated, truncated, info = environment.step(action)
+    assert (terminated, truncated) == (True, False)
+    trial = environment.trial
+    assert trial.trajectory.positions.tobytes() == trajectory.positions.tobytes()
+    assert written(trial.trajectory) == written(trajectory)
+    assert trial.score == score(SHORT, machine, trajectory)
+    assert info["score"]["indicator"] == trial.score.indicator
+
+
+def test_a_whole_episode_in_the_task_itself() -> None:
+    weights = {"success": 1.0, "indicator": 2.0}
+    environment = gymnasium.make(IDS[0], simulator="mujoco", rewards=weights)
+    environment.reset(seed=1)
+    steps = to_the_end(environment, np.full(4, 0.3))
+    assert [step[1] for step in steps[:-1]] == [0.0] * (len(steps) - 1)
+    assert all("score" not in step[4] for step in steps[:-1])
+    *_, terminated, truncated, info = steps[-1]
+    assert (terminated, truncated, len(steps)) == (True, False, 750)
+    assert info["time_s"] == pytest.approx(30)
+    assert (info["score"]["success"], info["score"]["indicator"]) == (False, 0.0)
+    assert environment.unwrapped.trial.trajectory.settings["seed"] == 1
+
+
+def test_rewards_are_of_the_trial_alone() -> None:
+    # Within 30 of the mark is near enough here, and everything counts.
+    easy = SHORT.scoring.model_copy(update={"radius": 30.0})
+    task = replace(SHORT, scoring=easy)
+    environment = DriveEnv(
+        task, simulator="mujoco", rewards={"success": 1, "indicator": 2}, reference=0.5
+    )
+    environment.reset()
+    _, reward, *_, info = to_the_end(environment, np.full(4, 0.37))[-1]
+    assert info["score"]["success"]
+    assert reward == pytest.approx(1 + 2 * info["score"]["indicator"] / 0.5)
+    with pytest.raises(UnknownChoiceError, match="no reward 'accepted_share': choose from ind"):
+        short(rewards={"accepted_share": 1.0})
+    with pytest.raises(ValueError, match="no reference indicator"):
+        short(rewards={"indicator": 1.0})
+
+
+def test_the_same_seed_and_actions_have_the_same_bytes() -> None:
+    def played(environment: DriveEnv, seed: int) -> tuple[bytes, bytes]:
+        environment.reset(seed=seed)
+        environment.action_space.seed(5)
+        actions = [environment.action_space.sample() for _ in range(TICKS)]
+        seen = [environment.step(action)[0] for action in actions]
+        return np.array(seen).tobytes(), written(environment.trial.trajectory)
+
+    first, other = short(), short()
+    once = played(first, 7)
+    other.reset(seed=8)  # an episode that is left behind changes nothing
+    other.step(rising(other))
+    assert played(other, 7) == once == played(first, 7)
+    assert played(first, 8) != once
+
+
+def test_worlds_are_the_exact_one_or_of_a_seed_or_drawn() -> None:
+    def mark(seen: np.ndarray) -> tuple[float, ...]:
+        first = short().sense_names.index("marks.goal.position.x")
+        return tuple(seen[first : first + 3])
+
+    exact = short()
+    seen, info = exact.reset()
+    assert mark(seen) == (4, -3, 12)
+    assert info == {"time_s": 0.0}
+    seen, info = exact.reset(seed=9)
+    assert info["world_seed"] == 9
+    assert mark(seen) == SHORT.scenario.world(9).marks[0].center
+    assert mark(exact.reset()[0]) == (4, -3, 12)
+    varied = short(varied_worlds=True)
+    drawn = [varied.reset(seed=9)[1], varied.reset()[1], varied.reset()[1]]
+    assert len({info["world_seed"] for info in drawn}) == 3
+    assert [varied.reset(seed=9)[1], varied.reset()[1], varied.reset()[1]] == drawn
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (np.full(3, 0.5), "an action is 4 numbers, of 4.fly, 7.fly, 10.fly, 13.fly; not an array"),
+        (np.full((1, 4), 0.5), r"of shape \(1, 4\)"),
+        (np.array([0.5, np.nan, 0.5, 0.5]), "the action for 7.fly is not a number"),
+        (np.array(["1"] * 4), "not an array of <U1"),
+        (np.full(4, 1j), "complex128"),
+        (np.array([None] * 4), "object"),
+        ([0.5, [0.5], 0.5, 0.5], "not a list of 4"),
+        ({"4.fly": 1.0}, "not dict"),
+        ("4.fly", "not str"),
+        (0.5, "not float"),
+        (None, "not NoneType"),
+    ],
+)
+def test_what_is_no_action_is_refused_and_no_tick_passes(action, words) -> None:
+    environment = short()
+    environment.reset(seed=2)
+    environment.step(rising(environment))
+    with pytest.raises(InvalidAction, match=words):
+        environment.step(action)
+    assert environment.step(rising(environment))[4]["time_s"] == pytest.approx(0.08)
+
+
+def test_numbers_of_other_kinds_count_and_what_is_beyond_is_the_bound() -> None:
+    def after(action) -> bytes:
+        environment = short()
+        environment.reset()
+        for _ in range(20):
+            seen, *_ = environment.step(action)
+        return seen.tobytes()
+
+    full = after(np.ones(4))
+    for same in (np.ones(4, np.float32), [1, 1, 1, 1], np.ones(4, bool), np.full(4, np.inf)):
+        assert after(same) == full
+    # A fan has no way back: below 0 is nothing.
+    assert after(np.full(4, -np.inf)) == after(np.zeros(4)) != full
+
+
+def test_steps_outside_of_an_episode_need_a_reset() -> None:
+    environment = short(render_mode="rgb_array")
+    for doing in (lambda: environment.step(np.zeros(4)), environment.render):
+        with pytest.raises(ResetNeeded, match="call reset first"):
+            doing()
+    environment.reset()
+    assert len(to_the_end(environment)) == TICKS
+    with pytest.raises(ResetNeeded):
+        environment.step(np.zeros(4))
+    environment.reset()
+    environment.close()
+    environment.close()
+    with pytest.raises(ResetNeeded):
+        environment.step(np.zeros(4))
+    assert environment.trial is None
+
+
+def test_a_lost_simulator_loses_the_episode_and_no_more(monkeypatch) -> None:
+    environment = short()
+    environment.reset()
+    with monkeypatch.context() as broken:
+        broken.setattr(Trial, "pass_tick", lambda _: 1 / 0)
+        with pytest.raises(SimulationError, match="division by zero"):
+            environment.step(np.zeros(4))
+    with pytest.raises(ResetNeeded):
+        environment.step(np.zeros(4))
+    environment.reset()
+    assert to_the_end(environment)[-1][2]
+
+
+def test_a_machine_that_blows_up_truncates_the_episode(monkeypatch) -> None:
+    environment = short()
+    environment.reset()
+    before, *_ = environment.step(rising(environment))
+    kind = type(environment._drive._rollout._adapter)
+    motion = kind.motion
+
+    def exploding(engine):
+        now = motion(engine)
+        return replace(now, position=now.position * np.nan)
+
+    monkeypatch.setattr(kind, "motion", exploding)
+    seen, reward, terminated, truncated, info = environment.step(rising(environment))
+    assert (reward, terminated, truncated) == (0.0, False, True)
+    assert np.array_equal(seen, before)
+    assert "unstable" in info["score"]["flags"]
+    assert not info["score"]["success"]
+
+
+@pytest.mark.parametrize("kind", [SyncVectorEnv, AsyncVectorEnv])
+def test_each_environment_of_a_vector_drives_by_itself(kind) -> None:
+    alone = []
+    for seed in (4, 5):
+        environment = short()
+        environment.reset(seed=seed)
+        alone.append(to_the_end(environment))
+    vector = kind([short, short])
+    try:
+        vector.reset(seed=4)
+        for tick in range(TICKS):
+            seen, rewards, terminated, truncated, info = vector.step(np.full((2, 4), 0.37))
+            for index in range(2):
+                assert np.array_equal(seen[index], alone[index][tick][0])
+        assert terminated.all()
+        assert not truncated.any()
+        assert rewards.tolist() == [steps[-1][1] for steps in alone]
+        assert info["score"]["indicator"].tolist() == [
+            steps[-1][4]["score"]["indicator"] for steps in alone
+        ]
+        _, _, terminated, _, info = vector.step(np.full((2, 4), 0.37))  # begins the next ones
+        assert not terminated.any()
+        assert info["time_s"].tolist() == [0.0, 0.0]
+    finally:
+        vector.close()
+
+
+def test_pictures_show_where_the_machine_is() -> None:
+    environment = short(render_mode="rgb_array")
+    environment.reset(seed=1)
+    begun = environment.render()
+    assert (begun.shape, begun.dtype) == ((320, 480, 3), np.uint8)
+    assert np.array_equal(environment.render(), begun)
+    to_the_end(environment, np.array([0.5, 0.4, 0.4, 0.4]))
+    assert not np.array_equal(environment.render(), begun)
+    assert short().render() is None
+
+
+def test_what_cannot_be_driven_is_refused_with_the_choices() -> None:
+    with pytest.raises(UnknownChoiceError, match="no task 'hover-4'"):
+        gymnasium.make("BuildArena/Drive-v0", task="hover-4")
+    with pytest.raises(ValueError, match="support-1 offers no senses: choose from landing-1"):
+        DriveEnv("support-1")
+    with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
+        DriveEnv(simulator="game")
+    with pytest.raises(UnknownChoiceError, match="driven in task 'mine': choose from landing-1"):
+        DriveEnv(replace(HOVER, name="mine"))
+    with pytest.raises(ValueError, match="no render mode 'film'"):
+        DriveEnv(render_mode="film")
+    with pytest.raises(ValueError, match="no option 'state': there are none"):
+        short().reset(options={"state": 1})
+    # Wheels are no modules of this task.
+    with pytest.raises(ValueError, match="this is no machine for hover-3: "):
+        DriveEnv(machine=fixed_machine("slalom-2"))
+
+
+def test_another_machine_can_be_driven() -> None:
+    environment = DriveEnv("landing-1", machine=fixed_machine("hover-3"), simulator="mujoco")
+    assert environment.reset()[0].shape == environment.observation_space.shape
+
+
+def test_an_episode_that_is_left_behind_ends_its_world(monkeypatch) -> None:
+    closed, close = [], Drive.close
+    monkeypatch.setattr(Drive, "close", lambda drive: (closed.append(1), close(drive)))
+    environment = short()
+    for _ in range(3):
+        environment.reset()
+    assert len(closed) == 2

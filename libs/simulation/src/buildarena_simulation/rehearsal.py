@@ -1,0 +1,129 @@
+"""What a controller would answer, without a trial: at the start, and to senses that are named."""
+
+import difflib
+import re
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from buildarena_simulation.controllers.pilot import Pilot
+from buildarena_simulation.controllers.program import Program
+from buildarena_simulation.controllers.senses import TICK_S, Seen
+from buildarena_simulation.engines.base import CargoPose
+from buildarena_simulation.errors import ControllerFailed
+from buildarena_simulation.machine import bindings_of, part_ids, structure_of
+from buildarena_simulation.placement import start_of
+from buildarena_simulation.scenario import Scenario, Senses
+from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_simulation.structure.motion import at_rest
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation.structure.model import Structure
+
+MAX_TICKS: Final = 20
+MAX_REHEARSAL_S: Final = 0.2
+"""Processor time of all its ticks: others wait meanwhile."""
+TIME: Final = "t"
+"""The name of the time among senses that are named."""
+_NAME: Final = re.compile(r"\w+")
+_NEAR: Final = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answered:
+    """One tick of a rehearsal.
+
+    Attributes:
+        time_s: The time that the program was told, seconds.
+        senses: What it sensed, by name as in a trajectory; those whose names stand in its text.
+        actions: What it asked for by block and action, 0 to 1, as a trial would take it.
+    """
+
+    time_s: float
+    senses: Mapping[str, float]
+    actions: Mapping[str, float]
+
+
+def rehearsed(
+    text: str,
+    machine: "Machine",
+    scenario: Scenario,
+    ticks: Sequence[Mapping[str, float]] = ({},),
+) -> list[Answered]:
+    """Asks a program at some ticks, one after the other, as a trial would.
+
+    Senses that no tick has named yet are those at the exact start: without noise, at once.
+
+    Args:
+        text: The program.
+        machine: What it acts on.
+        scenario: Its places, and what may be sensed.
+        ticks: By name what is different at each, and from then on; `TIME` is seconds, and grows by
+            one tick where it is not named.
+
+    Raises:
+        ControllerFailed: The program did, or there is no such sense.
+        MachineNotSimulable: There is no machine to act on.
+    """
+    structure = structure_of(machine)
+    exact = Senses(offers=scenario.senses.offers) if scenario.senses else None
+    scenario = scenario.model_copy(update={"senses": exact})
+    program = Program(text, most_s=MAX_REHEARSAL_S)
+    ids, bindings = part_ids(machine), bindings_of(machine)
+    pilot = Pilot(structure, bindings, ids, scenario, program.sensors, seed=0)
+    program.senses_are(pilot.layout)
+    names = {name: place for place, name in enumerate(pilot.sense_names)}
+    words = set(_NAME.findall(text))
+    shown = [name for name in names if words.issuperset(_NAME.findall(name))]
+    values = pilot.senses(_at_start(structure, scenario))
+    began, now, answers = time.process_time(), -TICK_S, []
+    for tick, changes in enumerate(ticks):
+        now = changes.get(TIME, now + TICK_S)
+        for name, value in changes.items():
+            if name != TIME:
+                values[_place(names, name)] = value
+        levels = pilot.levels(values, program.answer(tick, now, values))
+        answers.append(
+            Answered(
+                time_s=now,
+                senses={name: values[names[name]] for name in shown},
+                actions={pilot.action_names[key]: level for key, level in levels.items()},
+            )
+        )
+        if time.process_time() - began > MAX_REHEARSAL_S:
+            raise ControllerFailed(
+                f"{tick + 1} ticks took more than {MAX_REHEARSAL_S:g} s of a processor"
+            )
+    return answers
+
+
+def _place(names: Mapping[str, int], name: str) -> int:
+    place = names.get(name)
+    if place is not None:
+        return place
+    near = difflib.get_close_matches(name, names, n=_NEAR, cutoff=0.4) or list(names)
+    raise ControllerFailed(f"there is no sense {name[:60]!r}; there is {', '.join(near) or 'none'}")
+
+
+def _at_start(structure: "Structure", scenario: Scenario) -> Seen:
+    """What there is to be sensed at the exact start, with no contact of any wheel yet."""
+    start = start_of(structure, scenario, None)
+    clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
+    motion = at_rest(clusters, start.position, start.rotation)
+    motion.velocity[:] += start.velocity
+    cargo = None
+    if start.cargo is not None:
+        rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        place = start.cargo.position
+        cargo = CargoPose(position=place, quaternion=level, velocity=rest, spin=rest)
+    return Seen(
+        time_s=0.0,
+        clusters=clusters,
+        motion=motion,
+        cargo=cargo,
+        on_wheels=np.zeros(len(structure.wheels)),
+    )

@@ -1,0 +1,241 @@
+"""Trials that somebody outside drives: the same loop, senses and bytes as with a program."""
+
+import gc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support.machines.families import car
+from support.machines.piloted import experts_machine
+
+from buildarena_simulation import (
+    ControllerFailed,
+    Drive,
+    Scenario,
+    SimulationError,
+    Trajectory,
+    UnknownEngineError,
+    pilot_of,
+    simulate,
+    write_trajectory,
+)
+from buildarena_simulation.controllers.program import Program
+from buildarena_simulation.engines.base import Engine
+from buildarena_simulation.rollout import Rollout
+from buildarena_simulation.scenario import Control, Gate, Senses
+from buildarena_simulation.trial import Trial
+
+WEAVING = """
+function control(t, sense)
+  local turn = 0.4 * math.sin(2 * t) - 0.1 * sense.spin.z + 0.02 * math.random()
+  return { spinning_forward = 0.8 + turn, ["7.spinning_forward"] = 0.8 - turn }
+end
+"""
+SHORT = Scenario(
+    duration_s=2.0,
+    control=Control(mode="agent"),
+    gates=[Gate(name="goal", center=(1, 8), half_width=2)],
+    senses=Senses(noise={"place": 0.05, "spin": 0.02}, delay_ticks=2),
+)
+
+
+@pytest.fixture
+def listening(monkeypatch) -> list[dict[str, float]]:
+    """What programs answer from now on."""
+    answers: list[dict[str, float]] = []
+    answer = Program.answer
+
+    def listened(program: Program, *tick) -> dict[str, float]:
+        answers.append(answer(program, *tick))
+        return answers[-1]
+
+    monkeypatch.setattr(Program, "answer", listened)
+    return answers
+
+
+def to_the_end(drive: Drive, answers) -> Trajectory:
+    for answer in answers:
+        drive.step(answer)
+    assert drive.is_over
+    return drive.trajectory()
+
+
+def written(trajectory: Trajectory) -> bytes:
+    """The whole of it, but for which program acted."""
+    settings = {name: value for name, value in trajectory.settings.items() if name != "controller"}
+    return write_trajectory(replace(trajectory, settings=settings))
+
+
+def wheels() -> dict[str, float]:
+    return dict.fromkeys(pilot_of(car(drive=()), SHORT).axes, 0.7)
+
+
+@pytest.mark.parametrize("seed", [None, 11])
+def test_the_answers_of_a_program_make_the_same_trial(engine, seed, listening) -> None:
+    machine = car(drive=())
+    program = simulate(machine.with_controller(WEAVING), SHORT, engine, seed=seed)
+    assert len(listening) == 50
+    driven = to_the_end(Drive(machine, SHORT, engine, seed=seed), listening)
+    assert written(driven) == written(program)
+    assert "controller" not in driven.settings
+    assert "piloting" not in driven.settings
+    assert driven.piloting is not None
+
+
+def test_so_do_those_of_the_expert_in_a_drawn_world(engine, tasks, listening) -> None:
+    task = tasks["hover-3"]
+    scenario = task.scenario.model_copy(update={"duration_s": 6.0})
+    machine = experts_machine(task)
+    program = simulate(machine, scenario, engine, seed=3)
+    # A machine's own program does not act.
+    driven = to_the_end(Drive(machine, scenario, engine, seed=3), listening)
+    assert written(driven) == written(program)
+
+
+def test_trials_side_by_side_do_not_touch_each_other(engine) -> None:
+    machine, answers = car(drive=()), wheels()
+    alone = [
+        written(to_the_end(Drive(machine, SHORT, engine, seed=seed), [answers] * 50))
+        for seed in (1, 2)
+    ]
+    drives = [Drive(machine, SHORT, engine, seed=seed) for seed in (1, 2)]
+    for _ in range(50):
+        for drive in drives:
+            drive.step(answers)
+    assert [written(drive.trajectory()) for drive in drives] == alone
+    assert alone[0] != alone[1]
+
+
+def test_a_trajectory_on_the_way_is_the_beginning_and_changes_nothing() -> None:
+    answers = wheels()
+    whole = to_the_end(Drive(car(drive=()), SHORT, "mujoco"), [answers] * 50)
+    drive = Drive(car(drive=()), SHORT, "mujoco")
+    for tick in range(50):
+        assert drive.time_s == pytest.approx(0.04 * tick)
+        part = drive.trajectory()
+        assert len(part.time_s) == tick + 1
+        assert np.array_equal(part.positions, whole.positions[: tick + 1])
+        drive.step(answers)
+    assert written(drive.trajectory()) == written(whole)
+
+
+def test_names_of_senses_and_actions() -> None:
+    pilot = pilot_of(car(drive=()), SHORT)
+    drive = Drive(car(drive=()), SHORT, "mujoco")
+    assert drive.pilot.sense_names == pilot.sense_names
+    assert len(drive.senses) == len(pilot.sense_names)
+    senses = dict(zip(pilot.sense_names, drive.senses, strict=True))
+    assert senses["gates.goal.position.y"] == 8
+    # Of two opposites the forward one, with both ways in it.
+    assert {name.partition(".")[2] for name in pilot.axes} == {"spinning_forward"}
+    assert set(pilot.axes.values()) == {-1.0}
+
+
+def test_what_has_no_opposite_has_no_number_below_0(tasks) -> None:
+    craft = pilot_of(experts_machine(tasks["hover-3"]), tasks["hover-3"].scenario)
+    assert set(craft.axes.values()) == {0.0}
+    assert all(name.endswith(".fly") for name in craft.axes)
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"spinning_forwards": 1.0}, "there is no action 'spinning_forwards'; there is spinning_"),
+        ({"99.fly": 1.0}, "there is no action '99.fly'"),
+        ({"spinning_forward": float("nan")}, "what it answers for spinning_forward is no number"),
+    ],
+)
+def test_a_wrong_answer_is_refused_and_nothing_passes(answers, words) -> None:
+    good = wheels()
+    whole = to_the_end(Drive(car(drive=()), SHORT, "mujoco"), [good] * 50)
+    drive = Drive(car(drive=()), SHORT, "mujoco")
+    for _ in range(50):
+        with pytest.raises(ControllerFailed, match=words):
+            drive.step(answers)
+        drive.step(good)
+    assert written(drive.trajectory()) == written(whole)
+
+
+def test_what_is_beyond_counts_as_the_bound() -> None:
+    far = [
+        to_the_end(Drive(car(drive=()), SHORT, "mujoco"), [dict.fromkeys(wheels(), share)] * 50)
+        for share in (1.0, float("inf"), 1e300)
+    ]
+    assert len({written(trajectory) for trajectory in far}) == 1
+
+
+def test_a_trial_that_is_over_passes_no_tick(engine) -> None:
+    drive = Drive(car(drive=()), SHORT, engine)
+    to_the_end(drive, [{}] * 50)
+    with pytest.raises(ValueError, match="the trial is over"):
+        drive.step({})
+    assert len(drive.trajectory().time_s) == 51
+    drive.close()
+    drive.close()
+
+
+def test_an_abandoned_trial_ends_its_world(monkeypatch) -> None:
+    ended = []
+    drive = Drive(car(drive=()), SHORT, "mujoco")
+    close = type(drive._rollout._adapter).close
+    monkeypatch.setattr(
+        type(drive._rollout._adapter), "close", lambda engine: (ended.append(1), close(engine))
+    )
+    abandoned = Drive(car(drive=()), SHORT, "mujoco")
+    drive.close()
+    del abandoned
+    gc.collect()
+    assert ended == [1]
+
+
+def test_a_machine_that_blows_up_ends_the_trial_there(engine, monkeypatch) -> None:
+    drive = Drive(car(drive=()), SHORT, engine)
+    kind: type[Engine] = type(drive._rollout._adapter)
+    for _ in range(10):
+        drive.step(wheels())
+    before, motion = list(drive.senses), kind.motion
+
+    def exploding(engine: Engine):
+        now = motion(engine)
+        return replace(now, position=now.position * np.nan)
+
+    monkeypatch.setattr(kind, "motion", exploding)
+    drive.step(wheels())
+    assert drive.is_cut
+    assert drive.is_over
+    assert drive.senses == before
+    cut = drive.trajectory()
+    assert np.isfinite(cut.positions[:11]).all()
+    assert np.isnan(cut.positions[11:]).any(axis=(1, 2)).all()
+    assert len(cut.time_s) == len(cut.piloting.senses) == 51
+
+
+def test_a_simulator_that_fails_is_no_fault_of_the_machine(monkeypatch) -> None:
+    def failing(*_: object) -> None:
+        raise RuntimeError("lost")
+
+    drive = Drive(car(drive=()), SHORT, "mujoco")
+    monkeypatch.setattr(Trial, "_advance", failing)
+    with pytest.raises(SimulationError, match="mujoco failed: lost"):
+        drive.step({})
+
+
+def test_a_trial_that_cannot_begin_leaves_no_world_behind(monkeypatch) -> None:
+    closed = []
+    close = Rollout.close
+    monkeypatch.setattr(Rollout, "close", lambda rollout: (closed.append(1), close(rollout)))
+    missing = SHORT.model_copy(update={"tracked_blocks": ("99",)})
+    with pytest.raises(Exception, match="the machine has no block 99"):
+        Drive(car(drive=()), missing, "mujoco")
+    assert closed == [1]
+
+
+def test_trials_without_senses_cannot_be_driven() -> None:
+    for scenario in (
+        SHORT.model_copy(update={"senses": None}),
+        SHORT.model_copy(update={"control": Control(mode="held")}),
+    ):
+        with pytest.raises(ControllerFailed, match="offers no senses"):
+            Drive(car(drive=()), scenario, "mujoco")
+    with pytest.raises(UnknownEngineError, match="no engine 'game'"):
+        Drive(car(drive=()), SHORT, "game")
