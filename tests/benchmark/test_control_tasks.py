@@ -178,6 +178,36 @@ def test_rising_without_looking_does_not_keep_a_place(engine) -> None:
     assert not result.success
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_who_stays_where_the_place_was_does_not_follow_it(engine) -> None:
+    """The expert's craft, which keeps to the middle of where the place goes, without a look."""
+    task = builtin_tasks()["hover-4"]
+    honest = experts_machine(task)
+    program = honest.controller.replace("sense.marks.goal.relative", "sense.marks.goal.middle")
+    assert program != honest.controller
+    middle = "sense.marks.goal.middle = {}\n  for a, at in pairs({ x = 4, y = -3, z = 12 }) do"
+    middle += " sense.marks.goal.middle[a] = at - sense.position[a] end\n"
+    program = program.replace("control(t, sense)\n", f"control(t, sense)\n  {middle}", 1)
+    result = scored(task, honest.with_controller(program), engine, None)
+    assert not result.success
+    assert result.metrics["share_near"] < 0.4
+    assert scored(task, honest, engine, None).success
+
+
+@pytest.mark.parametrize("task", ["landing-1", "mechanisms-4", "transport-4"])
+def test_a_scorer_of_places_that_stay_refuses_those_that_move(task) -> None:
+    document = dict(builtin_tasks()[task].as_document())
+    marks = [
+        {**mark, "drift": {"swing": [1, 1, 1], "period_s": [9, 9, 9]}}
+        for mark in document["scenario"]["marks"]
+    ]
+    document["scenario"] = {**document["scenario"], "marks": marks}
+    document["name"] = "moving"
+    document = {key: value for key, value in document.items() if value is not None}
+    with pytest.raises(TaskError, match=r"moves \(drift\), and this scorer's marks stay"):
+        load_task(json.dumps(document) + "\n")
+
+
 def test_a_gate_that_there_is_not_ends_a_trial_at_its_line() -> None:
     task = builtin_tasks()["slalom-2"]
     machine = experts_machine(task)

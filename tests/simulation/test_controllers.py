@@ -25,7 +25,7 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.control import read_presses
-from buildarena_simulation.scenario import Cargo, Control, Gate, Mark, SenseKind, Senses
+from buildarena_simulation.scenario import Cargo, Control, Drift, Gate, Mark, SenseKind, Senses
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, UP
 
 EXAMPLE = Path(__file__).parents[2] / "examples/control"
@@ -164,6 +164,23 @@ def test_cargo_marks_and_gates_are_told_from_where_it_is() -> None:
     assert float(told("sense.gates.first.relative.y", scenario=scenario)) == pytest.approx(
         9.0, abs=0.1
     )
+
+
+def test_a_mark_that_moves_is_told_where_it_is_then(engine) -> None:
+    drift = Drift(swing=(4, -2, 1), period_s=(16, 8, 4))
+    mark = Mark(name="goal", center=(3, 4, 5), radius=1, drift=drift)
+    still = "function control() return {} end"
+    trajectory = driven(still, drive(2.0, marks=(mark,)), engine)
+    piloting = trajectory.piloting
+    place, relative = (
+        piloting.senses[:-1, piloting.sense_names.index(f"marks.goal.{name}")]
+        for name in ("position.x", "relative.y")
+    )
+    times = trajectory.time_s[:-1]
+    assert mark.at(0.0) == (3, 4, 5)
+    np.testing.assert_allclose(place, 3 + 4 * np.sin(np.pi * times / 8), atol=2e-6)
+    own = trajectory.positions[:-1, 0, 1]
+    np.testing.assert_allclose(relative, 4 - 2 * np.sin(np.pi * times / 4) - own, atol=1e-4)
 
 
 def test_a_task_offers_what_it_says_and_no_more() -> None:

@@ -2,7 +2,7 @@ import { useFrame } from "@react-three/fiber";
 import { useMemo, useRef } from "react";
 import { DoubleSide, type Group } from "three";
 import type { Vector } from "./modules";
-import { posts, type Gate } from "./signs";
+import { markAt, posts, type Gate, type Mark } from "./signs";
 
 export interface Scenario {
   duration_s: number;
@@ -10,7 +10,7 @@ export interface Scenario {
   cargo: { size: Vector; drop_height: number; final_mass: number; at?: Vector | null } | null;
   placement: { kind: string; gap?: number; lowest_center?: number; height?: number; velocity?: Vector };
   gates?: Gate[];
-  marks?: { name: string; center: Vector; radius: number }[];
+  marks?: Mark[];
 }
 
 const GROUND = 160;
@@ -38,7 +38,7 @@ const POST = 2;
 const FLAT = 0.03;
 
 /** What is shown and nothing can touch: gates to be crossed, and places. */
-function Signs({ scenario }: { scenario: Scenario }) {
+function Signs({ scenario, time }: { scenario: Scenario; time: number }) {
   return (
     <>
       {(scenario.gates ?? []).flatMap((gate) =>
@@ -49,18 +49,28 @@ function Signs({ scenario }: { scenario: Scenario }) {
           </mesh>
         )),
       )}
-      {(scenario.marks ?? []).map(({ name, center, radius }) => (
-        <mesh key={name} position={[center[0], center[1], center[2] + FLAT]}>
-          <ringGeometry args={[Math.max(0, radius - 0.1), radius, 48]} />
-          <meshBasicMaterial color="#c2410c" side={DoubleSide} />
-        </mesh>
-      ))}
+      {(scenario.marks ?? []).map((mark) => {
+        const [x, y, z] = markAt(mark, time);
+        return (
+          <mesh key={mark.name} position={[x, y, z + FLAT]}>
+            <ringGeometry args={[Math.max(0, mark.radius - 0.1), mark.radius, 48]} />
+            <meshBasicMaterial color="#c2410c" side={DoubleSide} />
+          </mesh>
+        );
+      })}
     </>
   );
 }
 
+interface SurroundingsProps {
+  scenario: Scenario | null;
+  floor?: number;
+  /** Seconds of the trial: some marks move. */
+  time?: number;
+}
+
 /** The ground, the fixed boxes, the gates and the marks of a scenario. */
-export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | null; floor?: number }) {
+export function Surroundings({ scenario, floor = 0, time = 0 }: SurroundingsProps) {
   const terrain = useMemo(() => scenario?.terrain ?? [], [scenario]);
   return (
     <>
@@ -71,7 +81,7 @@ export function Surroundings({ scenario, floor = 0 }: { scenario: Scenario | nul
           <meshLambertMaterial color="#9aa38b" />
         </mesh>
       ))}
-      {scenario !== null && <Signs scenario={scenario} />}
+      {scenario !== null && <Signs scenario={scenario} time={time} />}
     </>
   );
 }

@@ -101,7 +101,7 @@ export function TrialScene({
   return (
     <>
       <Stage bounds={bounds} height={height} label={`The trial at ${clock.shown.toFixed(1)} seconds`} lock={lock}>
-        <Surroundings scenario={scenario} />
+        <Surroundings scenario={scenario} time={clock.shown} />
         <Film machine={machine} trial={trial} clock={clock} follow={follow} loads={loads ? borne : null} />
       </Stage>
       {loads && (

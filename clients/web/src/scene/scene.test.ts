@@ -4,7 +4,7 @@ import { boundsOf, machineOf, readScene, type MachineScene } from "./machine";
 import { jointsOf, loadsAt, loadsOfBlocks, mostLoaded } from "./loads";
 import { moduleShape } from "./modules";
 import { poseAt } from "./playing";
-import { posts } from "./signs";
+import { markAt, posts } from "./signs";
 import { instantAt, type Trial } from "./trial";
 
 const CYCLE: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
@@ -167,5 +167,17 @@ describe("posts", () => {
       [4, 11.5, 0],
       [4, 8.5, 0],
     ]);
+  });
+});
+
+describe("marks", () => {
+  it("stay, or swing about their centres", () => {
+    const mark = { name: "goal", center: [1, 2, 3] as const, radius: 1 };
+    expect(markAt(mark, 7)).toEqual([1, 2, 3]);
+    const drift = { swing: [4, -2, 1] as const, period_s: [16, 8, 4] as const };
+    expect(markAt({ ...mark, drift }, 0)).toEqual([1, 2, 3]);
+    markAt({ ...mark, drift }, 2).forEach((value, axis) => {
+      expect(value).toBeCloseTo([1 + 4 * Math.sin(Math.PI / 4), 0, 3][axis] ?? 0, 12);
+    });
   });
 });

@@ -1,5 +1,21 @@
 import type { Vector } from "./modules";
 
+/** A place that nothing can touch; one with a drift swings about its centre. */
+export interface Mark {
+  name: string;
+  center: Vector;
+  radius: number;
+  drift?: { swing: Vector; period_s: Vector } | null;
+}
+
+/** Where a mark is at a time of the trial, in seconds. */
+export function markAt({ center, drift }: Mark, time: number): Vector {
+  if (drift == null) return center;
+  const at = (axis: 0 | 1 | 2): number =>
+    center[axis] + drift.swing[axis] * Math.sin((2 * Math.PI * time) / drift.period_s[axis]);
+  return [at(0), at(1), at(2)];
+}
+
 /** A line on the ground to be crossed; nothing can touch it. */
 export interface Gate {
   name: string;

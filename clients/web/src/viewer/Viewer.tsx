@@ -50,7 +50,7 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
   return (
     <>
       <Stage bounds={bounds} height={height} label={`${title}, at ${clock.shown.toFixed(1)} seconds`}>
-        <Surroundings scenario={scenario} />
+        <Surroundings scenario={scenario} time={clock.shown} />
         <Film machine={machine} trial={trial} clock={clock} follow loads={coloured ? borne : null} />
       </Stage>
       <div className="controls">

@@ -23,6 +23,8 @@ CargoExtent = Annotated[float, Field(ge=0.1, le=100)]
 Mass = Annotated[float, Field(ge=0.01, le=100_000)]
 Instant = Annotated[float, Field(ge=0, le=MAX_DURATION_S)]
 Speed = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
+Swing = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
+Period = Annotated[float, Field(ge=1, le=600)]
 Label = Annotated[str, Field(pattern=r"^[\w -]+$", min_length=1, max_length=40)]
 Gravity = Annotated[float, Field(ge=5, le=100)]
 Strength = Annotated[float, Field(ge=0.1, le=10)]
@@ -140,18 +142,43 @@ class Gate(_Document):
     heading_deg: Annotated[float, Field(ge=-180, le=180)] = 0.0
 
 
+class Drift(_Document):
+    """How a place moves: along each axis it swings about its centre, and starts there.
+
+    Attributes:
+        swing: (3,) how far it gets from its centre, units; below 0 it first goes the other way.
+        period_s: (3,) in what time it is back, seconds.
+    """
+
+    swing: tuple[Swing, Swing, Swing]
+    period_s: tuple[Period, Period, Period]
+
+
 class Mark(_Document):
     """A place; it is shown and nothing can touch it.
 
     Attributes:
         name: What it is called.
-        center: (3,) world frame, units.
+        center: (3,) world frame, units; of one that moves at the start.
         radius: Around its centre, units.
+        drift: How it moves; None where it stays.
     """
 
     name: Label
     center: tuple[Coordinate, Coordinate, Coordinate]
     radius: Distance
+    drift: Annotated[Drift | None, Field(exclude_if=_is_default)] = None
+
+    def at(self, time_s: float) -> tuple[float, float, float]:
+        """Where it is at a time, (3,), world frame, units."""
+        if self.drift is None:
+            return self.center
+        drifts = zip(self.center, self.drift.swing, self.drift.period_s, strict=True)
+        x, y, z = (
+            middle + swing * math.sin(2 * math.pi * time_s / period)
+            for middle, swing, period in drifts
+        )
+        return x, y, z
 
 
 class Control(_Document):

@@ -8,7 +8,12 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import stands
 from buildarena_benchmark.scorers.measures.components import joined_to_start
-from buildarena_benchmark.scorers.measures.marks import MarkName, center_of_mark, lacking_mark
+from buildarena_benchmark.scorers.measures.marks import (
+    MarkName,
+    center_of_mark,
+    lacking_mark,
+    moving_mark,
+)
 from buildarena_benchmark.scorers.measures.series import starting_block, tilt_deg
 from buildarena_benchmark.scorers.measures.touching_down import first_touch, speeds_before
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
@@ -63,7 +68,7 @@ def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
         return "a landing is judged, but scenario.placement.kind is not released"
     if scoring.hold_s >= scenario.duration_s:
         return f"hold_s {scoring.hold_s:g} is longer than the trial"
-    return lacking_mark(scoring.mark, scenario) or undriven(scenario)
+    return lacking_mark(scoring.mark, scenario) or moving_mark(scenario) or undriven(scenario)
 
 
 def judge(

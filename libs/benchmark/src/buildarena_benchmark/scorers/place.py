@@ -8,7 +8,12 @@ from pydantic import Field
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.carrying import bears_cargo
 from buildarena_benchmark.scorers.measures.components import joined_to_start
-from buildarena_benchmark.scorers.measures.marks import MarkName, center_of_mark, lacking_mark
+from buildarena_benchmark.scorers.measures.marks import (
+    MarkName,
+    center_of_mark,
+    lacking_mark,
+    moving_mark,
+)
 from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
@@ -85,7 +90,7 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
     """Why no machine can pass; see `Scorer`."""
     if scenario.cargo is None or scenario.cargo.at is None:
         return "the cargo is carried from its place, but scenario.cargo has none: give cargo.at"
-    lacking = lacking_mark(scoring.mark, scenario)
+    lacking = lacking_mark(scoring.mark, scenario) or moving_mark(scenario)
     if lacking is not None:
         return lacking
     way = center_of_mark(scoring.mark, scenario)[:2] - np.array(scenario.cargo.at[:2])

@@ -9,7 +9,7 @@ from buildarena_benchmark.fields import Document
 from buildarena_benchmark.scorers.measures.carrying import is_airborne
 from buildarena_benchmark.scorers.measures.components import center_of, joined_to_start
 from buildarena_benchmark.scorers.measures.flight import NOT_AIRBORNE
-from buildarena_benchmark.scorers.measures.marks import MarkName, center_of_mark, lacking_mark
+from buildarena_benchmark.scorers.measures.marks import MarkName, lacking_mark, path_of_mark
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     FORCES_NOT_MEASURED,
@@ -56,8 +56,9 @@ def judge(
 ) -> Verdict:
     """The indicator is the mean nearness: 1 at the mark, 0 at the radius and beyond.
 
-    It is measured from the centre of the mass of all that is joined to the starting block, and a
-    moment counts only while none of that touches ground or terrain.
+    Where the mark moves, it is where the mark is then. It is measured from the centre of the
+    mass of all that is joined to the starting block, and a moment counts only while none of
+    that touches ground or terrain.
 
     Args:
         scoring: Thresholds, and the mark.
@@ -73,7 +74,8 @@ def judge(
     if lacking is not None:
         return lacking
     joined = joined_to_start(machine, trajectory)
-    away = center_of(machine, trajectory, joined) - center_of_mark(scoring.mark, scenario)
+    places = path_of_mark(scoring.mark, scenario, trajectory.time_s.tolist())
+    away = center_of(machine, trajectory, joined) - places
     distance = np.linalg.norm(away, axis=1)
     near = distance < scoring.radius
     flies = is_airborne(machine, trajectory, joined)

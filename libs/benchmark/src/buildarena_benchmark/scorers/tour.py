@@ -7,6 +7,7 @@ from pydantic import Field
 
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scorers.measures.marks import moving_mark
 from buildarena_benchmark.scorers.measures.rolling import explained_distances
 from buildarena_benchmark.scorers.measures.series import Series, starting_block
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
@@ -53,7 +54,7 @@ def infeasible(scoring: TourScoring, scenario: Scenario) -> str | None:
         return "a vehicle goes from mark to mark, but scenario.marks has none"
     if scoring.stop_s * len(scenario.marks) >= scenario.duration_s:
         return f"stops of {scoring.stop_s:g} s at every mark are longer than the trial"
-    return undriven(scenario)
+    return moving_mark(scenario) or undriven(scenario)
 
 
 def judge(

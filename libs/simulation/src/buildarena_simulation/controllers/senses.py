@@ -183,7 +183,7 @@ class Sensing:
             "joints": lambda: self._joint_values(seen),
             "wheels": lambda: self._wheel_values(seen),
             "cargo": lambda: _cargo_values(seen, own),
-            "marks": lambda: _places((mark.center for mark in self._scenario.marks), own),
+            "marks": lambda: _places((mark.at(seen.time_s) for mark in self._scenario.marks), own),
             "gates": lambda: _places(((*g.center, 0.0) for g in self._scenario.gates), own),
         }
         for kind in self.offers:

@@ -17,7 +17,7 @@ from buildarena_simulation.terrain import shape_of
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
-    from buildarena_simulation.scenario import Scenario
+    from buildarena_simulation.scenario import Mark, Scenario
     from buildarena_simulation.trajectory import Trajectory
 
 Color = tuple[int, int, int]
@@ -83,7 +83,7 @@ class Scene:
             for shape in map(shape_of, scenario.terrain)
             for face in _faces(shape, shape.center, np.eye(3), _TERRAIN)
         ]
-        self._signs = [*_gates(scenario), *_marks(scenario)]
+        self._gates, self._marks = [*_gates(scenario)], scenario.marks
         self._braces = []
         for connector in machine.connectors.values():
             ends = [
@@ -126,7 +126,7 @@ class Scene:
         """The picture of one sample."""
         trajectory, picture = self._trajectory, Picture()
         picture.faces.extend(self._terrain)
-        picture.lines.extend(self._signs)
+        picture.lines.extend([*self._gates, *_marks(self._marks, float(trajectory.time_s[sample]))])
         positions = trajectory.positions[sample].astype(np.float64)
         turns = rotation_of(trajectory.quaternions[sample].astype(np.float64))
         for part, k in self._parts:
@@ -172,12 +172,12 @@ def _gates(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
         yield np.array([west, east]), _SIGN
 
 
-def _marks(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
-    """The level circle round each mark."""
+def _marks(marks: "Sequence[Mark]", time_s: float) -> Iterator[tuple[FloatArray, Color]]:
+    """The level circle round each mark, where it is at a time."""
     angles = np.linspace(0.0, 2 * np.pi, 2 * _ROUND_SIDES + 1)
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
-    for mark in scenario.marks:
-        rim = np.array(mark.center) + mark.radius * circle
+    for mark in marks:
+        rim = np.array(mark.at(time_s)) + mark.radius * circle
         yield from ((np.array(ends), _SIGN) for ends in pairwise(rim))
 
 

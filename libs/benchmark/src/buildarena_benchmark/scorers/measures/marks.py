@@ -1,5 +1,6 @@
 """The mark that a task is about."""
 
+from collections.abc import Iterable
 from typing import Annotated
 
 import numpy as np
@@ -11,6 +12,12 @@ from buildarena_simulation import Scenario
 MarkName = Annotated[str, Field(min_length=1, max_length=40)]
 
 
+def moving_mark(scenario: Scenario) -> str | None:
+    """Why a scorer of places that stay cannot judge: one of them moves; None if none does."""
+    name = next((mark.name for mark in scenario.marks if mark.drift is not None), None)
+    return None if name is None else f"mark {name!r} moves (drift), and this scorer's marks stay"
+
+
 def lacking_mark(name: str, scenario: Scenario) -> str | None:
     """Why no machine can reach a mark: there is none of this name; None if there is."""
     names = [mark.name for mark in scenario.marks]
@@ -19,6 +26,11 @@ def lacking_mark(name: str, scenario: Scenario) -> str | None:
     return f"there is no mark {name!r} in scenario.marks: there are {', '.join(names) or 'none'}"
 
 
-def center_of_mark(name: str, scenario: Scenario) -> NDArray[np.float64]:
-    """The middle of a mark that there is, (3,), world frame, units."""
-    return np.array(next(mark.center for mark in scenario.marks if mark.name == name))
+def center_of_mark(name: str, scenario: Scenario, time_s: float = 0.0) -> NDArray[np.float64]:
+    """The middle of a mark that there is, at a time, (3,), world frame, units."""
+    return np.array(next(mark.at(time_s) for mark in scenario.marks if mark.name == name))
+
+
+def path_of_mark(name: str, scenario: Scenario, times_s: Iterable[float]) -> NDArray[np.float64]:
+    """The same at several times, (T, 3)."""
+    return np.array([center_of_mark(name, scenario, time_s) for time_s in times_s])

@@ -50,6 +50,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "landing-1": piloted.lander,
     "slalom-2": piloted.gate_finder,
     "hover-3": piloted.keeper,
+    "hover-4": piloted.keeper,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 
