@@ -291,7 +291,7 @@ def test_what_the_game_cannot_tell_or_do_is_refused(scenario, words) -> None:
         prepare_run(piloted(), scenario, name="m", run_id="r")
 
 
-@pytest.mark.parametrize("name", ["landing-1", "hover-3"])
+@pytest.mark.parametrize("name", ["landing-1", "hover-3", "hover-4", "balance-1", "balance-2"])
 def test_tasks_that_the_game_cannot_stage_stay_refused(name) -> None:
     with pytest.raises(MachineNotPlayableError, match="the game"):
         prepare_run(piloted(), builtin_tasks()[name].scenario, name="m", run_id="r")

@@ -40,7 +40,7 @@ from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, globa
 from buildarena_besiege.timeline import control_timeline, timeline_bytes
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
 from buildarena_simulation.constants import GRAVITY, MAX_PARTS
-from buildarena_simulation.scenario import ReleasedPlacement, SpanPlacement
+from buildarena_simulation.scenario import GroundPlacement, ReleasedPlacement, SpanPlacement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -350,5 +350,9 @@ def _require_sayable(scenario: Scenario) -> None:
         raise MachineNotPlayableError("the game's cargo falls onto the machine: use another engine")
     if scenario.gusts is not None:
         raise MachineNotPlayableError("the game has no gusts: use another engine")
+    if scenario.pushes:
+        raise MachineNotPlayableError("the game pushes nothing: use another engine")
+    if isinstance(scenario.placement, GroundPlacement) and scenario.placement.tilt_deg:
+        raise MachineNotPlayableError("the game's machines do not lean at the start: use another")
     if scenario.gravity != GRAVITY or scenario.drive_strength != 1:
         raise MachineNotPlayableError("the game has one gravity and drives of one strength")

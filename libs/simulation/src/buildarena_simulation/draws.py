@@ -1,6 +1,6 @@
 """Parts of a scenario that the seed of a trial draws: each is a path to figures, and a range.
 
-A path names a field, and among places its name, among terrains its number from 1:
+A path names a field, and among places its name, among terrains and pushes its number from 1:
 `placement.height`, `marks.goal.center`, `terrain.2.slope_deg`. Figures are drawn evenly, those of
 each path by a generator of its own, so that one range more leaves what others draw as it is.
 """
@@ -25,6 +25,7 @@ ROOTS: Final = (
     "gates",
     "marks",
     "gusts",
+    "pushes",
     "gravity",
     "drive_strength",
 )

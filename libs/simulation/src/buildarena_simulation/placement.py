@@ -9,13 +9,14 @@ import numpy as np
 from buildarena_simulation.constants import CARGO_SHIFT, START_DROP, START_SHIFT, START_YAW_DEG
 from buildarena_simulation.engines.base import CargoBox
 from buildarena_simulation.scenario import (
-    Cargo,
+    GroundPlacement,
     Placement,
     ReleasedPlacement,
     Scenario,
     SpanPlacement,
 )
 from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.vectors import turn_about
 
 _CLEARANCE = 0.005
 """Height of the lowest point above the ground at the start, units: touching, not overlapping."""
@@ -62,7 +63,7 @@ def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) 
     return Start(
         position=position,
         rotation=rotation,
-        cargo=_cargo_at_start(structure, scenario.cargo, position, rotation, cargo_shift),
+        cargo=_cargo_at_start(structure, scenario, position, cargo_shift),
         velocity=_velocity_of(scenario.placement),
     )
 
@@ -82,6 +83,13 @@ def _velocity_of(placement: Placement) -> FloatArray:
     return np.array(placement.velocity if isinstance(placement, ReleasedPlacement) else [0.0] * 3)
 
 
+def _tilt_of(placement: Placement) -> FloatArray | None:
+    """By what a machine is turned that does not stand as it was built; None if it does."""
+    if not isinstance(placement, GroundPlacement) or not placement.tilt_deg:
+        return None
+    return turn_about(np.array([1.0, 0.0, 0.0]), -math.radians(placement.tilt_deg))
+
+
 def place(structure: Structure, placement: Placement) -> tuple[FloatArray, FloatArray]:
     """The pose world_from_machine at the start.
 
@@ -92,14 +100,17 @@ def place(structure: Structure, placement: Placement) -> tuple[FloatArray, Float
     Returns:
         The position (3,), units, and the rotation (3, 3).
     """
-    bounds = structure.bounds()
+    tilt = _tilt_of(placement)
+    bounds = structure.bounds(tilt)
     if not isinstance(placement, SpanPlacement):
         start = next(
             (part.shown for part in structure.parts if part.module.kind == "start"),
             structure.shown[0],
         )
+        rotation = np.eye(3) if tilt is None else tilt
+        start = rotation @ start
         height = placement.height if isinstance(placement, ReleasedPlacement) else _CLEARANCE
-        return np.array([-start[0], -start[1], height - bounds[0, 2]]), np.eye(3)
+        return np.array([-start[0], -start[1], height - bounds[0, 2]]), rotation
     extent = bounds[1] - bounds[0]
     turned = extent[1] <= placement.gap < extent[0]
     rotation = _QUARTER_TURN if turned else np.eye(3)
@@ -109,27 +120,23 @@ def place(structure: Structure, placement: Placement) -> tuple[FloatArray, Float
 
 
 def _cargo_at_start(
-    structure: Structure,
-    cargo: Cargo | None,
-    position: FloatArray,
-    rotation: FloatArray,
-    shift: FloatArray,
+    structure: Structure, scenario: Scenario, position: FloatArray, shift: FloatArray
 ) -> CargoBox | None:
     """The cargo at its place, or above the machine's top, over (0, 0); None without cargo.
 
     Args:
         structure: The machine.
-        cargo: The scenario's cargo.
+        scenario: Says what cargo there is, and how the machine is put.
         position: (3,) world_from_machine at the start, units.
-        rotation: (3, 3) world_from_machine at the start; turns about the vertical only.
         shift: (3,) from there, units.
     """
+    cargo = scenario.cargo
     if cargo is None:
         return None
     if cargo.at is not None:
         middle = np.array(cargo.at) + np.array([0.0, 0.0, cargo.size[2] / 2 + _CLEARANCE])
     else:
-        top = float((structure.bounds()[1] @ rotation.T + position)[2])
+        top = float(structure.bounds(_tilt_of(scenario.placement))[1, 2] + position[2])
         middle = np.array([0.0, 0.0, top + cargo.drop_height + cargo.size[2] / 2])
     return CargoBox(
         size=np.array(cargo.size),

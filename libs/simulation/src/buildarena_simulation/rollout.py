@@ -25,7 +25,7 @@ from buildarena_simulation.errors import (
     SimulationError,
     UnknownEngineError,
 )
-from buildarena_simulation.gusts import Wind
+from buildarena_simulation.gusts import Blows
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.planning import Keys
@@ -221,7 +221,8 @@ class Rollout:
         self._ending = finalize(self, self._adapter.close)
         try:
             with self.running():
-                wind = None if scenario.gusts is None else Wind(scenario.gusts, seed or 0)
+                blows = scenario.gusts or scenario.pushes
+                wind = Blows(scenario, seed or 0) if blows else None
                 self.trial = Trial(world, scenario, self._adapter, start, wind)
         except BaseException:
             self.close()

@@ -25,6 +25,7 @@ Instant = Annotated[float, Field(ge=0, le=MAX_DURATION_S)]
 Speed = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
 Swing = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
 Period = Annotated[float, Field(ge=1, le=600)]
+PushSpeed = Annotated[float, Field(allow_inf_nan=False, ge=-20, le=20)]
 Label = Annotated[str, Field(pattern=r"^[\w -]+$", min_length=1, max_length=40)]
 Gravity = Annotated[float, Field(ge=5, le=100)]
 Strength = Annotated[float, Field(ge=0.1, le=10)]
@@ -91,9 +92,15 @@ class Cargo(_Document):
 
 
 class GroundPlacement(_Document):
-    """The machine stands on the ground, its starting block above (0, 0)."""
+    """The machine stands on the ground, its starting block above (0, 0).
+
+    Attributes:
+        tilt_deg: By how much it is turned at the start about the axis to the east, degrees; above 0
+            its top leans towards the north.
+    """
 
     kind: Literal["ground"] = "ground"
+    tilt_deg: Annotated[float, Field(ge=-90, le=90, exclude_if=lambda value: value == 0)] = 0.0
 
 
 class SpanPlacement(_Document):
@@ -196,7 +203,8 @@ class Control(_Document):
     until_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
 
 
-SenseKind = Literal["pose", "blocks", "joints", "wheels", "cargo", "marks", "gates"]
+SenseKind = Literal["pose", "axes", "blocks", "joints", "wheels", "cargo", "marks", "gates"]
+_OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind != "axes")  # of the pose
 NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
 
 
@@ -210,7 +218,7 @@ class Senses(_Document):
         delay_ticks: By how many ticks of 0.04 s what is told is late.
     """
 
-    offers: Annotated[tuple[SenseKind, ...], Field(max_length=16)] = get_args(SenseKind)
+    offers: Annotated[tuple[SenseKind, ...], Field(max_length=16)] = _OFFERED
     noise: Mapping[NoiseKind, Annotated[float, Field(ge=0, le=100)]] = {}
     delay_ticks: Annotated[int, Field(ge=0, le=25)] = 0
 
@@ -225,6 +233,18 @@ class Gusts(_Document):
 
     strength: Annotated[float, Field(gt=0, le=20)]
     shortest_s: Annotated[float, Field(ge=0.5, le=60)] = 2.0
+
+
+class Push(_Document):
+    """A short push that everything gets alike, evenly over 0.2 s.
+
+    Attributes:
+        at_s: When it begins, seconds.
+        velocity: (2,) by how much it changes every velocity, to the east and to the north, units/s.
+    """
+
+    at_s: Instant
+    velocity: tuple[PushSpeed, PushSpeed]
 
 
 class Scenario(_Document):
@@ -248,6 +268,7 @@ class Scenario(_Document):
             force and torque of driven joints, the push of fans.
         senses: What a controller is told; None where it takes no controller.
         gusts: Wind; None where there is none. A trial without a seed has that of seed 0.
+        pushes: Pushes.
         draws: What the seed of a trial draws, see `buildarena_simulation.draws`; a trial without a
             seed has the figures that stand here.
     """
@@ -267,6 +288,7 @@ class Scenario(_Document):
     drive_strength: Annotated[Strength, Field(exclude_if=lambda value: value == 1)] = 1.0
     senses: Annotated[Senses | None, Field(exclude_if=_is_default)] = None
     gusts: Annotated[Gusts | None, Field(exclude_if=_is_default)] = None
+    pushes: Annotated[tuple[Push, ...], Field(max_length=64, exclude_if=_is_default)] = ()
     draws: Annotated[Draws, Field(exclude_if=_is_default)] = {}
 
     @model_validator(mode="after")

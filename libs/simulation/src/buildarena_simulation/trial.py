@@ -13,7 +13,7 @@ from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.senses import Seen
 from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.force_control import ForceSchedule
-from buildarena_simulation.gusts import Wind
+from buildarena_simulation.gusts import Blows
 from buildarena_simulation.holding import Holding
 from buildarena_simulation.placement import Start
 from buildarena_simulation.planning import Keys, Planner
@@ -38,7 +38,7 @@ class Trial:
         scenario: What it is put through.
         engine: The engine, with that world.
         start: Where machine and cargo start.
-        wind: What blows; None where nothing does.
+        wind: What pushes everything; None where nothing does.
 
     Attributes:
         has_blown_up: Whether the engine knows no numbers any more; nothing moves from there on.
@@ -52,7 +52,7 @@ class Trial:
         scenario: Scenario,
         engine: Engine,
         start: Start,
-        wind: Wind | None = None,
+        wind: Blows | None = None,
     ) -> None:
         structure = world.structure
         self._structure, self._scenario, self._engine = structure, scenario, engine

@@ -77,16 +77,21 @@ local function put_velocity(i)
   put_three((b[1] - a[1]) * rate, (b[2] - a[2]) * rate, (b[3] - a[3]) * rate)
 end
 
-local function pose(i)
+local function axes(i)
   local p = now[i]
   local x, y, z = spin(i)
-  put_three(p[1], p[2], p[3])
-  put_velocity(i)
   put_three(p[10], p[11], p[12])
   put_three(p[7], p[8], p[9])
   put_three(x, y, z)
   put_three(p[4] * x + p[5] * y + p[6] * z, p[7] * x + p[8] * y + p[9] * z,
     p[10] * x + p[11] * y + p[12] * z)
+end
+
+local function pose(i)
+  local p = now[i]
+  put_three(p[1], p[2], p[3])
+  put_velocity(i)
+  axes(i)
 end
 
 -- How fast a block turns on another about an axis of the machine as it was built.

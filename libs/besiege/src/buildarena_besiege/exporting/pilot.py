@@ -191,6 +191,8 @@ class _SenseWriter:
             match kind:
                 case "pose":
                     yield "pose(1)"
+                case "axes":
+                    yield "axes(1)"
                 case "blocks":
                     for block in sensing.blocks:
                         yield f"pose({self._number(self._structure.parts[block].id)})"

@@ -25,6 +25,8 @@ _GRAIN: Final = 6
 _TOUCHES: Final = 1e-3
 """Force above which a wheel has contact, mass·g."""
 _AXES: Final = "xyz"
+_AXES_FROM: Final = 6
+"""Where axes and spins begin among the figures of a pose."""
 _SHOWN: Final = 20
 
 
@@ -116,13 +118,16 @@ class Sensing:
             "gates": partial(self._places_layout, self._scenario.gates),
         }
         # The starting block's own pose has no name of its own: `sense.position`.
-        named = self._pose() if "pose" in self.offers else {}
-        return named | {kind: layouts[kind]() for kind in self.offers if kind != "pose"}
+        own = {"pose": self._pose, "axes": self._axes}
+        named = [own[kind]() for kind in self.offers if kind in own]
+        others = [kind for kind in self.offers if kind not in own]
+        return (named[0] if named else {}) | {kind: layouts[kind]() for kind in others}
 
     def _is_offered(self, kind: SenseKind) -> bool:
         """Whether the scenario offers a kind of senses, and has what it is about."""
         about: dict[str, object] = {"cargo": self._scenario.cargo}
         about |= {"marks": self._scenario.marks, "gates": self._scenario.gates}
+        about["axes"] = "pose" not in self._senses.offers  # which has them
         return kind in self._senses.offers and bool(about.get(kind, True))
 
     def _blocks_layout(self) -> dict[str, Any]:
@@ -157,9 +162,11 @@ class Sensing:
         }
 
     def _pose(self) -> dict[str, Any]:
+        places = {"position": self._vector("place"), "velocity": self._vector("speed")}
+        return places | self._axes()
+
+    def _axes(self) -> dict[str, Any]:
         return {
-            "position": self._vector("place"),
-            "velocity": self._vector("speed"),
             "up": self._vector("axis"),
             "forward": self._vector("axis"),
             "spin": self._vector("spin"),
@@ -179,6 +186,7 @@ class Sensing:
         own = poses[0, :3]
         values: dict[SenseKind, Callable[[], Iterable[float]]] = {
             "pose": poses[0].tolist,
+            "axes": poses[0, _AXES_FROM:].tolist,
             "blocks": poses[1:].ravel().tolist,
             "joints": lambda: self._joint_values(seen),
             "wheels": lambda: self._wheel_values(seen),

@@ -1,7 +1,7 @@
 """The arrays of one machine: what does not change while it is simulated."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Final
 
@@ -66,6 +66,10 @@ class Shape:
         if self.kind is ShapeKind.SPHERE:
             return self.half_extents
         return np.asarray(np.abs(self.rotation) @ self.half_extents)
+
+    def turned(self, rotation: FloatArray) -> "Shape":
+        """The same where its machine is turned about its origin by a rotation (3, 3)."""
+        return replace(self, center=rotation @ self.center, rotation=rotation @ self.rotation)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -309,9 +313,15 @@ class Structure:
         """Ids of the blocks, in the order of every array."""
         return tuple(part.id for part in self.parts)
 
-    def bounds(self) -> FloatArray:
-        """Lower and upper corner of all blocks' shapes, (2, 3), machine frame, units."""
+    def bounds(self, rotation: FloatArray | None = None) -> FloatArray:
+        """Lower and upper corner of all blocks' shapes, (2, 3), machine frame, units.
+
+        Args:
+            rotation: (3, 3) by which the machine is turned about its origin first.
+        """
         shapes = [shape for part in self.parts for shape in part.shapes]
+        if rotation is not None:
+            shapes = [shape.turned(rotation) for shape in shapes]
         lower = np.min([shape.center - shape.reach() for shape in shapes], axis=0)
         upper = np.max([shape.center + shape.reach() for shape in shapes], axis=0)
         return np.array([lower, upper])

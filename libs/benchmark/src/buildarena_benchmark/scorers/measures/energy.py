@@ -28,8 +28,8 @@ def gains_energy(
     """Whether machine and cargo have more energy than they had, and the growing cargo brought.
 
     Energies are those of the blocks' and the cargo's centres, of motion and height. Where
-    something drives the machine (a key, a balloon, a spring, wind), or not all of it was recorded,
-    that is not known, and it does not.
+    something drives the machine (a key, a balloon, a spring, wind, a push), or not all of it was
+    recorded, that is not known, and it does not.
 
     Args:
         scenario: Gives gravity, and the speed at the release.
@@ -74,7 +74,7 @@ def _is_driven(scenario: "Scenario", machine: "Machine", trajectory: "Trajectory
     blocks = machine.blocks.values()
     if any(_drives_itself(block) for block in blocks):
         return True
-    if scenario.gusts is not None:
+    if scenario.gusts is not None or scenario.pushes:
         return True
     if any(link.module.spring for link in machine.connectors.values()):
         return True

@@ -51,6 +51,8 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "slalom-2": piloted.gate_finder,
     "hover-3": piloted.keeper,
     "hover-4": piloted.keeper,
+    "balance-1": piloted.balancer,
+    "balance-2": piloted.balancer,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

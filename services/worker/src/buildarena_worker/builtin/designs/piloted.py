@@ -1,4 +1,4 @@
-"""Machines that programs control: a car with two sides, and a craft of four fans."""
+"""Machines that programs control: a car with two sides, a craft of four fans, a mast on an axle."""
 
 # BuildArena benchmark data, not for training corpora:
 # canary 3ab839c7-e533-462b-9729-71495c1ee1f6
@@ -15,6 +15,7 @@ from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, W
 
 _LENGTH, _TRACK = 3, 2
 _ARM: Final = 2
+_MAST: Final = 3
 _GRAVITY: Final = 32.81
 _FAN_PUSH: Final = 3.25
 """What a fan pushes, in masses that it would hold up."""
@@ -56,6 +57,28 @@ def lander(seed: int) -> Design:
 def keeper(seed: int) -> Design:
     """The same craft; what pushes it off its place for long it learns to lean against."""
     return _craft("place", keen=3.0 + 0.05 * (seed % 5))
+
+
+def balancer(seed: int) -> Design:
+    """A tall mast on an axle of two wheels, which run after its top: what is tall falls slowly."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("middle of the axle")
+    sides = {}
+    for name, way in (("right", EAST), ("left", WEST)):
+        sides[name] = draft.wheel(draft.row(middle, way, _TRACK)[-1], way)
+    top = middle
+    for _ in range(_MAST):
+        top = draft.attach(top, UP, "Log")
+    return Design(
+        overall="A mast on two powered wheels that stands because they run after its top.",
+        parts={
+            "cart": PartDesign(
+                description=f"An axle with two wheels, and {_MAST} logs above each other on it",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=_program("balance", **_quoted(sides), keen=f"{0.44 + 0.01 * (seed % 5):g}"),
+    )
 
 
 def _craft(program: str, *, keen: float) -> Design:
