@@ -189,10 +189,8 @@ class _SenseWriter:
         sensing, scenario = self._sensing, self._scenario
         for kind in sensing.offers:
             match kind:
-                case "pose":
-                    yield "pose(1)"
-                case "axes":
-                    yield "axes(1)"
+                case "pose" | "axes":
+                    yield f"{kind}(1)"
                 case "blocks":
                     for block in sensing.blocks:
                         yield f"pose({self._number(self._structure.parts[block].id)})"
