@@ -98,9 +98,11 @@ def recorded(machine: Machine, scenario: Scenario, moved_as: Machine | None = No
     """
     moved_as = moved_as or machine
     start = game_start(machine, scenario)
+    whole = scenario.model_copy(update={"tracked_blocks": "all"})
     return Recorded(
         prepared=prepared_machine(machine, scenario, run_id=RUN),
-        trajectory=simulate(moved_as, scenario, "mujoco", start=start),
+        # A program is told of blocks that the scenario's log leaves out.
+        trajectory=simulate(moved_as, whole, "mujoco", start=start),
         rotation=np.array(start.rotation),
         position=np.array(start.position),
         cargo_height=0.0 if scenario.cargo is None else scenario.cargo.size[2],
