@@ -32,6 +32,8 @@ from buildarena_pipeline.evidence.packing import without_paths
 
 SHOWN = tuple(name for name in STEPS if name != "calibration" and not name.startswith("expert"))
 CONFIRMED, CONTRADICTED, NOT_SEEN = Verdict
+WHEEL = 18
+"""Which sense is the speed of the first wheel that the program turns."""
 
 
 def verdicts(inputs) -> dict[str, Verdict]:
@@ -48,6 +50,14 @@ def moved(line: str, axis: int, change) -> str:
     if fields[0] == "s":
         for at in range(6 + axis, len(fields), 5):
             fields[at] = f"{change(float(fields[at])):.4f}"
+    return ",".join(fields)
+
+
+def told(line: str, sense: int, value: float) -> str:
+    """A line of what a program was told with one of its senses changed."""
+    fields = line.split(",")
+    if fields[0] == "p" and fields[2] == "1":
+        fields[4 + sense] = f"{value:.6f}"
     return ",".join(fields)
 
 
@@ -75,11 +85,21 @@ def test_every_assumption_is_some_steps_and_every_steps_is_known() -> None:
         ("drop", "landing", {"spoil": lambda line: moved(line, 1, lambda y: y + 0.3)}),
         ("scales", "masses", {"spoil": lambda line: moved(line, 1, lambda y: 15 - y)}),
         ("wheels", "wheels", {"spoil": lambda line: moved(line, 2, lambda z: z * 0.5)}),
+        ("program", "program_senses", {"spoil": lambda line: told(line, 2, 1.0)}),
+        ("program", "program_senses", {"spoil": lambda line: told(line, 8, -1.0)}),
+        ("program", "program_keys", {"spoil": lambda line: told(line, WHEEL, 0.0)}),
+        ("program", "program_shares", {"spoil": lambda line: told(line, WHEEL + 2, 9.0)}),
         ("expert-support-1", "level_origin", {"ground": lambda height: height * 0.9}),
     ],
 )
 def test_a_game_that_is_otherwise_contradicts_it(name, assumption, spoiled) -> None:
     assert verdicts(step_inputs(name, **spoiled))[assumption] is CONTRADICTED
+
+
+def test_a_program_that_answers_otherwise_or_fails_in_the_game_does_not_run_as_ours() -> None:
+    half = step_inputs("program", spoil=lambda line: line.replace(",0.500000", ",0.600000"))
+    assert "answered otherwise in the game" in seen(half, "program_text")
+    assert set(verdicts(half).values()) == {NOT_SEEN}
 
 
 def test_places_of_centres_are_no_roots() -> None:

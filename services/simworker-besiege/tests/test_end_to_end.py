@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from game_rig import Rig, our_score
+from game_rig import PROGRAMS, Rig, our_score, piloted_text, piloted_trial
+from sqlalchemy import text
 from support.long_tests import LONG
 from support.stages import work
 
@@ -16,11 +17,13 @@ from buildarena_api.leaderboard.agreement import agreement_rows
 from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_besiege import read_machine_file
 from buildarena_geometry import KeyPress, Machine
+from buildarena_pipeline.agents.machine_trials import request_trial
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.runtime.scoring import best_rollout, task_of
 from buildarena_pipeline.submission.submission import Submissions
+from buildarena_simulation import read_trajectory
 from buildarena_store import Job
 from buildarena_worker.wiring import verifier
 
@@ -137,6 +140,46 @@ def _spoil_log(context: Context, job: Job, name: str, digest: str) -> None:
     report = verifier(context).verify(job.id).as_document()
     failed = [check["name"] for check in report["checks"] if not check["ok"]]
     assert failed, "a changed log passed"
+
+
+@pytest.mark.slow
+def test_programs_are_played_scored_and_verified(playing, rig) -> None:
+    """One that drives has a trajectory of what it sensed; one that fails has its log."""
+    task, _ = piloted_trial("drives")
+    playing.tasks.add(task, piloted_text())
+    jobs = {}
+    for name in PROGRAMS:
+        machine = piloted_trial(name)[1]
+        jobs[name], _ = request_trial(playing, machine, task=task.name, simulator="besiege")
+    ended = {job.id: job for job in _ended(playing, rig)}
+    drives, fails = (ended[jobs[name].id] for name in ("drives", "fails"))
+    ours = our_score(*piloted_trial("drives"))
+    # Its senses are noisy, and the noise is drawn otherwise than in an engine's trial of our own.
+    assert drives.indicator == pytest.approx(ours.indicator, rel=NEAR)
+    (record,) = playing.store.rollouts.read(drives.id)
+    piloting = read_trajectory(playing.artifacts.get(record.trajectory_hash)).piloting
+    assert "marks.goal.relative.x" in piloting.sense_names
+    assert piloting.answers[:-1].any(axis=1).all()
+    assert (fails.success, fails.indicator) == (False, 0.0)
+    assert "line 2, tick 25 (1.00 s): attempt to index" in fails.manifest["simulator"]["refused"]
+    assert {"log-0.txt", "script-0.lua"} <= set(playing.store.jobs.artifacts(fails.id))
+    for job in (drives, fails):
+        report = verifier(playing).verify(job.id).as_document()
+        assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    assert "rollout 0: failure" in {check["name"] for check in report["checks"]}
+    _pretend(playing, fails, "line 3")
+    failed = [check for check in verifier(playing).verify(fails.id).checks if not check.ok]
+    assert [check.name for check in failed] == ["rollout 0: failure"]
+
+
+def _pretend(context: Context, job: Job, line: str) -> None:
+    """Has a job's program fail in another line than it did."""
+    said = "replace(versions::text, 'line 2', :line)::jsonb"
+    with context.store.database.transaction() as connection:
+        connection.execute(
+            text(f"UPDATE rollouts SET versions = {said} WHERE job_id = :job"),
+            {"line": line, "job": job.id},
+        )
 
 
 def test_a_job_of_another_version_of_the_game_ends_with_what_to_do(playing, rig) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from game_programs import AGENT, GO, drive, piloted, program
 from record_games import RUN, Recorded, between, game_of, recorded
 from support.lua_game import LuaGame
 from support.machines.drafts import KeyedDraft
@@ -34,27 +35,10 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.scenario import Cargo, Control, Gusts, Mark, Senses, TerrainBox
+from buildarena_simulation.scenario import Cargo, Gusts, Mark, Senses, TerrainBox
 from buildarena_worker.builtin.designs.drafting import UP
 
 EXAMPLE = Path(__file__).parents[3] / "examples/control"
-AGENT = Control(mode="agent")
-
-
-def drive(duration_s: float = 2.0, **changes) -> Scenario:
-    changes.setdefault("senses", Senses(offers=("pose", "wheels", "joints", "blocks")))
-    return Scenario(duration_s=duration_s, control=AGENT, **changes)
-
-
-def program(body: str) -> str:
-    return f"function control(t, sense)\n{body}\nend"
-
-
-GO = program("return { spinning_forward = 1 }")
-
-
-def piloted(text: str = GO, machine: Machine | None = None) -> Machine:
-    return (machine or car(bound=False, drive=())).with_controller(text)
 
 
 def read_back(game: LuaGame, machine: Machine, scenario: Scenario) -> Trajectory:

@@ -13,12 +13,22 @@ from support.player import Player
 import buildarena_pipeline.evidence
 from buildarena_benchmark import paper_tasks
 from buildarena_geometry import Machine, module_set
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SIDES, SOUTH, UP, WEST, Draft
 
 FILE = Path(buildarena_pipeline.evidence.__file__).parent / "machines.json.gz"
 ALL = module_set("all")
 SPACE = 4
 """Blocks of the sampler's beam from one module to the next."""
+MUTE = 12
+"""Hinges that nothing moves: their 24 actions have all keys that people have."""
+PROGRAM = """-- From 1 s on a wheel turns at full speed, and another at half of it.
+function control(t, sense)
+  if t < 1 then
+    return {{}}
+  end
+  return {{ ["{whole}.spinning_forward"] = 1, ["{half}.spinning_forward"] = 0.5 }}
+end
+"""
 
 
 def experts_machine(task: str) -> Machine:
@@ -99,10 +109,22 @@ def wheeled() -> Machine:
     return draft.machine
 
 
+def piloted() -> Machine:
+    """Two wheels in the air that a program turns, by keys after those that people have."""
+    draft = Draft(modules="all")
+    middle = draft.start()
+    arms = [block for way in SIDES for block in draft.row(middle, way, 4)]
+    post = draft.row(middle, UP, 4)[-1]
+    for base in arms[:MUTE]:
+        draft.attach(base, UP, "Steering Hinge")
+    whole, half = (draft.wheel(post, side) for side in (EAST, WEST))
+    return draft.machine.with_controller(PROGRAM.format(whole=whole, half=half))
+
+
 def machines() -> dict[str, Machine]:
     """Every machine, by the name of its trial."""
     own = {"sampler": sampler(), "probe": probe(), "drop": dropped()}
-    own |= {"scales": scales(), "wheels": wheeled()}
+    own |= {"scales": scales(), "wheels": wheeled(), "program": piloted()}
     return {**own, **{name: experts_machine(name) for name in paper_tasks()}}
 
 

@@ -27,6 +27,8 @@ class MachineNotSimulable(BuildarenaSimulationError):  # noqa: N818 - it names t
 class ControllerFailed(MachineNotSimulable):
     """A controller's program failed: a fault of the machine, never of the service.
 
+    Its sentence begins with `BEGINNING`.
+
     Args:
         words: What went wrong.
         line: The line of the program; None if there is none.
@@ -39,13 +41,14 @@ class ControllerFailed(MachineNotSimulable):
     """
 
     kind: ClassVar[str] = "controller_failed"
+    BEGINNING: ClassVar[str] = "the controller failed"
 
     def __init__(
         self, words: str, *, line: int | None = None, tick: int | None = None, time_s: float = 0.0
     ) -> None:
         at = [] if line is None else [f"line {line}"]
         at += [] if tick is None else [f"tick {tick} ({time_s:.2f} s)"]
-        super().__init__(f"the controller failed{', ' if at else ''}{', '.join(at)}: {words}")
+        super().__init__(f"{self.BEGINNING}{', ' if at else ''}{', '.join(at)}: {words}")
         self.line, self.tick = line, tick
         self._parts = words, line, tick, time_s
 

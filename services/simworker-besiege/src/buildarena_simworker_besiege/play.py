@@ -11,7 +11,7 @@ from typing import Final
 import structlog
 
 from buildarena_besiege import GameRun, LogIncompleteError
-from buildarena_simulation import MachineNotSimulable, Trajectory
+from buildarena_simulation import ControllerFailed, Trajectory
 from buildarena_simworker_besiege.desktop import Desktop, RunLog
 from buildarena_simworker_besiege.errors import (
     DesktopError,
@@ -38,16 +38,18 @@ class Played:
     Attributes:
         run: What was played.
         log: What the game printed.
-        trajectory: The trajectory in it.
+        trajectory: The trajectory in it; None where the machine's program failed.
         pace: Seconds of game time per second of wall-clock time.
         faults: What went wrong in earlier attempts.
+        failure: How the machine's program failed; "" where it did not.
     """
 
     run: GameRun
     log: RunLog
-    trajectory: Trajectory
+    trajectory: Trajectory | None
     pace: float
     faults: tuple[str, ...]
+    failure: str = ""
 
 
 class RunFailedError(Exception):
@@ -86,7 +88,6 @@ def play(
 
     Raises:
         RunFailedError: No attempt came to an end.
-        MachineNotSimulable: The machine's program failed.
     """
     faults: list[str] = []
     screenshots: list[bytes] = []
@@ -95,7 +96,7 @@ def play(
         desktop.require_able(run)
         try:
             game_log, pace = _attempt(desktop, run, require_held, limits)
-            trajectory = read(run, game_log)
+            trajectory, failure = _outcome(read, run, game_log)
         except NeedsPersonError as error:
             screenshots += _pictures(desktop)
             _start_clean(desktop, faults)
@@ -106,13 +107,28 @@ def play(
             screenshots += _pictures(desktop)
             _start_clean(desktop, faults)
             continue
-        except MachineNotSimulable:  # its program failed, in a run that ended as others do
-            raise
         except BaseException:
             _start_clean(desktop, faults)
             raise
-        return Played(run=run, log=game_log, trajectory=trajectory, pace=pace, faults=tuple(faults))
+        return Played(
+            run=run,
+            log=game_log,
+            trajectory=trajectory,
+            pace=pace,
+            faults=tuple(faults),
+            failure=failure,
+        )
     raise RunFailedError("; ".join(dict.fromkeys(faults)), screenshots)
+
+
+def _outcome(
+    read: Callable[[GameRun, RunLog], Trajectory], run: GameRun, game_log: RunLog
+) -> tuple[Trajectory | None, str]:
+    """The trajectory of a log, or how the machine's program failed in a run that ended well."""
+    try:
+        return read(run, game_log), ""
+    except ControllerFailed as failure:
+        return None, str(failure)
 
 
 def _attempt(

@@ -18,6 +18,7 @@ from buildarena_pipeline.runtime.simulators.simulator import (
     TrialRequest,
     TrialResult,
 )
+from buildarena_pipeline.runtime.trials import refused
 from buildarena_simulation import MachineNotSimulable
 from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import NeedsPersonError, NotSetUpError
@@ -84,7 +85,7 @@ class BesiegeSimulator(GameSimulator):
             raise SimulatorFaultError(str(error), delay_s=FAULT_WAIT_S) from error
         return TrialResult(
             trajectory=played.trajectory,
-            versions={**self.versions, **_course(played)},
+            versions={**self.versions, **_course(played), **refused(played.failure)},
             files=_files(played, trial.number),
         )
 

@@ -10,7 +10,7 @@ from typing import Any
 from support.machines.building import BLOCK, built
 from support.machines.evidence import experts_machine
 
-from buildarena_benchmark import Score, Task, builtin_tasks, score
+from buildarena_benchmark import Score, Task, builtin_tasks, parse_custom_task, score
 from buildarena_besiege import game_start
 from buildarena_geometry import Machine
 from buildarena_pipeline.runtime.simulators.simulator import TrialRequest
@@ -29,6 +29,13 @@ TRIALS = {
     "lift-2": {"duration_s": 6.0},
 }
 """The trials that are played in a few seconds."""
+CONTROL = HERE.parents[3] / "examples" / "control"
+STILL = "function control(t, sense)\n  return {}\nend\n"
+PROGRAMS = {
+    "drives": (CONTROL / "to-the-mark.lua").read_text(encoding="utf-8"),
+    "fails": STILL.replace("{}", "t < 1 and {} or sense.nothing.here"),
+}
+"""Programs of the example's car."""
 SIZE = (1280, 800)
 """Of the stand-in's window."""
 GAME, MOD = "1.75-23370", "1.4"
@@ -119,6 +126,19 @@ def short_trial(name: str) -> tuple[Task, Machine]:
     cargo = task.scenario.cargo and task.scenario.cargo.model_copy(update=changes)
     scenario = task.scenario.model_copy(update={"duration_s": duration_s, "cargo": cargo})
     return replace(task, scenario=scenario), experts_machine(name)
+
+
+def piloted_text() -> str:
+    """The example's task for programs, which lasts a few seconds."""
+    text = (CONTROL / "to-the-mark.yaml").read_text(encoding="utf-8")
+    return text.replace("duration_s: 20", "duration_s: 6")
+
+
+def piloted_trial(name: str) -> tuple[Task, Machine]:
+    """This task, and the example's car with one of `PROGRAMS`."""
+    document = json.loads((CONTROL / "car.machine.json").read_text(encoding="utf-8"))
+    machine = Machine.from_document(document).with_controller(PROGRAMS[name])
+    return parse_custom_task(piloted_text(), origin="to-the-mark"), machine
 
 
 def our_score(task: Task, machine: Machine, **more: Any) -> Score:

@@ -11,7 +11,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from game_rig import GAMES, TRIALS, experts_machine, short_trial, tried_machine
+from game_rig import (
+    GAMES,
+    PROGRAMS,
+    STILL,
+    TRIALS,
+    experts_machine,
+    piloted_trial,
+    short_trial,
+    tried_machine,
+)
 from support.lua_game import LuaGame
 
 from buildarena_benchmark import builtin_tasks, paper_tasks
@@ -79,12 +88,21 @@ class Recorded:
         return _matrix(self.trajectory.quaternions[0, column]).T
 
 
-def recorded(machine: Machine, scenario: Scenario) -> Recorded:
-    """Simulates a run from the place where the game puts the machine."""
+def recorded(machine: Machine, scenario: Scenario, moved_as: Machine | None = None) -> Recorded:
+    """Simulates a run from the place where the game puts the machine.
+
+    Args:
+        machine: The machine.
+        scenario: What it is put through.
+        moved_as: The same machine with the program that moves it; its own if left out.
+    """
+    moved_as = moved_as or machine
     start = game_start(machine, scenario)
+    whole = scenario.model_copy(update={"tracked_blocks": "all"})
     return Recorded(
         prepared=prepared_machine(machine, scenario, run_id=RUN),
-        trajectory=simulate(machine, scenario, "mujoco", start=start),
+        # A program is told of blocks that the scenario's log leaves out.
+        trajectory=simulate(moved_as, whole, "mujoco", start=start),
         rotation=np.array(start.rotation),
         position=np.array(start.position),
         cargo_height=0.0 if scenario.cargo is None else scenario.cargo.size[2],
@@ -173,6 +191,9 @@ def played_runs() -> dict[str, tuple[Machine, Scenario]]:
     for name in TRIALS:
         task, machine = short_trial(name)
         runs[f"{name}-short"] = (machine, task.scenario)
+    for name in PROGRAMS:
+        task, machine = piloted_trial(name)
+        runs[f"program-{name}"] = (machine, task.scenario)
     bridge = tried_machine("support-1")
     for name in OWN:
         trial = trial_named(name)
@@ -183,7 +204,9 @@ def played_runs() -> dict[str, tuple[Machine, Scenario]]:
 def main() -> None:
     """Records every run."""
     for name, (machine, scenario) in played_runs().items():
-        run = recorded(machine, scenario)
+        # No engine has a trajectory of a program that fails: it stands still.
+        still = machine.with_controller(STILL) if name == "program-fails" else None
+        run = recorded(machine, scenario, still)
         said = list(log_lines(run, scenario))
         if name == "transport-1-short":
             said += state_lines(run, scenario)

@@ -13,9 +13,7 @@ from buildarena_pipeline.runtime.simulators.simulator import (
     SimulatorFaultError,
     TrialRequest,
 )
-from buildarena_pipeline.runtime.trials import File, TrialResult
-
-_MOST_LETTERS = 400  # of why a machine was refused, in what is said of the simulator
+from buildarena_pipeline.runtime.trials import File, TrialResult, refused
 
 
 class TrialSource(Protocol):
@@ -56,7 +54,7 @@ def run_trial(simulator: Simulator, trial: TrialRequest) -> TrialResult:
     except MachineRefusedError as refusal:
         result = TrialResult(
             trajectory=None,
-            versions={**simulator.versions, "refused": str(refusal)[:_MOST_LETTERS]},
+            versions={**simulator.versions, **refused(refusal)},
         )
     return replace(result, wall_s=time.perf_counter() - started)
 

@@ -63,8 +63,8 @@ def repetitions(
     others = [name for name in runnable() if name != own["blas"]]
     then = named_processor(record.versions or {})
     tried = others if then is None and record.runner is None else []
-    if then is not None and then.get("blas") in others:
-        tried = [str(then["blas"])]
+    if (first := repeating_processor(record)["blas"]) != own["blas"]:
+        tried = [first]
     else:
         trajectory = simulate(
             machine,
@@ -78,8 +78,20 @@ def repetitions(
         trajectory = simulate_with(
             name, machine, task.scenario, engine, controls=controls, seed=record.seed
         )
-        here = {**own, "blas": name, "numpy": _LEVELS.get(name, _LOWEST)}
-        yield Repeated(trajectory=trajectory, processor=here)
+        yield Repeated(trajectory=trajectory, processor=_with(name))
+
+
+def repeating_processor(record: RolloutRecord) -> Mapping[str, str]:
+    """What simulates a trial first when it is repeated: its own kernels, or this process's."""
+    own, then = processor(), named_processor(record.versions or {})
+    name = own["blas"] if then is None else then.get("blas")
+    return own if name == own["blas"] or name not in runnable() else _with(str(name))
+
+
+def _with(name: str) -> dict[str, str]:
+    """This processor with other kernels, as manifests say it."""
+    numpy = _LEVELS.get(name, _LOWEST)
+    return {**processor(), "blas": name, "numpy": numpy}
 
 
 def named_processor(versions: Mapping[str, Any]) -> Mapping[str, Any] | None:

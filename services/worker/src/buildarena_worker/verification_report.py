@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from buildarena_pipeline.runtime.trials import REFUSED, refused
+from buildarena_simulation import ControllerFailed
+from buildarena_simulation.controllers.program import blames_clock
 from buildarena_store.states import Verdict
 
 
@@ -74,3 +77,23 @@ def compare(
 ) -> Check:
     """A comparison; the arguments are the fields of `Check`."""
     return Check(name=name, ok=kept == found, kept=kept, found=found, able=able, trial=trial)
+
+
+def failure_checks(
+    name: str, versions: Mapping[str, Any], failure: str, trial: int | None
+) -> list[Check]:
+    """Whether a machine's program failed as is stored: why, in which line, at which tick.
+
+    Args:
+        name: The rollout's.
+        versions: Its own, of the simulator.
+        failure: How it failed now; "" where it did not.
+        trial: See `Check`.
+    """
+    stored = str(versions.get(REFUSED, ""))
+    kept = stored if stored.startswith(ControllerFailed.BEGINNING) else ""
+    found = refused(failure).get(REFUSED, "")
+    if not kept and not found:
+        return []
+    able = not blames_clock(kept) and not blames_clock(found)
+    return [compare(f"{name}: failure", kept, found, able=able, trial=trial)]

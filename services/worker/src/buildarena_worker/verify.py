@@ -47,6 +47,7 @@ from buildarena_pipeline.runtime.scoring import (
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import (
     SIMULATION_VERSION,
+    ControllerFailed,
     MachineNotSimulable,
     Trajectory,
     TrajectoryFormatError,
@@ -73,7 +74,13 @@ from buildarena_store import (
 from buildarena_store.jobs.histories import Histories
 from buildarena_worker.game_trials import annotations_again
 from buildarena_worker.jobs import loop_of, pack_of
-from buildarena_worker.processors import Repeated, difference, named_processor, repetitions
+from buildarena_worker.processors import (
+    Repeated,
+    difference,
+    named_processor,
+    repeating_processor,
+    repetitions,
+)
 from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.results import (
     Failed,
@@ -83,7 +90,13 @@ from buildarena_worker.session.results import (
     Suspended,
 )
 from buildarena_worker.session.session import Session
-from buildarena_worker.verification_report import Check, Report, broken_off, compare
+from buildarena_worker.verification_report import (
+    Check,
+    Report,
+    broken_off,
+    compare,
+    failure_checks,
+)
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import run_session
 
@@ -269,19 +282,21 @@ class Verifier:
         # Another machine moves otherwise, whoever simulates it.
         trial = record.number if built == record.machine_hash else None
         task, simulated = task_of(job, self._tasks), cast("Repeated | None", None)
+        failure = ""
         try:
             if record.engine == BESIEGE:
-                trajectory = self._played(job, record, machine, task)
                 checks += [
                     compare(f"{name}: what {engine} says", kept, _plain(found))
                     for engine, kept, found in annotations_again(record, task, machine, controls)
                 ]
+                trajectory = self._played(job, record, machine, task)
             else:
                 checks += self._version_checks(name, record)
                 simulated = self._repeated(record, machine, task, controls)
                 trajectory = simulated.trajectory
-        except (MachineNotSimulable, MachineNotPlayableError):
+        except (MachineNotSimulable, MachineNotPlayableError) as error:
             repeated, digest = failed_score(task, machine), None
+            failure = str(error) if isinstance(error, ControllerFailed) else ""
         except LogIncompleteError as error:
             return [*checks, compare(f"{name}: log", "", str(error), able=False)]
         except UnknownEngineError as error:
@@ -289,8 +304,11 @@ class Verifier:
         else:
             repeated = score(task, machine, trajectory)
             digest = _hash(self._written_as(record.trajectory_hash, trajectory))
-        checks.append(compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial))
-        if simulated is not None and not checks[-1].ok:
+        moved = compare(f"{name}: trajectory", record.trajectory_hash, digest, trial=trial)
+        outcomes = [moved, *failure_checks(name, record.versions or {}, failure, trial)]
+        checks += outcomes
+        repeats = record.engine != BESIEGE and (simulated is not None or failure)
+        if repeats and not all(check.ok for check in outcomes):
             checks += self._processor_checks(name, record, simulated)
         for field in SCORED:
             kept = _plain(getattr(record, field))
@@ -332,18 +350,19 @@ class Verifier:
         return first
 
     def _processor_checks(
-        self, name: str, record: RolloutRecord, repeated: Repeated
+        self, name: str, record: RolloutRecord, repeated: Repeated | None
     ) -> list[Check]:
         """Whether another processor may be why bytes differ, so that nothing can be said here."""
         then = named_processor(record.versions or {})
+        here = repeating_processor(record) if repeated is None else repeated.processor
         # A runner that names no processor gains nothing by it.
-        if then == repeated.processor or (then is None and record.runner is not None):
+        if then == here or (then is None and record.runner is not None):
             return []
         kept = None
         with suppress(ArtifactStoreError, TrajectoryFormatError, ValueError):
             if record.trajectory_hash is not None:
                 kept = read_trajectory(self._artifacts.get(record.trajectory_hash))
-        told = difference(kept, repeated)
+        told = dict(here) if repeated is None else difference(kept, repeated)
         return [compare(f"{name}: processor", then and dict(then), told, able=False)]
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:

@@ -106,6 +106,32 @@ _TABLE: Final = (
         expected="the way after the trial within a tenth of each engine's",
     ),
     Assumption(
+        name="program_text",
+        text="The mod's Lua runs the text of a program, by `load` with an environment of its own, "
+        "and calls it as ours does.",
+        expected="a program does not fail, and its answers at every tick are those that it gives "
+        "here to the same senses",
+    ),
+    Assumption(
+        name="program_senses",
+        text="What the mod tells of a block (`position`, `right`, `up`, `forward`) makes a "
+        "program's senses.",
+        expected="the position that a program is told is within 0.1 of the starting block's in the "
+        "log, and on a machine that stands up points up (0.98)",
+    ),
+    Assumption(
+        name="program_keys",
+        text="Blocks heed keys of joysticks in machine files, which `new_key_emulator` presses "
+        "though there is no joystick.",
+        expected="two wheels that a program asks for turn by 0.5 rad/s or more",
+    ),
+    Assumption(
+        name="program_shares",
+        text="A key that is down in every second update drives a motor at half its speed.",
+        expected="a wheel asked for a half turns at a half of the speed of one asked for all, "
+        "within a tenth of it",
+    ),
+    Assumption(
         name="agreement",
         text="Our engines give a machine the verdict that the game gives it.",
         expected="the same verdict in every run of the expert's machine",

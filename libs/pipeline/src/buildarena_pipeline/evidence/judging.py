@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+import numpy as np
+
 from buildarena_besiege import MachineFileError
 from buildarena_besiege.exporting.probes import level_probes
 from buildarena_besiege.logs.level_check import GRAVITY_TOLERANCE, GROUND_TOLERANCE
@@ -19,6 +21,7 @@ from buildarena_pipeline.evidence.reading_runs import (
 )
 from buildarena_pipeline.evidence.saved_files import saved_differences
 from buildarena_pipeline.evidence.trials import Trial, trial_named
+from buildarena_simulation import ControllerFailed
 from buildarena_simulation.constants import GRAVITY
 
 ROOT_OFF: Final = 0.25
@@ -32,6 +35,13 @@ REST_OFF: Final = 0.1
 WAY_OFF: Final = 0.1
 TIPS: Final = 0.2
 """How far the end of a balance sinks or rises until it counts as tipped, units."""
+SENSED_OFF: Final = 0.1
+UPRIGHT: Final = 0.98
+"""The least share of up that points up, on a machine that stands."""
+TURNS: Final = 0.5
+"""A wheel that is slower does not turn, rad/s."""
+SHARE_OFF: Final = 0.1
+"""How far half a speed may be from the half, as a share of the whole."""
 MAX_NAMED: Final = 8
 
 Shown = dict[str, dict[str, float | None]]
@@ -128,6 +138,33 @@ def driven(inputs: StepInputs) -> Iterator[Judgement]:
             near = abs(way - ours) <= WAY_OFF * max(abs(ours), 1.0)
             holds = near if holds is None else holds and near
     yield judgement("wheels", holds, ", ".join(texts))
+
+
+def piloted(inputs: StepInputs) -> Iterator[Judgement]:
+    """Whether a program runs, senses and acts as in an engine."""
+    run = next(iter(runs_of(inputs, "program")), None)
+    piloting = run.trajectory.piloting if run is not None and run.trajectory is not None else None
+    if run is None or run.trajectory is None or piloting is None:
+        why = _faults(runs_of(inputs, "program"))
+        failed = why.startswith(ControllerFailed.BEGINNING)
+        yield judgement("program_text", False if failed else None, why)
+        for name in ("program_senses", "program_keys", "program_shares"):
+            yield judgement(name, None, why)
+        return
+    yield judgement("program_text", True, f"{len(piloting.answers) - 1} answers are the same here")
+    place = [piloting.sense_names.index(f"position.{axis}") for axis in "xyz"]
+    away = piloting.senses[:-1, place] - run.trajectory.positions[:-1, 0]
+    farthest = float(np.linalg.norm(away, axis=1).max())
+    up = float(piloting.senses[:-1, piloting.sense_names.index("up.z")].min())
+    seen = f"at most {farthest:.3f} units away; up points up by {up:.3f} at least"
+    yield judgement("program_senses", farthest <= SENSED_OFF and up >= UPRIGHT, seen)
+    speeds = next(iter(step_figures(inputs, "program").values()))
+    whole, half = speeds["whole"] or 0.0, speeds["half"] or 0.0
+    seen = f"{whole:.2f} rad/s where all is asked for, {half:.2f} for a half"
+    turns = min(whole, half) >= TURNS
+    yield judgement("program_keys", turns, seen)
+    near = abs(half - whole / 2) <= SHARE_OFF * whole
+    yield judgement("program_shares", near if turns else None, seen)
 
 
 def agreed(inputs: StepInputs, trial_name: str) -> Iterator[Judgement]:

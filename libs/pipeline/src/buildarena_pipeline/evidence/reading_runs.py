@@ -23,11 +23,13 @@ from buildarena_geometry import Machine
 from buildarena_pipeline.evidence.document import StepRecord, Versions, sentence_of
 from buildarena_pipeline.evidence.landings import landing_figures
 from buildarena_pipeline.evidence.trials import DROP_CENTER, Trial, is_released, trial_named
-from buildarena_simulation import Trajectory
+from buildarena_simulation import ControllerFailed, Piloting, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 TIPPED_S: Final = 1.0
 """After which time it is seen which side of a balance sinks, seconds."""
+SPUN_S: Final = 1.0
+"""How long before a trial's end wheels that a program turns have their speed, seconds."""
 REST_S: Final = 0.4
 """How long before a trial's end something that landed counts as at rest, seconds."""
 
@@ -115,6 +117,8 @@ def figures_of(trial: Trial, machine: Machine, trajectory: Trajectory) -> dict[s
     if trial.name == "scales":
         moved = positions[round(TIPPED_S * SAMPLE_RATE_HZ), 1:3, 2] - positions[0, 1:3, 2]
         return {"against_3": round(float(moved[0]), 3), "against_4": round(float(moved[1]), 3)}
+    if trajectory.piloting is not None:
+        return _spins(trajectory.piloting)
     way = np.linalg.norm(positions[:, 0, :2] - positions[0, 0, :2], axis=1)
     seconds = range(2, int(trial.scenario.duration_s) + 1, 2)
     return {f"way_{second}_s": round(float(way[second * SAMPLE_RATE_HZ]), 3) for second in seconds}
@@ -163,7 +167,7 @@ def _run(inputs: StepInputs, trial: Trial, number: int, run_id: str) -> Run:
     fault, trajectory = "", None
     try:
         trajectory = logged_trajectory(_text(inputs, number), versions, machine, trial.scenario)
-    except (LogIncompleteError, ValueError) as error:
+    except (LogIncompleteError, ControllerFailed, ValueError) as error:
         fault = sentence_of(error)
     return Run(
         number=number, machine=machine, log=log, trajectory=trajectory, fault=fault, file=file
@@ -172,6 +176,15 @@ def _run(inputs: StepInputs, trial: Trial, number: int, run_id: str) -> Run:
 
 def _text(inputs: StepInputs, number: int) -> str:
     return inputs.files.get(f"log-{number}.txt", b"").decode("utf-8", "replace")
+
+
+def _spins(piloting: Piloting) -> dict[str, float | None]:
+    """How fast the wheels turn that a program asks for all and for half of their speed, rad/s."""
+    speeds = [at for at, name in enumerate(piloting.sense_names) if name.endswith(".speed")]
+    last = piloting.senses[-1 - round(SPUN_S * SAMPLE_RATE_HZ) : -1, speeds].mean(axis=0)
+    return {
+        name: round(float(speed), 3) for name, speed in zip(("whole", "half"), last, strict=True)
+    }
 
 
 def _acceleration(time_s: np.ndarray, height: np.ndarray) -> float | None:

@@ -29,6 +29,12 @@ OWN: Final[dict[str, dict[str, Any]]] = {
     },
     "scales": {"duration_s": 2.0, "control": {"mode": "agent"}},
     "wheels": {"duration_s": 8.0, "control": {"mode": "agent"}},
+    "program": {
+        "duration_s": 4.0,
+        "control": {"mode": "agent"},
+        "senses": {"offers": ("pose", "wheels")},
+        "tracked_blocks": ("1",),
+    },
 }
 """Scenarios that are no task's, all of them in the flat sandbox."""
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from buildarena_besiege import MachineNotPlayableError, prepare_run
+from buildarena_besiege import MachineNotPlayableError, logged_trajectory, prepare_run
 from buildarena_besiege.keys import cannons
 from buildarena_besiege.tracking import tracked_blocks
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
@@ -27,7 +27,8 @@ from buildarena_pipeline.runtime.trajectory_files import (
     require_sound,
     same,
 )
-from buildarena_simulation import MachineNotSimulable, Trajectory
+from buildarena_pipeline.runtime.trials import MOST_LETTERS, REFUSED, refused
+from buildarena_simulation import ControllerFailed, MachineNotSimulable, Trajectory
 from buildarena_simulation.control import (
     PRESSES,
     KeyHold,
@@ -115,20 +116,65 @@ def require_refusable(
     machine: Machine,
     scenario: Scenario,
     controls: Sequence[KeyPress] | None,
+    versions: Mapping[str, Any],
+    log: bytes | None = None,
 ) -> None:
     """Checks that a simulator would refuse a machine, as a runner says it did.
+
+    That its program failed in the middle of the trial is seen in the log of the game. An engine's
+    trial shows it when it is simulated again, so such a claim counts once it was verified.
+
+    Args:
+        simulator: The simulator that ran the trial.
+        machine: The machine.
+        scenario: What it was put through.
+        controls: Key presses of this run; None for the machine's own.
+        versions: What the runner says of its versions.
+        log: That of a trial in the game, where the runner sent one.
 
     Raises:
         OutcomeRefusedError: It would not.
     """
+    piloted, why = bool(machine.controller) and controls is None, versions.get(REFUSED)
     try:
-        if simulator == BESIEGE:
-            prepare_run(machine, scenario, name="a", run_id="a", controls=controls)
-        else:
+        if simulator != BESIEGE:
             _tracked(structure_of(machine), scenario)
+            if piloted and _says_failed(why):
+                return
+        else:
+            prepare_run(machine, scenario, name="a", run_id="a", controls=controls)
+            if piloted and log is not None:
+                _require_whole(log, versions, machine, scenario)
+    except ControllerFailed as failure:
+        require(refused(failure).get(REFUSED) == why, f"versions.{REFUSED} is not: {failure}")
+        return
     except (MachineNotPlayableError, MachineNotSimulable):
         return
     raise OutcomeRefusedError(f"{simulator} does not refuse this machine: send its trajectory")
+
+
+def _says_failed(why: object) -> bool:
+    """Whether a sentence of a runner's says how a program failed."""
+    is_sentence = isinstance(why, str) and len(why) <= MOST_LETTERS
+    return is_sentence and str(why).startswith(ControllerFailed.BEGINNING)
+
+
+def _require_whole(
+    log: bytes, versions: Mapping[str, Any], machine: Machine, scenario: Scenario
+) -> None:
+    """Checks that a log tells a whole trial.
+
+    Raises:
+        ControllerFailed: It does, and the program failed in it.
+        OutcomeRefusedError: It does not.
+    """
+    try:
+        logged_trajectory(log.decode("utf-8", "replace"), versions, machine, scenario)
+    except ControllerFailed:
+        raise
+    except Exception as error:
+        # Strangers' logs fail in more ways than a reader foresees.
+        raise OutcomeRefusedError(f"the log does not tell the trial: {error}"[:500]) from error
 
 
 def checked_versions(

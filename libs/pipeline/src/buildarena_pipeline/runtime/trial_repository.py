@@ -159,7 +159,7 @@ class TrialRepository:
             "trajectory_hash": None,
             "trace": [],
             "runner": runner,
-            "audited": runner is not None and self._is_audited(runner, due.request.engine),
+            "audited": runner is not None and self._is_audited(runner, due, trajectory),
         }
         if trajectory is None:
             values |= _scored(failed_score(due.task, due.machine))
@@ -172,11 +172,16 @@ class TrialRepository:
             values["annotations"] = dict(outcome.annotations)
         self._write(lease, due, values, kept | self._put(outcome.files))
 
-    def _is_audited(self, runner: str, engine: str) -> bool:
-        """Whether a runner's trial is verified before it counts; no runner can tell which are."""
-        share = self._audited_shares.get(engine)
+    def _is_audited(self, runner: str, due: DueTrial, trajectory: Trajectory | None) -> bool:
+        """Whether a runner's trial is verified before it counts; no runner can tell which are.
+
+        That a program failed is always verified, as nothing else shows it.
+        """
+        share = self._audited_shares.get(due.request.engine)
         if share is None:
             return False
+        if trajectory is None and due.machine.controller and due.controls is None:
+            return True
         if SystemRandom().random() < share:
             return True
         with self._store.database.statement() as connection:

@@ -11,6 +11,10 @@ from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory
 
 PARQUET: Final = "application/vnd.apache.parquet"
+REFUSED: Final = "refused"
+"""The key of a trial's versions that says why the machine was not simulated to the end."""
+MOST_LETTERS: Final = 400
+"""Of that sentence."""
 FaultReason = Literal[
     "simulator_fault",
     "game_version",
@@ -62,7 +66,8 @@ class TrialResult:
     """What came of a trial.
 
     Attributes:
-        trajectory: What the scorer reads; None when the simulator refused the machine.
+        trajectory: What the scorer reads; None when the simulator refused the machine, or the
+            machine's program failed.
         versions: Everything about the simulator that can change the trajectory.
         wall_s: How long it took, seconds; whoever runs the simulator measures it.
         files: Further bytes to store with the job, by name.
@@ -74,3 +79,13 @@ class TrialResult:
     wall_s: float = 0.0
     files: Mapping[str, File] = field(default_factory=dict)
     annotations: Mapping[str, Any] | None = None
+
+
+def refused(why: object) -> Mapping[str, str]:
+    """What a trial's versions say of a machine that was not simulated to the end.
+
+    Args:
+        why: The error, or its sentence; "" where there is none.
+    """
+    sentence = str(why)[:MOST_LETTERS]
+    return {REFUSED: sentence} if sentence else {}

@@ -184,6 +184,11 @@ class Program:
         )
 
 
+def blames_clock(sentence: str) -> bool:
+    """Whether a program is said to have failed by a processor's time, which differs everywhere."""
+    return _BOUNDS["clock"] in sentence
+
+
 def _started(seed: int, most_s: float) -> Any:
     from lupa.lua52 import LuaRuntime
 

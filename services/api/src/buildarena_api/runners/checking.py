@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, Final
 
 from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_geometry import KeyPress, Machine
 from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
-from buildarena_pipeline.runtime.trial_checks import checked_trajectory
+from buildarena_pipeline.runtime.trial_checks import checked_trajectory, require_refusable
 from buildarena_simulation import Scenario, Trajectory
 
 SPARE_BYTES: Final = 1 << 30
@@ -41,23 +41,55 @@ class TrajectoryChecker:
         Raises:
             OutcomeRefusedError: It is none of this trial, or can't be read within the bounds.
         """
-        question = {
-            "data": data,
-            "simulator": simulator,
-            "version": version,
-            "machine": machine.to_document(),
-            "scenario": scenario.model_dump_json(),
-            "controls": controls,
-            "seed": seed,
-        }
+        checked: Trajectory = self._asked(
+            checked_trajectory,
+            machine,
+            scenario,
+            data=data,
+            simulator=simulator,
+            version=version,
+            controls=controls,
+            seed=seed,
+        )
+        return checked
+
+    def require_refusable(
+        self,
+        *,
+        simulator: str,
+        machine: Machine,
+        scenario: Scenario,
+        controls: Sequence[KeyPress] | None,
+        versions: Mapping[str, Any],
+        log: bytes | None,
+    ) -> None:
+        """Checks that a simulator would refuse a machine; see the function of this name.
+
+        Raises:
+            OutcomeRefusedError: It would not, or that can't be told within the bounds.
+        """
+        self._asked(
+            require_refusable,
+            machine,
+            scenario,
+            simulator=simulator,
+            controls=controls,
+            versions=dict(versions),
+            log=log,
+        )
+
+    def _asked(
+        self, check: Callable[..., Any], machine: Machine, scenario: Scenario, **more: Any
+    ) -> Any:
         try:
-            refusal, trajectory = self._checker.ask(question)
+            refusal, answer = self._checker.ask(
+                (check, machine.to_document(), scenario.model_dump_json(), more)
+            )
         except CheckFailedError as error:
             raise OutcomeRefusedError(str(error)) from error
-        if trajectory is None:
+        if refusal:
             raise OutcomeRefusedError(refusal)
-        checked: Trajectory = trajectory
-        return checked
+        return answer
 
 
 @cache
@@ -66,7 +98,7 @@ def shared_checker() -> TrajectoryChecker:
     return TrajectoryChecker()
 
 
-def _answering() -> Callable[[Any], tuple[str, Trajectory | None]]:
+def _answering() -> Callable[[Any], tuple[str, Any]]:
     # Loaded before memory is limited.
     import pyarrow.parquet
 
@@ -74,16 +106,13 @@ def _answering() -> Callable[[Any], tuple[str, Trajectory | None]]:
     return _answer
 
 
-def _answer(question: Any) -> tuple[str, Trajectory | None]:
+def _answer(question: Any) -> tuple[str, Any]:
+    check, machine, scenario, more = question
     try:
-        return "", checked_trajectory(
-            question["data"],
-            simulator=question["simulator"],
-            version=question["version"],
-            machine=Machine.from_document(question["machine"]),
-            scenario=Scenario.model_validate_json(question["scenario"]),
-            controls=question["controls"],
-            seed=question["seed"],
+        return "", check(
+            machine=Machine.from_document(machine),
+            scenario=Scenario.model_validate_json(scenario),
+            **more,
         )
     except OutcomeRefusedError as error:
-        return str(error), None
+        return str(error) or "it is refused", None

@@ -14,10 +14,7 @@ from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_pipeline.runtime.tracing import Attribute, span
 from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
-from buildarena_pipeline.runtime.trial_checks import (
-    checked_versions,
-    require_refusable,
-)
+from buildarena_pipeline.runtime.trial_checks import checked_versions
 from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
 from buildarena_pipeline.runtime.trials import File, TrialResult
 from buildarena_simulation import Trajectory
@@ -125,12 +122,16 @@ class Outcomes:
         if said.annotations is not None and simulator != BESIEGE:
             raise OutcomeRefusedError("only trials in the game have annotations")
         trajectory: Trajectory | None = None
+        files = self._files(named, due.request.number, said.files)
         if said.trajectory is None:
-            require_refusable(
+            log_file = files.get(f"log-{due.request.number}.txt")
+            self._checker.require_refusable(
                 simulator=simulator,
                 machine=due.machine,
                 scenario=due.task.scenario,
                 controls=due.controls,
+                versions=said.versions,
+                log=None if log_file is None else log_file.data,
             )
         else:
             file = UploadedFile(sha256=said.trajectory.sha256, size=said.trajectory.size)
@@ -150,7 +151,7 @@ class Outcomes:
                 said.versions, simulator=simulator, version=version, trajectory=trajectory
             ),
             wall_s=said.wall_s,
-            files=self._files(named, due.request.number, said.files),
+            files=files,
             annotations=None
             if annotations is None
             else {engine: one.model_dump() for engine, one in annotations.items()},

@@ -192,7 +192,8 @@ class Outcome(_Document):
     """What came of a trial; its score is found here."""
 
     trajectory: SentFile | None = Field(
-        description="The Parquet file; null when the simulator refused the machine"
+        description="The Parquet file; null when the simulator refused the machine, or its program "
+        "failed: `versions.refused` says why"
     )
     versions: Facts = Field(description="Everything about the simulator that can change it")
     wall_s: Seconds = Field(description="How long the trial took")
