@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
+from buildarena_benchmark import Score
+from buildarena_benchmark.scorers.scorer import REFUTED
 from buildarena_pipeline.runtime.trials import REFUSED, refused
 from buildarena_simulation import ControllerFailed
 from buildarena_simulation.controllers.program import blames_clock
+from buildarena_store import Job, JobScore, Usage
 from buildarena_store.states import Verdict
+
+SCORED: Final = ("success", "indicator", "metrics", "flags")
+"""Figures of a score that are compared."""
+_COUNTED: Final = (
+    "requests",
+    "input_tokens",
+    "output_tokens",
+    "cached_tokens",
+    "reasoning_tokens",
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,3 +111,30 @@ def failure_checks(
         return []
     able = not blames_clock(kept) and not blames_clock(found)
     return [compare(f"{name}: failure", kept, found, able=able, trial=trial)]
+
+
+def score_checks(job: Job, counted: JobScore | Score) -> list[Check]:
+    """Whether a job's score is what its trials are worth."""
+    return [compare(f"score: {n}", _scored(job, n), plain(getattr(counted, n))) for n in SCORED]
+
+
+def usage_checks(job: Job, usage: Usage) -> list[Check]:
+    """Whether what a job took and cost is what its replies did."""
+    checks = [compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in _COUNTED]
+    checks.append(compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
+    return checks
+
+
+def plain(value: Any) -> Any:
+    """A value as it comes back from JSON."""
+    if isinstance(value, Mapping):
+        value = dict(value)
+    elif isinstance(value, tuple):
+        value = list(value)
+    return json.loads(json.dumps(value))
+
+
+def _scored(job: Job, name: str) -> Any:
+    """A figure of a job's score, without what an earlier verification added to it."""
+    value = plain(getattr(job, name))
+    return [flag for flag in value if flag != REFUTED.name] if name == "flags" else value
