@@ -52,7 +52,7 @@ def written(trajectory) -> bytes:
 def test_each_task_that_takes_programs_can_be_driven() -> None:
     piloted = [name for name, task in builtin_tasks().items() if task.scenario.senses]
     assert list(fixed_machines()) == piloted
-    assert IDS[-1] == "BuildArena/Drive-Hover-3-v0"
+    assert "BuildArena/Drive-Hover-3-v0" in IDS
     assert len(IDS) == len(piloted)
     usual = gymnasium.make("buildarena_gymnasium:BuildArena/Drive-v0").unwrapped
     assert usual.task.name == "hover-3"
@@ -310,8 +310,8 @@ def test_pictures_show_where_the_machine_is() -> None:
 
 
 def test_what_cannot_be_driven_is_refused_with_the_choices() -> None:
-    with pytest.raises(UnknownChoiceError, match="no task 'hover-4'"):
-        gymnasium.make("BuildArena/Drive-v0", task="hover-4")
+    with pytest.raises(UnknownChoiceError, match="no task 'hover-9'"):
+        gymnasium.make("BuildArena/Drive-v0", task="hover-9")
     with pytest.raises(ValueError, match="support-1 offers no senses: choose from landing-1"):
         DriveEnv("support-1")
     with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
