@@ -13,7 +13,7 @@ from support.machines.piloted import experts_machine, listened, repeated, scored
 
 from buildarena_benchmark import Task, TaskError, builtin_tasks, load_task, score
 from buildarena_simulation import ENGINES, MachineNotSimulable, simulate
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 CONTROL = [task for task in builtin_tasks().values() if task.category == "control"]
 FAN = "Flying Block"
@@ -147,6 +147,46 @@ def _with_threshold(task: Task, name: str, value: float) -> str:
     document["scoring"] = {**document["scoring"], name: value}
     document = {key: value for key, value in document.items() if value is not None}
     return json.dumps(document) + "\n"
+
+
+SPENDTHRIFTS = {
+    "hovers first": "t < 4 and 1 or 0.36",
+    "flies up and falls": "1",
+    "slows down all the way": "0.351",
+}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("how", SPENDTHRIFTS)
+def test_who_burns_its_fuel_in_the_air_does_not_land(engine, how) -> None:
+    machine = cross().machine
+    program = f"function control(t) return {{ fly = {SPENDTHRIFTS[how]} }} end"
+    result = scored(builtin_tasks()["landing-2"], machine.with_controller(program), engine, None)
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+def test_landing_slowly_and_with_more_fans_burns_as_much() -> None:
+    """Who sinks as in landing-1 is in the air for too long; twice the fans hold no longer."""
+    task = builtin_tasks()["landing-2"]
+    slow = experts_machine(builtin_tasks()["landing-1"])
+    results = [scored(task, slow, "mujoco", seed).success for seed in range(12)]
+    assert sum(results) <= 4
+    left = []
+    for fans in (1, 2):
+        draft = cross()
+        for block in list(draft.machine.blocks.values()):
+            if fans == 2 and block.module.name == FAN:
+                base = next(j.base for j in draft.machine.joints if j.part == block.id)
+                draft.bind(draft.attach(base, DOWN, FAN), "fly", "Alpha2")
+        share = float(draft.machine.mass) / (4 * 3.25)
+        program = f"function control() return {{ fly = 0.4 * {share / fans} }} end"
+        machine = draft.machine.with_controller(program)
+        trial = simulate(machine, task.scenario, "mujoco")
+        assert trial.piloting is not None
+        fuel = trial.piloting.sense_names.index("fuel")
+        left.append(float(trial.piloting.senses[25, fuel]))
+    assert left[0] == pytest.approx(left[1], abs=1e-3)
+    assert left[0] == pytest.approx(6.8 - 0.4 * 0.96, abs=0.02)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

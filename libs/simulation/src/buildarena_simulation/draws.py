@@ -26,6 +26,7 @@ ROOTS: Final = (
     "marks",
     "gusts",
     "pushes",
+    "fuel_s",
     "gravity",
     "drive_strength",
 )

@@ -16,7 +16,8 @@ from buildarena_simulation.control import (
     reaching,
 )
 from buildarena_simulation.force_control import ForceSchedule, ForceState, plan_forces
-from buildarena_simulation.scenario import Control
+from buildarena_simulation.fuel import Tank
+from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.force_field import ForceField
 from buildarena_simulation.structure.grips import grips_of
 from buildarena_simulation.structure.model import FloatArray, Structure
@@ -58,10 +59,11 @@ class Planner:
     Args:
         structure: The machine.
         field: What its blocks exert by themselves; None where none does.
-        control: Who acts.
+        scenario: Who acts, and how much fuel there is.
         time_step_s: Length of a step, seconds.
 
     Attributes:
+        tank: The fuel that is left after the planned steps.
         first: The first step that is planned.
         drives: Commands of the planned steps.
         forces: The same to blocks that exert forces; None where none does.
@@ -71,10 +73,12 @@ class Planner:
     forces: ForceSchedule | None = None
 
     def __init__(
-        self, structure: Structure, field: ForceField | None, control: Control, time_step_s: float
+        self, structure: Structure, field: ForceField | None, scenario: Scenario, time_step_s: float
     ) -> None:
-        self._structure, self._control, self._time_step_s = structure, control, time_step_s
+        self._structure, self._time_step_s = structure, time_step_s
+        self._control = scenario.control
         self._table = None if field is None else field.table
+        self.tank = Tank(structure, self._table, scenario)
         self._drive_state = DriveState.still(structure)
         self._force_state = (
             None if self._table is None else ForceState.still(structure, self._table)
@@ -114,3 +118,4 @@ class Planner:
                 times=times,
                 time_step_s=self._time_step_s,
             )
+        self.tank.burn(self.drives, self.forces, self._time_step_s)

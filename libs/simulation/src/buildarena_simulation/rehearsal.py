@@ -126,4 +126,5 @@ def _at_start(structure: "Structure", scenario: Scenario) -> Seen:
         motion=motion,
         cargo=cargo,
         on_wheels=np.zeros(len(structure.wheels)),
+        fuel_s=scenario.fuel_s or 0.0,
     )

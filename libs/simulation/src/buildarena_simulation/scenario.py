@@ -203,8 +203,8 @@ class Control(_Document):
     until_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
 
 
-SenseKind = Literal["pose", "axes", "blocks", "joints", "wheels", "cargo", "marks", "gates"]
-_OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind != "axes")  # of the pose
+SenseKind = Literal["pose", "axes", "blocks", "joints", "wheels", "cargo", "marks", "gates", "fuel"]
+_OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind not in ("axes", "fuel"))
 NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
 
 
@@ -269,6 +269,9 @@ class Scenario(_Document):
         senses: What a controller is told; None where it takes no controller.
         gusts: Wind; None where there is none. A trial without a seed has that of seed 0.
         pushes: Pushes.
+        fuel_s: For how many seconds fans and cannons can hold the machine's weight: what all of
+            them are asked to push is added up, and once it is more than that they push no longer.
+            None forever.
         draws: What the seed of a trial draws, see `buildarena_simulation.draws`; a trial without a
             seed has the figures that stand here.
     """
@@ -289,6 +292,7 @@ class Scenario(_Document):
     senses: Annotated[Senses | None, Field(exclude_if=_is_default)] = None
     gusts: Annotated[Gusts | None, Field(exclude_if=_is_default)] = None
     pushes: Annotated[tuple[Push, ...], Field(max_length=64, exclude_if=_is_default)] = ()
+    fuel_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
     draws: Annotated[Draws, Field(exclude_if=_is_default)] = {}
 
     @model_validator(mode="after")

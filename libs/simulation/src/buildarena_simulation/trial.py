@@ -71,7 +71,7 @@ class Trial:
         self.recorder = Recorder(structure, scenario)
         self.has_blown_up = False
         self._per_sample = round(1 / (SAMPLE_RATE_HZ * engine.time_step_s))
-        self._planner = Planner(structure, self._field, scenario.control, engine.time_step_s)
+        self._planner = Planner(structure, self._field, scenario, engine.time_step_s)
         self._tick, self._ticks = 0, scenario.sample_count - 1
         self._sample(0.0)
 
@@ -137,6 +137,7 @@ class Trial:
             motion=breaking.motion,
             cargo=self._engine.cargo() if self._scenario.cargo else None,
             on_wheels=breaking.bearing.now[len(breaking.bearing.now) - wheels :],
+            fuel_s=self._planner.tank.left_s,
         )
 
     def _command(self, schedule: ForceSchedule, row: int, step: int) -> None:

@@ -22,7 +22,15 @@ _HEADROOM: Final = (
     *("flight-3", "lift-4", "mechanisms-7"),
 )
 _FAMILIES: Final = ("budget-1", "repair-1", "identify-1")
-_CONTROL: Final = ("landing-1", "slalom-2", "hover-3", "hover-4", "balance-1", "balance-2")
+_CONTROL: Final = (
+    "landing-1",
+    "landing-2",
+    "slalom-2",
+    "hover-3",
+    "hover-4",
+    "balance-1",
+    "balance-2",
+)
 
 
 @cache

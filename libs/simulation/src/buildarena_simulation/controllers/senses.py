@@ -40,6 +40,7 @@ class Seen:
         motion: Theirs.
         cargo: The cargo; None without.
         on_wheels: (W,) what ground and terrain exert on each wheel, mass·g.
+        fuel_s: What fuel is left, seconds.
     """
 
     time_s: float
@@ -47,6 +48,7 @@ class Seen:
     motion: Motion
     cargo: CargoPose | None
     on_wheels: FloatArray
+    fuel_s: float
 
 
 class Sensing:
@@ -109,13 +111,14 @@ class Sensing:
         return values
 
     def _laid_out(self) -> dict[str, Any]:
-        layouts: dict[SenseKind, Callable[[], dict[str, Any]]] = {
+        layouts: dict[SenseKind, Callable[[], Any]] = {
             "blocks": self._blocks_layout,
             "joints": self._joints_layout,
             "wheels": self._wheels_layout,
             "cargo": self._cargo_layout,
             "marks": partial(self._places_layout, self._scenario.marks),
             "gates": partial(self._places_layout, self._scenario.gates),
+            "fuel": self._number,
         }
         # The starting block's own pose has no name of its own: `sense.position`.
         own = {"pose": self._pose, "axes": self._axes}
@@ -127,6 +130,7 @@ class Sensing:
         """Whether the scenario offers a kind of senses, and has what it is about."""
         about: dict[str, object] = {"cargo": self._scenario.cargo}
         about |= {"marks": self._scenario.marks, "gates": self._scenario.gates}
+        about["fuel"] = self._scenario.fuel_s is not None
         about["axes"] = "pose" not in self._senses.offers  # which has them
         return kind in self._senses.offers and bool(about.get(kind, True))
 
@@ -193,6 +197,7 @@ class Sensing:
             "cargo": lambda: _cargo_values(seen, own),
             "marks": lambda: _places((mark.at(seen.time_s) for mark in self._scenario.marks), own),
             "gates": lambda: _places(((*g.center, 0.0) for g in self._scenario.gates), own),
+            "fuel": lambda: (seen.fuel_s,),
         }
         for kind in self.offers:
             yield from values[kind]()

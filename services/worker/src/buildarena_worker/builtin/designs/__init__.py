@@ -51,6 +51,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "slalom-2": piloted.gate_finder,
     "hover-3": piloted.keeper,
     "hover-4": piloted.keeper,
+    "landing-2": piloted.sparing_lander,
     "balance-1": piloted.balancer,
     "balance-2": piloted.balancer,
 }

@@ -54,6 +54,11 @@ def lander(seed: int) -> Design:
     return _craft("landing", keen=0.6 + 0.01 * (seed % 5))
 
 
+def sparing_lander(seed: int) -> Design:
+    """The same craft, which falls fast and brakes late: it has little fuel."""
+    return _craft("sparing", keen=1.4 + 0.02 * (seed % 5))
+
+
 def keeper(seed: int) -> Design:
     """The same craft; what pushes it off its place for long it learns to lean against."""
     return _craft("place", keen=3.0 + 0.05 * (seed % 5))
