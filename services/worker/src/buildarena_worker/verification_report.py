@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,10 @@ from typing import Any
 from buildarena_pipeline.runtime.trials import REFUSED, refused
 from buildarena_simulation import ControllerFailed
 from buildarena_simulation.controllers.program import blames_clock
+from buildarena_store import Job, Usage
 from buildarena_store.states import Verdict
+
+COUNTED = ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,3 +101,19 @@ def failure_checks(
         return []
     able = not blames_clock(kept) and not blames_clock(found)
     return [compare(f"{name}: failure", kept, found, able=able, trial=trial)]
+
+
+def usage_checks(job: Job, usage: Usage) -> list[Check]:
+    """Whether a session used again what it used."""
+    checks = [compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in COUNTED]
+    checks.append(compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
+    return checks
+
+
+def plain(value: Any) -> Any:
+    """A value as it comes back from JSON."""
+    if isinstance(value, Mapping):
+        value = dict(value)
+    elif isinstance(value, tuple):
+        value = list(value)
+    return json.loads(json.dumps(value))

@@ -12,7 +12,7 @@ the verification inconclusive: nothing follows from it.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from hashlib import sha256
 from typing import Any, cast
@@ -69,18 +69,11 @@ from buildarena_store import (
     Outcome,
     RolloutRecord,
     Store,
-    Usage,
 )
 from buildarena_store.jobs.histories import Histories
 from buildarena_worker.game_trials import annotations_again
 from buildarena_worker.jobs import loop_of, pack_of
-from buildarena_worker.processors import (
-    Repeated,
-    difference,
-    named_processor,
-    repeating_processor,
-    repetitions,
-)
+from buildarena_worker.processors import Repeated, other_processors, repetitions
 from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.results import (
     Failed,
@@ -96,12 +89,13 @@ from buildarena_worker.verification_report import (
     broken_off,
     compare,
     failure_checks,
+    plain,
+    usage_checks,
 )
 from buildarena_worker.workflow import Workflows
 from buildarena_worker.workflow.rounds import run_session
 
 SCORED = ("success", "indicator", "metrics", "flags")
-COUNTED = ("requests", "input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
 
 
 class Verifier:
@@ -187,7 +181,7 @@ class Verifier:
                 "transcript", self._artifact(job, "transcript"), _hash(session.transcript.to_json())
             ),
             compare("rollouts", len(exact), len(host.simulated)),
-            *_usage_checks(job, host.usage),
+            *usage_checks(job, host.usage),
             *reasons,
         ]
         best = best_rollout(exact, session.task) if has_counted(exact, session.task) else None
@@ -286,7 +280,7 @@ class Verifier:
         try:
             if record.engine == BESIEGE:
                 checks += [
-                    compare(f"{name}: what {engine} says", kept, _plain(found))
+                    compare(f"{name}: what {engine} says", kept, plain(found))
                     for engine, kept, found in annotations_again(record, task, machine, controls)
                 ]
                 trajectory = self._played(job, record, machine, task)
@@ -311,8 +305,8 @@ class Verifier:
         if repeats and not all(check.ok for check in outcomes):
             checks += self._processor_checks(name, record, simulated)
         for field in SCORED:
-            kept = _plain(getattr(record, field))
-            checks.append(compare(f"{name}: {field}", kept, _plain(getattr(repeated, field))))
+            kept = plain(getattr(record, field))
+            checks.append(compare(f"{name}: {field}", kept, plain(getattr(repeated, field))))
         return checks
 
     def _version_checks(self, name: str, record: RolloutRecord) -> list[Check]:
@@ -353,17 +347,12 @@ class Verifier:
         self, name: str, record: RolloutRecord, repeated: Repeated | None
     ) -> list[Check]:
         """Whether another processor may be why bytes differ, so that nothing can be said here."""
-        then = named_processor(record.versions or {})
-        here = repeating_processor(record) if repeated is None else repeated.processor
-        # A runner that names no processor gains nothing by it.
-        if then == here or (then is None and record.runner is not None):
-            return []
         kept = None
         with suppress(ArtifactStoreError, TrajectoryFormatError, ValueError):
             if record.trajectory_hash is not None:
                 kept = read_trajectory(self._artifacts.get(record.trajectory_hash))
-        told = dict(here) if repeated is None else difference(kept, repeated)
-        return [compare(f"{name}: processor", then and dict(then), told, able=False)]
+        processors = other_processors(record, kept, repeated)
+        return [compare(f"{name}: processor", *pair, able=False) for pair in processors]
 
     def _played(self, job: Job, record: RolloutRecord, machine: Machine, task: Task) -> Trajectory:
         """What the kept log of a trial in the game tells; the game itself plays nothing again.
@@ -386,9 +375,7 @@ class Verifier:
         counted: JobScore | Score = failed_score(task, machine)
         if has_counted(records, task):
             counted = rollout_score(job, task, records)
-        return [
-            compare(f"score: {n}", _scored(job, n), _plain(getattr(counted, n))) for n in SCORED
-        ]
+        return [compare(f"score: {n}", _scored(job, n), plain(getattr(counted, n))) for n in SCORED]
 
     def _artifact(self, job: Job, name: str) -> str | None:
         return self._store.jobs.artifacts(job.id).get(name)
@@ -396,7 +383,7 @@ class Verifier:
 
 def _scored(job: Job, name: str) -> Any:
     """A figure of a job's score, without what an earlier verification added to it."""
-    value = _plain(getattr(job, name))
+    value = plain(getattr(job, name))
     return [flag for flag in value if flag != REFUTED.name] if name == "flags" else value
 
 
@@ -404,20 +391,5 @@ def _feedback_of(calls: Sequence[ExternalCall]) -> list[list[Any]]:
     return [[call.ok, call.reason, call.feedback] for call in calls]
 
 
-def _usage_checks(job: Job, usage: Usage) -> list[Check]:
-    checks = [compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in COUNTED]
-    checks.append(compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
-    return checks
-
-
 def _hash(data: bytes) -> str:
     return sha256(data).hexdigest()
-
-
-def _plain(value: Any) -> Any:
-    """A value as it comes back from JSON."""
-    if isinstance(value, Mapping):
-        value = dict(value)
-    elif isinstance(value, tuple):
-        value = list(value)
-    return json.loads(json.dumps(value))
