@@ -66,12 +66,10 @@ def settings(rig: Rig, **changes: object) -> BesiegeSettings:
 @pytest.mark.slow
 def test_an_evening_is_played_packed_and_judged(rig, screen) -> None:
     slow = replace(rig, speed=1.2, patience=2.0)
-    steps = "doctor,calibration,sampler,drop,scales"
+    steps = "doctor,calibration,sampler,drop,scales,program"
     said = played(slow, screen, "--steps", steps)
     fast = replace(rig, speed=6.0, patience=2.0)
-    said += played(
-        fast, screen, "--steps", "probe,wheels,program,expert-transport-1,expert-support-1"
-    )
+    said += played(fast, screen, "--steps", "probe,wheels,expert-transport-1,expert-support-1")
     assert set(verdicts(rig).values()) == {Verdict.CONFIRMED, Verdict.NOT_SEEN}, said
     assert [k for k, v in verdicts(rig).items() if v is Verdict.NOT_SEEN] == [
         ("probe", "mass_slider")

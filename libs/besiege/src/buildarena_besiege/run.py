@@ -351,7 +351,9 @@ def _require_sayable(scenario: Scenario) -> None:
     if scenario.gusts is not None:
         raise MachineNotPlayableError("the game has no gusts: use another engine")
     if scenario.fuel_s is not None:
-        raise MachineNotPlayableError("the game's fans and cannons burn no fuel: use another engine")
+        raise MachineNotPlayableError(
+            "the game's fans and cannons burn no fuel: use another engine"
+        )
     if scenario.pushes:
         raise MachineNotPlayableError("the game pushes nothing: use another engine")
     if isinstance(scenario.placement, GroundPlacement) and scenario.placement.tilt_deg:

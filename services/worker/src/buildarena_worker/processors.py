@@ -100,6 +100,25 @@ def named_processor(versions: Mapping[str, Any]) -> Mapping[str, Any] | None:
     return named if isinstance(named, Mapping) else None
 
 
+def other_processors(
+    record: RolloutRecord, kept: Trajectory | None, repeated: Repeated | None
+) -> list[tuple[Mapping[str, Any] | None, Mapping[str, Any]]]:
+    """The processor that simulated a trial, and what is said of the one here, if it is another.
+
+    Args:
+        record: The rollout.
+        kept: As for `difference`.
+        repeated: What came out now; None where the machine's program failed.
+    """
+    then = named_processor(record.versions or {})
+    here = repeating_processor(record) if repeated is None else repeated.processor
+    # A runner that names no processor gains nothing by it.
+    if then == here or (then is None and record.runner is not None):
+        return []
+    told = here if repeated is None else difference(kept, repeated)
+    return [(then and dict(then), dict(told))]
+
+
 def difference(kept: Trajectory | None, repeated: Repeated) -> dict[str, Any]:
     """The processor here, and from when, and how far in units, blocks are apart.
 

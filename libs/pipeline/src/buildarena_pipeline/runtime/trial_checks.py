@@ -27,7 +27,7 @@ from buildarena_pipeline.runtime.trajectory_files import (
     require_sound,
     same,
 )
-from buildarena_pipeline.runtime.trials import MOST_LETTERS, REFUSED, refused
+from buildarena_pipeline.runtime.trials import MAX_SENTENCE, REFUSED, refused
 from buildarena_simulation import ControllerFailed, MachineNotSimulable, Trajectory
 from buildarena_simulation.control import (
     PRESSES,
@@ -155,7 +155,7 @@ def require_refusable(
 
 def _says_failed(why: object) -> bool:
     """Whether a sentence of a runner's says how a program failed."""
-    is_sentence = isinstance(why, str) and len(why) <= MOST_LETTERS
+    is_sentence = isinstance(why, str) and len(why) <= MAX_SENTENCE
     return is_sentence and str(why).startswith(ControllerFailed.BEGINNING)
 
 

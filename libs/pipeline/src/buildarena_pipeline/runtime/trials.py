@@ -13,8 +13,8 @@ from buildarena_simulation import Trajectory
 PARQUET: Final = "application/vnd.apache.parquet"
 REFUSED: Final = "refused"
 """The key of a trial's versions that says why the machine was not simulated to the end."""
-MOST_LETTERS: Final = 400
-"""Of that sentence."""
+MAX_SENTENCE: Final = 400
+"""Its length, characters."""
 FaultReason = Literal[
     "simulator_fault",
     "game_version",
@@ -87,5 +87,5 @@ def refused(why: object) -> Mapping[str, str]:
     Args:
         why: The error, or its sentence; "" where there is none.
     """
-    sentence = str(why)[:MOST_LETTERS]
+    sentence = str(why)[:MAX_SENTENCE]
     return {REFUSED: sentence} if sentence else {}
