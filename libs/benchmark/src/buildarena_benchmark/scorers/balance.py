@@ -37,12 +37,12 @@ if TYPE_CHECKING:
 
 NOT_ON_TWO_WHEELS: Final = Flag(
     name="not_on_two_wheels",
-    meaning="The machine does not begin on exactly two wheels of one axle that lies east and west.",
+    meaning="The machine did not begin on exactly two wheels of one axle that lies east and west.",
 )
 PROPPED: Final = Flag(
     name="propped",
-    meaning="It stood upright for long enough, but something other than its wheels came near the "
-    "ground, its mass was too low, or it turned away.",
+    meaning="The machine stood upright for long enough, but something other than its wheels came "
+    "near the ground, its mass was too low, or it turned away.",
 )
 
 
@@ -94,8 +94,8 @@ def judge(
         trajectory: The trial.
 
     Flags:
-        `not_on_two_wheels`: the wheels are not as they must be. `came_apart`, `propped`: it
-        would have passed but for that. `forces_not_measured`: cannot be judged.
+        `not_on_two_wheels`: the wheels are not as they must be. `came_apart`: it would have passed, but lost
+        parts. `propped`: it would have passed but for its rules. `forces_not_measured`: cannot be judged.
     """
     lacking = unmeasured(trajectory, cargo=False)
     if lacking is not None:
