@@ -94,8 +94,9 @@ def judge(
         trajectory: The trial.
 
     Flags:
-        `not_on_two_wheels`: the wheels are not as they must be. `came_apart`: it would have passed, but lost
-        parts. `propped`: it would have passed but for its rules. `forces_not_measured`: cannot be judged.
+        `not_on_two_wheels`: the wheels are not as they must be. `came_apart`: it would have
+        passed, but lost parts. `propped`: it would have passed but for the rules on what stands.
+        `forces_not_measured`: cannot be judged.
     """
     lacking = unmeasured(trajectory, cargo=False)
     if lacking is not None:
