@@ -93,11 +93,13 @@ export async function act(session: string, tool: string, argument: unknown): Pro
   }
 }
 
-export async function openSession(agent: string, seed = 0): Promise<string> {
+/** Opens an agent's session; what is named besides takes the place of a bridge of the agent's. */
+export async function openSession(agent: string, seed = 0, more: Record<string, unknown> = {}): Promise<string> {
   const answer = await fetch(`${URL_OF_SERVICE}/v1/sessions`, {
     method: "POST",
     headers: { "Content-Type": "application/json" },
-    body: JSON.stringify({ task: "support-1", agent, seed, simulator: "mujoco" }),
+    body: JSON.stringify({ task: "support-1", agent, seed, simulator: "mujoco", ...more }),
   });
+  if (!answer.ok) throw new Error(await answer.text());
   return ((await answer.json()) as { id: string }).id;
 }

@@ -1,6 +1,6 @@
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { expectNoSeriousFault, launched, opened, URL_OF_SERVICE } from "./browser";
+import { ATTACH, act, expectNoSeriousFault, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
 
 const LONG_MS = 90_000;
 const TASK = "transport-1";
@@ -293,17 +293,10 @@ describe("building by hand", () => {
 
 describe("in the dark, at 390", () => {
   it.each(["/build", "/machine", "room"])("%s has no serious fault and does not scroll sideways", async (path) => {
-    const ask = { task: "support-1", agent: `dark-${process.pid}`, seed: 0, simulator: "mujoco", kind: "human" };
-    const post = (to: string, body: unknown) =>
-      fetch(`${URL_OF_SERVICE}${to}`, {
-        method: "POST",
-        headers: { "Content-Type": "application/json" },
-        body: JSON.stringify(body),
-      });
     let where = path;
     if (path === "room") {
-      const { id } = (await (await post("/v1/sessions", ask)).json()) as { id: string };
-      await post(`/v1/sessions/${id}/calls`, { tool: "start", arguments: {} });
+      const id = await openSession(`dark-${process.pid}`, 0, { kind: "human" });
+      await act(id, "start", {});
       where = `/build?session=${id}`;
     }
     const page = await opened(browser, where, 390);
@@ -319,26 +312,11 @@ describe("in the dark, at 390", () => {
 });
 
 describe("a machine from a file", () => {
-  const brick = { tool: "attach_block_to", arguments: { base_block: "1", face: "E", new_block: "Small Wooden Block" } };
-
   async function machineDocument(): Promise<string> {
-    const ask = async (path: string, body: unknown): Promise<{ id: string }> =>
-      (await (
-        await fetch(`${URL_OF_SERVICE}${path}`, {
-          method: "POST",
-          headers: { "Content-Type": "application/json" },
-          body: JSON.stringify(body),
-        })
-      ).json()) as { id: string };
-    const { id } = await ask("/v1/sessions", {
-      task: "support-1",
-      agent: `filed-${process.pid}`,
-      seed: 0,
-      simulator: "mujoco",
-    });
-    await ask(`/v1/sessions/${id}/calls`, { tool: "start", arguments: {} });
-    await ask(`/v1/sessions/${id}/calls`, brick);
-    await ask(`/v1/sessions/${id}/submit`, {});
+    const id = await openSession(`filed-${process.pid}`);
+    await act(id, "start", {});
+    await act(id, "attach_block_to", ATTACH(1, 4));
+    await fetch(`${URL_OF_SERVICE}/v1/sessions/${id}/submit`, { method: "POST" });
     return (await fetch(`${URL_OF_SERVICE}/v1/jobs/${id}/machine`)).text();
   }
 

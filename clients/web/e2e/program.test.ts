@@ -1,6 +1,6 @@
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, expect, it } from "vitest";
-import { expectNoSeriousFault, launched, opened, URL_OF_SERVICE } from "./browser";
+import { act, expectNoSeriousFault, launched, opened, openSession } from "./browser";
 
 const LONG_MS = 90_000;
 let browser: Browser;
@@ -12,20 +12,9 @@ afterAll(() => browser.close());
 it(
   "a program is set, asked what it would do, and tried live",
   async () => {
-    const post = async (to: string, body: unknown): Promise<{ id: string }> => {
-      const response = await fetch(`${URL_OF_SERVICE}${to}`, {
-        method: "POST",
-        headers: { "Content-Type": "application/json" },
-        body: JSON.stringify(body),
-      });
-      if (!response.ok) throw new Error(`${to}: ${await response.text()}`);
-      return (await response.json()) as { id: string };
-    };
-    const ask = { task: "landing-1", agent: `lua-${process.pid}`, seed: 0, simulator: "mujoco", kind: "human" };
-    const { id } = await post("/v1/sessions", ask);
-    await post(`/v1/sessions/${id}/calls`, { tool: "start", arguments: {} });
-    const fan = { base_block: "1", face: "E", new_block: "Flying Block" };
-    await post(`/v1/sessions/${id}/calls`, { tool: "attach_block_to", arguments: fan });
+    const id = await openSession(`lua-${process.pid}`, 0, { task: "landing-1", kind: "human" });
+    await act(id, "start", {});
+    await act(id, "attach_block_to", { base_block: "1", face: "E", new_block: "Flying Block" });
     const page = await opened(browser, `/build?session=${id}`);
     // Beside other work a page that draws in software takes its time.
     page.setDefaultTimeout(LONG_MS);

@@ -20,7 +20,7 @@ from buildarena_environment import (
     Snapshot,
     call_text,
 )
-from buildarena_gymnasium.pictures import Picture, picture_of
+from buildarena_gymnasium.pictures import Picture, checked_mode, picture_of
 from buildarena_gymnasium.scores import score_told
 from buildarena_gymnasium.spaces import ACTION_SPACE, OBSERVATION_SPACE, observed
 from buildarena_simulation import DEFAULT_ENGINE
@@ -70,10 +70,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         varied_start: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        modes = self.metadata["render_modes"]
-        if render_mode is not None and render_mode not in modes:
-            raise ValueError(f"there is no render mode {render_mode!r}: choose from {modes}")
-        self.render_mode = render_mode
+        self.render_mode = checked_mode(render_mode, self.metadata["render_modes"])
         self.environment = Environment(
             task,
             simulator,

@@ -17,7 +17,7 @@ from buildarena_environment.choices import checked_simulator, chosen_task, refer
 from buildarena_environment.rewards import DEFAULT_WEIGHTS, TERMINAL, checked_weights, weighed
 from buildarena_geometry import Machine
 from buildarena_gymnasium.machines import fixed_machine, fixed_machines
-from buildarena_gymnasium.pictures import Picture, picture_at
+from buildarena_gymnasium.pictures import Picture, checked_mode, picture_at
 from buildarena_gymnasium.scores import score_told
 from buildarena_simulation import DEFAULT_ENGINE, Drive, SimulationError, pilot_of
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
@@ -72,10 +72,7 @@ class DriveEnv(gymnasium.Env[Figures, Figures]):
         varied_worlds: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        modes = self.metadata["render_modes"]
-        if render_mode is not None and render_mode not in modes:
-            raise ValueError(f"there is no render mode {render_mode!r}: choose from {modes}")
-        self.render_mode = render_mode
+        self.render_mode = checked_mode(render_mode, self.metadata["render_modes"])
         self.task, self.simulator = chosen_task(task), checked_simulator(simulator)
         self.weights = _terminal(DEFAULT_WEIGHTS if rewards is None else rewards)
         self.reference = reference_of(

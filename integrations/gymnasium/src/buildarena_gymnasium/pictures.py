@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,17 @@ from buildarena_simulation.render.still import SIZE, still_png
 
 Picture = NDArray[np.uint8]
 """(height, width, 3), red, green and blue."""
+
+
+def checked_mode(mode: str | None, modes: Sequence[str]) -> str | None:
+    """A render mode, if there is such a one; None for none.
+
+    Raises:
+        ValueError: There is not; the message has those that there are.
+    """
+    if mode is not None and mode not in modes:
+        raise ValueError(f"there is no render mode {mode!r}: choose from {modes}")
+    return mode
 
 
 def picture_of(environment: Environment) -> Picture:

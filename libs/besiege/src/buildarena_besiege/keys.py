@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
     from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation.scenario import Control
+
+Moment = TypeVar("Moment", int, float)
 
 UPDATES_PER_S: Final = 100
 """How often a second the game calls the script, by its own time."""
@@ -65,7 +67,7 @@ def key_edges(presses: Iterable[KeyPress]) -> tuple[Edge, ...]:
     edges = [
         edge
         for key, spans in holds.items()
-        for start, end in _united(spans)
+        for start, end in united(spans)
         for edge in (Edge(start, key, down=True), Edge(end, key, down=False))
     ]
     return tuple(sorted(edges))
@@ -137,14 +139,15 @@ def _update(time_s: float) -> int:
     return round(tenths * UPDATES_PER_S)
 
 
-def _united(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    united: list[tuple[int, int]] = []
+def united(spans: Iterable[tuple[Moment, Moment]]) -> list[tuple[Moment, Moment]]:
+    """Spans of time in order, those that touch or overlap as one."""
+    whole: list[tuple[Moment, Moment]] = []
     for start, end in sorted(spans):
-        if united and start <= united[-1][1]:
-            united[-1] = (united[-1][0], max(united[-1][1], end))
+        if whole and start <= whole[-1][1]:
+            whole[-1] = (whole[-1][0], max(whole[-1][1], end))
         else:
-            united.append((start, end))
-    return united
+            whole.append((start, end))
+    return whole
 
 
 def _require_sound(press: KeyPress) -> None:

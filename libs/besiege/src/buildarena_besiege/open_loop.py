@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
@@ -10,7 +9,7 @@ from msgspec import Meta
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.machine_file import parts_in_file_order
-from buildarena_besiege.keys import bindings_of, bound_presses
+from buildarena_besiege.keys import bindings_of, bound_presses, united
 from buildarena_besiege.timeline import (
     SCHEMA,
     channel_of,
@@ -24,7 +23,7 @@ from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.reading import Form, Whole, read, shown
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.controllers.answers import Channels
+from buildarena_simulation.controllers.answers import Channels, near_names
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.machine import bindings_of as actions_of
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
 MAX_EVENTS: Final = 20_000
 ON_ABOVE: Final = 0.5
 """A key is down while a channel's value is above it: a key knows no shares."""
-_NEAR: Final = 3
 _DECIMALS: Final = 6
 
 
@@ -134,7 +132,7 @@ def timeline_of(machine: Machine, *, seconds: float) -> bytes:
     if not presses:
         raise MachineNotPlayableError("the machine has no key presses that reach an action")
     changes = {
-        key: _united([(p.time_s, p.time_s + p.hold_for_s) for p in presses if p.key == key])
+        key: united([(p.time_s, p.time_s + p.hold_for_s) for p in presses if p.key == key])
         for key in {press.key for press in presses}
     }
     key_changes = sorted(
@@ -205,7 +203,7 @@ def _part(machine: Machine, entry: _Event, place: str) -> _Part:
     channels = _channels(machine, part) if isinstance(part, Block) else {}
     if entry.channel in channels:
         return part.id, channels[entry.channel]
-    near = difflib.get_close_matches(entry.channel, channels, n=_NEAR, cutoff=0.4)
+    near = near_names(entry.channel, channels)
     meant = f"did you mean {' or '.join(near)}? " if near else ""
     raise DocumentError(
         f"{place}.channel: block {entry.block} ({part.module.name}, {part.id} here) has no "
@@ -237,16 +235,6 @@ def _spans(entries: list[_Event]) -> _Spans:
     if since is not None and since < MAX_DURATION_S:
         spans.append((since, MAX_DURATION_S))
     return tuple(spans)
-
-
-def _united(spans: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    united: list[tuple[float, float]] = []
-    for start, end in sorted(spans):
-        if united and start <= united[-1][1]:
-            united[-1] = (united[-1][0], max(united[-1][1], end))
-        else:
-            united.append((start, end))
-    return united
 
 
 def _controlled(machine: Machine, keys: dict[_Part, str], presses: tuple[KeyPress, ...]) -> Machine:

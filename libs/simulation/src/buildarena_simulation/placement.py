@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from buildarena_simulation.scenario import (
     Scenario,
     SpanPlacement,
 )
+from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.motion import Motion, at_rest
 from buildarena_simulation.structure.vectors import turn_about
 
 _CLEARANCE = 0.005
@@ -39,6 +41,12 @@ class Start:
     rotation: FloatArray
     cargo: CargoBox | None
     velocity: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+
+def motion_at(start: Start, clusters: Clusters) -> Motion:
+    """How a machine's clusters stand and move at the start of a trial."""
+    motion = at_rest(clusters, start.position, start.rotation)
+    return replace(motion, velocity=motion.velocity + start.velocity)
 
 
 def start_of(structure: Structure, scenario: Scenario, seed: int | None = None) -> Start:

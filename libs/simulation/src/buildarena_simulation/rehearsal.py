@@ -1,7 +1,5 @@
 """What a controller would answer, without a trial: at the start, and to senses that are named."""
 
-import difflib
-import re
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,16 +7,16 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_simulation.controllers.pilot import Pilot
+from buildarena_simulation.controllers.answers import near_names
+from buildarena_simulation.controllers.pilot import Pilot, named_in
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.controllers.senses import TICK_S, Seen
 from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
-from buildarena_simulation.placement import start_of
+from buildarena_simulation.placement import motion_at, start_of
 from buildarena_simulation.scenario import Scenario, Senses
 from buildarena_simulation.structure.clusters import find_clusters
-from buildarena_simulation.structure.motion import at_rest
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -29,8 +27,6 @@ MAX_REHEARSAL_S: Final = 0.2
 """Processor time of all its ticks: others wait meanwhile."""
 TIME: Final = "t"
 """The name of the time among senses that are named."""
-_NAME: Final = re.compile(r"\w+")
-_NEAR: Final = 3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +73,7 @@ def rehearsed(
     pilot = Pilot(structure, bindings, ids, scenario, program.sensors, seed=0)
     program.senses_are(pilot.layout)
     names = {name: place for place, name in enumerate(pilot.sense_names)}
-    words = set(_NAME.findall(text))
-    shown = [name for name in names if words.issuperset(_NAME.findall(name))]
+    shown = named_in(text, names)
     values = pilot.senses(_at_start(structure, scenario))
     began, now, answers = time.process_time(), -TICK_S, []
     for tick, changes in enumerate(ticks):
@@ -105,7 +100,7 @@ def _place(names: Mapping[str, int], name: str) -> int:
     place = names.get(name)
     if place is not None:
         return place
-    near = difflib.get_close_matches(name, names, n=_NEAR, cutoff=0.4) or list(names)
+    near = near_names(name, names) or list(names)
     raise ControllerFailed(f"there is no sense {name[:60]!r}; there is {', '.join(near) or 'none'}")
 
 
@@ -113,8 +108,7 @@ def _at_start(structure: "Structure", scenario: Scenario) -> Seen:
     """What there is to be sensed at the exact start, with no contact of any wheel yet."""
     start = start_of(structure, scenario, None)
     clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
-    motion = at_rest(clusters, start.position, start.rotation)
-    motion.velocity[:] += start.velocity
+    motion = motion_at(start, clusters)
     cargo = None
     if start.cargo is not None:
         rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])

@@ -1,7 +1,6 @@
 """One trial as it runs: commands, steps, loads, samples."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,12 +14,12 @@ from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.force_control import ForceSchedule
 from buildarena_simulation.gusts import Blows
 from buildarena_simulation.holding import Holding
-from buildarena_simulation.placement import Start
+from buildarena_simulation.placement import Start, motion_at
 from buildarena_simulation.planning import Keys, Planner
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
-from buildarena_simulation.structure.motion import Motion, at_rest
+from buildarena_simulation.structure.motion import Motion
 
 _PROGRESS_EVERY = 10
 _FINER = 2
@@ -60,9 +59,7 @@ class Trial:
         self._let_go = np.zeros(0 if world.field is None else len(world.field.table.seats), bool)
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
-        motion = at_rest(clusters, start.position, start.rotation)
-        if start.velocity.any():
-            motion = replace(motion, velocity=motion.velocity + start.velocity)
+        motion = motion_at(start, clusters)
         engine.enter(clusters, motion)
         self._interval_s = engine.time_step_s * engine.steps_per_evaluation
         self.breaking = BreakingModel(world, clusters, motion, interval_s=self._interval_s)

@@ -1,7 +1,7 @@
 """What a controller asks for: names of actions, of all blocks or of one, and how far."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -81,10 +81,15 @@ class Channels:
         parts = self.named.get(name)
         if parts is not None:
             return parts
-        near = difflib.get_close_matches(name, self.named, n=_NEAR, cutoff=0.4)
+        near = near_names(name, self.named)
         names = near or sorted({action for _, action in self.names})
         shown = ", ".join(names) or "none: no block of this machine has an action"
         raise ControllerFailed(f"there is no action {name[:60]!r}; there is {shown}")
+
+
+def near_names(name: str, names: Iterable[str]) -> list[str]:
+    """Those of some names that somebody may have meant, the nearest first; at most three."""
+    return difflib.get_close_matches(name, list(names), n=_NEAR, cutoff=0.4)
 
 
 def constant(levels: Mapping[tuple[int, str], float], count: int) -> Levels:

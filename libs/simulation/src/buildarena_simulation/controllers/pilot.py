@@ -1,7 +1,8 @@
 """Who acts in a trial, a program or somebody outside: at every tick it is told, and asks."""
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -16,6 +17,8 @@ from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.trajectory import Piloting
+
+_NAME: Final = re.compile(r"\w+")
 
 CONTROLLER: Final = "controller"
 """Where a trajectory's settings keep which program acted."""
@@ -184,6 +187,12 @@ class ProgramPilot(Pilot):
     def settings(self) -> dict[str, str]:
         """Which program acted."""
         return {CONTROLLER: controller_digest(self._text)}
+
+
+def named_in(text: str, names: Iterable[str]) -> list[str]:
+    """Those senses of whose names every part stands in a program's text."""
+    words = set(_NAME.findall(text))
+    return [name for name in names if words.issuperset(_NAME.findall(name))]
 
 
 def _require_senses(scenario: Scenario) -> None:

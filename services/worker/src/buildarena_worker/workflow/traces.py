@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from typing import Final
 
 from buildarena_simulation import Piloting
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.controllers.pilot import named_in
 
 STILL: Final = 0.02
 """Closer than this to where it ends, it has stopped, units."""
 ROWS_PER_S: Final = 2
 MAX_SENSES: Final = 24
 MAX_ANSWERS: Final = 12
-_NAME: Final = re.compile(r"\w+")
 
 
 def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
@@ -43,11 +42,9 @@ def rendered_piloting(piloting: Piloting, program: str) -> str:
         piloting: What it sensed and asked for.
         program: Its text.
     """
-    words = set(_NAME.findall(program))
-    senses = [
-        k for k, name in enumerate(piloting.sense_names) if words.issuperset(_NAME.findall(name))
-    ][:MAX_SENSES]
-    heads = ["t", *(piloting.sense_names[k] for k in senses), *piloting.action_names[:MAX_ANSWERS]]
+    named = named_in(program, piloting.sense_names)[:MAX_SENSES]
+    senses = [piloting.sense_names.index(name) for name in named]
+    heads = ["t", *named, *piloting.action_names[:MAX_ANSWERS]]
     rows = []
     ticks = len(piloting.answers) - 1
     for k in range(ticks):

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from buildarena_simulation import Scenario
+from buildarena_simulation.scenario import Mark
 
 MarkName = Annotated[str, Field(min_length=1, max_length=40)]
 
@@ -26,11 +27,16 @@ def lacking_mark(name: str, scenario: Scenario) -> str | None:
     return f"there is no mark {name!r} in scenario.marks: there are {', '.join(names) or 'none'}"
 
 
-def center_of_mark(name: str, scenario: Scenario, time_s: float = 0.0) -> NDArray[np.float64]:
-    """The middle of a mark that there is, at a time, (3,), world frame, units."""
-    return np.array(next(mark.at(time_s) for mark in scenario.marks if mark.name == name))
+def center_of_mark(name: str, scenario: Scenario) -> NDArray[np.float64]:
+    """The middle of a mark that there is, at the start, (3,), world frame, units."""
+    return np.array(_mark(name, scenario).center)
 
 
 def path_of_mark(name: str, scenario: Scenario, times_s: Iterable[float]) -> NDArray[np.float64]:
     """The same at several times, (T, 3)."""
-    return np.array([center_of_mark(name, scenario, time_s) for time_s in times_s])
+    mark = _mark(name, scenario)
+    return np.array([mark.at(time_s) for time_s in times_s])
+
+
+def _mark(name: str, scenario: Scenario) -> Mark:
+    return next(mark for mark in scenario.marks if mark.name == name)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -96,6 +97,12 @@ def put_cargo(client: Mapping[str, int], body: int, pose: CargoPose) -> None:
     turn = pose.quaternion[[1, 2, 3, 0]].tolist()
     pybullet.resetBasePositionAndOrientation(body, pose.position.tolist(), turn, **client)
     pybullet.resetBaseVelocity(body, pose.velocity.tolist(), pose.spin.tolist(), **client)
+
+
+def push_cargo(client: Mapping[str, int], body: int, change: FloatArray) -> None:
+    """Changes the velocity of the cargo's centre, (3,), units/s."""
+    pose = pose_of(client, body)
+    put_cargo(client, body, replace(pose, velocity=pose.velocity + change))
 
 
 def set_time_step(client: Mapping[str, int], time_step_s: float) -> None:

@@ -9,7 +9,6 @@ import itertools
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as distribution_version
 from pathlib import Path
@@ -30,6 +29,7 @@ from buildarena_simulation.engines.pybullet.bodies import (
     friction_of,
     limit_spin,
     pose_of,
+    push_cargo,
     put_cargo,
     set_friction,
     set_time_step,
@@ -186,9 +186,7 @@ class PyBulletEngine:
     def push_cargo(self, change: FloatArray) -> None:
         """See `Engine`."""
         if self._cargo is not None:
-            cargo = self.cargo()
-            pushed = replace(cargo, velocity=cargo.velocity + change)
-            put_cargo(self._client, self._cargo, pushed)
+            push_cargo(self._client, self._cargo, change)
 
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
