@@ -68,7 +68,12 @@ def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
     secret = runner_key(context)[1]
     with runner(tmp_path, url, secret, "--at-once", "2") as process:
         state = context.store.jobs.get
-        wait_until(lambda: all(state(j.id).state == "done" for j in jobs), 150, "jobs are done")
+        wait_until(
+            lambda: process.poll() is not None or all(state(j.id).state == "done" for j in jobs),
+            150,
+            "jobs are done",
+        )
+        assert process.poll() is None
         for job in jobs:
             kept = context.store.jobs.artifacts(ended(context, job).id)
             assert kept["trajectory-0"] == digest

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import threading
 from typing import TYPE_CHECKING, Annotated, NoReturn, TypeVar
 
 import msgspec
@@ -37,6 +38,9 @@ _BOUNDS = {
 }
 _STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")
 _Read = TypeVar("_Read")
+_FIRST = threading.Lock()
+"""msgspec lays a struct's form out when it is first read; two threads at once crash there."""
+_laid_out: set[object] = set()
 
 
 class Whole(int):
@@ -60,6 +64,7 @@ def read(value: object, kind: type[_Read], *, where: str, error: type[GeometryEr
         where: what messages call the value.
         error: what is raised where it has another form.
     """
+    _lay_out(kind)
     try:
         return msgspec.convert(value, kind, dec_hook=_whole)
     except UnicodeError as problem:
@@ -81,6 +86,13 @@ def shown(value: object) -> str:
     """A value as messages quote it."""
     text = repr(value)
     return text if len(text) <= _LONGEST_QUOTE else text[: _LONGEST_QUOTE - 3] + "..."
+
+
+def _lay_out(kind: object) -> None:
+    with _FIRST:
+        if kind not in _laid_out:
+            msgspec.json.Decoder(kind, dec_hook=_whole)
+            _laid_out.add(kind)
 
 
 def _whole(kind: type, value: object) -> object:
