@@ -9,7 +9,7 @@ from typing import Any, Final
 from scenarios.hunt.confirming import Confirmed
 from scenarios.hunt.genome import Genome
 from scenarios.hunt.kinds import KINDS, kind_of
-from scenarios.hunt.trial import FULL_MARKS, Finding
+from scenarios.hunt.trial import Finding, worth
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_simulation import SIMULATION_VERSION
@@ -106,19 +106,17 @@ class Gallery:
 
 
 def best_of(confirmed: Iterable[Confirmed], kind: str) -> list[Confirmed]:
-    """The best successes of a kind of task, each by its task's full marks."""
+    """The best successes of a kind of task, each beside the expert."""
     return ranked([f for f in confirmed if kind_of(f.task) == kind])[:BEST]
 
 
 def ranked(confirmed: Iterable[Confirmed]) -> list[Confirmed]:
     """Best first; among equals, that of fewer parts."""
-    tasks = builtin_tasks()
 
-    def worth(found: Confirmed) -> tuple[float, int, str]:
-        marks = FULL_MARKS[tasks[found.task].scorer]
-        return -round(found.indicator / marks, 3), found.parts, found.key
+    def place(found: Confirmed) -> tuple[float, int, str]:
+        return -round(worth(found.task, found.indicator), 3), found.parts, found.key
 
-    return sorted(confirmed, key=worth)
+    return sorted(confirmed, key=place)
 
 
 def line_of(found: Confirmed) -> str:

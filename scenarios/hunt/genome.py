@@ -25,10 +25,12 @@ class Genome:
         actions: The machine's log. An action that makes a block or connector may say under `makes`
             what later actions call it.
         sub_structures: Logs by name; empty unless the machine is an assembly.
+        program: What controls it, Lua; "" for none.
     """
 
     actions: Actions
     sub_structures: Mapping[str, Actions] = field(default_factory=dict)
+    program: str = ""
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> Self:
@@ -36,11 +38,13 @@ class Genome:
         return cls(
             actions=list(content["actions"]),
             sub_structures=dict(content.get("sub_structures", {})),
+            program=str(content.get("program", "")),
         )
 
     def as_json(self) -> dict[str, Any]:
         """JSON values that `from_json` reads, and that replay without any genome's help."""
-        return {
+        controlled = {"program": self.program} if self.program else {}
+        return controlled | {
             "sub_structures": {name: _plain(log) for name, log in self.sub_structures.items()},
             "actions": _plain(self.actions),
         }
@@ -65,7 +69,9 @@ def grown(genome: Genome, *, most: int = MAX_ACTIONS) -> tuple[Machine, Genome]:
         if machine.started:
             built[name], logs[name] = machine, kept
     machine, kept = replayed(genome.actions, built, most=most)
-    return machine, Genome(actions=kept, sub_structures=logs)
+    if genome.program:
+        machine = machine.with_controller(genome.program)
+    return machine, Genome(actions=kept, sub_structures=logs, program=genome.program)
 
 
 def replayed(

@@ -2,13 +2,17 @@
 
 from typing import Final
 
-KINDS: Final = ("support", "transport", "lift", "mechanisms", "flight")
+from buildarena_benchmark import builtin_tasks
+
+KINDS: Final = ("support", "transport", "lift", "mechanisms", "flight", "control")
 
 _FAMILIES: Final = {"budget": "support", "repair": "transport", "identify": "flight"}
 """What sort of machine a family asks for."""
 
 
 def kind_of(task: str) -> str:
-    """The kind of a task, by its name: what stands before the level, or what a family is of."""
+    """The kind of a task: control where programs sense; otherwise by its name or its family."""
+    if builtin_tasks()[task].scenario.senses is not None:
+        return "control"
     kind = task.rpartition("-")[0]
     return _FAMILIES.get(kind, kind)

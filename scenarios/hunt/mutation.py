@@ -1,11 +1,13 @@
 """Mutations and crossovers of genomes; every draw comes from a generator that is given."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
 from scenarios.hunt.genome import Actions, Genome, act, grown, replayed
+from scenarios.hunt.programs import changed
 
 from buildarena_geometry import Block, Machine
 
@@ -29,8 +31,14 @@ _MODULES: Final[Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]]] = Mappi
             (WOOD, "Log", "Wing Panel", "Sqr Balloon", "Balloon", "Flying Block", "Drag Block"),
             (0.3, 0.1, 0.2, 0.15, 0.1, 0.1, 0.05),
         ),
+        "control": (
+            (WOOD, WHEEL, "Flying Block", "Log", "Ballast", "Steering Hinge", "Large Wheel"),
+            (0.3, 0.2, 0.2, 0.1, 0.08, 0.06, 0.06),
+        ),
     }
 )
+_PROGRAM_SHARE: Final = 0.5
+"""How many changes of a machine with a program are of the program."""
 _KEYS: Final = ("UpArrow", "DownArrow", "LeftArrow")
 _ANGLES: Final = (90, 180, 270, 45, 30)
 _SHIFTS: Final = (-0.5, -0.25, 0.0, 0.0, 0.25, 0.5)
@@ -39,16 +47,20 @@ _SHIFTS: Final = (-0.5, -0.25, 0.0, 0.0, 0.25, 0.5)
 def mutated(genome: Genome, category: str, draw: Draw) -> Genome:
     """A genome with one to four random changes; some of them may come to nothing."""
     for _ in range(int(draw.integers(1, 5))):
+        if category == "control" and draw.random() < _PROGRAM_SHARE:
+            program = changed(genome.program, grown(genome)[0], draw)
+            genome = replace(genome, program=program)
+            continue
         names = sorted(genome.sub_structures)
         which = str(draw.choice(names)) if names and draw.random() < 0.7 else None
         if which is None:
             available = {name: replayed(genome.sub_structures[name])[0] for name in names}
             log = _changed(genome.actions, available, category, draw)
-            genome = Genome(actions=log, sub_structures=genome.sub_structures)
+            genome = replace(genome, actions=log)
         else:
             log = _changed(genome.sub_structures[which], {}, category, draw)
             logs = {**genome.sub_structures, which: log}
-            genome = Genome(actions=genome.actions, sub_structures=logs)
+            genome = replace(genome, sub_structures=logs)
     return grown(genome)[1]
 
 
@@ -59,7 +71,8 @@ def crossed(first: Genome, second: Genome, draw: Draw) -> Genome:
         for name, log in first.sub_structures.items()
     }
     actions = _spliced(first.actions, second.actions, draw)
-    return grown(Genome(actions=actions, sub_structures=logs))[1]
+    program = (first, second)[int(draw.integers(2))].program if second.program else first.program
+    return grown(Genome(actions=actions, sub_structures=logs, program=program))[1]
 
 
 def _spliced(first: Actions, second: Actions, draw: Draw) -> Actions:
@@ -276,5 +289,6 @@ _GROWTHS: Final[Mapping[str, tuple[tuple[Mutation, float], ...]]] = MappingProxy
         "lift": (*_SHAPES, (_bind, 1.5)),
         "mechanisms": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
         "flight": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
+        "control": _SHAPES,
     }
 )

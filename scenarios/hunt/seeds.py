@@ -12,6 +12,7 @@ from scenarios.hunt.kinds import kind_of
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
+from buildarena_worker.builtin.designs import DESIGNS
 
 DATA: Final = Path(__file__).parents[2] / "tests" / "data"
 EXPLOITS: Final = DATA / "exploits"
@@ -58,10 +59,20 @@ def seeds_of(task_name: str) -> list[Genome]:
     """Genomes to start from: all that suit the task's kind and number of sub-structures."""
     whole = builtin_tasks()[task_name].constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
+    if kind_of(task_name) == "control":
+        found += map(_experts, filter(lambda name: kind_of(name) == "control", DESIGNS))
     for other, genome in _stored():
         if kind_of(other) == kind_of(task_name) and bool(genome.sub_structures) != whole:
             found.append(genome)
     return found
+
+
+def _experts(task_name: str) -> Genome:
+    """The expert's machine, with its program."""
+    design = DESIGNS[task_name](0)
+    log = next(iter(design.parts.values())).actions
+    actions = [{"op": op, "params": dict(params)} for op, params in log]
+    return grown(Genome(actions=actions, program=design.program), most=sys.maxsize)[1]
 
 
 def _stored() -> Iterator[tuple[str, Genome]]:

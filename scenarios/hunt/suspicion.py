@@ -13,16 +13,22 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from scenarios.hunt.kinds import kind_of
+from scenarios.hunt.programs import IDLE
+from support.machines.piloted import listened, repeated, scored
 
 from buildarena_benchmark import Score, Task
+from buildarena_benchmark.flags import is_disqualified
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory
+from buildarena_simulation import MachineNotSimulable, Trajectory
 from buildarena_simulation.scenario import SpanPlacement
 
 Floats = NDArray[np.float64]
 
 _TOP: Final = 5.0
 """Height of the terrains' tops in the built-in support tasks, units."""
+
+_ELSEWHERE: Final = 11
+"""A drawn world that no search is in."""
 
 _UPRIGHT: Final = 0.866
 """Cosine of the largest angle between up and a rocket's net thrust."""
@@ -212,6 +218,35 @@ def _idle_structure(evidence: Evidence) -> bool:
     return len(sizes) > 1 and min(sizes.values()) <= 2
 
 
+# Control
+
+
+def _needs_no_program(evidence: Evidence) -> bool:
+    """It succeeds in a drawn world with a program that asks for nothing."""
+    return _drawn(
+        evidence,
+        lambda task, machine: scored(task, machine.with_controller(IDLE), "mujoco", _ELSEWHERE),
+    )
+
+
+def _looks_at_nothing(evidence: Evidence) -> bool:
+    """What it answered in the exact world succeeds in a drawn one, whatever is sensed there."""
+
+    def again(task: Task, machine: Machine) -> Score:
+        _, answers = listened(task, machine, "mujoco")
+        return repeated(answers, task, machine, "mujoco", _ELSEWHERE)
+
+    return _drawn(evidence, again)
+
+
+def _drawn(evidence: Evidence, trial: Callable[[Task, Machine], Score]) -> bool:
+    try:
+        result = trial(evidence.task, evidence.machine)
+    except MachineNotSimulable:
+        return False
+    return result.success and not is_disqualified(result.flags)
+
+
 # All categories
 
 
@@ -265,6 +300,10 @@ CHECKS: Final[Mapping[str, Mapping[str, Check]]] = MappingProxyType(
             "start stays behind": _start_stays_behind,
             "no cannon with the start": _no_cannon_with_the_start,
             "idle structure": _idle_structure,
+        },
+        "control": {
+            "needs no program": _needs_no_program,
+            "looks at nothing": _looks_at_nothing,
         },
     }
 )

@@ -11,11 +11,14 @@ from scenarios.hunt.gallery import Gallery
 from scenarios.hunt.genome import Genome, grown
 from scenarios.hunt.kinds import kind_of
 from scenarios.hunt.mutation import crossed, mutated
+from scenarios.hunt.programs import IDLE
 from scenarios.hunt.search import Crew, TaskSearch
 from scenarios.hunt.seeds import exploits, seeds_of
+from scenarios.hunt.suspicion import Evidence, suspicions
 from scenarios.hunt.trial import tried
 
-from buildarena_benchmark import score
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_simulation import simulate
 
 START = Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])
 GENERATIONS = 6
@@ -158,3 +161,42 @@ def test_wrong_options_are_named(arguments, says, capsys) -> None:
     with pytest.raises(SystemExit):
         hunt.main(arguments)
     assert says in capsys.readouterr().err
+
+
+@pytest.mark.samples(4)
+@pytest.mark.parametrize(
+    "task", {task.scorer: name for name, task in builtin_tasks().items()}.values()
+)
+def test_machines_of_every_scorer_can_be_hunted(task) -> None:
+    draw = np.random.default_rng(4)
+    pool = seeds_of(task)
+    child = mutated(crossed(pool[-1], pool[0], draw), kind_of(task), draw)
+    machine, _ = grown(child)
+    assert machine.started
+    finding = tried(task, pool[-1])
+    assert finding is None or finding.objective >= -1.0
+
+
+def test_checks_name_a_program_that_looks_at_nothing() -> None:
+    expert = seeds_of("balance-1")[-1]
+    honest = tried("balance-1", expert)
+    assert honest is not None
+    assert honest.success
+    assert not honest.suspicions
+    task = builtin_tasks()["balance-1"]
+    easy = replace(task, scoring=task.scoring.model_copy(update={"min_s": 0.04}))
+    machine = grown(expert)[0].with_controller(IDLE)
+    trajectory = simulate(machine, task.scenario, "mujoco")
+    odd = suspicions(
+        Evidence(easy, machine, {"mujoco": (score(easy, machine, trajectory), trajectory)})
+    )
+    assert {"needs no program", "looks at nothing"} <= set(odd)
+
+
+def test_programs_are_changed_and_stay_with_their_machines() -> None:
+    draw, pool = np.random.default_rng(2), seeds_of("hover-3")
+    programs = {mutated(pool[-1], "control", draw).program for _ in range(12)}
+    assert len(programs) > 4
+    child = crossed(pool[-1], pool[-2], draw)
+    assert child.program in {pool[-1].program, pool[-2].program}
+    assert grown(Genome.from_json(child.as_json()))[0].controller == child.program

@@ -13,6 +13,7 @@ from scenarios.hunt.suspicion import Evidence, suspicions
 
 from buildarena_benchmark import Score, Task, broken_constraint, builtin_tasks, score
 from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.tasks.loading import references
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, SimulationError, Trajectory, simulate
 
@@ -22,47 +23,23 @@ MEASURES: Final = ("parts, as a power of two", "oddness", "share of parts that a
 RANGES: Final = ((1.0, 8.0), (0.0, 1.0), (0.0, 1.0))
 CELLS: Final = (14, 8, 4)
 
-FULL_MARKS: Final[Mapping[str, float]] = MappingProxyType(
-    {
-        "support": 1500.0,
-        "budget": 120.0,
-        "regained": 1.0,
-        "transport": 150.0,
-        "thrust": 8.0,
-        "height": 5000.0,
-        "road": 36.0,
-        "slalom": 6.0,
-        "winch": 200.0,
-        "place": 10.0,
-        "hover": 28.0,
-        "glide": 5.0,
-        "tour": 4.0,
-        "heights": 28.0,
-        "haul": 90.0,
-    }
-)
-"""Indicators that are worth an objective of 1, by scorer."""
-
 _SEARCH_S: Final[Mapping[str, float]] = MappingProxyType(
     {
-        "support": 17.0,
-        "budget": 12.0,
-        "regained": 10.0,
         "transport": 12.0,
         "thrust": 4.0,
         "height": 13.0,
         "road": 15.0,
         "slalom": 15.0,
-        "winch": 30.0,
-        "place": 30.0,
         "hover": 15.0,
-        "glide": 30.0,
         "tour": 12.0,
         "heights": 24.0,
         "haul": 8.0,
     }
 )
-"""Seconds of a trial while searching; the full length is for what is confirmed."""
+"""Seconds of a trial while searching, by scorer, where the whole trial is not needed."""
+
+_WORLD: Final = 1
+"""The drawn world in which machines with programs are searched."""
 
 _FIRST_LOOK_S: Final = 4.0
 """A bridge that has carried nothing for two seconds by then never will."""
@@ -137,7 +114,7 @@ def tried(task_name: str, genome: Genome, scorer: Scorer = score) -> Finding | N
     except (MachineNotSimulable, SimulationError):
         return None
     success = result.success and not is_disqualified(result.flags)
-    value = result.indicator / FULL_MARKS[task.scorer] if success else _nearness(task, result) - 1.0
+    value = worth(task_name, result.indicator) if success else _nearness(task, result) - 1.0
     odd = suspicions(Evidence(task, machine, {"mujoco": (result, trajectory)})) if success else ()
     return Finding(
         genome=genome,
@@ -151,13 +128,19 @@ def tried(task_name: str, genome: Genome, scorer: Scorer = score) -> Finding | N
     )
 
 
+def worth(task_name: str, indicator: float) -> float:
+    """An indicator as a share of the expert's."""
+    return indicator / references()[task_name]
+
+
 def _searched(task: Task, machine: Machine, scorer: Scorer) -> tuple[Score, Trajectory]:
-    lengths = [min(_SEARCH_S[task.scorer], task.scenario.duration_s)]
+    whole, seed = task.scenario.duration_s, _WORLD if task.scenario.draws else None
+    lengths = [whole if seed else min(_SEARCH_S.get(task.scorer, whole), whole)]
     if task.scorer == "support":
         lengths.insert(0, _FIRST_LOOK_S)
     for length in lengths:
         scenario = task.scenario.model_copy(update={"duration_s": length})
-        trajectory = simulate(machine, scenario, "mujoco")
+        trajectory = simulate(machine, scenario, "mujoco", seed=seed)
         result = scorer(task, machine, trajectory)
         if not result.success:
             break
