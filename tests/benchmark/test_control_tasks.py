@@ -248,7 +248,7 @@ def test_a_scorer_of_places_that_stay_refuses_those_that_move(task) -> None:
         load_task(json.dumps(document) + "\n")
 
 
-def test_a_gate_that_there_is_not_ends_a_trial_at_its_line() -> None:
+def test_a_gate_that_is_not_told_ends_a_trial_at_its_line() -> None:
     task = builtin_tasks()["slalom-2"]
     machine = experts_machine(task)
     program = "function control(t, sense) return sense.gates['gate 9'].position end"

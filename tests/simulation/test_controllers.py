@@ -166,6 +166,20 @@ def test_cargo_marks_and_gates_are_told_from_where_it_is() -> None:
     )
 
 
+def test_the_next_gate_is_the_first_one_to_the_north() -> None:
+    gates = [
+        Gate(name=f"gate {y}", center=(x, y), half_width=2) for x, y in ((1, -3), (2, 4), (3, 9))
+    ]
+    scenario = Scenario(
+        duration_s=2.0, control=AGENT, senses=Senses(offers=("pose", "gate")), gates=gates
+    )
+    assert float(told("sense.gate.position.x", scenario=scenario)) == 2.0
+    assert float(told("sense.gate.relative.y", scenario=scenario)) == pytest.approx(4.0, abs=0.1)
+    past = scenario.model_copy(update={"gates": gates[:1]})
+    assert float(told("sense.gate.position.y", scenario=past)) == -3.0
+    assert "index field 'gates'" in told("sense.gates['gate 4'].position.y", scenario=scenario)
+
+
 def test_a_mark_that_moves_is_told_where_it_is_then(engine) -> None:
     drift = Drift(swing=(4, -2, 1), period_s=(16, 8, 4))
     mark = Mark(name="goal", center=(3, 4, 5), radius=1, drift=drift)

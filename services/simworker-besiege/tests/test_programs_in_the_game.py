@@ -35,7 +35,7 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.scenario import Cargo, Gusts, Mark, Senses, TerrainBox
+from buildarena_simulation.scenario import Cargo, Gate, Gusts, Mark, Senses, TerrainBox
 from buildarena_worker.builtin.designs.drafting import UP
 
 EXAMPLE = Path(__file__).parents[3] / "examples/control"
@@ -315,6 +315,16 @@ def test_marks_are_told_relative_to_the_starting_block() -> None:
     )
     assert np.all(mark == [3, 4, 0])
     assert np.abs(mark - own - apart).max() < 2e-6
+
+
+def test_the_gate_that_is_told_is_the_next_one() -> None:
+    gates = [Gate(name=f"gate {y}", center=(x, y), half_width=2) for x, y in ((1, 1), (2, 9))]
+    scenario = drive(senses=Senses(offers=("pose", "gate")), gates=gates)
+    _, trajectory = tried(program("return { spinning_forward = 1 }"), scenario)
+    names, senses = trajectory.piloting.sense_names, trajectory.piloting.senses[:-1]
+    own, place = (senses[:, names.index(f"{name}position.y")] for name in ("", "gate."))
+    assert {1.0, 9.0} == set(place.tolist())
+    assert np.all(place == np.where(own < 1, 1.0, 9.0))
 
 
 def test_between_samples_blocks_move_in_a_line() -> None:

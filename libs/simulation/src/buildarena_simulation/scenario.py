@@ -203,8 +203,11 @@ class Control(_Document):
     until_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
 
 
-SenseKind = Literal["pose", "axes", "blocks", "joints", "wheels", "cargo", "marks", "gates", "fuel"]
-_OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind not in ("axes", "fuel"))
+SenseKind = Literal[
+    "pose", "axes", "blocks", "joints", "wheels", "cargo", "marks", "gates", "gate", "fuel"
+]
+_UNUSUAL: Final = ("axes", "gate", "fuel")
+_OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind not in _UNUSUAL)
 NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
 
 

@@ -150,6 +150,14 @@ local function place(x, y, z)
   put_three(x - own[1], y - own[2], z - own[3])
 end
 
+local function next_gate(gates)
+  local number = 1
+  while number < #gates and gates[number][2] <= now[1][2] do
+    number = number + 1
+  end
+  place(gates[number][1], gates[number][2], 0)
+end
+
 -- Normally distributed, of mean 0 and deviation 1.
 local drawn = seed % 2147483646 + 1
 local function normal()

@@ -204,6 +204,9 @@ class _SenseWriter:
                     yield from (f"place{_numbers(mark.center)}" for mark in scenario.marks)
                 case "gates":
                     yield from (f"place{_numbers((*g.center, 0.0))}" for g in scenario.gates)
+                case "gate":
+                    gates = _table(_table(map(repr, gate.center)) for gate in scenario.gates)
+                    yield f"next_gate({gates})"
 
     def bodies(self) -> str:
         """The blocks: their keys, and what ties them to the machine as it was built."""

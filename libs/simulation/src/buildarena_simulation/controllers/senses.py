@@ -118,6 +118,7 @@ class Sensing:
             "cargo": self._cargo_layout,
             "marks": partial(self._places_layout, self._scenario.marks),
             "gates": partial(self._places_layout, self._scenario.gates),
+            "gate": self._place,
             "fuel": self._number,
         }
         # The starting block's own pose has no name of its own: `sense.position`.
@@ -130,6 +131,7 @@ class Sensing:
         """Whether the scenario offers a kind of senses, and has what it is about."""
         about: dict[str, object] = {"cargo": self._scenario.cargo}
         about |= {"marks": self._scenario.marks, "gates": self._scenario.gates}
+        about["gate"] = self._scenario.gates
         about["fuel"] = self._scenario.fuel_s is not None
         about["axes"] = "pose" not in self._senses.offers  # which has them
         return kind in self._senses.offers and bool(about.get(kind, True))
@@ -160,10 +162,10 @@ class Sensing:
         return {name: self._vector(noise) for name, noise in kinds.items()}
 
     def _places_layout(self, places: Sequence[Gate | Mark]) -> dict[str, Any]:
-        return {
-            place.name: {"position": self._vector(), "relative": self._vector("place")}
-            for place in places
-        }
+        return {place.name: self._place() for place in places}
+
+    def _place(self) -> dict[str, Any]:
+        return {"position": self._vector(), "relative": self._vector("place")}
 
     def _pose(self) -> dict[str, Any]:
         places = {"position": self._vector("place"), "velocity": self._vector("speed")}
@@ -197,6 +199,7 @@ class Sensing:
             "cargo": lambda: _cargo_values(seen, own),
             "marks": lambda: _places((mark.at(seen.time_s) for mark in self._scenario.marks), own),
             "gates": lambda: _places(((*g.center, 0.0) for g in self._scenario.gates), own),
+            "gate": lambda: _places([next_gate(self._scenario.gates, own[1])], own),
             "fuel": lambda: (seen.fuel_s,),
         }
         for kind in self.offers:
@@ -241,6 +244,17 @@ def _places(centers: Iterable[Sequence[float]], own: FloatArray) -> Iterator[flo
     for center in centers:
         yield from center
         yield from (np.array(center) - own).tolist()
+
+
+def next_gate(gates: Sequence[Gate], north: float) -> tuple[float, float, float]:
+    """The centre of the first gate that lies north of a place; of the last where none does.
+
+    Args:
+        gates: In the order in which they are to be passed; at least one.
+        north: Where somebody is, units.
+    """
+    ahead = next((gate for gate in gates if gate.center[1] > north), gates[-1])
+    return (*ahead.center, 0.0)
 
 
 def forwards(structure: Structure, index: int) -> float:

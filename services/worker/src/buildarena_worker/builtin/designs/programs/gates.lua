@@ -2,14 +2,9 @@
 -- canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 -- Drives towards the next gate, and through it once it is near; the more it must turn, the slower.
 local LEFT, RIGHT = $left, $right
-local COUNT = 8
-local number = 1
 
 function control(t, sense)
-  local here, forward = sense.position, sense.forward
-  local function gate() return sense.gates["gate " .. number].position end
-  while number < COUNT and gate().y < here.y - 0.3 do number = number + 1 end
-  local goal = gate()
+  local here, forward, goal = sense.position, sense.forward, sense.gate.position
   local x, y = goal.x - here.x, goal.y - 0.5 - here.y
   if goal.y - here.y < 1.5 then y = 2.5 end
   local ahead = x * forward.x + y * forward.y
