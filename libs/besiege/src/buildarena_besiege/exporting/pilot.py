@@ -29,12 +29,13 @@ from buildarena_simulation.machine import bindings_of, part_ids, structure_of
 from buildarena_simulation.structure.model import ShapeKind
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from buildarena_besiege.exporting.machine_file import BlockRecord
     from buildarena_geometry import Machine
     from buildarena_geometry.rotations import Vector
     from buildarena_simulation import Scenario
+    from buildarena_simulation.scenario import SenseKind
     from buildarena_simulation.structure.model import FloatArray, Structure
 
 NUMBERS_PER_LINE: Final = 24
@@ -187,26 +188,19 @@ class _SenseWriter:
     def calls(self) -> Iterable[str]:
         """The calls, in the order of the layout."""
         sensing, scenario = self._sensing, self._scenario
+        calls: dict[SenseKind, Callable[[], Iterable[str]]] = {
+            "pose": lambda: ["pose(1)"],
+            "axes": lambda: ["axes(1)"],
+            "blocks": lambda: map(self._block, sensing.blocks),
+            "joints": lambda: map(self._joint, sensing.moving),
+            "wheels": lambda: map(self._wheel, self._structure.wheels.tolist()),
+            "cargo": lambda: [f"cargo_moves({self._number(CARGO_ID)})"],
+            "marks": lambda: (f"place{_numbers(mark.center)}" for mark in scenario.marks),
+            "gates": lambda: (f"place{_numbers((*g.center, 0.0))}" for g in scenario.gates),
+            "gate": lambda: [f"next_gate({_centers(scenario)})"],
+        }
         for kind in sensing.offers:
-            match kind:
-                case "pose" | "axes":
-                    yield f"{kind}(1)"
-                case "blocks":
-                    for block in sensing.blocks:
-                        yield f"pose({self._number(self._structure.parts[block].id)})"
-                case "joints":
-                    yield from map(self._joint, sensing.moving)
-                case "wheels":
-                    yield from map(self._wheel, self._structure.wheels.tolist())
-                case "cargo":
-                    yield f"cargo_moves({self._number(CARGO_ID)})"
-                case "marks":
-                    yield from (f"place{_numbers(mark.center)}" for mark in scenario.marks)
-                case "gates":
-                    yield from (f"place{_numbers((*g.center, 0.0))}" for g in scenario.gates)
-                case "gate":
-                    gates = _table(_table(map(repr, gate.center)) for gate in scenario.gates)
-                    yield f"next_gate({gates})"
+            yield from calls[kind]()
 
     def bodies(self) -> str:
         """The blocks: their keys, and what ties them to the machine as it was built."""
@@ -242,6 +236,9 @@ class _SenseWriter:
         sign = repr(forwards(self._structure, index))
         return self._number(part), self._number(self._structure.parts[seat].id), axis, sign, seat
 
+    def _block(self, index: int) -> str:
+        return f"pose({self._number(self._structure.parts[index].id)})"
+
     def _joint(self, index: int) -> str:
         own, base, axis, sign, seat = self._seat(index)
         if place_of(self._structure, index) == "angle":
@@ -269,6 +266,10 @@ def _pilot_text() -> str:
 def _vector(numbers: FloatArray | Any) -> Vector:
     x, y, z = (float(number) + 0.0 for number in numbers)
     return (x, y, z)
+
+
+def _centers(scenario: Scenario) -> str:
+    return _table(_table(map(repr, gate.center)) for gate in scenario.gates)
 
 
 def _numbers(numbers: Iterable[float]) -> str:
