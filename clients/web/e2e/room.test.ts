@@ -168,3 +168,61 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
     await page.close();
   });
 });
+
+describe.skipIf(sessions.length === 0)("a moment of a trial", () => {
+  it("is sent as an address, as a picture and as a film", async () => {
+    const { jobs } = (await (
+      await fetch(`${URL_OF_SERVICE}/v1/jobs?task=support-1&state=done&outcome=success`)
+    ).json()) as { jobs: { id: string }[] };
+    const page = await opened(browser, `/jobs/${jobs[0]?.id ?? ""}?view=trial`);
+    await page.locator(".stage-3d canvas").waitFor();
+    const slider = page.getByRole("slider", { name: /Time of the trial/ });
+    await slider.focus();
+    for (let presses = 0; presses < 50; presses++) await page.keyboard.press("ArrowRight");
+    const eye = (of: Page): Promise<number[]> =>
+      of.evaluate(() => {
+        const { camera } = document.querySelector(".stage-3d canvas") as unknown as {
+          camera: { position: { toArray: () => number[] } };
+        };
+        return camera.position.toArray().map((value) => Math.round(value * 10) / 10);
+      });
+    const start = await eye(page);
+    const turned = async (): Promise<number[]> => {
+      const box = await page.locator(".stage-3d canvas").boundingBox();
+      if (box === null) throw new Error("no drawing");
+      await page.mouse.move(box.x + 100, box.y + 100);
+      await page.mouse.down();
+      await page.mouse.move(box.x + 260, box.y + 140, { steps: 4 });
+      await page.mouse.up();
+      return eye(page);
+    };
+    await expect.poll(turned, { timeout: 40_000, interval: 500 }).not.toEqual(start);
+    await page.getByRole("button", { name: "Copy link to this moment" }).click();
+    await page.waitForURL(/t=2&/);
+    expect(page.url()).toMatch(/rollout=0/);
+    const seen = await eye(page);
+    const again = await page.context().newPage();
+    await again.goto(page.url());
+    await again.locator(".stage-3d canvas").waitFor();
+    expect(await again.getByRole("slider", { name: /Time of the trial/ }).getAttribute("aria-valuenow")).toBe("2");
+    await expect.poll(() => eye(again), { timeout: 20_000 }).toEqual(seen);
+    await again.close();
+    const saved = async (button: string): Promise<Buffer> => {
+      const [download] = await Promise.all([
+        page.waitForEvent("download"),
+        page.getByRole("button", { name: button }).click(),
+      ]);
+      return readFileSync(await download.path());
+    };
+    const picture = await saved("Save picture");
+    expect(picture.subarray(1, 4).toString()).toBe("PNG");
+    expect(picture.length).toBeGreaterThan(5000);
+    await page.getByRole("button", { name: "Record film" }).click();
+    await page.getByRole("button", { name: "Stop and save the film" }).waitFor();
+    await page.waitForTimeout(2500);
+    const film = await saved("Stop and save the film");
+    expect(film.subarray(0, 4).toString("hex")).toBe("1a45dfa3");
+    expect(film.length).toBeGreaterThan(5000);
+    await page.close();
+  });
+});

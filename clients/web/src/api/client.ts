@@ -61,7 +61,12 @@ export async function jsonOf<Data>(path: string): Promise<Data> {
 
 /** Saves what the API answers with; a link could not carry the key. */
 export async function download(path: string, name: string): Promise<void> {
-  const url = URL.createObjectURL(new Blob([await bytesOf(path)]));
+  save(new Blob([await bytesOf(path)]), name);
+}
+
+/** Saves a file where the reader keeps downloads. */
+export function save(data: Blob, name: string): void {
+  const url = URL.createObjectURL(data);
   const link = document.createElement("a");
   link.href = url;
   link.download = name;

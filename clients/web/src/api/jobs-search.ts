@@ -22,6 +22,12 @@ export interface JobSearch {
   step?: number;
   part?: string;
   view?: "trial";
+  /** Seconds of the trial that is shown. */
+  t?: number;
+  /** The number of the rollout that is shown. */
+  rollout?: number;
+  /** From where it is seen, see `writtenLook`. */
+  camera?: string;
 }
 
 export function readJobSearch(raw: Record<string, unknown>): JobSearch {
@@ -31,5 +37,8 @@ export function readJobSearch(raw: Record<string, unknown>): JobSearch {
     step: step >= 0 && Number.isSafeInteger(step) ? step : undefined,
     part: typeof part === "string" && part.length < 100 ? part : undefined,
     view: raw.view === "trial" ? "trial" : undefined,
+    t: typeof raw.t === "number" && raw.t >= 0 && Number.isFinite(raw.t) ? raw.t : undefined,
+    rollout: typeof raw.rollout === "number" && Number.isSafeInteger(raw.rollout) ? raw.rollout : undefined,
+    camera: typeof raw.camera === "string" && raw.camera.length < 100 ? raw.camera : undefined,
   };
 }

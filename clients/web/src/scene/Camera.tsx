@@ -47,7 +47,10 @@ export function Camera({ bounds, subject, lock }: { bounds: Box3; subject: strin
     camera.updateMatrix();
     (camera as { updateProjectionMatrix?: () => void }).updateProjectionMatrix?.();
     controls.target.copy(aim.center);
+    // What it is aimed at is nobody's look: those who share one are told nothing.
+    told.current = true;
     controls.update();
+    told.current = false;
     invalidate();
   }, [aim, subject, camera, controls, invalidate]);
   const follow = useMemo(

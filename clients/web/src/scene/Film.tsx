@@ -21,11 +21,14 @@ export function Film({
   clock,
   follow,
   loads,
+  begins = 0,
 }: {
   machine: Machine;
   trial: Trial;
   clock: Clock;
   follow: boolean;
+  /** At which time the machine is where the camera first looks for it. */
+  begins?: number;
   /** What each joint bears; null to draw the parts in their own colours. */
   loads: Float32Array | null;
 }) {
@@ -34,8 +37,9 @@ export function Film({
   const controls = useThree((state) => state.controls) as Orbit | null;
   const cargo = useRef<Mesh>(null);
   const poses = useRef(new Map<string, Matrix4>());
-  const followed = useRef<Vector3 | null>(null);
   const first = machine.parts.find((part) => part.id === trial.blockIds[0]);
+  const followed = useRef<Vector3 | null>(null);
+  const unmoved = useRef(true);
   useEffect(() => {
     invalidate();
   }, [shown, playing, follow, invalidate]);
@@ -55,6 +59,10 @@ export function Film({
     }
     if (follow && first !== undefined && controls !== null) {
       const here = new Vector3().setFromMatrixPosition(poses.current.get(first.id) ?? first.pose);
+      if (unmoved.current) {
+        unmoved.current = false;
+        followed.current = new Vector3().setFromMatrixPosition(poseAt(trial, begins)(first, new Matrix4()));
+      }
       if (followed.current !== null) {
         const moved = here.clone().sub(followed.current);
         camera.position.add(moved);

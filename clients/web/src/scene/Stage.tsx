@@ -50,7 +50,7 @@ export function Stage({ bounds, height, label, subject = "", lock, children }: S
         gl={{ antialias: drawing === "hardware" }}
         onCreated={({ gl, scene, camera }) => {
           // Whoever measures the page reads poses where they are drawn from.
-          Object.assign(gl.domElement, { scene, camera });
+          Object.assign(gl.domElement, { gl, scene, camera });
         }}
       >
         <hemisphereLight args={["#ffffff", "#8a7f70", 1.6]} />

@@ -1,16 +1,17 @@
 import { Alert, Button, Group, Stack, Switch, Text } from "@mantine/core";
-import { useMemo, useState } from "react";
-import { duration } from "../format";
+import { useMemo, useRef, useState } from "react";
 import { useClock, type Clock } from "./clock";
 import { Curves } from "./Curves";
 import { curvesOf } from "./curves";
 import { Film } from "./Film";
 import { Legend } from "./Legend";
 import { loadsAt, mostLoaded } from "./loads";
-import type { CameraLock } from "./lock";
+import { CameraLock } from "./lock";
 import { readScene, type MachineScene } from "./machine";
+import type { Moment } from "./moment";
 import { PilotingView } from "./PilotingView";
 import { startBounds } from "./playing";
+import { Share } from "./Share";
 import { Stage } from "./Stage";
 import { Surroundings, type Scenario } from "./Surroundings";
 import { TimeLine } from "./TimeLine";
@@ -22,17 +23,26 @@ interface TrialProps {
   scenario: Scenario;
   /** Whether it plays from the start, as the reader asked for before. */
   begun?: boolean;
+  /** When and from where it is seen at first. */
+  moment?: Moment;
+  /** The address of a moment; without, none can be copied. */
+  addressOf?: (moment: Moment) => Promise<string>;
 }
 
 /** A trial, played: scrubbed, slowed, joints coloured by what they bear, breaks marked. */
 export default function TrialView(props: TrialProps) {
   const end = props.trial.times.at(-1) ?? 0;
-  const clock = useClock(end, props.begun);
+  const { moment, addressOf } = props;
+  const clock = useClock(end, props.begun, moment?.time);
+  const [lock] = useState(() => new CameraLock(moment?.look));
+  const stage = useRef<HTMLDivElement>(null);
   const [loads, setLoads] = useState(true);
   const [follow, setFollow] = useState(true);
   return (
     <Stack gap="xs">
-      <TrialScene {...props} clock={clock} loads={loads} follow={follow} />
+      <div ref={stage}>
+        <TrialScene {...props} clock={clock} loads={loads} follow={follow} lock={lock} />
+      </div>
       <TimeLine clock={clock} end={end} breaks={props.trial.breaks} />
       <Group gap="md">
         <Switch
@@ -55,6 +65,11 @@ export default function TrialView(props: TrialProps) {
           {props.trial.engine} {props.trial.engineVersion}
         </Text>
       </Group>
+      <Share
+        stage={stage}
+        clock={clock}
+        address={addressOf === undefined ? undefined : () => addressOf({ time: clock.time.current, look: lock.look })}
+      />
       {loads && <Legend whole={props.trial.loads === null} />}
       <Broken breaks={props.trial.breaks} seek={clock.seek} />
       <TrialCurves trial={props.trial} clock={clock} />
@@ -93,6 +108,7 @@ export function TrialScene({
   follow,
   height = 420,
   lock,
+  moment,
 }: TrialProps & { clock: Clock; loads: boolean; follow: boolean; height?: number; lock?: CameraLock }) {
   const machine = useMemo(() => readScene(scene), [scene]);
   const bounds = useMemo(() => startBounds(machine, trial), [machine, trial]);
@@ -102,7 +118,14 @@ export function TrialScene({
     <>
       <Stage bounds={bounds} height={height} label={`The trial at ${clock.shown.toFixed(1)} seconds`} lock={lock}>
         <Surroundings scenario={scenario} time={clock.shown} />
-        <Film machine={machine} trial={trial} clock={clock} follow={follow} loads={loads ? borne : null} />
+        <Film
+          machine={machine}
+          trial={trial}
+          clock={clock}
+          follow={follow}
+          loads={loads ? borne : null}
+          begins={moment?.look ? moment.time : 0}
+        />
       </Stage>
       {loads && (
         <Text size="xs" className="figures">
@@ -131,7 +154,7 @@ function Broken({ breaks, seek }: { breaks: readonly Break[]; seek: (time: numbe
               seek(Math.max(0, found.time_s - 0.2));
             }}
           >
-            ✕ {found.kind} {found.joint} at {duration(found.time_s)}, {(100 * found.ratio).toFixed(0)} %
+            ✕ {found.kind} {found.joint} at {found.time_s.toFixed(2)} s, {(100 * found.ratio).toFixed(0)} %
           </Button>
         ))}
         {breaks.length > NAMED && <Text size="sm">and {breaks.length - NAMED} more</Text>}

@@ -8,16 +8,20 @@ export interface Look {
 
 type Follow = (look: Look) => void;
 
-/** Cameras that turn together: what one is told, all others do. */
+/** Cameras that turn together: what one is told, all others do, and those that join later. */
 export class CameraLock {
   private readonly followers = new Set<Follow>();
 
+  constructor(public look: Look | null = null) {}
+
   join(follow: Follow): () => void {
     this.followers.add(follow);
+    if (this.look !== null) follow(this.look);
     return () => this.followers.delete(follow);
   }
 
   tell(look: Look, from: Follow): void {
+    this.look = look;
     for (const follow of this.followers) if (follow !== from) follow(look);
   }
 }

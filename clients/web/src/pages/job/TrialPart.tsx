@@ -1,11 +1,15 @@
 import { SegmentedControl, Stack } from "@mantine/core";
 import { useQueries } from "@tanstack/react-query";
-import { lazy, Suspense, useState } from "react";
+import { getRouteApi, useNavigate } from "@tanstack/react-router";
+import { lazy, Suspense } from "react";
+import type { JobSearch } from "../../api/jobs-search";
 import type { JobDetail } from "../../api/queries";
 import { ProblemNote } from "../../parts/Problem";
 import { Empty, Loading } from "../../parts/States";
+import { readLook, writtenLook, type Moment } from "../../scene/moment";
 import { scene as sceneQuery, trial as trialQuery } from "./queries";
 
+const route = getRouteApi("/jobs/$id");
 const TrialView = lazy(() => import("../../scene/TrialView"));
 
 /** The trial of one of a job's rollouts. */
@@ -18,8 +22,16 @@ export function TrialPart({
   numbers: readonly number[];
   begun?: boolean;
 }) {
-  const [chosen, setChosen] = useState<number | null>(null);
-  const number = chosen ?? numbers.at(-1) ?? 0;
+  const search = route.useSearch();
+  const navigate = useNavigate({ from: "/jobs/$id" });
+  const asked = search.rollout !== undefined && numbers.includes(search.rollout) ? search.rollout : undefined;
+  const number = asked ?? numbers.at(-1) ?? 0;
+  const change = (to: JobSearch): Promise<void> =>
+    navigate({ search: (before) => ({ ...before, ...to }), replace: true, resetScroll: false });
+  const addressOf = async ({ time, look }: Moment): Promise<string> => {
+    await change({ view: "trial", t: Number(time.toFixed(2)), rollout: number, camera: writtenLook(look) });
+    return window.location.href;
+  };
   const [scene, trial] = useQueries({
     queries: [sceneQuery(job.id, number), trialQuery(job.id, number, job.artifacts[`trajectory-${number}`])],
   });
@@ -32,7 +44,7 @@ export function TrialPart({
           aria-label="Rollout"
           value={String(number)}
           onChange={(value) => {
-            setChosen(Number(value));
+            void change({ rollout: Number(value), t: undefined, camera: undefined });
           }}
           data={numbers.map((one) => ({ value: String(one), label: `Rollout ${one}` }))}
         />
@@ -58,6 +70,12 @@ export function TrialPart({
               trial={trial.data}
               scenario={scene.data.scenario}
               begun={begun}
+              moment={
+                asked === undefined && search.t === undefined
+                  ? undefined
+                  : { time: search.t ?? 0, look: readLook(search.camera) }
+              }
+              addressOf={addressOf}
             />
           )}
         </Suspense>
