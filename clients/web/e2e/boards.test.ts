@@ -210,6 +210,27 @@ describe("every figure of the board", () => {
   });
 });
 
+describe("what a board is about", () => {
+  it("is chosen by a chip, stands in the address and in the title, and holds for the whole page", async () => {
+    const { page, context } = await opened("/");
+    await page.getByText("The paper’s nine", { exact: true }).waitFor();
+    await page.getByText("Bridges", { exact: true }).click();
+    await page.waitForURL(/category=/);
+    await page.getByRole("heading", { level: 1, name: "Leaderboard: Bridges" }).waitFor();
+    await page.getByText("Ranked over support-1.").waitFor();
+    const rockets = await opened(`/?category=${encodeURIComponent('["lift"]')}`);
+    await rockets.page.getByRole("heading", { level: 1, name: "Leaderboard: Rockets" }).waitFor();
+    await rockets.page.getByText("No job of these tasks has ended on this track").waitFor();
+    await expectNoSeriousFault(rockets.page);
+    await rockets.context.close();
+    // Somebody writes an address by hand.
+    const plain = await opened("/?category=support");
+    await plain.page.getByText("Ranked over support-1.").waitFor();
+    await plain.context.close();
+    await context.close();
+  });
+});
+
 describe("sweeps", () => {
   it.each([
     ["/sweeps/new", 1280],

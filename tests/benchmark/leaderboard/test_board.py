@@ -288,3 +288,21 @@ def test_a_duel_without_shared_seeds_has_no_test() -> None:
     (task,) = compare_models(trials("lift-1", "a", 3, 9), second).tasks
     assert (task.success, task.success_p, task.indicator_p) == (None, None, None)
     assert compare_models([], second) is None
+
+
+def test_the_ranking_is_over_the_asked_tasks_that_are_there_or_over_what_there_is() -> None:
+    found = board_of(
+        trials("lift-1", "a", 3, 4), trials("support-1", "a", 1, 4), trials("own-1", "a", 2, 4)
+    )
+    of = {
+        asked: found.board(BoardQuery(overall=frozenset(asked))).ranked
+        for asked in (("support-1", "lift-1"), ("lift-1", "hover-3"), ("hover-3",))
+    }
+    assert sorted(of["support-1", "lift-1"]) == ["lift-1", "support-1"]
+    assert of["lift-1", "hover-3"] == ("lift-1",)
+    assert sorted(of[("hover-3",)]) == ["lift-1", "own-1", "support-1"]
+    assert found.board(BoardQuery(overall=frozenset({"hover-3"}))).overall[0].rank == 1
+    only = found.board(BoardQuery(tasks=frozenset({"own-1"}), overall=frozenset({"lift-1"})))
+    assert only.ranked == ("own-1",)
+    assert only.overall[0].rank == 1
+    assert TrackBoard({}, WEIGHTS).board(BoardQuery(overall=frozenset({"lift-1"}))).ranked == ()

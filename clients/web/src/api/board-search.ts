@@ -4,6 +4,8 @@ export type Figure = "success" | "indicator" | "cost";
 export interface BoardSearch {
   track?: string;
   task?: string[];
+  /** Categories of tasks; without, models are ranked over the paper's nine. */
+  category?: string[];
   policy?: "ours" | "published";
   since?: string;
   until?: string;
@@ -34,6 +36,7 @@ export function readSearch(raw: Record<string, unknown>): BoardSearch {
   return {
     track: text(raw.track),
     task: list(raw.task),
+    category: list(raw.category),
     policy: oneOf(raw.policy ?? raw.reading, "ours", "published"),
     since: since !== undefined && DAY.test(since) ? since : undefined,
     until: until !== undefined && DAY.test(until) ? until : undefined,

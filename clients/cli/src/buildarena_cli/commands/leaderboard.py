@@ -30,6 +30,12 @@ COMPARISON = columns(
 )
 
 LevelOption = Annotated[list[int] | None, typer.Option("--level", help="Only these levels.")]
+CategoryOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--category", help="Only tasks of these categories (mechanisms, flight, ...), ranked apart."
+    ),
+]
 SinceOption = Annotated[
     datetime | None, typer.Option(help="Only jobs that ended then or later (UTC).")
 ]
@@ -39,6 +45,7 @@ def leaderboard(
     *,
     task: TasksOption = None,
     level: LevelOption = None,
+    category: CategoryOption = None,
     model: ModelsOption = None,
     since: SinceOption = None,
     policy: PolicyOption = PolicyName.OURS,
@@ -56,6 +63,7 @@ def leaderboard(
     asked: dict[str, Any] = {
         "task": task,
         "level": level,
+        "category": category,
         "model": model,
         "since": None if since is None else f"{since.isoformat()}Z",
         "policy": policy.value,

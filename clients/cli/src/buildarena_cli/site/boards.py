@@ -19,6 +19,8 @@ MAX_COMPARED: Final = 20
 LISTED_SWEEPS: Final = 50
 """As many as a page of sweeps shows."""
 BOARD: Final = "/v1/leaderboard"
+PAPER: Final = ("support", "transport", "lift")
+"""The categories whose tasks are the paper's nine."""
 
 
 class Collected:
@@ -51,11 +53,18 @@ class Collected:
 
     def _boards(self) -> None:
         tasks = sorted({job["task"] for job in self._scope.ended})
+        listed = self._client.get("/v1/tasks")
+        categories = sorted({one["category"] for one in listed if one["name"] in tasks})
+        scopes: list[list[str]] = [[name] for name in categories]
+        if any(name in PAPER for name in categories):
+            scopes.append(list(PAPER))
+        parts: list[dict[str, Any]] = [{}, *({"task": name} for name in tasks)]
+        parts += [{"category": scope} for scope in scopes]
         # Pages ask without a track first, and get that of the scope or the first.
-        for track, policy, task in itertools.product(
-            (None, *self._scope.tracks), SCORING_POLICIES, (None, *tasks)
+        for track, policy, part in itertools.product(
+            (None, *self._scope.tracks), SCORING_POLICIES, parts
         ):
-            asked = {"track": track, "policy": policy, "task": task}
+            asked = {"track": track, "policy": policy, **part}
             self._put(question(BOARD, asked), self._board(asked))
             self._put(question(f"{BOARD}/figures", asked), self._held(f"{BOARD}/figures", asked))
             for form, ending in EXPORTS.items():

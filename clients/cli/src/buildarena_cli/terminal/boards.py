@@ -131,15 +131,17 @@ def _print_rows(
 
 
 def overall_table(board: Mapping[str, Any]) -> None:
-    """Prints the ranking over all tasks."""
-    rows = []
+    """Prints the ranking over all tasks that it is over."""
+    rows, ranked = [], board.get("ranked") or []
+    whole = len(ranked) in (0, len(board["tasks"]))
+    scope = "All tasks together" if whole else f"Over {', '.join(ranked)}"
     for row in board["overall"]:
-        rate, ranked = row["success_rate_mean"], row["rank"] is not None
+        rate, placed = row["success_rate_mean"], row["rank"] is not None
         rows.append(
             (
                 _rank(row["rank"]),
                 row["model"] + ("*" if row["baseline"] else ""),
-                f"{row['rank_low']}-{row['rank_high']}" if ranked else "",
+                f"{row['rank_low']}-{row['rank_high']}" if placed else "",
                 number(row["mean_rank"], 2),
                 number(row.get("score_mean"), 2),
                 "" if rate is None else f"{100 * rate:.1f} %",
@@ -150,7 +152,7 @@ def overall_table(board: Mapping[str, Any]) -> None:
     print_table(
         OVERALL,
         rows,
-        title=emphasised("All tasks together"),
+        title=emphasised(scope),
         notes=[
             "# is shared by statistically tied models; place: its 95 % interval",
             "+ no other model is both better and cheaper",

@@ -10,6 +10,8 @@ import { Controls } from "./Controls";
 import { Exports } from "./Exports";
 import { HeatMap } from "./HeatMap";
 import { Overall } from "./Overall";
+import { rankedOver, scopeOf } from "./scope";
+import { ScopeChips } from "./ScopeChips";
 import type { BoardSearch } from "../../api/board-search";
 
 const BoardPlots = lazy(() => import("./BoardPlots"));
@@ -19,14 +21,16 @@ const route = getRouteApi("/");
 export default function BoardPage() {
   const search = route.useSearch();
   const query = useQuery(board(search));
+  const scope = scopeOf(search);
   return (
     <Stack gap="lg">
       <div>
-        <Title order={1}>Leaderboard</Title>
+        <Title order={1}>{scope.key === "" ? "Leaderboard" : `Leaderboard: ${scope.label}`}</Title>
         <Text size="sm" className="dimmed">
           Who builds machines that work? Each model builds every task several times; a simulator tries each machine.
         </Text>
       </div>
+      <ScopeChips search={search} />
       <Answered query={query} rows={12}>
         {(found) => <Found found={found} search={search} />}
       </Answered>
@@ -54,7 +58,18 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
     <>
       <Controls board={found} search={search} />
       <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
-        <Overall board={found} search={search} />
+        {found.overall.length === 0 ? (
+          <Empty title="No job of these tasks has ended on this track">
+            Choose other tasks above, or another track.
+          </Empty>
+        ) : (
+          <>
+            <Text size="sm" className="dimmed" mb="xs">
+              {rankedOver(found.ranked, found.tasks.length)}
+            </Text>
+            <Overall board={found} search={search} />
+          </>
+        )}
       </Section>
       <Section title="Model by task">
         <HeatMap board={found} search={search} />

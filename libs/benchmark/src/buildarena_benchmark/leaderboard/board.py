@@ -74,10 +74,17 @@ class TaskBoard:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
-    """A track's boards, one for each task, and the ranking over them."""
+    """A track's boards, one for each task, and the ranking over them.
+
+    Attributes:
+        tasks: The boards.
+        overall: The ranking over `ranked`.
+        ranked: Names of the tasks that it is over.
+    """
 
     tasks: Sequence[TaskBoard]
     overall: Sequence[OverallRow]
+    ranked: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -153,7 +160,8 @@ def ranked_board(
         chosen: Which cells.
         cell_of: A cell's summary; None when nothing of it was asked for.
         outdated: Ended jobs of other versions, by task.
-        overall: Tasks that the overall ranking is over; None means all.
+        overall: Tasks that the overall ranking is over; None means all, as it does where none of
+            these is on the board.
         weights: Difficulty weights by task.
         tests: What was tested before.
     """
@@ -162,10 +170,9 @@ def ranked_board(
         row = {key[2]: cell_of(key) for key in keys}
         cells[task] = {name: cell for name, cell in row.items() if cell is not None}
 
-    def ranked(task: str) -> bool:
-        return overall is None or task in overall
-
-    ranks = standings(cells, ranked, tests)
+    there = frozenset(task for task, row in cells.items() if row)
+    scope = there if overall is None else (overall & there or there)
+    ranks = standings(cells, scope.__contains__, tests)
     boards = [
         TaskBoard(
             task=task,
@@ -176,8 +183,12 @@ def ranked_board(
         for task, version in chosen.shown
         if cells[task]
     ]
-    filled = {task: row for task, row in cells.items() if row and ranked(task)}
-    return Board(tasks=boards, overall=overall_rows(filled, ranks.overall, weights))
+    filled = {task: row for task, row in cells.items() if task in scope}
+    return Board(
+        tasks=boards,
+        overall=overall_rows(filled, ranks.overall, weights),
+        ranked=tuple(filled),
+    )
 
 
 class TrackBoard:

@@ -69,7 +69,8 @@ def select_board(
         list[str] | None,
         Query(
             description="Only tasks of these categories, over whose built-in ones models are "
-            "ranked then; by default the overall ranking is over the paper's nine tasks"
+            "ranked then; by default the overall ranking is over the paper's nine tasks, or over "
+            "what there is where none of these was played"
         ),
     ] = None,
     model: Annotated[list[str] | None, Query(description="Only these models")] = None,

@@ -180,6 +180,7 @@ class Board(UnderPolicy):
     flags: list[FlagView] = Field(default_factory=lambda: FLAGS)
     tasks: list[TaskBoard]
     overall: list[OverallView] = Field(default=[])
+    ranked: list[str] = Field(default=[], description="Tasks that `overall` is over")
     published: list[PublishedOverall] = Field(default=[])
 
 
@@ -275,6 +276,7 @@ def board_view(
             )
             for place in board.overall
         ],
+        ranked=list(board.ranked),
         published=published_ranking(),
     )
 
