@@ -6,7 +6,9 @@ import { DataTable } from "../../parts/DataTable";
 import Drawing from "../../parts/Plot";
 import { Section } from "../../parts/Section";
 import { keyOf, type Entry } from "./entries";
-import { COLOURS } from "./palette";
+import { coloursOf, MOST, OTHER } from "./palette";
+
+const SUCCESS = "success";
 
 interface Part {
   label: string;
@@ -15,19 +17,35 @@ interface Part {
   share: number;
 }
 
-/** Counts by model and name as shares of the model's sum; the most frequent names first. */
+/** Counts by model and name as shares of the model's sum; success first, then the most frequent names. */
 export function partsOf(counted: readonly { label: string; counts: Readonly<Record<string, number>> }[]): Part[] {
   const sums = new Map<string, number>();
   for (const { counts } of counted) {
     for (const [name, n] of Object.entries(counts)) sums.set(name, (sums.get(name) ?? 0) + n);
   }
-  const names = [...sums].sort((a, b) => b[1] - a[1]).map(([name]) => name);
+  const names = [...sums]
+    .sort((a, b) => Number(b[0] === SUCCESS) - Number(a[0] === SUCCESS) || b[1] - a[1])
+    .map(([name]) => name);
   return counted.flatMap(({ label, counts }) => {
     const total = Object.values(counts).reduce((sum, n) => sum + n, 0);
     return names.flatMap((name) => {
       const n = counts[name] ?? 0;
       return n === 0 ? [] : [{ label, name: words(name), count: n, share: n / total }];
     });
+  });
+}
+
+/** The parts as they are drawn: what is beyond the most frequent names is one. */
+export function drawnParts(parts: readonly Part[]): Part[] {
+  const names = [...new Set(parts.map((part) => part.name))];
+  if (names.length <= MOST) return [...parts];
+  const kept = new Set(names.slice(0, MOST));
+  return [...new Set(parts.map((part) => part.label))].flatMap((label) => {
+    const own = parts.filter((part) => part.label === label);
+    const rest = own.filter((part) => !kept.has(part.name));
+    const sum = (of: (part: Part) => number): number => rest.reduce((total, part) => total + of(part), 0);
+    const other = { label, name: OTHER.name, count: sum((part) => part.count), share: sum((part) => part.share) };
+    return [...own.filter((part) => kept.has(part.name)), ...(rest.length > 0 ? [other] : [])];
   });
 }
 
@@ -77,19 +95,22 @@ export function Failures({ figures, entries }: { figures: Figures; entries: read
 }
 
 function Shares({ name, what, parts, labels }: { name: string; what: string; parts: Part[]; labels: string[] }) {
+  const drawn = drawnParts(parts);
+  const kinds = [...new Set(parts.map((part) => part.name))].slice(0, MOST);
+  const domain = drawn.some((part) => part.name === OTHER.name) ? [...kinds, OTHER.name] : kinds;
   const options = (width: number): Plot.PlotOptions => ({
     height: 76 + 38 * labels.length,
     marginBottom: 42,
     marginLeft: Math.min(150, 0.3 * width),
     style: { fontSize: "12px" },
-    color: { legend: true, range: [...COLOURS], domain: [...new Set(parts.map((part) => part.name))] },
+    color: { legend: true, range: coloursOf(domain), domain },
     x: { label: `share of ${what}, %`, percent: true, domain: [0, 100], grid: true },
     y: { label: null, domain: labels },
     marks: [
-      Plot.barX(parts, { x: "share", y: "label", fill: "name", inset: 0.5, order: null }),
+      Plot.barX(drawn, { x: "share", y: "label", fill: "name", inset: 0.5, order: null }),
       // A bar's number stands in it, so that nobody depends on its colour.
       Plot.text(
-        parts,
+        drawn,
         Plot.stackX({
           x: "share",
           y: "label",

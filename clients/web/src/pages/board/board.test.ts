@@ -2,7 +2,8 @@ import { describe, expect, it } from "vitest";
 import { boardQuery } from "../../api/queries";
 import { exportPath } from "./Exports";
 import { sharedRanks } from "../../parts/ranks";
-import { partsOf } from "./Failures";
+import { drawnParts, partsOf } from "./Failures";
+import { coloursOf } from "./palette";
 import { spotOf } from "./Radar";
 import { readSearch } from "../../api/board-search";
 import { jobsBehind } from "../../parts/jobs-behind";
@@ -72,6 +73,30 @@ describe("drawings", () => {
       ["a", "one", 0.25],
       ["c", "one", 1],
     ]);
+  });
+});
+describe("kinds in a drawing", () => {
+  const many = partsOf([
+    { label: "a", counts: { one: 9, two: 8, three: 7, four: 6, five: 5, six: 4, seven: 3, success: 1 } },
+    { label: "b", counts: { one: 1 } },
+  ]);
+
+  it("begin with success, and are at most six and the others", () => {
+    expect(many[0]?.name).toBe("success");
+    const drawn = drawnParts(many);
+    expect(new Set(drawn.map((part) => part.name)).size).toBe(7);
+    expect(drawn.find((part) => part.name === "other")).toMatchObject({ label: "a", count: 7 });
+    expect(drawn.filter((part) => part.label === "a").reduce((sum, part) => sum + part.share, 0)).toBeCloseTo(1);
+    expect(drawnParts(many.slice(0, 3))).toEqual(many.slice(0, 3));
+  });
+
+  it("have a colour of their own wherever they stand", () => {
+    const kinds = ["success", "unsuccessful", "construction failed: no plan"];
+    const colours = coloursOf(kinds);
+    expect(new Set(colours).size).toBe(3);
+    for (const kind of kinds) expect(coloursOf([kind])[0]).toBe(colours[kinds.indexOf(kind)]);
+    expect(new Set(coloursOf(["success", "a", "b", "c", "d", "e"])).size).toBe(6);
+    expect(coloursOf(["other"])).toEqual(["#999999"]);
   });
 });
 describe("a cell", () => {
