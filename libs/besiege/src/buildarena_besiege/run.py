@@ -356,7 +356,14 @@ def _require_sayable(scenario: Scenario) -> None:
         )
     if scenario.pushes:
         raise MachineNotPlayableError("the game pushes nothing: use another engine")
-    if isinstance(scenario.placement, GroundPlacement) and scenario.placement.tilt_deg:
-        raise MachineNotPlayableError("the game's machines do not lean at the start: use another")
+    if isinstance(scenario.placement, GroundPlacement):
+        if scenario.placement.tilt_deg:
+            raise MachineNotPlayableError(
+                "the game's machines do not lean at the start: use another"
+            )
+        if scenario.placement.heading_deg:
+            raise MachineNotPlayableError(
+                "the game's machines face north at the start: use another engine"
+            )
     if scenario.gravity != GRAVITY or scenario.drive_strength != 1:
         raise MachineNotPlayableError("the game has one gravity and drives of one strength")

@@ -15,6 +15,10 @@ class BearingMeter:
         structure: The machine.
         terrain_count: Number of terrain boxes.
         gravity: Downward acceleration, units/s²: forces are multiples of what it makes of a mass.
+
+    Attributes:
+        now: What `series` takes of an instant.
+        on_blocks: (N,) what ground and terrain exert on each block upwards, mass·g.
     """
 
     def __init__(self, structure: Structure, terrain_count: int, *, gravity: float) -> None:
@@ -23,6 +27,7 @@ class BearingMeter:
         self._wheels = structure.wheels
         self._blocks = len(structure)
         self.now: NDArray[np.float64] = np.zeros(self._surfaces + 1 + len(self._wheels))
+        self.on_blocks: NDArray[np.float64] = np.zeros(self._blocks)
 
     def read(self, other: IntArray, surface: IntArray, forces: PointForces) -> None:
         """Takes the present contacts.
@@ -36,6 +41,7 @@ class BearingMeter:
         fixed = (surface >= 0).nonzero()[0]
         on_surface = np.bincount(surface[fixed], up[fixed], minlength=self._surfaces)
         on_block = np.bincount(forces.block[fixed], up[fixed], minlength=self._blocks)
+        self.on_blocks = on_block.astype(np.float64)
         cargo = -up[other == CARGO].sum()
         self.now = np.concatenate([on_surface, [cargo], on_block[self._wheels]])
 

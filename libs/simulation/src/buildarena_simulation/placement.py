@@ -3,6 +3,7 @@
 import hashlib
 import math
 from dataclasses import dataclass, field, replace
+from functools import reduce
 
 import numpy as np
 
@@ -91,11 +92,13 @@ def _velocity_of(placement: Placement) -> FloatArray:
     return np.array(placement.velocity if isinstance(placement, ReleasedPlacement) else [0.0] * 3)
 
 
-def _tilt_of(placement: Placement) -> FloatArray | None:
+def _turn_of(placement: Placement) -> FloatArray | None:
     """By what a machine is turned that does not stand as it was built; None if it does."""
-    if not isinstance(placement, GroundPlacement) or not placement.tilt_deg:
+    if not isinstance(placement, GroundPlacement):
         return None
-    return turn_about(np.array([1.0, 0.0, 0.0]), -math.radians(placement.tilt_deg))
+    angles = {(0.0, 0.0, 1.0): placement.heading_deg, (1.0, 0.0, 0.0): placement.tilt_deg}
+    turns = [turn_about(np.array(axis), -math.radians(deg)) for axis, deg in angles.items() if deg]
+    return reduce(lambda turn, further: further @ turn, turns) if turns else None
 
 
 def place(structure: Structure, placement: Placement) -> tuple[FloatArray, FloatArray]:
@@ -108,14 +111,14 @@ def place(structure: Structure, placement: Placement) -> tuple[FloatArray, Float
     Returns:
         The position (3,), units, and the rotation (3, 3).
     """
-    tilt = _tilt_of(placement)
-    bounds = structure.bounds(tilt)
+    turn = _turn_of(placement)
+    bounds = structure.bounds(turn)
     if not isinstance(placement, SpanPlacement):
         start = next(
             (part.shown for part in structure.parts if part.module.kind == "start"),
             structure.shown[0],
         )
-        rotation = np.eye(3) if tilt is None else tilt
+        rotation = np.eye(3) if turn is None else turn
         start = rotation @ start
         height = placement.height if isinstance(placement, ReleasedPlacement) else _CLEARANCE
         return np.array([-start[0], -start[1], height - bounds[0, 2]]), rotation
@@ -144,7 +147,7 @@ def _cargo_at_start(
     if cargo.at is not None:
         middle = np.array(cargo.at) + np.array([0.0, 0.0, cargo.size[2] / 2 + _CLEARANCE])
     else:
-        top = float(structure.bounds(_tilt_of(scenario.placement))[1, 2] + position[2])
+        top = float(structure.bounds(_turn_of(scenario.placement))[1, 2] + position[2])
         middle = np.array([0.0, 0.0, top + cargo.drop_height + cargo.size[2] / 2])
     return CargoBox(
         size=np.array(cargo.size),

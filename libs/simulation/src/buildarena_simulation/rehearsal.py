@@ -119,6 +119,6 @@ def _at_start(structure: "Structure", scenario: Scenario) -> Seen:
         clusters=clusters,
         motion=motion,
         cargo=cargo,
-        on_wheels=np.zeros(len(structure.wheels)),
+        on_blocks=np.zeros(len(structure)),
         fuel_s=scenario.fuel_s or 0.0,
     )

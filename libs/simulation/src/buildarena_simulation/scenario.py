@@ -97,10 +97,13 @@ class GroundPlacement(_Document):
     Attributes:
         tilt_deg: By how much it is turned at the start about the axis to the east, degrees; above 0
             its top leans towards the north.
+        heading_deg: By how much it is turned about the vertical before that, degrees; what was
+            built northwards points so far from north towards east.
     """
 
     kind: Literal["ground"] = "ground"
     tilt_deg: Annotated[float, Field(ge=-90, le=90, exclude_if=lambda value: value == 0)] = 0.0
+    heading_deg: Annotated[float, Field(ge=-180, le=180, exclude_if=lambda value: value == 0)] = 0.0
 
 
 class SpanPlacement(_Document):
@@ -204,9 +207,19 @@ class Control(_Document):
 
 
 SenseKind = Literal[
-    "pose", "axes", "blocks", "joints", "wheels", "cargo", "marks", "gates", "gate", "fuel"
+    "pose",
+    "axes",
+    "blocks",
+    "joints",
+    "wheels",
+    "contacts",
+    "cargo",
+    "marks",
+    "gates",
+    "gate",
+    "fuel",
 ]
-_UNUSUAL: Final = ("axes", "gate", "fuel")
+_UNUSUAL: Final = ("axes", "contacts", "gate", "fuel")
 _OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind not in _UNUSUAL)
 NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
 

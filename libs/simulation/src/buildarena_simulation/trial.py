@@ -127,13 +127,12 @@ class Trial:
     def seen(self) -> Seen:
         """What there is to be sensed now."""
         breaking = self.breaking
-        wheels = len(self._structure.wheels)
         return Seen(
             time_s=self._tick / SAMPLE_RATE_HZ,
             clusters=breaking.clusters,
             motion=breaking.motion,
             cargo=self._engine.cargo() if self._scenario.cargo else None,
-            on_wheels=breaking.bearing.now[len(breaking.bearing.now) - wheels :],
+            on_blocks=breaking.bearing.on_blocks,
             fuel_s=self._planner.tank.left_s,
         )
 

@@ -14,7 +14,7 @@ from buildarena_benchmark.scorers.measures.balancing import (
 )
 from buildarena_benchmark.scorers.measures.components import joined_to_start
 from buildarena_benchmark.scorers.measures.outline import lowest_points
-from buildarena_benchmark.scorers.measures.series import starting_block
+from buildarena_benchmark.scorers.measures.series import lasts, starting_block
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     CAME_APART,
@@ -114,12 +114,12 @@ def judge(
     ahead = axle_turn_deg(trajectory, wheels) < scoring.max_turn_deg
     time_s, path = trajectory.time_s, trajectory.positions[:, start, :2].astype(np.float64)
     away = np.linalg.norm(path - path[0], axis=1)
-    end = _lasts(whole & upright & above & clear & ahead)
+    end = lasts(whole & upright & above & clear & ahead)
     balanced_s = float(time_s[end])
     nearness = float((1.0 / (1.0 + away)).mean()) if end == len(away) - 1 else 0.0
     success = balanced_s >= scoring.min_s
     stood_s = {
-        flag: float(time_s[_lasts(upright & rest)])
+        flag: float(time_s[lasts(upright & rest)])
         for flag, rest in ((CAME_APART, above & clear & ahead), (PROPPED, whole))
     }
     metrics: dict[str, Metric] = {
@@ -136,11 +136,6 @@ def judge(
         ),
         deciding=Deciding(samples=end + 1, members=joined, cargo=False),
     )
-
-
-def _lasts(holds: np.ndarray) -> int:
-    """The last sample up to which something holds without a break; 0 if it never does."""
-    return len(holds) - 1 if holds.all() else max(int(holds.argmin()) - 1, 0)
 
 
 SCORER: Final = Scorer(

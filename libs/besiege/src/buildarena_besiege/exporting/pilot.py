@@ -67,6 +67,10 @@ def pilot_of(machine: Machine, scenario: Scenario) -> ProgramPilot:
         raise MachineNotPlayableError(
             "the task offers the sense wheels[…].contact, which the game tells on flat ground alone"
         )
+    if "contacts" in pilot.sensing.offers:
+        raise MachineNotPlayableError(
+            "the task offers the sense contacts, and the game does not tell what touches"
+        )
     if "marks" in pilot.sensing.offers and any(mark.drift for mark in scenario.marks):
         raise MachineNotPlayableError("the task's marks move, which the game's script does not do")
     spring = next((name for (part, _), name in _channels(pilot) if part not in machine.blocks), "")

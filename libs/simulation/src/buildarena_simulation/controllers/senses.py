@@ -23,7 +23,7 @@ TICK_S: Final = 1.0 / SAMPLE_RATE_HZ
 _GRAIN: Final = 6
 """Decimals that a program sees: the last bits of an engine are none of its business."""
 _TOUCHES: Final = 1e-3
-"""Force above which a wheel has contact, mass·g."""
+"""Force above which a block has contact, mass·g."""
 _AXES: Final = "xyz"
 _AXES_FROM: Final = 6
 """Where axes and spins begin among the figures of a pose."""
@@ -39,7 +39,7 @@ class Seen:
         clusters: The machine's.
         motion: Theirs.
         cargo: The cargo; None without.
-        on_wheels: (W,) what ground and terrain exert on each wheel, mass·g.
+        on_blocks: (N,) what ground and terrain exert on each block upwards, mass·g.
         fuel_s: What fuel is left, seconds.
     """
 
@@ -47,7 +47,7 @@ class Seen:
     clusters: Clusters
     motion: Motion
     cargo: CargoPose | None
-    on_wheels: FloatArray
+    on_blocks: FloatArray
     fuel_s: float
 
 
@@ -115,6 +115,7 @@ class Sensing:
             "blocks": self._blocks_layout,
             "joints": self._joints_layout,
             "wheels": self._wheels_layout,
+            "contacts": self._contacts_layout,
             "cargo": self._cargo_layout,
             "marks": partial(self._places_layout, self._scenario.marks),
             "gates": partial(self._places_layout, self._scenario.gates),
@@ -157,6 +158,9 @@ class Sensing:
             for index in self._structure.wheels
         }
 
+    def _contacts_layout(self) -> dict[str, Any]:
+        return {self._structure.parts[block].id: self._number() for block in self.blocks}
+
     def _cargo_layout(self) -> dict[str, Any]:
         kinds = {"position": "place", "relative": "place", "velocity": "speed"}
         return {name: self._vector(noise) for name, noise in kinds.items()}
@@ -196,6 +200,7 @@ class Sensing:
             "blocks": poses[1:].ravel().tolist,
             "joints": lambda: self._joint_values(seen),
             "wheels": lambda: self._wheel_values(seen),
+            "contacts": lambda: (seen.on_blocks[self.blocks] > _TOUCHES).astype(float).tolist(),
             "cargo": lambda: _cargo_values(seen, own),
             "marks": lambda: _places((mark.at(seen.time_s) for mark in self._scenario.marks), own),
             "gates": lambda: _places(((*g.center, 0.0) for g in self._scenario.gates), own),
@@ -213,11 +218,11 @@ class Sensing:
             yield from (sign * place, sign * speed)
 
     def _wheel_values(self, seen: Seen) -> Iterator[float]:
-        for index, force in zip(self._structure.wheels.tolist(), seen.on_wheels, strict=True):
+        for index in self._structure.wheels.tolist():
             sides = self._seats.get(index)
             outward = _relative_spin(self._structure, seen, index, sides) if sides else 0.0
             yield forwards(self._structure, index) * outward
-            yield float(force > _TOUCHES)
+            yield float(seen.on_blocks[index] > _TOUCHES)
 
     def _poses(self, seen: Seen) -> FloatArray:
         """Position, velocity, up, forward, spin and spin in the block's frame, (1 + B, 18)."""

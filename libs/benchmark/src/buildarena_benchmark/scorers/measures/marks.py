@@ -32,6 +32,11 @@ def center_of_mark(name: str, scenario: Scenario) -> NDArray[np.float64]:
     return np.array(_mark(name, scenario).center)
 
 
+def radius_of_mark(name: str, scenario: Scenario) -> float:
+    """The radius of a mark that there is, units."""
+    return _mark(name, scenario).radius
+
+
 def path_of_mark(name: str, scenario: Scenario, times_s: Iterable[float]) -> NDArray[np.float64]:
     """The same at several times, (T, 3)."""
     mark = _mark(name, scenario)

@@ -50,6 +50,11 @@ def tilt_deg(trajectory: "Trajectory", block: int) -> Series:
     return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
+def lasts(holds: NDArray[np.bool_]) -> int:
+    """The last sample up to which something holds without a break; 0 if it never does."""
+    return len(holds) - 1 if holds.all() else max(int(holds.argmin()) - 1, 0)
+
+
 def rotations(quaternions: NDArray[np.floating]) -> Series:
     """Rotation matrices, (T, 3, 3), of quaternions (T, 4) as (w, x, y, z)."""
     wxyz = quaternions.astype(np.float64)

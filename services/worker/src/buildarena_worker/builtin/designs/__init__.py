@@ -17,6 +17,7 @@ from buildarena_worker.builtin.designs import (
     rockets,
     rovers,
     vehicles,
+    walkers,
 )
 from buildarena_worker.builtin.designs.design import Design
 
@@ -54,6 +55,8 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "landing-2": piloted.sparing_lander,
     "balance-1": piloted.balancer,
     "balance-2": piloted.balancer,
+    "walk-1": walkers.walker,
+    "walk-2": walkers.corner_walker,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

@@ -5,13 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cache
-from importlib import resources
+from collections.abc import Mapping
 from typing import Final
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_worker.builtin.designs.programs import listed, program_text, quoted
 
 _LENGTH, _TRACK = 3, 2
 _ARM: Final = 2
@@ -40,10 +39,10 @@ def gate_finder(seed: int) -> Design:
                 actions=tuple(draft.actions),
             )
         },
-        program=_program(
+        program=program_text(
             "gates",
-            left=_listed(sides["left"]),
-            right=_listed(sides["right"]),
+            left=listed(sides["left"]),
+            right=listed(sides["right"]),
             keen=f"{1.0 + 0.02 * (seed % 5):g}",
         ),
     )
@@ -82,7 +81,7 @@ def balancer(seed: int) -> Design:
                 actions=tuple(draft.actions),
             )
         },
-        program=_program("balance", **_quoted(sides), keen=f"{0.44 + 0.01 * (seed % 5):g}"),
+        program=program_text("balance", **quoted(sides), keen=f"{0.44 + 0.01 * (seed % 5):g}"),
     )
 
 
@@ -103,8 +102,8 @@ def _craft(program: str, *, keen: float) -> Design:
                 actions=tuple(draft.actions),
             )
         },
-        program=_program("flying", **_quoted(fans), **_figures(draft, inertia))
-        + _program(program, keen=f"{keen:g}"),
+        program=program_text("flying", **quoted(fans), **_figures(draft, inertia))
+        + program_text(program, keen=f"{keen:g}"),
     )
 
 
@@ -116,26 +115,3 @@ def _figures(draft: Draft, inertia: float) -> Mapping[str, str]:
         "push": f"{_FAN_PUSH * _GRAVITY:g}",
         "gravity": f"{_GRAVITY:g}",
     }
-
-
-def _quoted(ids: Mapping[str, str]) -> dict[str, str]:
-    return {name: f'"{block}"' for name, block in ids.items()}
-
-
-def _listed(ids: Sequence[str]) -> str:
-    return "{ " + ", ".join(f'"{block}"' for block in ids) + " }"
-
-
-def _program(name: str, **places: str) -> str:
-    """The text of a program, with its places filled: `$name` in comments and figures."""
-    text = _text(name)
-    for place, value in places.items():
-        text = text.replace(f"${place}", value)
-    return text
-
-
-@cache
-def _text(name: str) -> str:
-    text = resources.files(__package__).joinpath("programs", f"{name}.lua").read_text("utf-8")
-    # The first two lines say whose the file is.
-    return text.split("\n", 2)[2]
