@@ -158,7 +158,7 @@ def test_an_empty_board_is_empty() -> None:
 
 
 def test_one_model_is_first_and_scores_one() -> None:
-    (row,) = board_of(trials("lift-1", "a", 0, 5)).board(ALL).overall
+    (row,) = board_of(trials("lift-1", "a", 1, 5)).board(ALL).overall
     assert (row.rank, row.rank_low, row.rank_high, row.pareto) == (1, 1, 1, True)
     assert row.dimensions == {"precision": 1.0, "ambiguity": 1.0}
 
@@ -306,3 +306,16 @@ def test_the_ranking_is_over_the_asked_tasks_that_are_there_or_over_what_there_i
     assert only.ranked == ("own-1",)
     assert only.overall[0].rank == 1
     assert TrackBoard({}, WEIGHTS).board(BoardQuery(overall=frozenset({"lift-1"}))).ranked == ()
+
+
+def test_who_never_succeeds_is_on_no_front_however_cheap() -> None:
+    found = board_of(
+        trials("lift-1", "good", 4, 6, cost_usd=2.0),
+        trials("lift-1", "cheap", 2, 6, cost_usd=1.0),
+        trials("lift-1", "idle", 0, 6, cost_usd=0.0),
+    ).board(ALL)
+    assert {row.model: row.pareto for row in found.overall} == {
+        "good": True,
+        "cheap": True,
+        "idle": False,
+    }

@@ -36,7 +36,8 @@ class OverallRow:
         success_rate_mean: Mean of the tasks' success rates; None without any.
         cost_usd_mean: Mean of the tasks' mean costs.
         output_tokens_mean: Mean of the tasks' mean output tokens.
-        pareto: Whether no other ranked configuration is both better and cheaper.
+        pareto: Whether it succeeded at all and no other ranked configuration is both better and
+            cheaper.
         dimensions: Score from 0 to 1 by difficulty dimension; empty when it is not ranked.
     """
 
@@ -152,7 +153,7 @@ def _mean_of_all(row: Sequence[Cell | None]) -> float | None:
 
 
 def _with_pareto(row: OverallRow, rows: Sequence[OverallRow]) -> OverallRow:
-    if row.mean_rank is None or row.cost_usd_mean is None:
+    if row.mean_rank is None or row.cost_usd_mean is None or not row.success_rate_mean:
         return row
     beaten = any(
         other.mean_rank <= row.mean_rank
