@@ -27,6 +27,7 @@ Swing = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
 Period = Annotated[float, Field(ge=1, le=600)]
 PushSpeed = Annotated[float, Field(allow_inf_nan=False, ge=-20, le=20)]
 Label = Annotated[str, Field(pattern=r"^[\w -]+$", min_length=1, max_length=40)]
+Heading = Annotated[float, Field(ge=-180, le=180, exclude_if=lambda value: value == 0)]
 Gravity = Annotated[float, Field(ge=5, le=100)]
 Strength = Annotated[float, Field(ge=0.1, le=10)]
 BlockId = Annotated[str, Field(min_length=1, max_length=40)]
@@ -70,6 +71,7 @@ class Cargo(_Document):
         at: (3,) the middle of its underside at the start, world frame, units; None above the
             machine, over (0, 0).
     """
+        heading_deg: By how much it is turned about the vertical, from north towards east, degrees.
 
     size: tuple[CargoExtent, CargoExtent, CargoExtent]
     drop_height: Annotated[float, Field(ge=0, le=100)] = 3.0
@@ -82,6 +84,7 @@ class Cargo(_Document):
         Field(exclude_if=_is_default),
     ] = None
 
+    heading_deg: Heading = 0.0
     def mass_at(self, time_s: float) -> float:
         """Mass of the cargo at a time, mass units.
 
