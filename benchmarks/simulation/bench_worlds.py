@@ -51,10 +51,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path)
     parser.add_argument("--worlds", type=int, default=WORLDS)
+    parser.add_argument("--tasks", nargs="+", choices=TASKS, default=TASKS, metavar="TASK")
     options = parser.parse_args()
     figures: dict[str, Any] = {}
     with ProcessPoolExecutor() as pool:
-        for name in TASKS:
+        for name in options.tasks:
             rows = {
                 engine: list(pool.map(partial(in_world, name, engine), range(options.worlds)))
                 for engine in ENGINES
