@@ -354,6 +354,10 @@ def _require_sayable(scenario: Scenario) -> None:
         raise MachineNotPlayableError(
             "the game's fans and cannons burn no fuel: use another engine"
         )
+    if scenario.cargo is not None and scenario.cargo.heading_deg:
+        raise MachineNotPlayableError("the game's cargo is not turned: use another engine")
+    if scenario.line is not None:
+        raise MachineNotPlayableError("the game has no line on the ground: use another engine")
     if scenario.pushes:
         raise MachineNotPlayableError("the game pushes nothing: use another engine")
     if isinstance(scenario.placement, GroundPlacement) and scenario.placement.tilt_deg:

@@ -147,8 +147,7 @@ def start_world(
     if cargo is None:
         return surfaces, None
     turn = quaternion_of(cargo.rotation)[[1, 2, 3, 0]].tolist()
-    half = cargo.size / 2
-    return surfaces, add_box(client, half, cargo.position, mass=cargo.mass, turn=turn)
+    return surfaces, add_box(client, cargo.size / 2, cargo.position, mass=cargo.mass, turn=turn)
 
 
 def friction_of(structure: Structure, blocks: IntArray) -> float:
