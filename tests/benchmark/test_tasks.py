@@ -39,7 +39,10 @@ HEADROOM = [
     *("flight-3", "lift-4", "mechanisms-7"),
 ]
 FAMILIES = ["budget-1", "repair-1", "identify-1"]
-CONTROL = ["landing-1", "landing-2", "slalom-2", "hover-3", "hover-4", "balance-1", "balance-2"]
+CONTROL = [
+    *("landing-1", "landing-2", "slalom-2", "hover-3", "hover-4", "balance-1", "balance-2"),
+    *("place-2", "line-1"),
+]
 
 
 GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL}

@@ -30,6 +30,8 @@ _CONTROL: Final = (
     "hover-4",
     "balance-1",
     "balance-2",
+    "place-2",
+    "line-1",
 )
 
 

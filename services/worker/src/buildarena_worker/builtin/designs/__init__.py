@@ -54,6 +54,8 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "landing-2": piloted.sparing_lander,
     "balance-1": piloted.balancer,
     "balance-2": piloted.balancer,
+    "place-2": piloted.placer,
+    "line-1": piloted.line_follower,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 
