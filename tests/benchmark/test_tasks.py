@@ -41,7 +41,7 @@ HEADROOM = [
 FAMILIES = ["budget-1", "repair-1", "identify-1"]
 CONTROL = [
     *("landing-1", "landing-2", "slalom-2", "hover-3", "hover-4"),
-    *("balance-1", "balance-2", "walk-1", "walk-2"),
+    *("balance-1", "balance-2", "walk-1", "walk-2", "place-2", "line-1"),
 ]
 
 

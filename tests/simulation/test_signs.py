@@ -6,6 +6,7 @@ import pytest
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
+from buildarena_simulation.line import Line
 from buildarena_simulation.render.scene import Scene
 from buildarena_simulation.scenario import Gate, Mark, Scenario
 
@@ -40,3 +41,12 @@ def test_a_mark_is_a_circle_of_its_radius() -> None:
 def test_the_slaloms_gates_are_all_drawn() -> None:
     scenario = builtin_tasks()["mechanisms-2"].scenario.model_copy(update={"duration_s": 0.2})
     assert len(lines(scenario)) == 3 * len(scenario.gates) == 15
+
+
+def test_a_lines_edges_lie_beside_it() -> None:
+    line = Line(radius=11, bends=((0.1, -0.12), (0.04, 0.03)), side=-1, half_width=0.4)
+    edges = np.array(lines(Scenario(duration_s=0.2, line=line))).reshape(-1, 3)
+    assert (edges[:, 2] == 0).all()
+    ways, apart = line.nearest(edges)
+    assert apart == pytest.approx(np.full(len(edges), 0.4), abs=0.03)
+    assert np.ptp(ways) > 0.95 * line.length

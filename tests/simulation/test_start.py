@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from buildarena_simulation import Scenario, simulate
-from buildarena_simulation.engines.base import CargoBox
+from buildarena_simulation import MachineNotSimulable, Scenario, simulate
+from buildarena_simulation.engines.base import CargoBox, rotation_of
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.placement import Start, start_of
 from buildarena_simulation.scenario import Cargo
@@ -67,3 +67,27 @@ def test_a_start_that_contradicts_the_rest_is_refused(beam, scenario, cargo, see
     start = Start(position=np.zeros(3), rotation=np.eye(3), cargo=cargo)
     with pytest.raises(ValueError, match=message):
         simulate(beam, scenario, "mujoco", start=start, seed=seed)
+
+
+@pytest.mark.parametrize("heading", [30.0, -90.0])
+def test_a_cargo_starts_turned_from_north_towards_east(beam, engine, heading) -> None:
+    cargo = LOADED.cargo.model_copy(update={"at": (8.0, 0.0, 0.0), "heading_deg": heading})
+    scenario = LOADED.model_copy(update={"cargo": cargo})
+    trajectory = simulate(beam, scenario, engine)
+    north = rotation_of(trajectory.cargo_quaternion.astype(float))[:, :, 1]
+    expected = [np.sin(np.radians(heading)), np.cos(np.radians(heading)), 0.0]
+    assert np.allclose(north[0], expected, atol=1e-3)
+    assert np.allclose(north[-1], expected, atol=1e-2)
+
+
+def test_a_cargo_that_is_turned_is_in_the_way_where_it_is_turned_to(beam) -> None:
+    """A long box beside the machine, which it reaches once it lies across."""
+    long = Cargo(size=(1, 8, 1), final_mass=1.0, ramp_s=1.0, at=(3, 0, 0))
+    for heading, clear in ((0.0, True), (90.0, False)):
+        cargo = long.model_copy(update={"heading_deg": heading})
+        scenario = Scenario(duration_s=0.2, cargo=cargo, clear_start=True)
+        if clear:
+            simulate(beam, scenario, "mujoco")
+        else:
+            with pytest.raises(MachineNotSimulable, match="overlaps the cargo"):
+                simulate(beam, scenario, "mujoco")

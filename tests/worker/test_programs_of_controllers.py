@@ -62,7 +62,11 @@ def answered(*answers: str, task: str = TASK):
 @pytest.mark.samples(3)
 @pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
 @pytest.mark.parametrize(
-    "task", ["landing-1", "slalom-2", "hover-3", "hover-4", "balance-2", "landing-2", "walk-2"]
+    "task",
+    [
+        *("landing-1", "slalom-2", "hover-3", "hover-4", "balance-2", "landing-2"),
+        *("walk-2", "place-2", "line-1"),
+    ],
 )
 def test_the_expert_writes_programs_in_every_workflow(play, task, workflow) -> None:
     played = play(task=task, workflow=workflow, seed=3)

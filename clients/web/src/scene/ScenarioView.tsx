@@ -27,7 +27,10 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
       <Stage bounds={bounds} height={320} label={described(scenario)}>
         <Surroundings scenario={scenario} />
         {scenario.cargo !== null && (
-          <mesh position={cargoPlace(scenario.cargo, height)}>
+          <mesh
+            position={cargoPlace(scenario.cargo, height)}
+            rotation={[0, 0, (-(scenario.cargo.heading_deg ?? 0) * Math.PI) / 180]}
+          >
             <boxGeometry args={[...scenario.cargo.size]} />
             <meshLambertMaterial color="#859966" transparent opacity={0.85} />
           </mesh>
@@ -57,10 +60,11 @@ function released({ height = 0, velocity = [0, 0, 0] }: Scenario["placement"]): 
   return `The machine is let go ${height} units up, at ${Math.hypot(...velocity)} units a second.`;
 }
 
-function signs({ gates = [], marks = [] }: Scenario): string {
+function signs({ gates = [], marks = [], line = null }: Scenario): string {
   const shown = [
     ...(gates.length > 0 ? [counted(gates.length, "gate")] : []),
     ...(marks.length > 0 ? [counted(marks.length, "mark")] : []),
+    ...(line === null ? [] : ["a line"]),
   ];
   return shown.length === 0 ? "" : `There are ${shown.join(" and ")}, which nothing can touch. `;
 }

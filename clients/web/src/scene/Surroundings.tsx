@@ -2,15 +2,16 @@ import { useFrame } from "@react-three/fiber";
 import { useMemo, useRef } from "react";
 import { DoubleSide, type Group } from "three";
 import type { Vector } from "./modules";
-import { markAt, posts, type Gate, type Mark } from "./signs";
+import { lineStrip, markAt, posts, type Gate, type GroundLine, type Mark } from "./signs";
 
 export interface Scenario {
   duration_s: number;
   terrain: { center: Vector; size: Vector; slope_deg?: number }[];
-  cargo: { size: Vector; drop_height: number; final_mass: number; at?: Vector | null } | null;
+  cargo: { size: Vector; drop_height: number; final_mass: number; at?: Vector | null; heading_deg?: number } | null;
   placement: { kind: string; gap?: number; lowest_center?: number; height?: number; velocity?: Vector };
   gates?: Gate[];
   marks?: Mark[];
+  line?: GroundLine | null;
 }
 
 const GROUND = 160;
@@ -37,10 +38,33 @@ function Ground({ height }: { height: number }) {
 const POST = 2;
 const FLAT = 0.03;
 
-/** What is shown and nothing can touch: gates to be crossed, and places. */
+/** A line on the ground, as a flat strip. */
+function Strip({ line }: { line: GroundLine }) {
+  const [corners, faces] = useMemo(() => {
+    const strip = lineStrip(line);
+    const next = (k: number, by: number) => (k + by) % strip.length;
+    const pairs = Array.from({ length: strip.length / 2 }, (_, k) => 2 * k);
+    return [
+      new Float32Array(strip.flat()),
+      new Uint16Array(pairs.flatMap((k) => [k, next(k, 2), next(k, 1), next(k, 1), next(k, 2), next(k, 3)])),
+    ];
+  }, [line]);
+  return (
+    <mesh position={[0, 0, FLAT / 2]}>
+      <bufferGeometry>
+        <bufferAttribute attach="attributes-position" args={[corners, 3]} />
+        <bufferAttribute attach="index" args={[faces, 1]} />
+      </bufferGeometry>
+      <meshBasicMaterial color="#1c1917" side={DoubleSide} />
+    </mesh>
+  );
+}
+
+/** What is shown and nothing can touch: gates to be crossed, places, and a line. */
 function Signs({ scenario, time }: { scenario: Scenario; time: number }) {
   return (
     <>
+      {scenario.line != null && <Strip line={scenario.line} />}
       {(scenario.gates ?? []).flatMap((gate) =>
         posts(gate).map(([x, y], side) => (
           <mesh key={`${gate.name} ${side}`} position={[x, y, POST / 2]} rotation={[Math.PI / 2, 0, 0]}>
@@ -69,7 +93,7 @@ interface SurroundingsProps {
   time?: number;
 }
 
-/** The ground, the fixed boxes, the gates and the marks of a scenario. */
+/** The ground, the fixed boxes, the gates, the marks and the line of a scenario. */
 export function Surroundings({ scenario, floor = 0, time = 0 }: SurroundingsProps) {
   const terrain = useMemo(() => scenario?.terrain ?? [], [scenario]);
   return (

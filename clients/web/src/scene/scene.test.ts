@@ -4,7 +4,7 @@ import { boundsOf, machineOf, readScene, type MachineScene } from "./machine";
 import { jointsOf, loadsAt, loadsOfBlocks, mostLoaded } from "./loads";
 import { moduleShape } from "./modules";
 import { poseAt } from "./playing";
-import { markAt, posts } from "./signs";
+import { linePoints, lineStrip, markAt, posts } from "./signs";
 import { instantAt, type Trial } from "./trial";
 
 const CYCLE: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
@@ -179,5 +179,27 @@ describe("marks", () => {
     markAt({ ...mark, drift }, 2).forEach((value, axis) => {
       expect(value).toBeCloseTo([1 + 4 * Math.sin(Math.PI / 4), 0, 3][axis] ?? 0, 12);
     });
+  });
+});
+
+describe("a line on the ground", () => {
+  const line = { radius: 10, bends: [[0.1, -0.12] as const, [0.04, 0.03] as const], half_width: 0.5 };
+
+  it("begins at the origin towards the north, and bends to the left or, mirrored, to the right", () => {
+    const [first, second] = linePoints(line, 2000);
+    expect(first).toEqual([0, 0]);
+    expect(second?.[1]).toBeGreaterThan(0);
+    expect(Math.abs((second?.[0] ?? 1) / (second?.[1] ?? 1))).toBeLessThan(0.01);
+    const half = linePoints(line, 2)[1];
+    expect(half?.[0]).toBeLessThan(-15);
+    expect(linePoints({ ...line, side: -1 }, 2)[1]?.[0]).toBeCloseTo(-(half?.[0] ?? 0));
+  });
+
+  it("is a strip of its width", () => {
+    const strip = lineStrip(line);
+    for (let k = 0; k < strip.length; k += 2) {
+      const [right, left] = [strip[k] ?? [0, 0, 0], strip[k + 1] ?? [0, 0, 0]];
+      expect(Math.hypot(right[0] - left[0], right[1] - left[1])).toBeCloseTo(1);
+    }
   });
 });

@@ -34,3 +34,40 @@ export function posts({ center, half_width, heading_deg = 0 }: Gate): [Vector, V
   ];
   return [at(-1), at(1)];
 }
+
+/** A closed line on the ground, which begins at the origin towards the north: a circle with waves. */
+export interface GroundLine {
+  radius: number;
+  bends?: readonly (readonly [number, number])[];
+  side?: number;
+  half_width?: number;
+}
+
+/** Points along a line, the first at the origin, at even angles about its centre. */
+export function linePoints({ radius, bends = [], side = 1 }: GroundLine, count = 240): [number, number][] {
+  const away = (angle: number): number =>
+    radius * bends.reduce((sum, [c, s], k) => sum + c * Math.cos((k + 2) * angle) + s * Math.sin((k + 2) * angle), 1);
+  const slope = radius * bends.reduce((sum, [, s], k) => sum + (k + 2) * s, 0);
+  const turn = Math.PI / 2 - Math.atan2(away(0), slope);
+  return Array.from({ length: count }, (_, step) => {
+    const angle = (2 * Math.PI * step) / count;
+    const [x, y] = [away(angle) * Math.cos(angle) - away(0), away(angle) * Math.sin(angle)];
+    const east = x * Math.cos(turn) - y * Math.sin(turn);
+    return [side < 0 ? -east : east, x * Math.sin(turn) + y * Math.cos(turn)];
+  });
+}
+
+/** Both edges of a line, as corners of a strip: of each point the right one, then the left one. */
+export function lineStrip(line: GroundLine): Vector[] {
+  const points = linePoints(line);
+  const at = (k: number) => points[(k + points.length) % points.length] ?? [0, 0];
+  return points.flatMap(([x, y], k) => {
+    const [ahead, behind] = [at(k + 1), at(k - 1)];
+    const [dx, dy] = [ahead[0] - behind[0], ahead[1] - behind[1]];
+    const half = (line.half_width ?? 0.5) / Math.hypot(dx, dy);
+    return [
+      [x + dy * half, y - dx * half, 0],
+      [x - dy * half, y + dx * half, 0],
+    ] as Vector[];
+  });
+}

@@ -344,26 +344,21 @@ def _require_sayable(scenario: Scenario) -> None:
     Raises:
         MachineNotPlayableError: The scenario is another; the message says what it asks for.
     """
-    if isinstance(scenario.placement, ReleasedPlacement):
-        raise MachineNotPlayableError("the game lets no machine go in the air: use another engine")
-    if scenario.cargo is not None and scenario.cargo.at is not None:
-        raise MachineNotPlayableError("the game's cargo falls onto the machine: use another engine")
-    if scenario.gusts is not None:
-        raise MachineNotPlayableError("the game has no gusts: use another engine")
-    if scenario.fuel_s is not None:
-        raise MachineNotPlayableError(
-            "the game's fans and cannons burn no fuel: use another engine"
-        )
-    if scenario.pushes:
-        raise MachineNotPlayableError("the game pushes nothing: use another engine")
-    if isinstance(scenario.placement, GroundPlacement):
-        if scenario.placement.tilt_deg:
-            raise MachineNotPlayableError(
-                "the game's machines do not lean at the start: use another"
-            )
-        if scenario.placement.heading_deg:
-            raise MachineNotPlayableError(
-                "the game's machines face north at the start: use another engine"
-            )
-    if scenario.gravity != GRAVITY or scenario.drive_strength != 1:
-        raise MachineNotPlayableError("the game has one gravity and drives of one strength")
+    cargo, place = scenario.cargo, scenario.placement
+    on_ground = place if isinstance(place, GroundPlacement) else GroundPlacement(kind="ground")
+    usual = scenario.gravity == GRAVITY and scenario.drive_strength == 1
+    asked: dict[str, object] = {
+        "the game lets no machine go in the air": isinstance(place, ReleasedPlacement),
+        "the game's cargo falls onto the machine": cargo is not None and cargo.at is not None,
+        "the game's cargo is not turned": cargo is not None and cargo.heading_deg,
+        "the game has no gusts": scenario.gusts,
+        "the game pushes nothing": scenario.pushes,
+        "the game's fans and cannons burn no fuel": scenario.fuel_s is not None,
+        "the game has no line on the ground": scenario.line,
+        "the game's machines do not lean at the start": on_ground.tilt_deg,
+        "the game's machines face north at the start": on_ground.heading_deg,
+        "the game has one gravity and drives of one strength": not usual,
+    }
+    for refusal, is_asked in asked.items():
+        if is_asked:
+            raise MachineNotPlayableError(f"{refusal}: use another engine")

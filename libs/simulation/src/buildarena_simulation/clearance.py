@@ -54,7 +54,7 @@ def _obstacles(scenario: Scenario, start: Start) -> Iterator[tuple[str, Shape]]:
             Shape(
                 kind=ShapeKind.BOX,
                 center=start.cargo.position,
-                rotation=np.eye(3),
+                rotation=start.cargo.rotation,
                 half_extents=start.cargo.size / 2,
             ),
         )

@@ -24,6 +24,7 @@ ROOTS: Final = (
     "placement",
     "gates",
     "marks",
+    "line",
     "gusts",
     "pushes",
     "fuel_s",

@@ -82,6 +82,8 @@ def start_digest(start: Start) -> str:
     arrays = [start.position, start.rotation]
     if start.cargo is not None:
         arrays += [start.cargo.size, start.cargo.position]
+        if not np.array_equal(start.cargo.rotation, np.eye(3)):
+            arrays.append(start.cargo.rotation)
     if start.velocity.any():
         arrays.append(start.velocity)
     values = np.concatenate([np.asarray(array, np.float64).ravel() for array in arrays])
@@ -153,4 +155,5 @@ def _cargo_at_start(
         size=np.array(cargo.size),
         position=middle + shift,
         mass=cargo.mass_at(0.0),
+        rotation=turn_about(np.array([0.0, 0.0, 1.0]), -math.radians(cargo.heading_deg)),
     )

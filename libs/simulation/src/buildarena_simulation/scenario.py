@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.draws import Draws, at_end, drawn
+from buildarena_simulation.line import Line
 
 MAX_DURATION_S: Final = 600.0
 
@@ -26,6 +27,7 @@ Speed = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
 Swing = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
 Period = Annotated[float, Field(ge=1, le=600)]
 PushSpeed = Annotated[float, Field(allow_inf_nan=False, ge=-20, le=20)]
+Heading = Annotated[float, Field(ge=-180, le=180, exclude_if=lambda value: value == 0)]
 Label = Annotated[str, Field(pattern=r"^[\w -]+$", min_length=1, max_length=40)]
 Gravity = Annotated[float, Field(ge=5, le=100)]
 Strength = Annotated[float, Field(ge=0.1, le=10)]
@@ -69,6 +71,7 @@ class Cargo(_Document):
         ramp_s: How long the ramp lasts, seconds.
         at: (3,) the middle of its underside at the start, world frame, units; None above the
             machine, over (0, 0).
+        heading_deg: By how much it is turned about the vertical, from north towards east, degrees.
     """
 
     size: tuple[CargoExtent, CargoExtent, CargoExtent]
@@ -81,6 +84,7 @@ class Cargo(_Document):
         tuple[Coordinate, Coordinate, Annotated[float, Field(ge=0, le=1000)]] | None,
         Field(exclude_if=_is_default),
     ] = None
+    heading_deg: Heading = 0.0
 
     def mass_at(self, time_s: float) -> float:
         """Mass of the cargo at a time, mass units.
@@ -218,8 +222,9 @@ SenseKind = Literal[
     "gates",
     "gate",
     "fuel",
+    "line",
 ]
-_UNUSUAL: Final = ("axes", "contacts", "gate", "fuel")
+_UNUSUAL: Final = ("axes", "contacts", "gate", "fuel", "line")
 _OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind not in _UNUSUAL)
 NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
 
@@ -277,6 +282,7 @@ class Scenario(_Document):
         tracked_blocks: Ids of the blocks whose poses are recorded, or "all".
         gates: Lines to be crossed, in order.
         marks: Places.
+        line: A line on the ground; None where there is none.
         clear_start: Whether a machine that overlaps terrain or cargo at the start is refused.
         gravity: Downward acceleration, units/s². The unit of forces stays what holds up one mass
             unit at the usual gravity: joints and drives are as strong as ever.
@@ -302,6 +308,7 @@ class Scenario(_Document):
     ) = "all"
     gates: Annotated[tuple[Gate, ...], Field(max_length=64, exclude_if=_is_default)] = ()
     marks: Annotated[tuple[Mark, ...], Field(max_length=64, exclude_if=_is_default)] = ()
+    line: Annotated[Line | None, Field(exclude_if=_is_default)] = None
     clear_start: Annotated[bool, Field(exclude_if=_is_default)] = False
     gravity: Annotated[Gravity, Field(exclude_if=lambda value: value == GRAVITY)] = GRAVITY
     drive_strength: Annotated[Strength, Field(exclude_if=lambda value: value == 1)] = 1.0

@@ -1,4 +1,4 @@
-"""Pick and place: how near to a mark a cargo is put down, beyond a wall."""
+"""Pick and place: how near to a mark a cargo is put down, perhaps beyond a wall."""
 
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -70,6 +70,8 @@ class PlaceScoring(Document):
         max_loose: Farthest that the cargo may move, in all, while the machine does not bear it,
             units.
         nearest: Nearer to the mark counts no more, units.
+        must_rest: Whether the indicator counts only for a cargo that is at rest at the end, and
+            that the machine has let go.
     """
 
     name: Literal["place"]
@@ -84,6 +86,7 @@ class PlaceScoring(Document):
     nearest: Annotated[float, Field(gt=0, le=1, exclude_if=lambda value: value == _NEAREST)] = (
         _NEAREST
     )
+    must_rest: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
 
 
 def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
@@ -106,9 +109,9 @@ def judge(
 ) -> Verdict:
     """The indicator is one over the distance from the mark at which the cargo comes to rest.
 
-    It counts for a cargo that the machine carried over the wall: whose underside was high enough
-    halfway, and that moved little while the machine did not bear it. A cargo that was thrown,
-    kicked, pushed along the ground or taken round the wall scores 0.
+    It counts for a cargo that the machine carried over what is between: whose underside was high
+    enough halfway, and that moved little while the machine did not bear it. A cargo that was
+    thrown, kicked, pushed along the ground or taken round a wall scores 0.
 
     Args:
         scoring: Thresholds, and the mark.
@@ -134,10 +137,11 @@ def judge(
     carried = loose <= scoring.max_loose and _passes_over(scoring, trajectory, path, mark[:2])
     stays = base_shift < scoring.max_base_shift
     whole = bool(joined.all())
+    rests = _rests(scoring, trajectory, path)
     lies = (
         apart <= scoring.max_distance
         and float(np.linalg.norm(path[-1, :2] - path[0, :2])) >= scoring.min_carry
-        and _rests(scoring, trajectory, path)
+        and rests
     )
     flags = {
         NOT_CARRIED: lies and not carried,
@@ -155,7 +159,9 @@ def judge(
     counts = carried and stays and whole
     return Verdict(
         success=lies and counts,
-        indicator=rounded(1.0 / max(apart, scoring.nearest)) if counts else 0.0,
+        indicator=rounded(1.0 / max(apart, scoring.nearest))
+        if counts and (rests or not scoring.must_rest)
+        else 0.0,
         metrics=metrics,
         flags=raised(flags),
         deciding=Deciding(samples=len(path), members=joined, cargo=True),

@@ -10,6 +10,7 @@ from buildarena_benchmark.scorers.measures.components import Mask, center_of, jo
 from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scorers.measures.series import Series
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
+from buildarena_benchmark.scorers.measures.vehicles import has_wheels, wheels_of
 from buildarena_benchmark.scorers.scorer import (
     FORCES_NOT_MEASURED,
     NOT_DRIVEN,
@@ -69,8 +70,8 @@ def judge(
     if lacking is not None:
         return lacking
     joined = joined_to_start(machine, trajectory)
-    wheels = _wheels(machine, trajectory)
-    whole = _has_wheels(joined, wheels)
+    wheels = wheels_of(machine, trajectory)
+    whole = has_wheels(joined, wheels)
     paths = [center_of(machine, trajectory, joined)]
     if len(wheels):
         paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
@@ -145,20 +146,6 @@ def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Se
         return np.zeros(len(path), dtype=bool)
     moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
     return np.asarray(moved <= np.minimum(driven, moved_upright(trajectory, joined, path)))
-
-
-def _wheels(machine: "Machine", trajectory: "Trajectory") -> list[int]:
-    """The tracked blocks that are wheels."""
-    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
-    wheels = set(trajectory.bearing.wheel_ids)
-    wheels |= {block.id for block in machine.blocks.values() if block.module.motor}
-    return [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
-
-
-def _has_wheels(joined: Mask, wheels: Sequence[int]) -> Mask:
-    """Until when every wheel is joined to the starting block, (T,); never without wheels."""
-    whole = joined[:, wheels].all(axis=1) if len(wheels) else np.zeros(len(joined), dtype=bool)
-    return np.asarray(np.logical_and.accumulate(whole))
 
 
 SCORER: Final = Scorer(

@@ -32,6 +32,8 @@ _CONTROL: Final = (
     "balance-2",
     "walk-1",
     "walk-2",
+    "place-2",
+    "line-1",
 )
 
 

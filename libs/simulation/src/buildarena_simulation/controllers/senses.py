@@ -1,4 +1,4 @@
-"""What a controller is told at a tick: poses, joints, wheels, cargo, places."""
+"""What a controller is told at a tick: poses, joints, wheels, cargo, places, a line."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -12,6 +12,7 @@ from buildarena_geometry.modules.joints import MOVING_JOINTS
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.errors import ControllerFailed
+from buildarena_simulation.line import SENSORS
 from buildarena_simulation.scenario import Gate, Mark, Scenario, SenseKind, Senses
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
@@ -121,6 +122,7 @@ class Sensing:
             "gates": partial(self._places_layout, self._scenario.gates),
             "gate": self._place,
             "fuel": self._number,
+            "line": lambda: {sensor: self._number() for sensor in SENSORS},
         }
         # The starting block's own pose has no name of its own: `sense.position`.
         own = {"pose": self._pose, "axes": self._axes}
@@ -133,6 +135,7 @@ class Sensing:
         about: dict[str, object] = {"cargo": self._scenario.cargo}
         about |= {"marks": self._scenario.marks, "gates": self._scenario.gates}
         about["gate"] = self._scenario.gates
+        about["line"] = self._scenario.line
         about["fuel"] = self._scenario.fuel_s is not None
         about["axes"] = "pose" not in self._senses.offers  # which has them
         return kind in self._senses.offers and bool(about.get(kind, True))
@@ -206,9 +209,21 @@ class Sensing:
             "gates": lambda: _places(((*g.center, 0.0) for g in self._scenario.gates), own),
             "gate": lambda: _places([next_gate(self._scenario.gates, own[1])], own),
             "fuel": lambda: (seen.fuel_s,),
+            "line": lambda: self._line_values(seen),
         }
         for kind in self.offers:
             yield from values[kind]()
+
+    def _line_values(self, seen: Seen) -> Iterator[float]:
+        """Whether the line is below each ground sensor, from left to right."""
+        line = self._scenario.line
+        if line is None:
+            return
+        motion, c = seen.motion, seen.clusters.cluster_of[0]
+        aside = line.apart * np.arange(-1, len(SENSORS) - 1)
+        seats = np.column_stack([aside, np.full(len(SENSORS), line.ahead), np.zeros(len(SENSORS))])
+        points = motion.position[c] + (self._structure.shown[0] + seats) @ motion.rotation[c].T
+        yield from (line.nearest(points)[1] <= line.half_width).astype(float).tolist()
 
     def _joint_values(self, seen: Seen) -> Iterator[float]:
         for index in self.moving:

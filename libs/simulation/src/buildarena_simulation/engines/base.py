@@ -5,7 +5,7 @@ breaking, control, heating and recording are shared and independent of the engin
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -28,11 +28,13 @@ class CargoBox:
         size: (3,) full extents, units.
         position: (3,) its centre, world frame, units.
         mass: Mass units.
+        rotation: (3, 3) world_from_cargo.
     """
 
     size: FloatArray
     position: FloatArray
     mass: float
+    rotation: FloatArray = field(default_factory=lambda: np.eye(3))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

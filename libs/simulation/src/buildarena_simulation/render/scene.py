@@ -42,6 +42,7 @@ _SIGN: Final[Color] = (194, 65, 12)
 _POST: Final = 2.0
 """Height of a gate's posts, units."""
 _ROUND_SIDES: Final = 16
+_LINE_SIDES: Final = 120
 _FIRST_SIDE: Final = 2
 """Where a cylinder's sides begin among its faces."""
 _SPOKE: Final[Color] = (200, 200, 200)
@@ -83,7 +84,7 @@ class Scene:
             for shape in map(shape_of, scenario.terrain)
             for face in _faces(shape, shape.center, np.eye(3), _TERRAIN)
         ]
-        self._gates, self._marks = [*_gates(scenario)], scenario.marks
+        self._signs, self._marks = [*_gates(scenario), *_edges(scenario)], scenario.marks
         self._braces = []
         for connector in machine.connectors.values():
             ends = [
@@ -126,7 +127,7 @@ class Scene:
         """The picture of one sample."""
         trajectory, picture = self._trajectory, Picture()
         picture.faces.extend(self._terrain)
-        picture.lines.extend([*self._gates, *_marks(self._marks, float(trajectory.time_s[sample]))])
+        picture.lines.extend([*self._signs, *_marks(self._marks, float(trajectory.time_s[sample]))])
         positions = trajectory.positions[sample].astype(np.float64)
         turns = rotation_of(trajectory.quaternions[sample].astype(np.float64))
         for part, k in self._parts:
@@ -170,6 +171,21 @@ def _gates(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
         up = np.array([0.0, 0.0, _POST])
         yield from ((np.array(ends), _SIGN) for ends in ((west, west + up), (east, east + up)))
         yield np.array([west, east]), _SIGN
+
+
+def _edges(scenario: "Scenario") -> Iterator[tuple[FloatArray, Color]]:
+    """Both edges of the line on the ground."""
+    if scenario.line is None:
+        return
+    middle = scenario.line.points(_LINE_SIDES)
+    ahead = np.roll(middle, -1, axis=0) - np.roll(middle, 1, axis=0)
+    aside = np.column_stack([ahead[:, 1], -ahead[:, 0]])
+    aside *= scenario.line.half_width / np.linalg.norm(ahead, axis=1)[:, None]
+    for edge in (middle + aside, middle - aside):
+        rim = np.column_stack([edge, np.zeros(len(edge))])
+        yield from (
+            (np.array(ends), _SIGN) for ends in zip(rim, np.roll(rim, -1, axis=0), strict=True)
+        )
 
 
 def _marks(marks: "Sequence[Mark]", time_s: float) -> Iterator[tuple[FloatArray, Color]]:

@@ -20,7 +20,7 @@ from buildarena_simulation.engines.mujoco.joints import (
     enter_joint,
 )
 from buildarena_simulation.engines.mujoco.model import MjcfSettings, MjcfState, mjcf_of
-from buildarena_simulation.engines.mujoco.tendons import Tendons, weld_wrenches
+from buildarena_simulation.engines.mujoco.tendons import Tendons, hold_as_they_are, weld_wrenches
 from buildarena_simulation.engines.mujoco.wheels import wheel_contacts
 from buildarena_simulation.engines.shared.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
@@ -144,6 +144,7 @@ class MujocoEngine:
             self._scale_cargo_by_mass()
         self._set_drag(moments)
         self._set_velocities(motion)
+        hold_as_they_are(self._model, self._data, self._holds)
         mujoco.mj_forward(self._model, self._data)
         wheels = len(self._structure.wheels)
         self._wheels = wheel_contacts(self._model, self._data, wheels, _FRICTION_S)

@@ -170,7 +170,8 @@ def _cargo(world: World, mass: float) -> Iterator[str]:
         return
     a, b, c = cargo.size
     moments = mass / 12 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
-    yield opened("body", name="cargo", pos=cargo.position)
+    turn = quaternion_of(cargo.rotation)
+    yield opened("body", name="cargo", pos=cargo.position, quat=turn)
     yield tag("inertial", pos=(0.0, 0.0, 0.0), mass=mass, diaginertia=moments)
     yield "<freejoint/>"
     yield tag(
@@ -308,7 +309,7 @@ def _cannons(structure: Structure, state: MjcfState) -> Iterator[str]:
 
 
 def _welds(state: MjcfState) -> Iterator[str]:
-    """What blocks hold; named "grip G". A weld keeps its bodies as they are compiled."""
+    """What blocks hold; named "grip G". How its bodies are kept is told once they are in place."""
     if not state.holds:
         return
     yield "<equality>"

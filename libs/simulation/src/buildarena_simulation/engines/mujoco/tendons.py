@@ -78,3 +78,22 @@ def weld_wrenches(
             turn = data.xmat[model.eq_obj2id[weld]].reshape(3, 3)
             wrenches[row] = -np.concatenate([force[:3], turn @ force[3:] / 2])
     return wrenches
+
+
+def hold_as_they_are(model: "mujoco.MjModel", data: "mujoco.MjData", holds: Sequence[Hold]) -> None:
+    """Lets welds keep their bodies as they are in a state, not as they were compiled.
+
+    A body on a joint is compiled as it was built, and the cargo where it started.
+    """
+    if not holds:
+        return
+    mujoco.mj_kinematics(model, data)
+    for hold in holds:
+        weld = model.equality(f"grip {hold.grip}").id
+        held, own = int(model.eq_obj1id[weld]), int(model.eq_obj2id[weld])
+        point = data.xpos[own] + data.xmat[own].reshape(3, 3) @ model.eq_data[weld, :3]
+        back, turn = np.zeros(4), np.zeros(4)
+        mujoco.mju_negQuat(back, data.xquat[held])
+        mujoco.mju_mulQuat(turn, back, data.xquat[own])
+        model.eq_data[weld, 3:6] = data.xmat[held].reshape(3, 3).T @ (point - data.xpos[held])
+        model.eq_data[weld, 6:10] = turn

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from buildarena_simulation.constants import FRICTION_TERRAIN, MAX_SPIN
-from buildarena_simulation.engines.base import CargoPose, World
+from buildarena_simulation.engines.base import CargoPose, World, quaternion_of
 from buildarena_simulation.engines.pybullet.hinges import HingedComponent
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
@@ -146,7 +146,8 @@ def start_world(
     cargo = world.cargo
     if cargo is None:
         return surfaces, None
-    return surfaces, add_box(client, cargo.size / 2, cargo.position, mass=cargo.mass)
+    turn = quaternion_of(cargo.rotation)[[1, 2, 3, 0]].tolist()
+    return surfaces, add_box(client, cargo.size / 2, cargo.position, mass=cargo.mass, turn=turn)
 
 
 def friction_of(structure: Structure, blocks: IntArray) -> float:

@@ -57,6 +57,8 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "balance-2": piloted.balancer,
     "walk-1": walkers.walker,
     "walk-2": walkers.corner_walker,
+    "place-2": piloted.placer,
+    "line-1": piloted.line_follower,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

@@ -9,12 +9,13 @@ from collections.abc import Mapping
 from typing import Final
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_worker.builtin.designs.programs import listed, program_text, quoted
 
 _LENGTH, _TRACK = 3, 2
 _ARM: Final = 2
 _MAST: Final = 3
+_FOOT, _TOES, _POST, _REACH = 5, 4, 4, 4
 _GRAVITY: Final = 32.81
 _FAN_PUSH: Final = 3.25
 """What a fan pushes, in masses that it would hold up."""
@@ -23,28 +24,18 @@ _WOOD_MASS, _FAN_MASS = 0.3, 0.5
 
 def gate_finder(seed: int) -> Design:
     """A short, wide car that turns by driving its sides apart, towards the next gate."""
-    draft = Draft(modules="workshop")
-    middle = draft.start("middle of the spine")
-    front = draft.row(middle, NORTH, _LENGTH // 2)[-1]
-    back = draft.row(middle, SOUTH, _LENGTH // 2)[-1]
-    sides: dict[str, list[str]] = {"left": [], "right": []}
-    for base in (front, back):
-        for way, name in ((EAST, "right"), (WEST, "left")):
-            sides[name].append(draft.wheel(draft.row(base, way, _TRACK)[-1], way))
-    return Design(
-        overall="A car on four powered wheels that steers by driving its sides apart.",
-        parts={
-            "car": PartDesign(
-                description="A spine of 3 blocks, two cross members with two wheels each",
-                actions=tuple(draft.actions),
-            )
-        },
-        program=program_text(
-            "gates",
-            left=listed(sides["left"]),
-            right=listed(sides["right"]),
-            keen=f"{1.0 + 0.02 * (seed % 5):g}",
-        ),
+    return _car("gates", keen=f"{1.0 + 0.02 * (seed % 5):g}")
+
+
+def line_follower(seed: int) -> Design:
+    """The same car; three ground sensors before it see the line."""
+    return _car(
+        "line",
+        leads=True,
+        speed=f"{0.7 + 0.01 * (seed % 5):g}",
+        keen="0.4",
+        near="0.4",
+        learns="0.04",
     )
 
 
@@ -82,6 +73,70 @@ def balancer(seed: int) -> Design:
             )
         },
         program=program_text("balance", **quoted(sides), keen=f"{0.44 + 0.01 * (seed % 5):g}"),
+    )
+
+
+def placer(seed: int) -> Design:
+    """An arm with shoulder and elbow above a wide foot, whose gripper two pistons lower."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("under the post")
+    for way in (NORTH, SOUTH):
+        end = draft.row(middle, way, _FOOT)[-1]
+        for side in (EAST, WEST):
+            draft.row(end, side, _TOES)
+    shoulder = draft.attach(draft.row(middle, UP, _POST)[-1], UP, "Steering Block")
+    elbow = draft.attach(draft.row(shoulder, NORTH, _REACH)[-1], UP, "Steering Block")
+    upper = draft.attach(draft.row(elbow, NORTH, _REACH)[-1], DOWN, "Piston")
+    lower = draft.attach(upper, DOWN, "Piston")
+    gripper = draft.attach(lower, DOWN, "Grabber")
+    named = {"shoulder": shoulder, "elbow": elbow, "upper": upper, "lower": lower}
+    return Design(
+        overall="An arm with shoulder and elbow, above a foot; two pistons lower its gripper.",
+        parts={
+            "arm": PartDesign(
+                description=f"A foot like an H, a post of {_POST}, two arms of {_REACH}, a gripper",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            "placing",
+            **quoted(named | {"gripper": gripper}),
+            arm=f"{_REACH}",
+            forearm=f"{_REACH}",
+            looks=f"{1 + 0.04 * (seed % 5):g}",
+            down="1.37",
+            keen="4",
+        ),
+    )
+
+
+def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
+    """A car of two sides, and the program that drives it.
+
+    Args:
+        program: Name of the program.
+        leads: Whether the starting block is in front, and not in the middle.
+        figures: What its places are filled with.
+    """
+    draft = Draft(modules="workshop")
+    start = draft.start("front of the spine" if leads else "middle of the spine")
+    front = start if leads else draft.row(start, NORTH, _LENGTH // 2)[-1]
+    back = draft.row(start, SOUTH, _LENGTH - 1 if leads else _LENGTH // 2)[-1]
+    sides: dict[str, list[str]] = {"left": [], "right": []}
+    for base in (front, back):
+        for way, name in ((EAST, "right"), (WEST, "left")):
+            sides[name].append(draft.wheel(draft.row(base, way, _TRACK)[-1], way))
+    return Design(
+        overall="A car on four powered wheels that steers by driving its sides apart.",
+        parts={
+            "car": PartDesign(
+                description="A spine of 3 blocks, two cross members with two wheels each",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            program, left=listed(sides["left"]), right=listed(sides["right"]), **figures
+        ),
     )
 
 

@@ -1,0 +1,122 @@
+"""A closed line on the ground, which a machine may follow and sense from above."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Radius = Annotated[float, Field(ge=1, le=1000)]
+Width = Annotated[float, Field(ge=0.05, le=10)]
+Bend = Annotated[float, Field(allow_inf_nan=False, ge=-0.5, le=0.5)]
+Reach = Annotated[float, Field(allow_inf_nan=False, ge=-20, le=20)]
+Side = Annotated[float, Field(allow_inf_nan=False, ge=-1, le=1)]
+
+SENSORS: Final = ("left", "middle", "right")
+"""The ground sensors, from left to right."""
+_MOST_BENT: Final = 0.5
+_FINE: Final = 20_000
+"""Steps of the angle in which the line is measured."""
+_FIRST_BEND: Final = 2
+"""Waves of the first bend: one wave would only shift the circle."""
+
+
+class Line(BaseModel):
+    """A closed line that begins at (0, 0) towards the north; nothing can touch it.
+
+    It is a circle with waves: at the angle a its distance from its centre is
+    radius x (1 + the sum, over bends k from 2 on, of c cos(k a) + s sin(k a)), and it begins at
+    a = 0, after which it bends to the left.
+
+    Attributes:
+        radius: Of the circle, units.
+        bends: (c, s) of each bend, shares of the radius; the first has two waves, the next three.
+        side: Below 0 the line is mirrored, and bends to the right.
+        half_width: From its middle to either edge, units.
+        ahead: How far before the starting block's centre, along what was north when it was built,
+            the ground sensors are, units.
+        apart: How far the outer ones are to the sides of the middle one, units.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    radius: Radius
+    bends: Annotated[tuple[tuple[Bend, Bend], ...], Field(max_length=6)] = ()
+    side: Side = 1.0
+    half_width: Width = 0.5
+    ahead: Reach = 1.5
+    apart: Reach = 0.6
+
+    @model_validator(mode="after")
+    def _goes_round_once(self) -> Self:
+        bent = sum(abs(share) for bend in self.bends for share in bend)
+        if bent > _MOST_BENT:
+            raise ValueError(f"the bends' shares are {bent:g} in all; the most is {_MOST_BENT:g}")
+        return self
+
+    @property
+    def length(self) -> float:
+        """All the way round, units."""
+        return _measured(self)[2]
+
+    @property
+    def greatest_curvature(self) -> float:
+        """Where it bends most, 1/units."""
+        return _measured(self)[3]
+
+    def points(self, count: int) -> NDArray[np.float64]:
+        """Points at even distances along the line, the first at (0, 0), (count, 2), units."""
+        path, ways, length, _ = _measured(self)
+        at = np.arange(count) * length / count
+        return np.column_stack([np.interp(at, ways, path[:, axis]) for axis in (0, 1)])
+
+    def nearest(self, places: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+        """Where along the line places are, and how far from it.
+
+        Args:
+            places: (T, 2) or (T, 3), world frame, units; heights do not matter.
+
+        Returns:
+            The way along the line to its nearest point, (T,), from 0 on and below the length, and
+            the level distance from there, (T,), units.
+        """
+        path, ways, _, _ = _measured(self)
+        own = np.atleast_2d(places)[:, :2].astype(np.float64)
+        # About the centre the angle tells where to begin: only what is near it can be nearest.
+        nodes = path[:: _FINE // _NODES]
+        coarse = np.linalg.norm(own[:, None] - nodes[None], axis=2).argmin(axis=1)
+        around = np.arange(-_FINE // _NODES, _FINE // _NODES + 1)
+        rows = (coarse[:, None] * (_FINE // _NODES) + around) % _FINE
+        apart = np.linalg.norm(own[:, None] - path[rows], axis=2)
+        best = apart.argmin(axis=1)
+        each = np.arange(len(own))
+        return ways[rows[each, best]], apart[each, best]
+
+
+_NODES: Final = 200
+
+
+@cache
+def _measured(line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
+    """Points of a line, (F, 2), the way to each, (F + 1,) units, its length and curvature."""
+    angle = np.arange(_FINE + 1) * 2 * np.pi / _FINE
+    away, slope, bend = np.ones(_FINE + 1), np.zeros(_FINE + 1), np.zeros(_FINE + 1)
+    for k, (c, s) in enumerate(line.bends, start=_FIRST_BEND):
+        even, odd = np.cos(k * angle), np.sin(k * angle)
+        away += c * even + s * odd
+        slope += k * (s * even - c * odd)
+        bend -= k * k * (c * even + s * odd)
+    curvature = (away**2 + 2 * slope**2 - away * bend) / (away**2 + slope**2) ** 1.5 / line.radius
+    around = line.radius * away[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    # What is the way at the start becomes north.
+    turn = np.pi / 2 - np.arctan2(away[0], slope[0])
+    cosine, sine = np.cos(turn), np.sin(turn)
+    path = (around - around[0]) @ np.array([[cosine, sine], [-sine, cosine]])
+    if line.side < 0:
+        path[:, 0] *= -1
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    ways = np.concatenate([[0.0], np.cumsum(steps)])
+    return path, ways, float(ways[-1]), float(np.abs(curvature).max())
