@@ -230,7 +230,7 @@ def test_each_threshold_ends_a_walk(stricter) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_corner_must_be_walked_to_and_round(engine) -> None:
-    """Who walks north for ever, or east at once, does not pass, and north counts to the corner."""
+    """Who only walks north, or east at once, does not pass, and north counts to the corner."""
     machine = experts_machine(CORNER)
     assert scored(CORNER, machine, engine, None).success
     for aim in ("return 0, 2", "return math.pi / 2, 2"):

@@ -2,8 +2,8 @@
 -- canary 3ab839c7-e533-462b-9729-71495c1ee1f6
 -- Where to walk, from north towards east, and how long a step may be: to the corner, then along a
 -- line to the east. Near the corner steps are short, so as not to go beyond it.
-local SHORT, BEYOND, ALONG = 2.2, 0.1, 5
-local round = false
+local SHORT, BEYOND, ALONG = 2.2, 0.4, 4
+local GENTLE, round = true, false
 
 local function aim(sense)
   local corner = sense.marks.corner.relative
