@@ -54,6 +54,7 @@ def sides(machine: Machine, left: float, right: float) -> Machine:
     )
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     ("left", "right"),
@@ -69,6 +70,7 @@ def test_what_does_not_look_follows_no_line(engine, left, right) -> None:
     assert result.indicator == 0 or not spins
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_who_goes_round_the_other_way_has_followed_nothing(engine) -> None:
     """A car that turns round at the start, and then follows the line with the same care."""
@@ -90,6 +92,7 @@ def test_who_goes_round_the_other_way_has_followed_nothing(engine) -> None:
     assert all(of.metrics["stretches"] <= 1 and not of.success for _, of in backwards)
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_shortcut_gains_nothing(engine) -> None:
     """It leaves the line after a while, crosses the middle, and follows the rest."""
@@ -104,6 +107,7 @@ def test_a_shortcut_gains_nothing(engine) -> None:
     assert short.indicator < whole.indicator
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_back_and_forth_counts_once(engine) -> None:
     """The first part of the line, again and again."""
@@ -114,6 +118,7 @@ def test_back_and_forth_counts_once(engine) -> None:
     assert result.metrics["stretches"] <= 4
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_bar_across_the_ring_that_turns_about_its_middle_follows_nothing(engine) -> None:
     """Wheels at the ends of a long bar run along the line's whole length; its middle stays."""
@@ -133,6 +138,7 @@ def test_a_bar_across_the_ring_that_turns_about_its_middle_follows_nothing(engin
     assert result.metrics["broken_joints"] == 0
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_fans_do_not_follow_a_line(engine) -> None:
     """A car whose wheels only roll, and that a fan pushes."""

@@ -63,6 +63,7 @@ VARIANTS: Final = {
 }
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("how", VARIANTS)
 def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
@@ -70,6 +71,7 @@ def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
     assert (result.success, result.indicator) == (False, 0.0), result
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
     """It is exactly where it shall be, and nothing of that counts until it is let go."""
@@ -81,6 +83,7 @@ def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
     assert score(lax, *varied("never lets go", engine)).indicator > 2
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
     """It may fall by what is allowed, and no farther."""
@@ -92,6 +95,7 @@ def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
     assert not score(strict, machine, falls).success
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("what", ["cargo", "goal"])
 def test_who_remembers_where_things_were_fails_where_they_are_not(what) -> None:
     """It looks at one of the two only; for the other it takes the exact world's place."""
@@ -112,6 +116,7 @@ def _apart(seed: int, what: str) -> float:
     return math.dist(world.marks[0].center, exact.marks[0].center)
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
     """The same arm on a small foot."""
@@ -122,6 +127,7 @@ def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
     assert result.metrics["base_shift"] > 0.5
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_that_come_off_end_it(engine) -> None:
     machine, trial = honest(engine)
@@ -162,6 +168,7 @@ def test_a_machine_in_the_cargos_place_is_refused(engine) -> None:
             simulate(machine, TASK.scenario, engine, seed=seed)
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize(
     "stricter",
     [

@@ -154,6 +154,7 @@ FAR: Final = ("telescope", "mast")
 """The starting blocks of these get far enough all the same."""
 
 
+@pytest.mark.samples(3)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", MACHINES)
 def test_what_does_not_walk_does_not_pass(name, engine) -> None:
@@ -167,6 +168,7 @@ def test_what_does_not_walk_does_not_pass(name, engine) -> None:
     assert ("not_walked" in result.flags) == (name in FAR)
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", ["sled", "trembler", "stepper"])
 def test_who_is_pushed_and_slides_does_not_walk(name, engine) -> None:
@@ -179,6 +181,7 @@ def test_who_is_pushed_and_slides_does_not_walk(name, engine) -> None:
     assert result.indicator < 3, result
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("task", [WALK, CORNER], ids=lambda task: task.name)
 def test_who_does_nothing_or_walks_on_without_looking_does_not_pass(task, engine) -> None:
@@ -189,6 +192,7 @@ def test_who_does_nothing_or_walks_on_without_looking_does_not_pass(task, engine
     assert not scored(task, machine.with_controller(ahead), engine, None).success
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_feet_take_turns_and_the_least_of_all_counts(engine) -> None:
     machine = experts_machine(WALK)
@@ -217,6 +221,7 @@ def test_a_part_that_comes_off_ends_the_walk() -> None:
     assert result.indicator < 8
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     "stricter", [{"max_tilt_deg": 1}, {"max_part_tilt_deg": 1}, {"lane": 0.01}]
 )
@@ -228,6 +233,7 @@ def test_each_threshold_ends_a_walk(stricter) -> None:
     assert (result.success, result.flags) == (False, ("not_walked",))
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_corner_must_be_walked_to_and_round(engine) -> None:
     """Who only walks north, or east at once, does not pass, and north counts to the corner."""

@@ -245,6 +245,20 @@ def test_a_failure_says_what_there_is(body, words) -> None:
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
 
 
+def test_what_touches_is_told_of_the_blocks_that_are_listed(engine) -> None:
+    machine = car(drive=())
+    wheel = next(block.id for block in machine.blocks.values() if block.module.spins)
+    program = (
+        f"sensors = {{ '1', '{wheel}' }} function control(t, sense) if t >= 1 then "
+        f"error(sense.contacts['1'] .. ' ' .. sense.contacts['{wheel}']) end return {{}} end"
+    )
+    senses = Senses(offers=("axes", "contacts"))
+    scenario = Scenario(duration_s=2.0, control=AGENT, senses=senses)
+    with pytest.raises(ControllerFailed) as caught:
+        driven(program, scenario, engine, machine=machine)
+    assert caught.value.reason.endswith(": 0 1")
+
+
 def test_sensors_are_blocks_of_the_machine() -> None:
     with pytest.raises(ControllerFailed, match="sensors names block 'x'; the machine has 1, 2, 3"):
         driven("sensors = { 'x' } function control() end")

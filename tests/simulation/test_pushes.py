@@ -82,6 +82,18 @@ def test_a_machine_starts_tilted_and_touches_the_ground(engine, tilt_deg) -> Non
     assert trial.positions[-1, -1, 2] < 4.6
 
 
+def test_a_machine_starts_turned_about_the_vertical(engine) -> None:
+    draft = KeyedDraft(modules="workshop")
+    draft.row(draft.start(), NORTH, 4)
+    place = {"kind": "ground", "heading_deg": 30}
+    first = simulate(draft.machine, scenario(placement=place), engine).positions[0].astype(float)
+    angle = np.radians(30)
+    assert first[-1] - first[0] == pytest.approx(
+        [4 * np.sin(angle), 4 * np.cos(angle), 0], abs=0.01
+    )
+    assert first[0, :2] == pytest.approx([0, 0], abs=1e-3)
+
+
 def test_a_seed_draws_a_tilt_and_turns_it_little() -> None:
     tilted = scenario(
         placement={"kind": "ground", "tilt_deg": 2}, draws={"placement.tilt_deg": [-3, 3]}
