@@ -54,7 +54,7 @@ class Collected:
     def _boards(self) -> None:
         tasks = sorted({job["task"] for job in self._scope.ended})
         listed = self._client.get("/v1/tasks")
-        categories = sorted({one["category"] for one in listed if one["name"] in tasks})
+        categories = sorted({task["category"] for task in listed if task["name"] in tasks})
         scopes: list[list[str]] = [[name] for name in categories]
         if any(name in PAPER for name in categories):
             scopes.append(list(PAPER))
