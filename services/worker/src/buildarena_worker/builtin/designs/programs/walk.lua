@@ -8,7 +8,7 @@ for _, feet in ipairs({ BODY_FEET, INNER_FEET }) do
   for _, foot in ipairs(feet) do table.insert(sensors, foot) end
 end
 local RATE, MOST, AHEAD, EVEN, CLEAR, FULL, NEAR = 1.5708, 0.66, 0.2, 1, $keen, 0.1, 0.15
-local lowered, yaw, step = false, 0, 0
+local lowered, yaw, step, ticks = false, 0, 0, 0
 
 local function clip(value, most) return math.max(-most, math.min(most, value)) end
 
@@ -50,10 +50,15 @@ function control(t, sense)
 
   local answer = { [HINGE .. ".turn_right"] = clip((yaw - angle) / (0.12 * RATE), 1) }
   for number, block in ipairs(SLIDES) do answer[block .. ".extend"] = number <= step and 1 or 0 end
-  -- Who lands gently draws in the lifts one after the other, so that the legs strike half as fast.
+  -- Who lands gently draws in the lifts one after the other, and holds them in every fourth tick.
+  ticks = ticks + 1
   for number, block in ipairs(LIFTS) do
-    local waits = GENTLE and number == 2 and sense.joints[LIFTS[1]].length > 0.3
-    answer[block .. ".extend"] = (lowered or waits) and 1 or 0
+    local share = lowered and 1 or 0
+    if GENTLE and not lowered then
+      if number == 2 and sense.joints[LIFTS[1]].length > 0.05 then share = 1
+      elseif ticks % 4 == 0 then share = 0.01 end
+    end
+    answer[block .. ".extend"] = share
   end
   return answer
 end
