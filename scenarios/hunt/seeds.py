@@ -60,14 +60,14 @@ def seeds_of(task_name: str) -> list[Genome]:
     whole = builtin_tasks()[task_name].constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
     if kind_of(task_name) == "control":
-        found += map(_experts, filter(lambda name: kind_of(name) == "control", DESIGNS))
+        found += map(expert_genome, filter(lambda name: kind_of(name) == "control", DESIGNS))
     for other, genome in _stored():
         if kind_of(other) == kind_of(task_name) and bool(genome.sub_structures) != whole:
             found.append(genome)
     return found
 
 
-def _experts(task_name: str) -> Genome:
+def expert_genome(task_name: str) -> Genome:
     """The expert's machine, with its program."""
     design = DESIGNS[task_name](0)
     log = next(iter(design.parts.values())).actions

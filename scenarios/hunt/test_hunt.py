@@ -13,7 +13,7 @@ from scenarios.hunt.kinds import kind_of
 from scenarios.hunt.mutation import crossed, mutated
 from scenarios.hunt.programs import IDLE
 from scenarios.hunt.search import Crew, TaskSearch
-from scenarios.hunt.seeds import exploits, seeds_of
+from scenarios.hunt.seeds import expert_genome, exploits, seeds_of
 from scenarios.hunt.suspicion import Evidence, suspicions
 from scenarios.hunt.trial import tried
 
@@ -178,7 +178,7 @@ def test_machines_of_every_scorer_can_be_hunted(task) -> None:
 
 
 def test_checks_name_a_program_that_looks_at_nothing() -> None:
-    expert = seeds_of("balance-1")[-1]
+    expert = expert_genome("balance-1")
     honest = tried("balance-1", expert)
     assert honest is not None
     assert honest.success
@@ -194,9 +194,9 @@ def test_checks_name_a_program_that_looks_at_nothing() -> None:
 
 
 def test_programs_are_changed_and_stay_with_their_machines() -> None:
-    draw, pool = np.random.default_rng(2), seeds_of("hover-3")
-    programs = {mutated(pool[-1], "control", draw).program for _ in range(12)}
+    draw, first, second = np.random.default_rng(2), *map(expert_genome, ("hover-3", "landing-1"))
+    programs = {mutated(first, "control", draw).program for _ in range(12)}
     assert len(programs) > 4
-    child = crossed(pool[-1], pool[-2], draw)
-    assert child.program in {pool[-1].program, pool[-2].program}
+    child = crossed(first, second, draw)
+    assert child.program in {first.program, second.program}
     assert grown(Genome.from_json(child.as_json()))[0].controller == child.program

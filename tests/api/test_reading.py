@@ -21,7 +21,7 @@ def end_job(context, outcome: str) -> None:
 
 
 def test_an_empty_leaderboard_is_an_empty_page(api) -> None:
-    lists = {"tracks": [], "tasks": [], "overall": [], "published": []}
+    lists = {"tracks": [], "tasks": [], "overall": [], "ranked": [], "published": []}
     answer = api.get("/v1/leaderboard").json()
     assert {"does_not_span", "not_driven", "unstable"} <= {f["name"] for f in answer.pop("flags")}
     assert answer == {"track": None, "policy": "ours", "reading": "ours", **lists}
