@@ -10,12 +10,12 @@ from typing import Any, Final
 import numpy as np
 import pytest
 from support.machines.drafts import KeyedDraft
-from support.machines.piloted import experts_machine, scored
+from support.machines.piloted import FASTER_FIRST, experts_machine, scored
 
 from buildarena_benchmark import Score, TaskError, builtin_tasks, load_task, score
 from buildarena_benchmark.scorers.line import LineScoring
 from buildarena_geometry import Machine
-from buildarena_simulation import ENGINES, Trajectory, simulate
+from buildarena_simulation import Trajectory, simulate
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, WEST
 
 TASK: Final = builtin_tasks()["line-1"]
@@ -55,7 +55,7 @@ def sides(machine: Machine, left: float, right: float) -> Machine:
 
 
 @pytest.mark.samples(2)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize(
     ("left", "right"),
     [(0.6, 0.6), (-0.6, -0.6), (0.5, -0.5), (0, 0), (0.6, 0.45), (0.45, 0.6)],
@@ -71,7 +71,7 @@ def test_what_does_not_look_follows_no_line(engine, left, right) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_goes_round_the_other_way_has_followed_nothing(engine) -> None:
     """A car that turns round at the start, and then follows the line with the same care."""
     turns = "function control(t, sense)\n  if t < $turn then\n    local answer = {}\n"
@@ -93,7 +93,7 @@ def test_who_goes_round_the_other_way_has_followed_nothing(engine) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_shortcut_gains_nothing(engine) -> None:
     """It leaves the line after a while, crosses the middle, and follows the rest."""
     cuts = "function control(t, sense)\n  if t > 3 and t < 6.2 then\n    local answer = {}\n"
@@ -108,7 +108,7 @@ def test_a_shortcut_gains_nothing(engine) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_back_and_forth_counts_once(engine) -> None:
     """The first part of the line, again and again."""
     shuttles = "local speed = SPEED * (t % 6 < 3 and 1 or -1)"
@@ -119,7 +119,7 @@ def test_back_and_forth_counts_once(engine) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_bar_across_the_ring_that_turns_about_its_middle_follows_nothing(engine) -> None:
     """Wheels at the ends of a long bar run along the line's whole length; its middle stays."""
     draft = KeyedDraft(modules="workshop")
@@ -139,7 +139,7 @@ def test_a_bar_across_the_ring_that_turns_about_its_middle_follows_nothing(engin
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_fans_do_not_follow_a_line(engine) -> None:
     """A car whose wheels only roll, and that a fan pushes."""
     draft = KeyedDraft(modules="workshop")

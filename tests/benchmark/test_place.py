@@ -10,11 +10,11 @@ from typing import Any, Final
 
 import pytest
 from support.machines.drafts import KeyedDraft
-from support.machines.piloted import experts_machine, scored
+from support.machines.piloted import FASTER_FIRST, experts_machine, scored
 
 from buildarena_benchmark import TaskError, builtin_tasks, load_task, score
 from buildarena_geometry import Machine
-from buildarena_simulation import ENGINES, MachineNotSimulable, Trajectory, simulate
+from buildarena_simulation import MachineNotSimulable, Trajectory, simulate
 from buildarena_worker.builtin.designs import piloted
 from buildarena_worker.builtin.designs.drafting import NORTH, SOUTH, WEST
 
@@ -64,7 +64,7 @@ VARIANTS: Final = {
 
 
 @pytest.mark.samples(2)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("how", VARIANTS)
 def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
     result = score(TASK, *varied(how, engine))
@@ -72,7 +72,7 @@ def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
     """It is exactly where it shall be, and nothing of that counts until it is let go."""
     result = score(TASK, *varied("never lets go", engine))
@@ -84,7 +84,7 @@ def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
     """It may fall by what is allowed, and no farther."""
     machine = changed(("DOWN - 0.08", "0.1"))
@@ -117,7 +117,7 @@ def _apart(seed: int, what: str) -> float:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
     """The same arm on a small foot."""
     monkeypatch.setattr(piloted, "_FOOT", 2)
@@ -128,7 +128,7 @@ def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_parts_that_come_off_end_it(engine) -> None:
     machine, trial = honest(engine)
     assert score(TASK, machine, trial).success
@@ -154,7 +154,7 @@ def test_there_are_no_wheels_and_no_fans_to_go_there_with() -> None:
     assert "Flying Block" not in modules
 
 
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_machine_in_the_cargos_place_is_refused(engine) -> None:
     """A row that reaches where the cargo stands; the exact one, and one of another world."""
     for seed, north in ((None, 2), (0, round(TASK.scenario.world(0).cargo.at[1]))):

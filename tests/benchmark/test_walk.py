@@ -9,12 +9,12 @@ from typing import Any, Final
 
 import pytest
 from support.machines.drafts import KeyedDraft
-from support.machines.piloted import experts_machine, scored
+from support.machines.piloted import FASTER_FIRST, experts_machine, scored
 
 from buildarena_benchmark import TaskError, builtin_tasks, load_task, score
 from buildarena_benchmark.scorers.measures.walking import links_of, touching, walked
 from buildarena_geometry import Machine
-from buildarena_simulation import ENGINES, simulate
+from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
 
 WALK: Final = builtin_tasks()["walk-1"]
@@ -155,7 +155,7 @@ FAR: Final = ("telescope", "mast")
 
 
 @pytest.mark.samples(3)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("name", MACHINES)
 def test_what_does_not_walk_does_not_pass(name, engine) -> None:
     machine = MACHINES[name]()
@@ -169,7 +169,7 @@ def test_what_does_not_walk_does_not_pass(name, engine) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("name", ["sled", "trembler", "stepper"])
 def test_who_is_pushed_and_slides_does_not_walk(name, engine) -> None:
     """Even where its feet are lifted in turn meanwhile: a link that slides carries nothing."""
@@ -182,7 +182,7 @@ def test_who_is_pushed_and_slides_does_not_walk(name, engine) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("task", [WALK, CORNER], ids=lambda task: task.name)
 def test_who_does_nothing_or_walks_on_without_looking_does_not_pass(task, engine) -> None:
     machine = experts_machine(task)
@@ -193,7 +193,7 @@ def test_who_does_nothing_or_walks_on_without_looking_does_not_pass(task, engine
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_feet_take_turns_and_the_least_of_all_counts(engine) -> None:
     machine = experts_machine(WALK)
     trial = simulate(machine, EASY.scenario, engine)
@@ -234,7 +234,7 @@ def test_each_threshold_ends_a_walk(stricter) -> None:
 
 
 @pytest.mark.samples(1)
-@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_corner_must_be_walked_to_and_round(engine) -> None:
     """Who only walks north, or east at once, does not pass, and north counts to the corner."""
     machine = experts_machine(CORNER)

@@ -1,14 +1,17 @@
 """The expert's machines with their programs, and what they do when they no longer look."""
 
 from collections.abc import Callable
+from typing import Final
 
 from buildarena_benchmark import Score, Task, score
 from buildarena_geometry import Machine
-from buildarena_simulation import simulate
+from buildarena_simulation import ENGINES, simulate
 from buildarena_simulation.controllers.program import Program
 from buildarena_worker.builtin.designs import DESIGNS
 
 Answer = dict[str, float]
+FASTER_FIRST: Final = tuple(reversed(ENGINES))
+"""The engines: of a test with samples, those are its first variants."""
 
 
 def experts_machine(task: Task, seed: int = 0) -> Machine:
