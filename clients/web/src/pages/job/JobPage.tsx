@@ -5,6 +5,7 @@ import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { useState } from "react";
 import { download } from "../../api/client";
 import type { StreamState } from "../../api/events";
+import type { JobSearch } from "../../api/jobs-search";
 import { job as jobQuery, type JobDetail } from "../../api/queries";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
@@ -75,6 +76,8 @@ function Room({ job }: { job: JobDetail }) {
   const trials = rolloutsOf(job.artifacts);
   const ended = job.state === "done";
   const [begun, setBegun] = useState(false);
+  const change = (to: JobSearch): Promise<void> =>
+    navigate({ search: (before) => ({ ...before, ...to }), replace: true, resetScroll: false });
   const show = (view: "trial" | undefined, playing: boolean): void => {
     setBegun(playing);
     void navigate({ search: (before) => ({ ...before, view }), replace: true, resetScroll: false });
@@ -119,7 +122,7 @@ function Room({ job }: { job: JobDetail }) {
             </Answered>
           </Tabs.Panel>
           <Tabs.Panel value="trial">
-            <TrialPart job={job} numbers={trials} begun={begun} />
+            <TrialPart job={job} numbers={trials} begun={begun} seen={search} change={change} />
           </Tabs.Panel>
         </Tabs>
       </Section>

@@ -1,7 +1,6 @@
 import { SegmentedControl, Stack } from "@mantine/core";
 import { useQueries } from "@tanstack/react-query";
-import { getRouteApi, useNavigate } from "@tanstack/react-router";
-import { lazy, Suspense } from "react";
+import { lazy, Suspense, useState } from "react";
 import type { JobSearch } from "../../api/jobs-search";
 import type { JobDetail } from "../../api/queries";
 import { ProblemNote } from "../../parts/Problem";
@@ -9,7 +8,6 @@ import { Empty, Loading } from "../../parts/States";
 import { readLook, writtenLook, type Moment } from "../../scene/moment";
 import { scene as sceneQuery, trial as trialQuery } from "./queries";
 
-const route = getRouteApi("/jobs/$id");
 const TrialView = lazy(() => import("../../scene/TrialView"));
 
 /** The trial of one of a job's rollouts. */
@@ -17,19 +15,22 @@ export function TrialPart({
   job,
   numbers,
   begun = false,
+  seen,
+  change,
 }: {
   job: JobDetail;
   numbers: readonly number[];
   begun?: boolean;
+  /** What the page's address says of it; without, it has none, and no moment of it can be sent. */
+  seen?: JobSearch;
+  change?: (to: JobSearch) => Promise<void>;
 }) {
-  const search = route.useSearch();
-  const navigate = useNavigate({ from: "/jobs/$id" });
+  const [own, setOwn] = useState<JobSearch>({});
+  const search = seen ?? own;
   const asked = search.rollout !== undefined && numbers.includes(search.rollout) ? search.rollout : undefined;
   const number = asked ?? numbers.at(-1) ?? 0;
-  const change = (to: JobSearch): Promise<void> =>
-    navigate({ search: (before) => ({ ...before, ...to }), replace: true, resetScroll: false });
   const addressOf = async ({ time, look }: Moment): Promise<string> => {
-    await change({ view: "trial", t: Number(time.toFixed(2)), rollout: number, camera: writtenLook(look) });
+    await change?.({ view: "trial", t: Number(time.toFixed(2)), rollout: number, camera: writtenLook(look) });
     return window.location.href;
   };
   const [scene, trial] = useQueries({
@@ -44,7 +45,9 @@ export function TrialPart({
           aria-label="Rollout"
           value={String(number)}
           onChange={(value) => {
-            void change({ rollout: Number(value), t: undefined, camera: undefined });
+            const to = { rollout: Number(value), t: undefined, camera: undefined };
+            if (change === undefined) setOwn(to);
+            else void change(to);
           }}
           data={numbers.map((one) => ({ value: String(one), label: `Rollout ${one}` }))}
         />
@@ -75,7 +78,7 @@ export function TrialPart({
                   ? undefined
                   : { time: search.t ?? 0, look: readLook(search.camera) }
               }
-              addressOf={addressOf}
+              addressOf={change === undefined ? undefined : addressOf}
             />
           )}
         </Suspense>
