@@ -41,7 +41,7 @@ class BearingMeter:
         fixed = (surface >= 0).nonzero()[0]
         on_surface = np.bincount(surface[fixed], up[fixed], minlength=self._surfaces)
         on_block = np.bincount(forces.block[fixed], up[fixed], minlength=self._blocks)
-        self.on_blocks = on_block.astype(np.float64)
+        self.on_blocks = np.asarray(on_block, dtype=np.float64)
         cargo = -up[other == CARGO].sum()
         self.now = np.concatenate([on_surface, [cargo], on_block[self._wheels]])
 

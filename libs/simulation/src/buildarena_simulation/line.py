@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from typing import Annotated, Final, Self
 
 import numpy as np
@@ -20,6 +20,8 @@ SENSORS: Final = ("left", "middle", "right")
 _MOST_BENT: Final = 0.5
 _FINE: Final = 20_000
 """Steps of the angle in which the line is measured."""
+_REMEMBERED: Final = 8
+"""Lines whose points are kept, 0.6 MB each: every drawn world has its own."""
 _FIRST_BEND: Final = 2
 """Waves of the first bend: one wave would only shift the circle."""
 
@@ -99,7 +101,7 @@ class Line(BaseModel):
 _NODES: Final = 200
 
 
-@cache
+@lru_cache(maxsize=_REMEMBERED)
 def _measured(line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
     """Points of a line, (F, 2), the way to each, (F + 1,) units, its length and curvature."""
     angle = np.arange(_FINE + 1) * 2 * np.pi / _FINE
