@@ -97,6 +97,16 @@ async function walked(page: Page, expected: Expected): Promise<string[]> {
   }, expected);
 }
 
+/** Turns a drawing by the mouse. */
+async function dragged(page: Page, canvas: string): Promise<void> {
+  const box = await page.locator(canvas).boundingBox();
+  if (box === null) throw new Error("no drawing");
+  await page.mouse.move(box.x + 100, box.y + 100);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 220, box.y + 140, { steps: 4 });
+  await page.mouse.up();
+}
+
 describe.skipIf(sessions.length === 0)("random machines", () => {
   it.each(sessions.map((one, index) => [index, one] as const))(
     "of session %d stand where the geometry library says, step by step",
@@ -155,12 +165,7 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
     const [before] = await eyes();
     // Where software draws, the hands may be there before the picture can be turned.
     const turned = async (): Promise<number[] | undefined> => {
-      const box = await page.locator("[data-trial=a] canvas").boundingBox();
-      if (box === null) throw new Error("no drawing");
-      await page.mouse.move(box.x + 100, box.y + 100);
-      await page.mouse.down();
-      await page.mouse.move(box.x + 220, box.y + 140, { steps: 4 });
-      await page.mouse.up();
+      await dragged(page, "[data-trial=a] canvas");
       return (await eyes())[0];
     };
     await expect.poll(turned, { timeout: 40_000, interval: 500 }).not.toEqual(before);
@@ -188,12 +193,7 @@ describe.skipIf(sessions.length === 0)("a moment of a trial", () => {
       });
     const start = await eye(page);
     const turned = async (): Promise<number[]> => {
-      const box = await page.locator(".stage-3d canvas").boundingBox();
-      if (box === null) throw new Error("no drawing");
-      await page.mouse.move(box.x + 100, box.y + 100);
-      await page.mouse.down();
-      await page.mouse.move(box.x + 260, box.y + 140, { steps: 4 });
-      await page.mouse.up();
+      await dragged(page, ".stage-3d canvas");
       return eye(page);
     };
     await expect.poll(turned, { timeout: 40_000, interval: 500 }).not.toEqual(start);

@@ -41,6 +41,7 @@ class Collected:
 
     def collect(self) -> None:
         """Asks for everything."""
+        self._listed = self._client.get("/v1/tasks")
         self._boards()
         self._comparisons()
         self._tasks()
@@ -53,8 +54,7 @@ class Collected:
 
     def _boards(self) -> None:
         tasks = sorted({job["task"] for job in self._scope.ended})
-        listed = self._client.get("/v1/tasks")
-        categories = sorted({task["category"] for task in listed if task["name"] in tasks})
+        categories = sorted({task["category"] for task in self._listed if task["name"] in tasks})
         scopes: list[list[str]] = [[name] for name in categories]
         if any(name in PAPER for name in categories):
             scopes.append(list(PAPER))
@@ -116,8 +116,7 @@ class Collected:
     def _tasks(self) -> None:
         versions = {(job["task"], job["task_version"]) for job in self._scope.jobs}
         names = {name for name, _ in versions}
-        listed = self._client.get("/v1/tasks")
-        self._put("/v1/tasks", document([task for task in listed if task["name"] in names]))
+        self._put("/v1/tasks", document([task for task in self._listed if task["name"] in names]))
         for name, version in sorted({*versions, *((name, None) for name in names)}, key=str):
             path = at("tasks", name)
             content = ask(self._client, path, version=version)

@@ -23,9 +23,7 @@ export function partsOf(counted: readonly { label: string; counts: Readonly<Reco
   for (const { counts } of counted) {
     for (const [name, n] of Object.entries(counts)) sums.set(name, (sums.get(name) ?? 0) + n);
   }
-  const names = [...sums]
-    .sort((a, b) => Number(b[0] === SUCCESS) - Number(a[0] === SUCCESS) || b[1] - a[1])
-    .map(([name]) => name);
+  const names = [...sums].sort(foremost).map(([name]) => name);
   return counted.flatMap(({ label, counts }) => {
     const total = Object.values(counts).reduce((sum, n) => sum + n, 0);
     return names.flatMap((name) => {
@@ -35,9 +33,20 @@ export function partsOf(counted: readonly { label: string; counts: Readonly<Reco
   });
 }
 
+/** The names of parts, in their order in a drawing: success first, then the most frequent. */
+function kindsOf(parts: readonly Part[]): string[] {
+  const sums = new Map<string, number>();
+  for (const { name, count } of parts) sums.set(name, (sums.get(name) ?? 0) + count);
+  return [...sums].sort(foremost).map(([name]) => name);
+}
+
+function foremost(a: readonly [string, number], b: readonly [string, number]): number {
+  return Number(b[0] === SUCCESS) - Number(a[0] === SUCCESS) || b[1] - a[1];
+}
+
 /** The parts as they are drawn: what is beyond the most frequent names is one. */
 export function drawnParts(parts: readonly Part[]): Part[] {
-  const names = [...new Set(parts.map((part) => part.name))];
+  const names = kindsOf(parts);
   if (names.length <= MOST) return [...parts];
   const kept = new Set(names.slice(0, MOST));
   return [...new Set(parts.map((part) => part.label))].flatMap((label) => {
@@ -96,8 +105,8 @@ export function Failures({ figures, entries }: { figures: Figures; entries: read
 
 function Shares({ name, what, parts, labels }: { name: string; what: string; parts: Part[]; labels: string[] }) {
   const drawn = drawnParts(parts);
-  const kinds = [...new Set(parts.map((part) => part.name))].slice(0, MOST);
-  const domain = drawn.some((part) => part.name === OTHER.name) ? [...kinds, OTHER.name] : kinds;
+  const kinds = kindsOf(parts);
+  const domain = kinds.length > MOST ? [...kinds.slice(0, MOST), OTHER.name] : kinds;
   const options = (width: number): Plot.PlotOptions => ({
     height: 76 + 38 * labels.length,
     marginBottom: 42,

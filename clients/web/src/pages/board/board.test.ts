@@ -90,6 +90,18 @@ describe("kinds in a drawing", () => {
     expect(drawnParts(many.slice(0, 3))).toEqual(many.slice(0, 3));
   });
 
+  it("are the most frequent of all models, whoever stands first", () => {
+    const rare = { one: 1, two: 1, three: 1, four: 1, five: 1, six: 1 };
+    const drawn = drawnParts(
+      partsOf([
+        { label: "a", counts: rare },
+        { label: "b", counts: { frequent: 50 } },
+      ]),
+    );
+    expect(drawn.find((part) => part.label === "b")?.name).toBe("frequent");
+    expect(drawn.filter((part) => part.name === "other")).toMatchObject([{ label: "a", count: 1 }]);
+  });
+
   it("have a colour of their own wherever they stand", () => {
     const kinds = ["success", "unsuccessful", "construction failed: no plan"];
     const colours = coloursOf(kinds);

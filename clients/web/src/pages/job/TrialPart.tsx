@@ -73,11 +73,7 @@ export function TrialPart({
               trial={trial.data}
               scenario={scene.data.scenario}
               begun={begun}
-              moment={
-                asked === undefined && search.t === undefined
-                  ? undefined
-                  : { time: search.t ?? 0, look: readLook(search.camera) }
-              }
+              moment={{ time: search.t ?? 0, look: readLook(search.camera) }}
               addressOf={change === undefined ? undefined : addressOf}
             />
           )}
