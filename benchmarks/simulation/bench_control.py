@@ -17,7 +17,8 @@ from support.machines.families import car
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import ENGINES, Scenario, simulate
 from buildarena_simulation.controllers.program import Program
-from buildarena_simulation.scenario import Control, Senses
+from buildarena_simulation.offered import Senses
+from buildarena_simulation.scenario import Control
 
 LAYOUT: Final = {
     "height": 0,

@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenarios.hunt.genome import Genome, grown
-from scenarios.hunt.suspicion import Evidence, suspicions
+from scenarios.hunt.suspicion import Evidence, counts, suspicions
 from threadpoolctl import threadpool_limits
 
 from buildarena_benchmark import Score, Task, builtin_tasks, robustness, score
-from buildarena_benchmark.flags import is_disqualified
 from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES, Trajectory, simulate
 from buildarena_simulation.render.film import write_film
@@ -68,7 +67,7 @@ def confirmed(order: Order) -> Confirmed:
     machine, genome = grown(order.genome)
     with threadpool_limits(limits=1):
         trials = {engine: _trial(task, machine, engine) for engine in reversed(ENGINES)}
-        good = any(_counts(result) for result, _ in trials.values())
+        good = any(counts(result) for result, _ in trials.values())
         share = robustness(task, machine, "mujoco", SEEDS).share if good else 0.0
         if order.picture is not None:
             write_film(machine, task.scenario, trials["mujoco"][1], order.picture)
@@ -90,13 +89,9 @@ def _trial(task: Task, machine: Machine, engine: str) -> tuple[Score, Trajectory
     return score(task, machine, trajectory), trajectory
 
 
-def _counts(result: Score) -> bool:
-    return result.success and not is_disqualified(result.flags)
-
-
 def _told(result: Score) -> dict[str, Any]:
     return {
-        "success": _counts(result),
+        "success": counts(result),
         "indicator": result.indicator,
         "flags": list(result.flags),
     }

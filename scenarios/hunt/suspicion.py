@@ -62,6 +62,11 @@ class Evidence:
 Check = Callable[[Evidence], bool]
 
 
+def counts(result: Score) -> bool:
+    """Whether a trial succeeded and nothing disqualifies it."""
+    return result.success and not is_disqualified(result.flags)
+
+
 def suspicions(evidence: Evidence) -> tuple[str, ...]:
     """Names of the checks that find a success odd, the general ones last."""
     checks = {**CHECKS.get(kind_of(evidence.task.name), {}), **GENERAL}
@@ -244,7 +249,7 @@ def _drawn(evidence: Evidence, trial: Callable[[Task, Machine], Score]) -> bool:
         result = trial(evidence.task, evidence.machine)
     except MachineNotSimulable:
         return False
-    return result.success and not is_disqualified(result.flags)
+    return counts(result)
 
 
 # All categories

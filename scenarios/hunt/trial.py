@@ -9,10 +9,9 @@ from typing import Any, Final
 
 import numpy as np
 from scenarios.hunt.genome import Genome, grown
-from scenarios.hunt.suspicion import Evidence, suspicions
+from scenarios.hunt.suspicion import Evidence, counts, suspicions
 
 from buildarena_benchmark import Score, Task, broken_constraint, builtin_tasks, score
-from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.tasks.loading import references
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, SimulationError, Trajectory, simulate
@@ -113,7 +112,7 @@ def tried(task_name: str, genome: Genome, scorer: Scorer = score) -> Finding | N
         result, trajectory = _searched(task, machine, scorer)
     except (MachineNotSimulable, SimulationError):
         return None
-    success = result.success and not is_disqualified(result.flags)
+    success = counts(result)
     value = worth(task_name, result.indicator) if success else _nearness(task, result) - 1.0
     odd = suspicions(Evidence(task, machine, {"mujoco": (result, trajectory)})) if success else ()
     return Finding(

@@ -25,7 +25,8 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.control import read_presses
-from buildarena_simulation.scenario import Cargo, Control, Drift, Gate, Mark, SenseKind, Senses
+from buildarena_simulation.offered import SenseKind, Senses
+from buildarena_simulation.scenario import Cargo, Control, Drift, Gate, Mark
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, UP
 
 EXAMPLE = Path(__file__).parents[2] / "examples/control"

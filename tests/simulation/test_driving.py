@@ -21,8 +21,9 @@ from buildarena_simulation import (
 )
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.engines.base import Engine
+from buildarena_simulation.offered import Senses
 from buildarena_simulation.rollout import Rollout
-from buildarena_simulation.scenario import Control, Gate, Senses
+from buildarena_simulation.scenario import Control, Gate
 from buildarena_simulation.trial import Trial
 
 WEAVING = """

@@ -7,7 +7,8 @@ from support.machines.drafts import KeyedDraft
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_simulation.line import Line
-from buildarena_simulation.scenario import Control, Scenario, Senses
+from buildarena_simulation.offered import Senses
+from buildarena_simulation.scenario import Control, Scenario
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH
 
 BENT = Line(radius=11, bends=((0.1, -0.12), (0.04, 0.03)))

@@ -35,6 +35,7 @@ from buildarena_simulation import (
     write_trajectory,
 )
 from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import (
     Cargo,
     Gate,
@@ -42,7 +43,6 @@ from buildarena_simulation.scenario import (
     Gusts,
     Line,
     Mark,
-    Senses,
     TerrainBox,
 )
 from buildarena_worker.builtin.designs.drafting import UP

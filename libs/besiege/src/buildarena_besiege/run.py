@@ -345,7 +345,7 @@ def _require_sayable(scenario: Scenario) -> None:
         MachineNotPlayableError: The scenario is another; the message says what it asks for.
     """
     cargo, place = scenario.cargo, scenario.placement
-    on_ground = place if isinstance(place, GroundPlacement) else GroundPlacement(kind="ground")
+    on_ground = place if isinstance(place, GroundPlacement) else GroundPlacement()
     usual = scenario.gravity == GRAVITY and scenario.drive_strength == 1
     asked: dict[str, object] = {
         "the game lets no machine go in the air": isinstance(place, ReleasedPlacement),

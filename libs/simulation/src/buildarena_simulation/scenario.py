@@ -6,14 +6,14 @@ may come from strangers, so every number has bounds within which the engines sta
 """
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal, Self, get_args
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.draws import Draws, at_end, drawn
 from buildarena_simulation.line import Line
+from buildarena_simulation.offered import Senses
 
 MAX_DURATION_S: Final = 600.0
 
@@ -107,7 +107,7 @@ class GroundPlacement(_Document):
 
     kind: Literal["ground"] = "ground"
     tilt_deg: Annotated[float, Field(ge=-90, le=90, exclude_if=lambda value: value == 0)] = 0.0
-    heading_deg: Annotated[float, Field(ge=-180, le=180, exclude_if=lambda value: value == 0)] = 0.0
+    heading_deg: Heading = 0.0
 
 
 class SpanPlacement(_Document):
@@ -208,40 +208,6 @@ class Control(_Document):
     mode: Literal["agent", "held", "none"] = "none"
     from_s: Instant = 0.0
     until_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
-
-
-SenseKind = Literal[
-    "pose",
-    "axes",
-    "blocks",
-    "joints",
-    "wheels",
-    "contacts",
-    "cargo",
-    "marks",
-    "gates",
-    "gate",
-    "fuel",
-    "line",
-]
-_UNUSUAL: Final = ("axes", "contacts", "gate", "fuel", "line")
-_OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind not in _UNUSUAL)
-NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
-
-
-class Senses(_Document):
-    """What a controller is told, how exactly and how late.
-
-    Attributes:
-        offers: Kinds of senses.
-        noise: Standard deviation of each figure of a kind: places in units, speeds in units/s,
-            components of axes, spins in rad/s, joints in rad or units and their speeds.
-        delay_ticks: By how many ticks of 0.04 s what is told is late.
-    """
-
-    offers: Annotated[tuple[SenseKind, ...], Field(max_length=16)] = _OFFERED
-    noise: Mapping[NoiseKind, Annotated[float, Field(ge=0, le=100)]] = {}
-    delay_ticks: Annotated[int, Field(ge=0, le=25)] = 0
 
 
 class Gusts(_Document):

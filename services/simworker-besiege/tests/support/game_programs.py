@@ -4,7 +4,8 @@ from support.machines.families import car
 
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario
-from buildarena_simulation.scenario import Control, Senses
+from buildarena_simulation.offered import Senses
+from buildarena_simulation.scenario import Control
 
 AGENT = Control(mode="agent")
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_geometry.rotations import Vector
     from buildarena_simulation import Scenario
-    from buildarena_simulation.scenario import SenseKind
+    from buildarena_simulation.offered import SenseKind
     from buildarena_simulation.structure.model import FloatArray, Structure
 
 NUMBERS_PER_LINE: Final = 24

@@ -1,0 +1,41 @@
+"""What a task offers a controller to sense, how exactly and how late."""
+
+from collections.abc import Mapping
+from typing import Annotated, Final, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field
+
+SenseKind = Literal[
+    "pose",
+    "axes",
+    "blocks",
+    "joints",
+    "wheels",
+    "contacts",
+    "cargo",
+    "marks",
+    "gates",
+    "gate",
+    "fuel",
+    "line",
+]
+_UNUSUAL: Final = ("axes", "contacts", "gate", "fuel", "line")
+_OFFERED: Final = tuple(kind for kind in get_args(SenseKind) if kind not in _UNUSUAL)
+NoiseKind = Literal["place", "speed", "axis", "spin", "joint", "joint_speed"]
+
+
+class Senses(BaseModel):
+    """What a controller is told, how exactly and how late.
+
+    Attributes:
+        offers: Kinds of senses.
+        noise: Standard deviation of each figure of a kind: places in units, speeds in units/s,
+            components of axes, spins in rad/s, joints in rad or units and their speeds.
+        delay_ticks: By how many ticks of 0.04 s what is told is late.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    offers: Annotated[tuple[SenseKind, ...], Field(max_length=16)] = _OFFERED
+    noise: Mapping[NoiseKind, Annotated[float, Field(ge=0, le=100)]] = {}
+    delay_ticks: Annotated[int, Field(ge=0, le=25)] = 0
