@@ -1,9 +1,9 @@
 """Who passes in worlds that a trial's seed draws; run by `make bench-worlds`.
 
 Fifty worlds of each task for programs, on both engines: the expert's program, its answers in the
-exact world given again without looking (the best schedule of one world), and a machine that is told
-nothing. The bars: the expert in 90 %, the others in less than 10 %, equal verdicts of the engines
-in 95 %.
+exact world given again without looking (the best schedule of one world), a program that answers at
+random, and one that answers nothing. The bars: the expert in 90 %, the others in less than 10 %,
+equal verdicts of the engines in 95 %.
 """
 
 import argparse
@@ -17,12 +17,27 @@ from benchmarks.figures import tell
 from support.machines.piloted import Answer, experts_machine, listened, repeated, scored
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES
+from buildarena_simulation.control import channel
+from buildarena_simulation.machine import bindings_of, part_ids
 
 WORLDS: Final = 50
 IDLE: Final = "function control() return {} end"
+RANDOM: Final = """
+local names = {%s}
+local answers, since = {}, -1
+function control(t)
+  if t - since >= 1 then
+    since = t
+    for _, name in ipairs(names) do answers[name] = 2 * math.random() - 1 end
+  end
+  return answers
+end
+"""
 TASKS: Final = [name for name, task in builtin_tasks().items() if task.scenario.draws]
 SEEDS_OF_DESIGNS: Final = 5
+PLAYERS: Final = ("expert", "schedule", "random", "idle")
 
 
 @cache
@@ -32,8 +47,16 @@ def answers_of(name: str, engine: str, seed: int) -> list[Answer]:
     return listened(task, experts_machine(task, seed), engine)[1]
 
 
+def random_program(machine: Machine) -> str:
+    """A program that asks for every action of every block by chance, anew each second."""
+    ids, bindings = part_ids(machine), bindings_of(machine)
+    bound = zip(ids, bindings, strict=True)
+    names = (channel(part, action) for part, actions in bound for action in actions)
+    return RANDOM % ", ".join(f'"{name}"' for name in names)
+
+
 def in_world(name: str, engine: str, seed: int) -> dict[str, Any]:
-    """How the three do in one world."""
+    """How the four do in one world."""
     task = builtin_tasks()[name]
     expert = experts_machine(task, seed % SEEDS_OF_DESIGNS)
     own = scored(task, expert, engine, seed)
@@ -42,6 +65,9 @@ def in_world(name: str, engine: str, seed: int) -> dict[str, Any]:
         "expert": own.success,
         "indicator": own.indicator,
         "schedule": repeated(answers, task, expert, engine, seed).success,
+        "random": scored(
+            task, expert.with_controller(random_program(expert)), engine, seed
+        ).success,
         "idle": scored(task, expert.with_controller(IDLE), engine, seed).success,
     }
 
@@ -65,7 +91,7 @@ def main() -> None:
             figures[name] = {
                 engine: {
                     "indicator": round(mean(row["indicator"] for row in of), 3),
-                    **{who: mean(row[who] for row in of) for who in ("expert", "schedule", "idle")},
+                    **{who: mean(row[who] for row in of) for who in PLAYERS},
                 }
                 for engine, of in rows.items()
             } | {"equal_verdicts": mean(len(set(each)) == 1 for each in verdicts)}

@@ -12,7 +12,7 @@ from support.machines.trials import press
 from buildarena_geometry import KeyPress, Machine, load_catalogue
 from buildarena_geometry.flames import heating
 from buildarena_simulation import Scenario, simulate
-from buildarena_simulation.control import DriveState, heated_cannons, key_levels, plan_schedule
+from buildarena_simulation.control import Drives, heated_cannons, key_levels, plan_schedule
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.scenario import Control, SpanPlacement
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, UP, WEST
@@ -26,10 +26,9 @@ def _speeds(machine: Machine, *keys: KeyPress) -> np.ndarray:
     return plan_schedule(
         structure,
         key_levels(bindings_of(machine), keys, times),
-        DriveState.still(structure),
+        Drives(structure, 0.01),
         control=Control(mode="agent"),
         times=times,
-        time_step_s=0.01,
     ).targets
 
 

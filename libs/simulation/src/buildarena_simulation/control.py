@@ -1,17 +1,18 @@
 """What the keys make of a machine: targets of its drives, firing cannons, heated cannons."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol, Self
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
 from buildarena_geometry.blocks import KeyPress
 from buildarena_geometry.flames import flames_touch
+from buildarena_geometry.modules.joints import Drive, MovingJoint
 from buildarena_simulation.constants import GRAVITY, KEY_DELAY_S
 from buildarena_simulation.scenario import Control
-from buildarena_simulation.structure.drives import lagged, place_targets, speed_targets
+from buildarena_simulation.structure.drives import blends, lagged, place_targets, speed_targets
 from buildarena_simulation.structure.model import BoolArray, FloatArray, Structure
 
 PRESSES: Final = "presses"
@@ -126,22 +127,93 @@ class Schedule:
     firing: FloatArray
 
 
-@dataclass(slots=True)
-class DriveState:
-    """What drives have come to; D driven joints.
+class Drives:
+    """The drives of a machine's joints and what they have come to; D driven joints.
 
-    Attributes:
-        speeds: (D,) what follows a wheel's, or a drive's, wanted speed.
-        places: (D,) where each drive for a place aims.
+    Args:
+        structure: The machine.
+        time_step_s: Length of a step, seconds.
     """
 
-    speeds: FloatArray
-    places: FloatArray
+    def __init__(self, structure: Structure, time_step_s: float) -> None:
+        driven = structure.joints.driven
+        self._time_step_s = time_step_s
+        self._wheels = list(_motors(structure))
+        self._driven = list(_drives(structure))
+        lags = np.zeros(len(driven))
+        for wheel in self._wheels:
+            lags[wheel.column] = wheel.lag_per_s
+        self._blend = blends(lags, time_step_s)
+        # What follows a wheel's, or a drive's, wanted speed, and where a drive for a place aims.
+        self._speeds, self._places = np.zeros(len(driven)), np.zeros(len(driven))
 
-    @classmethod
-    def still(cls, structure: Structure) -> Self:
-        """Before anything was asked for."""
-        return cls(*(np.zeros(len(structure.joints.driven)) for _ in range(2)))
+    def targets(self, levels: Levels, step_count: int) -> FloatArray:
+        """The targets of the next steps, (S, D), as in `Schedule.targets`.
+
+        A driven wheel's follows what is asked for by a first-order lag; where nothing is, or both
+        directions alike, it brakes.
+        """
+        wanted, before = np.zeros((step_count, len(self._speeds))), self._speeds
+        for wheel in self._wheels:
+            forward, backward = (
+                levels(wheel.part, wheel.forward),
+                levels(wheel.part, wheel.backward),
+            )
+            wanted[:, wheel.column] = wheel.speed * (forward - backward)
+        targets, self._speeds = lagged(wanted, self._blend, before=before)
+        none = np.zeros(step_count)
+        for d, part, sign, joint, drive in self._driven:
+            forward = none if drive.forward is None else levels(part, drive.forward)
+            backward = none if drive.backward is None else levels(part, drive.backward)
+            if drive.kind == "speed":
+                targets[:, d], self._speeds[d] = speed_targets(
+                    drive,
+                    forward,
+                    backward,
+                    sign=sign,
+                    time_step_s=self._time_step_s,
+                    before=before[d],
+                )
+                continue
+            targets[:, d] = place_targets(
+                drive,
+                forward,
+                backward,
+                sign=sign,
+                limits=joint.limits,
+                time_step_s=self._time_step_s,
+                place=self._places[d],
+            )
+            self._places[d] = targets[-1, d]
+        return targets
+
+
+class _Motor(NamedTuple):
+    """A driven wheel: its column in targets, its part, its actions, speed forward and lag."""
+
+    column: int
+    part: int
+    forward: str
+    backward: str
+    speed: float
+    lag_per_s: float
+
+
+def _motors(structure: Structure) -> Iterator[_Motor]:
+    for w, block in enumerate(structure.wheels.tolist()):
+        part, motor = structure.parts[block], structure.parts[block].module.motor
+        if motor is not None:
+            # Clockwise seen from outside is against the outward axis.
+            speed = (-1.0 if part.forward_is_clockwise else 1.0) * motor.speed
+            yield _Motor(w, block, motor.forward, motor.backward, speed, motor.lag_per_s)
+
+
+def _drives(structure: Structure) -> Iterator[tuple[int, int, float, MovingJoint, Drive]]:
+    """Of each drive: its column in targets, its part, the sign of forward, its joint, itself."""
+    for d, block in enumerate(structure.joints.driven.tolist()):
+        part, joint = structure.parts[block], structure.parts[block].module.joint
+        if joint is not None and joint.drive is not None:
+            yield d, block, -1.0 if part.forward_is_clockwise else 1.0, joint, joint.drive
 
 
 def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray) -> BoolArray:
@@ -161,28 +233,18 @@ def held_during(keys: Sequence[KeyHold], names: Sequence[str], times: FloatArray
 
 
 def plan_schedule(
-    structure: Structure,
-    levels: Levels,
-    state: DriveState,
-    *,
-    control: Control,
-    times: FloatArray,
-    time_step_s: float,
+    structure: Structure, levels: Levels, drives: Drives, *, control: Control, times: FloatArray
 ) -> Schedule:
     """The commands of some steps.
-
-    A driven wheel's target follows what is asked for by a first-order lag; where nothing is, or
-    both directions alike, it brakes.
 
     Args:
         structure: The machine.
         levels: What is asked for.
-        state: What the drives have come to before; they go on from it.
+        drives: What the drives have come to before; they go on from it.
         control: Who presses the keys.
         times: (S,) when each step begins, seconds.
-        time_step_s: Length of one, seconds.
     """
-    targets = _targets(structure, levels, state, step_count=len(times), time_step_s=time_step_s)
+    targets = drives.targets(levels, len(times))
     firing = np.zeros((len(times), len(structure.cannons)))
     if control.mode == "held":
         firing[times >= control.from_s - 1e-9] = 1.0
@@ -192,57 +254,6 @@ def plan_schedule(
         if thrust is not None:
             firing[:, c] = levels(int(block), thrust.action)
     return Schedule(targets=targets, firing=firing)
-
-
-def _targets(
-    structure: Structure,
-    levels: Levels,
-    state: DriveState,
-    *,
-    step_count: int,
-    time_step_s: float,
-) -> FloatArray:
-    """The targets of all driven joints, as in `Schedule.targets`."""
-    targets = np.zeros((step_count, len(structure.joints.driven)))
-    lags = np.zeros(len(structure.joints.driven))
-    for w, block in enumerate(structure.wheels):
-        part = structure.parts[block]
-        motor = part.module.motor
-        if motor is None:
-            continue
-        forward, backward = (levels(int(block), way) for way in (motor.forward, motor.backward))
-        # Clockwise seen from outside is against the outward axis.
-        sign = -1.0 if part.forward_is_clockwise else 1.0
-        targets[:, w] = sign * motor.speed * (forward - backward)
-        lags[w] = motor.lag_per_s
-    before = state.speeds
-    targets, state.speeds = lagged(targets, lags, time_step_s, before=before)
-    for d, block in enumerate(structure.joints.driven):
-        part = structure.parts[block]
-        joint = part.module.joint
-        if joint is None or joint.drive is None:
-            continue
-        drive = joint.drive
-        none = np.zeros(step_count)
-        forward = none if drive.forward is None else levels(int(block), drive.forward)
-        backward = none if drive.backward is None else levels(int(block), drive.backward)
-        sign = -1.0 if part.forward_is_clockwise else 1.0
-        if drive.kind == "speed":
-            targets[:, d], state.speeds[d] = speed_targets(
-                drive, forward, backward, sign=sign, time_step_s=time_step_s, before=before[d]
-            )
-            continue
-        targets[:, d] = place_targets(
-            drive,
-            forward,
-            backward,
-            sign=sign,
-            limits=joint.limits,
-            time_step_s=time_step_s,
-            place=state.places[d],
-        )
-        state.places[d] = targets[-1, d]
-    return targets
 
 
 def reaching(bindings: Bindings, keys: Sequence[KeyHold]) -> list[KeyHold]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from buildarena_simulation.control import (
     Bindings,
-    DriveState,
+    Drives,
     KeyHold,
     Levels,
     Schedule,
@@ -79,7 +79,7 @@ class Planner:
         self._control = scenario.control
         self._table = None if field is None else field.table
         self.tank = Tank(structure, self._table, scenario)
-        self._drive_state = DriveState.still(structure)
+        self._drives = Drives(structure, time_step_s)
         self._force_state = (
             None if self._table is None else ForceState.still(structure, self._table)
         )
@@ -102,10 +102,9 @@ class Planner:
         self.drives = plan_schedule(
             self._structure,
             levels,
-            self._drive_state,
+            self._drives,
             control=self._control,
             times=times,
-            time_step_s=self._time_step_s,
         )
         if self._table is not None and self._force_state is not None:
             self.forces = plan_forces(

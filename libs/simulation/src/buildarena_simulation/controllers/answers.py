@@ -62,10 +62,13 @@ class Channels:
         Raises:
             ControllerFailed: There is no such name; the message has those that are near.
         """
+        if not answers.keys() <= self.named.keys():
+            raise self._unknown(min(answers.keys() - self.named.keys()))
         asked: dict[tuple[int, str], float] = {}
-        for name in sorted(answers, key=lambda name: ("." in name, name)):
-            for key in self._parts_of(name):
-                asked[key] = min(max(answers[name], -1.0), 1.0)
+        for is_of_one in (False, True):
+            for name, number in answers.items():
+                if ("." in name) is is_of_one:
+                    asked.update(dict.fromkeys(self.named[name], min(max(number, -1.0), 1.0)))
         levels: dict[tuple[int, str], float] = {}
         for (part, action), share in asked.items():
             wanted = action if share >= 0 else self.opposites.get((part, action))
@@ -77,14 +80,11 @@ class Channels:
         """Whether an action may be asked for in part; others are on above a half."""
         return (part, action) not in self._switches
 
-    def _parts_of(self, name: str) -> list[tuple[int, str]]:
-        parts = self.named.get(name)
-        if parts is not None:
-            return parts
+    def _unknown(self, name: str) -> ControllerFailed:
         near = near_names(name, self.named)
         names = near or sorted({action for _, action in self.names})
         shown = ", ".join(names) or "none: no block of this machine has an action"
-        raise ControllerFailed(f"there is no action {name[:60]!r}; there is {shown}")
+        return ControllerFailed(f"there is no action {name[:60]!r}; there is {shown}")
 
 
 def near_names(name: str, names: Iterable[str]) -> list[str]:
@@ -94,11 +94,10 @@ def near_names(name: str, names: Iterable[str]) -> list[str]:
 
 def constant(levels: Mapping[tuple[int, str], float], count: int) -> Levels:
     """The same levels for some steps, as schedules are planned from."""
-    none = np.zeros(count)
+    shares = {share: np.full(count, share) for share in {0.0, *levels.values()}}
 
     def level(part: int, action: str) -> "FloatArray":
-        share = levels.get((part, action), 0.0)
-        return np.full(count, share) if share else none
+        return shares[levels.get((part, action), 0.0)]
 
     return level
 

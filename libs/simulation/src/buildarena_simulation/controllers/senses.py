@@ -2,14 +2,15 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, Final, get_args
+from itertools import chain
+from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 
 from buildarena_geometry.modules.joints import MOVING_JOINTS
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.controllers.bodies import Bodies
 from buildarena_simulation.engines.base import CargoPose
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.line import SENSORS
@@ -18,7 +19,6 @@ from buildarena_simulation.scenario import Gate, Mark, Scenario
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.model import FloatArray, Structure
 from buildarena_simulation.structure.motion import Motion
-from buildarena_simulation.structure.vectors import cross, turned
 
 TICK_S: Final = 1.0 / SAMPLE_RATE_HZ
 """Time between two ticks, seconds."""
@@ -32,8 +32,7 @@ _AXES_FROM: Final = 6
 _SHOWN: Final = 20
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
+class Seen(NamedTuple):
     """What there is to be sensed at a tick.
 
     Attributes:
@@ -87,7 +86,7 @@ class Sensing:
                 + (", …" if len(ids) > _SHOWN else "")
             )
         self.blocks = [ids.index(block) for block in dict.fromkeys(sensors)]
-        self._told = np.array([0, *self.blocks])
+        self._wheels = [(index, forwards(structure, index)) for index in structure.wheels.tolist()]
         self.moving = [
             index
             for index, part in enumerate(structure.parts)
@@ -96,18 +95,19 @@ class Sensing:
         self._count, self.noise = 0, list[float]()
         self.layout = self._laid_out()
         self._draw = np.random.default_rng([seed, 2])
-        self._noisy = np.array(self.noise)
+        self._noise, self._is_noisy = np.array(self.noise), any(self.noise)
         self._past: deque[FloatArray] = deque(maxlen=self._senses.delay_ticks + 1)
-        self._clusters: Clusters | None = None
-        self._seats: dict[int, tuple[int, int]] = {}
+        self._bodies, self._own = Bodies(structure), list[float]()
+        self._kinds = self._readers()
 
     def read(self, seen: Seen) -> list[float]:
         """The numbers of a tick, in the order of the layout; the first ones again while late."""
-        if seen.clusters is not self._clusters:
-            self._clusters, self._seats = seen.clusters, _seats(seen.clusters)
-        now = np.fromiter(self._values(seen), dtype=np.float64, count=self._count)
-        if self._noisy.any():
-            now += self._noisy * self._draw.standard_normal(self._count)
+        self._bodies.see(seen.clusters, seen.motion)
+        self._own = self._bodies.pose(0)
+        numbers = chain.from_iterable(read(seen) for read in self._kinds)
+        now = np.fromiter(numbers, dtype=np.float64, count=self._count)
+        if self._is_noisy:
+            now += self._noise * self._draw.standard_normal(self._count)
         self._past.append(np.round(now, _GRAIN) + 0.0)
         values: list[float] = self._past[0].tolist()
         return values
@@ -195,76 +195,66 @@ class Sensing:
         self._count += 1
         return self._count - 1
 
-    def _values(self, seen: Seen) -> Iterator[float]:
-        poses = self._poses(seen)
-        own = poses[0, :3]
-        values: dict[SenseKind, Callable[[], Iterable[float]]] = {
-            "pose": poses[0].tolist,
-            "axes": poses[0, _AXES_FROM:].tolist,
-            "blocks": poses[1:].ravel().tolist,
-            "joints": lambda: self._joint_values(seen),
-            "wheels": lambda: self._wheel_values(seen),
-            "contacts": lambda: (seen.on_blocks[self.blocks] > _TOUCHES).astype(float).tolist(),
-            "cargo": lambda: _cargo_values(seen, own),
-            "marks": lambda: _places((mark.at(seen.time_s) for mark in self._scenario.marks), own),
-            "gates": lambda: _places(((*g.center, 0.0) for g in self._scenario.gates), own),
-            "gate": lambda: _places([next_gate(self._scenario.gates, own[1])], own),
-            "fuel": lambda: (seen.fuel_s,),
-            "line": lambda: self._line_values(seen),
+    def _readers(self) -> list[Callable[[Seen], Iterable[float]]]:
+        """What gives the numbers of each kind that is offered, in their order."""
+        scenario, bodies = self._scenario, self._bodies
+        readers: dict[SenseKind, Callable[[Seen], Iterable[float]]] = {
+            "pose": lambda _: self._own,
+            "axes": lambda _: self._own[_AXES_FROM:],
+            "blocks": lambda _: (each for block in self.blocks for each in bodies.pose(block)),
+            "joints": lambda _: self._joint_values(),
+            "wheels": self._wheel_values,
+            "contacts": lambda seen: (seen.on_blocks[self.blocks] > _TOUCHES).tolist(),
+            "cargo": self._cargo_values,
+            "marks": lambda seen: self._places([m.at(seen.time_s) for m in scenario.marks]),
+            "gates": lambda _: self._places([(*gate.center, 0.0) for gate in scenario.gates]),
+            "gate": lambda _: self._places([next_gate(scenario.gates, self._own[1])]),
+            "fuel": lambda seen: (seen.fuel_s,),
+            "line": self._line_values,
         }
-        for kind in self.offers:
-            yield from values[kind]()
+        return [readers[kind] for kind in self.offers]
 
-    def _line_values(self, seen: Seen) -> Iterator[float]:
+    def _line_values(self, seen: Seen) -> Iterable[float]:
         """Whether the line is below each ground sensor, from left to right."""
         line = self._scenario.line
         if line is None:
-            return
+            return ()
         motion, c = seen.motion, seen.clusters.cluster_of[0]
         aside = line.apart * np.arange(-1, len(SENSORS) - 1)
         seats = np.column_stack([aside, np.full(len(SENSORS), line.ahead), np.zeros(len(SENSORS))])
         points = motion.position[c] + (self._structure.shown[0] + seats) @ motion.rotation[c].T
-        yield from (line.nearest(points)[1] <= line.half_width).astype(float).tolist()
+        under: list[bool] = (line.nearest(points)[1] <= line.half_width).tolist()
+        return under
 
-    def _joint_values(self, seen: Seen) -> Iterator[float]:
+    def _joint_values(self) -> Iterator[float]:
+        bodies = self._bodies
         for index in self.moving:
+            if place_of(self._structure, index) == "angle":
+                place, speed = bodies.turn(index), bodies.turning(index)
+            else:
+                place, speed = bodies.shift(index)
             sign = forwards(self._structure, index)
-            sides = self._seats.get(index)
-            place, speed = _joint(self._structure, seen, index, sides) if sides else (0.0, 0.0)
             yield from (sign * place, sign * speed)
 
     def _wheel_values(self, seen: Seen) -> Iterator[float]:
-        for index in self._structure.wheels.tolist():
-            sides = self._seats.get(index)
-            outward = _relative_spin(self._structure, seen, index, sides) if sides else 0.0
-            yield forwards(self._structure, index) * outward
-            yield float(seen.on_blocks[index] > _TOUCHES)
+        touching = seen.on_blocks > _TOUCHES
+        for index, sign in self._wheels:
+            yield sign * self._bodies.turning(index)
+            yield touching[index]
 
-    def _poses(self, seen: Seen) -> FloatArray:
-        """Position, velocity, up, forward, spin and spin in the block's frame, (1 + B, 18)."""
-        motion, clusters = seen.motion, seen.clusters
-        c = clusters.cluster_of[self._told]
-        rotation, spin = motion.rotation[c], motion.spin[c]
-        shown = self._structure.shown[self._told]
-        position = motion.position[c] + turned(rotation, shown)
-        arm = turned(rotation, shown - clusters.center_of_mass[c])
-        velocity = motion.velocity[c] + cross(spin, arm)
-        own = turned(rotation.transpose(0, 2, 1), spin)
-        poses = [position, velocity, rotation[:, :, 2], rotation[:, :, 1], spin, own]
-        return np.concatenate(poses, axis=1)
+    def _cargo_values(self, seen: Seen) -> Iterable[float]:
+        if seen.cargo is None:
+            return ()
+        place: list[float] = seen.cargo.position.tolist()
+        return [*place, *self._seen_from_here(place), *seen.cargo.velocity.tolist()]
 
+    def _places(self, centers: Iterable[Sequence[float]]) -> Iterator[float]:
+        for center in centers:
+            yield from center
+            yield from self._seen_from_here(center)
 
-def _cargo_values(seen: Seen, own: FloatArray) -> Iterator[float]:
-    if seen.cargo is not None:
-        yield from seen.cargo.position.tolist()
-        yield from (seen.cargo.position - own).tolist()
-        yield from seen.cargo.velocity.tolist()
-
-
-def _places(centers: Iterable[Sequence[float]], own: FloatArray) -> Iterator[float]:
-    for center in centers:
-        yield from center
-        yield from (np.array(center) - own).tolist()
+    def _seen_from_here(self, place: Sequence[float]) -> Iterator[float]:
+        return (there - here for there, here in zip(place, self._own, strict=False))
 
 
 def next_gate(gates: Sequence[Gate], north: float) -> tuple[float, float, float]:
@@ -286,51 +276,3 @@ def forwards(structure: Structure, index: int) -> float:
 def place_of(structure: Structure, index: int) -> str:
     """What a program is told of where a block is on its seat: a length or an angle."""
     return "length" if structure.parts[index].physics.joint_type == "slider" else "angle"
-
-
-def _seats(clusters: Clusters) -> dict[int, tuple[int, int]]:
-    """The clusters of each block that moves on its seat and of that seat; of none that came off."""
-    rows = zip(
-        clusters.seated.tolist(),
-        clusters.parent.tolist(),
-        clusters.seated_is_outer.tolist(),
-        strict=True,
-    )
-    return {
-        block: (cluster, parent) if outer else (parent, cluster)
-        for cluster, (block, parent, outer) in enumerate(rows)
-        if parent >= 0
-    }
-
-
-def _relative_spin(structure: Structure, seen: Seen, index: int, sides: tuple[int, int]) -> float:
-    """How fast a block turns on its seat about its axis, rad/s."""
-    own, base = sides
-    axis = seen.motion.rotation[base] @ structure.joints.axes[index]
-    return float(axis @ (seen.motion.spin[own] - seen.motion.spin[base]))
-
-
-def _joint(
-    structure: Structure, seen: Seen, index: int, sides: tuple[int, int]
-) -> tuple[float, float]:
-    """Angle, rad, or shift, units, of a block on its seat, and how fast that grows."""
-    own, base = sides
-    motion, axis = seen.motion, structure.joints.axes[index]
-    back = motion.rotation[base].T
-    if place_of(structure, index) == "angle":
-        turn = back @ motion.rotation[own]
-        lever = np.array(
-            [turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]
-        )
-        angle = np.arctan2(lever @ axis, np.trace(turn) - 1.0)
-        return float(angle), _relative_spin(structure, seen, index, sides)
-    point = structure.joints.points[index]
-    places, speeds = [], []
-    for c in (own, base):
-        arm = motion.rotation[c] @ (point - seen.clusters.center_of_mass[c])
-        places.append(motion.position[c] + motion.rotation[c] @ point)
-        speeds.append(motion.velocity[c] + np.cross(motion.spin[c], arm))
-    apart = places[0] - places[1]
-    along = motion.rotation[base] @ axis
-    turning = np.cross(motion.spin[base], apart)
-    return float(along @ apart), float(along @ (speeds[0] - speeds[1] - turning))

@@ -33,8 +33,8 @@ def speed_targets(
     if drive.default_mode == "forward":
         forward = np.ones_like(forward)
     wanted = sign * drive.rate * (forward - backward)
-    lags = np.array([drive.lag_per_s])
-    speeds, reached = lagged(wanted[:, None], lags, time_step_s, before=np.array([before]))
+    blend = blends(np.array([drive.lag_per_s]), time_step_s)
+    speeds, reached = lagged(wanted[:, None], blend, before=np.array([before]))
     speeds = speeds[:, 0]
     if drive.default_mode == "free":
         speeds[(forward == 0) & (backward == 0)] = np.nan
@@ -78,21 +78,24 @@ def place_targets(
     return targets
 
 
+def blends(lags: FloatArray, time_step_s: float) -> FloatArray:
+    """By what share a speed comes nearer to its target in a step, of each rate, (W,), 1/s."""
+    return np.array([1.0 - math.exp(-lag * time_step_s) for lag in lags.tolist()])
+
+
 def lagged(
-    targets: FloatArray, lags: FloatArray, time_step_s: float, *, before: FloatArray
+    targets: FloatArray, blend: FloatArray, *, before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Speeds that follow their targets by first-order lags.
 
     Args:
         targets: (S, W) at each step.
-        lags: (W,) rates, 1/s.
-        time_step_s: Length of a step, seconds.
+        blend: (W,) see `blends`.
         before: (W,) the speeds before the first step.
 
     Returns:
         The speeds, (S, W), and the last of them, (W,).
     """
-    blend = np.array([1.0 - math.exp(-lag * time_step_s) for lag in lags])
     speeds = np.zeros_like(targets)
     current = before
     if not (targets.any() or current.any()):
