@@ -1,9 +1,17 @@
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from game_rig import Rig
 from virtual_screen import missing_packages, virtual_screen
+
+
+@pytest.fixture(autouse=True)
+def _locks_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A game's lock outlives its runner: here it goes with the test's folder."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
 
 
 @pytest.fixture(scope="session")

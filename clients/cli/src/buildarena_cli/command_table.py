@@ -45,6 +45,7 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     "model": Entry("models", "app", "Look at models."),
     "machine": Entry("machine", "app", "Simulate and draw machines on this computer."),
     "besiege": Entry("besiege", "app", "Play machines in the game Besiege."),
+    "challenge": Entry("challenge", "app", "Check what is handed in to a challenge."),
     "key": Entry("keys", "app", "Make, list, rotate, revoke and reinstate API keys."),
     "mcp": Entry("mcp", "mcp", "Let agents that speak the Model Context Protocol build."),
     "worker": Entry("worker", "app", "Run workers by themselves."),

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import stat
-import zipfile
-import zlib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -35,9 +31,9 @@ from buildarena_pipeline.evidence.document import (
 )
 from buildarena_pipeline.evidence.reading_runs import StepInputs
 from buildarena_pipeline.evidence.steps import judged, step_named
+from buildarena_pipeline.zip_files import ZipBounds, ZipFileError, zip_members
 
 MAX_DEPTH: Final = 16
-_ENCRYPTED: Final = 0x1
 _SHOWN: Final = 3
 
 
@@ -120,63 +116,26 @@ def _json(document: bytes) -> Any:
 
 
 def _members(data: bytes) -> dict[str, bytes]:
+    """The members, the sender's page left aside."""
+    bounds = ZipBounds(
+        members=MAX_MEMBERS,
+        unpacked_bytes=MAX_UNPACKED_BYTES,
+        ratio=MAX_RATIO,
+        small_bytes=SMALL_BYTES,
+    )
     try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            entries = archive.infolist()
-            _require_sound(entries)
-            return _unpacked(archive, entries)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OSError) as error:
-        raise EvidenceError(f"it is no sound ZIP file: {error}") from error
-    except (ValueError, RuntimeError) as error:
-        if isinstance(error, EvidenceError):
-            raise
-        raise EvidenceError(f"it is no sound ZIP file: {error}") from error
+        return zip_members(data, bounds, limit_of=_limit_of, unread=frozenset({PAGE}))
+    except ZipFileError as error:
+        raise EvidenceError(str(error)) from error
 
 
-def _require_sound(entries: list[zipfile.ZipInfo]) -> None:
-    if len(entries) > MAX_MEMBERS:
-        raise EvidenceError(f"it has {len(entries):,} members: at most {MAX_MEMBERS:,} are read")
-    twice = [name for name, n in Counter(entry.filename for entry in entries).items() if n > 1]
-    if twice:
-        raise EvidenceError(f"it has two members {twice[0][:100]!r}")
-    total = 0
-    for entry in entries:
-        _require_member(entry)
-        total += entry.file_size
-        if total > MAX_UNPACKED_BYTES:
-            raise EvidenceError(f"unpacked it has more than {MAX_UNPACKED_BYTES:,} bytes")
-
-
-def _require_member(entry: zipfile.ZipInfo) -> None:
-    name = entry.filename
-    if name not in {DOCUMENT, PAGE}:
-        _named(name)
-    kind = stat.S_IFMT(entry.external_attr >> 16)
-    if kind not in {0, stat.S_IFREG}:
-        raise EvidenceError(f"{name} is no ordinary file")
-    if entry.flag_bits & _ENCRYPTED:
-        raise EvidenceError(f"{name} is encrypted")
-    limit = MAX_DOCUMENT_BYTES if name == DOCUMENT else MAX_MEMBER_BYTES
+def _limit_of(name: str) -> int:
     if name == PAGE:
-        limit = MAX_UNPACKED_BYTES
-    if entry.file_size > limit:
-        raise EvidenceError(f"{name} has {entry.file_size:,} bytes: at most {limit:,} are read")
-    if entry.file_size > max(SMALL_BYTES, MAX_RATIO * entry.compress_size):
-        raise EvidenceError(f"{name} is more than {MAX_RATIO} times as large as it is packed")
-
-
-def _unpacked(archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo]) -> dict[str, bytes]:
-    """The members, the sender's page left aside; what is read is counted, whatever headers say."""
-    members = {}
-    for entry in entries:
-        if entry.filename == PAGE:
-            continue
-        with archive.open(entry) as member:
-            content = member.read(entry.file_size + 1)
-        if len(content) != entry.file_size:
-            raise EvidenceError(f"{entry.filename} is not as large as it says")
-        members[entry.filename] = content
-    return members
+        return MAX_UNPACKED_BYTES
+    if name == DOCUMENT:
+        return MAX_DOCUMENT_BYTES
+    _named(name)
+    return MAX_MEMBER_BYTES
 
 
 def _named(name: str) -> tuple[str, str]:

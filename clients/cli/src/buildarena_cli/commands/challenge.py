@@ -1,0 +1,206 @@
+"""`buildarena challenge`: seasons, and packages against their rules, without any server."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import typer
+
+from buildarena_cli.errors import DONE, FAILED, CommandError
+from buildarena_cli.lazy import new_group
+from buildarena_cli.options import JsonOption
+from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+
+if TYPE_CHECKING:
+    from buildarena_pipeline.challenges.checking import Report
+    from buildarena_pipeline.challenges.season import Season
+
+app = new_group("Check what is handed in to a challenge.")
+DEFAULT_SEASON: Final = "s01-stable-orbit"
+
+SeasonName = Annotated[
+    str, typer.Argument(help="Name of a season, or the path of its YAML file.", show_default=False)
+]
+SeasonOption = Annotated[
+    str, typer.Option("--season", help="Name of a season, or the path of its YAML file.")
+]
+TrackOption = Annotated[
+    str | None, typer.Option("--track", help="Track; the season's first if left out.")
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        help="A parameter of the score that nobody published, such as omega_ref=0.24 or "
+        "center=0,-400,0.",
+    ),
+]
+
+
+@app.command("list")
+def list_seasons(*, as_json: JsonOption = False) -> None:
+    """List the seasons that the product knows."""
+    from buildarena_pipeline.challenges.season import builtin_seasons
+
+    seasons = builtin_seasons().values()
+    if as_json:
+        print_json([season.model_dump(mode="json") for season in seasons])
+        return
+    rows = [[season.name, season.title, ", ".join(season.tracks)] for season in seasons]
+    print_table(columns("name", "title", "tracks"), rows)
+
+
+@app.command("show")
+def show_season(season: SeasonName, *, as_json: JsonOption = False) -> None:
+    """Show a season: its files, rules and score, and what of it nobody published."""
+    with _spelled():
+        chosen = _season(season, None)
+    if as_json:
+        print_json({**chosen.model_dump(mode="json"), "unknown": list(chosen.unknown)})
+        return
+    say(f"{chosen.name}: {chosen.title}")
+    say(chosen.about)
+    for name, track in chosen.tracks.items():
+        say(f"  track {name}: {track.title}")
+    say(f"files: {', '.join(chosen.files.by_role().values())}")
+    score = chosen.score
+    say(
+        f"score: 100 ({score.progress:g} progress + {score.speed:g} speed + "
+        f"{score.integrity:g} integrity); progress is full at {score.cycles:g} cycles"
+    )
+    if chosen.unknown:
+        say(f"not published: {', '.join(chosen.unknown)}; give them with --set")
+    for source in chosen.sources:
+        say(f"source: {source}")
+
+
+@app.command("check")
+def check(
+    package: Annotated[Path, typer.Argument(help="Folder or ZIP file with the package's files.")],
+    season: SeasonOption = DEFAULT_SEASON,
+    track: TrackOption = None,
+    settings: SetOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Check a package against every rule of its season, and score it; exit code 1 if it fails."""
+    from buildarena_pipeline.challenges.checking import check_package
+    from buildarena_pipeline.challenges.package import read_package
+
+    with _spelled():
+        chosen = _season(season, settings)
+        report = check_package(read_package(package), chosen, track or next(iter(chosen.tracks)))
+    if as_json:
+        print_json({**asdict(report), "passed": report.passed})
+    else:
+        _print_report(report)
+    raise typer.Exit(DONE if report.passed else FAILED)
+
+
+@app.command("table")
+def table(
+    folder: Annotated[Path, typer.Argument(help="Folder of packages: folders and ZIP files.")],
+    season: SeasonOption = DEFAULT_SEASON,
+    track: TrackOption = None,
+    settings: SetOption = None,
+    *,
+    as_json: JsonOption = False,
+) -> None:
+    """Check all packages of a folder, rank them by what is known, and show near-copies."""
+    from buildarena_pipeline.challenges.judging import judge_folder
+
+    with _spelled():
+        chosen = _season(season, settings)
+        entries = judge_folder(folder, chosen, track or next(iter(chosen.tracks)))
+    if as_json:
+        print_json([asdict(entry) for entry in entries])
+        return
+    rows = [
+        [
+            entry.name,
+            "" if entry.rank is None else str(entry.rank),
+            "" if entry.score is None else number(entry.score.known, 2),
+            "" if entry.score is None else number(entry.score.at_most, 2),
+            "" if entry.score is None else str(entry.score.cost),
+            ", ".join(entry.copies),
+            entry.refused,
+        ]
+        for entry in entries
+    ]
+    shown = columns(
+        "entry",
+        "rank",
+        "known",
+        "at most",
+        "cost",
+        "same as",
+        "refused",
+        numeric=("rank", "known", "at most", "cost"),
+    )
+    print_table(shown, rows)
+
+
+def _season(name: str, settings: list[str] | None) -> Season:
+    from buildarena_pipeline.challenges.season import season_named
+
+    return season_named(name).with_parameters(dict(map(_parameter, settings or ())))
+
+
+def _parameter(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise CommandError(f"--set {text[:60]}: expected NAME=VALUE, such as omega_ref=0.24")
+    try:
+        numbers = [float(part) for part in value.split(",")]
+    except ValueError:
+        raise CommandError(
+            f"--set {name[:60]}: expected a number, or three with commas between them"
+        ) from None
+    return name.strip(), numbers if len(numbers) > 1 else numbers[0]
+
+
+@contextmanager
+def _spelled() -> Iterator[None]:
+    from buildarena_pipeline.challenges.package import PackageError
+    from buildarena_pipeline.challenges.season import SeasonError
+
+    try:
+        yield
+    except (PackageError, SeasonError) as error:
+        raise CommandError(str(error)) from error
+
+
+def _print_report(report: Report) -> None:
+    rows = [
+        [finding.check, "ok" if finding.passed else "FAILED", finding.sentence]
+        for finding in report.findings
+    ]
+    print_table(columns("check", "", "found"), rows)
+    score = report.score
+    if score is None:
+        say("No score: the flight is not sound.")
+        return
+    rows = [
+        [
+            term.name,
+            "?" if term.share is None else number(term.points * term.share, 2),
+            f"{term.points:g}",
+            term.sentence,
+        ]
+        for term in score.terms
+    ]
+    print_table(columns("term", "points", "of", "figures", numeric=("points", "of")), rows)
+    say(f"cost {score.cost}; performance {_known(score.performance)}; final {_known(score.final)}")
+    if score.unknown:
+        say(
+            f"Known are {score.known:.2f} points, {score.at_most:.2f} at most; not published, to "
+            f"be given with --set: {', '.join(score.unknown)}"
+        )
+
+
+def _known(points: float | None) -> str:
+    return "not known" if points is None else f"{points:.2f}"

@@ -1,0 +1,158 @@
+"""Scores of flights: each term by itself, and what is not known said instead of guessed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from buildarena_besiege.logs.tracker_file import Floats, TrackerFile
+from buildarena_pipeline.challenges.season import OrbitScore, Track
+
+FULL: Final = 100.0
+"""Points of a perfect performance."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Term:
+    """A part of a score.
+
+    Attributes:
+        name: What it is for.
+        points: What it gives at most.
+        share: How much of them was reached, 0 to 1; None where something is not known.
+        sentence: The figures that it is made of.
+    """
+
+    name: str
+    points: float
+    share: float | None
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlightScore:
+    """The score of a package.
+
+    Attributes:
+        terms: Its parts.
+        performance: Their sum; None where one is not known.
+        known: The sum of those that are known: packages are ranked by it where not all are.
+        at_most: What it can be at most.
+        final: The performance times the track's coefficient, less what cost takes; None where
+            something is not known.
+        cost: Of the machine.
+        unknown: What would have to be stated to know the rest.
+    """
+
+    terms: tuple[Term, ...]
+    performance: float | None
+    known: float
+    at_most: float
+    final: float | None
+    cost: int
+    unknown: tuple[str, ...]
+
+
+def score_flight(
+    flight: TrackerFile, rule: OrbitScore, track: Track, *, cost: int, track_name: str
+) -> FlightScore:
+    """The score of a flight.
+
+    Args:
+        flight: The flight.
+        rule: The season's formula.
+        track: Whose coefficient counts.
+        cost: Of the machine.
+        track_name: What messages call the track.
+    """
+    angle = None if rule.center is None else swept_angle(flight.position, rule.center)
+    lasted = float(flight.time_s[-1] - flight.time_s[0])
+    terms = (
+        _progress(rule, angle),
+        _speed(rule, angle, lasted),
+        _integrity(rule, float(flight.integrity[-1])),
+    )
+    known = sum(term.points * term.share for term in terms if term.share is not None)
+    missing = sum(term.points for term in terms if term.share is None)
+    unknown = _unknown(rule, track, track_name)
+    performance = None if missing else known
+    final = None
+    if performance is not None and track.coefficient is not None and rule.cost_penalty is not None:
+        final = max(0.0, performance * track.coefficient - rule.cost_penalty * cost)
+    return FlightScore(
+        terms=terms,
+        performance=performance,
+        known=known,
+        at_most=known + missing,
+        final=final,
+        cost=cost,
+        unknown=unknown,
+    )
+
+
+def swept_angle(position: Floats, center: tuple[float, float, float]) -> float:
+    """How far a path goes round a point, rad, at least 0.
+
+    The angle about the axis about which the path turns most: what goes back is taken off again, so
+    that swinging to and fro is worth nothing.
+
+    Args:
+        position: (N, 3) places, units.
+        center: The point.
+    """
+    arms = position - np.asarray(center)
+    crossed = np.cross(arms[:-1], arms[1:])
+    axis = crossed.sum(axis=0)
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
+        return 0.0
+    axis = axis / length
+    level = arms - (arms @ axis)[:, None] * axis
+    sine = np.cross(level[:-1], level[1:]) @ axis
+    cosine = (level[:-1] * level[1:]).sum(axis=1)
+    return abs(float(np.arctan2(sine, cosine).sum()))
+
+
+def _progress(rule: OrbitScore, angle: float | None) -> Term:
+    points = FULL * rule.progress
+    if angle is None:
+        return Term(
+            name="progress", points=points, share=None, sentence="the planet's centre is not known"
+        )
+    cycles = angle / (2 * math.pi)
+    share = min(1.0, cycles / rule.cycles)
+    sentence = f"{cycles:.3f} cycles of {rule.cycles:g}"
+    return Term(name="progress", points=points, share=share, sentence=sentence)
+
+
+def _speed(rule: OrbitScore, angle: float | None, lasted_s: float) -> Term:
+    points = FULL * rule.speed
+    if angle is None:
+        return Term(
+            name="speed", points=points, share=None, sentence="the planet's centre is not known"
+        )
+    omega = angle / lasted_s if lasted_s > 0 else 0.0
+    said = f"{omega:.4f} rad/s over {lasted_s:.2f} s"
+    if rule.omega_ref is None:
+        return Term(
+            name="speed", points=points, share=None, sentence=f"{said}; its reference is not known"
+        )
+    share = min(1.0, omega / rule.omega_ref)
+    return Term(name="speed", points=points, share=share, sentence=f"{said}, of {rule.omega_ref:g}")
+
+
+def _integrity(rule: OrbitScore, share: float) -> Term:
+    points = FULL * rule.integrity
+    return Term(
+        name="integrity", points=points, share=share, sentence=f"{100 * share:.1f} % is whole"
+    )
+
+
+def _unknown(rule: OrbitScore, track: Track, track_name: str) -> tuple[str, ...]:
+    missing = [name for name, value in rule.model_dump().items() if value is None]
+    if track.coefficient is None:
+        missing.append(f"coefficient.{track_name}")
+    return tuple(missing)

@@ -1,0 +1,270 @@
+"""A season of a challenge: its tracks, its files, its rules and its score, as data."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, Self
+
+import yaml
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from buildarena_geometry.modules.sets import module_set
+
+Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
+FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,59}$")]
+Sentence = Annotated[str, Field(min_length=1, max_length=2000)]
+Share = Annotated[float, Field(ge=0, le=1)]
+Positive = Annotated[float, Field(gt=0, le=1e6)]
+Coordinate = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
+_MAX_BYTES: Final = 1 << 20
+_WEIGHTS_SUM: Final = 1e-9
+
+
+class SeasonError(ValueError):
+    """There is no such season, or its file is wrong; the message says why."""
+
+
+class _Form(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Track(_Form):
+    """Who may have built what is handed in.
+
+    Attributes:
+        title: What people read.
+        coefficient: What a score is multiplied by; None where it is not known.
+        transcript: Whether the conversation with the builder must be there.
+    """
+
+    title: Sentence
+    coefficient: Positive | None = None
+    transcript: bool = True
+
+
+class PackageFiles(_Form):
+    """What the files of a package are called.
+
+    Attributes:
+        raw: The machine that the history builds, as the game's file.
+        history: The actions that built it.
+        full_history: All that was asked for, queries and refused actions too.
+        tuned: The machine that flew: keys and settings may differ from the raw one's.
+        trajectory: What the tracker wrote of the flight.
+        transcript: The conversation with the builder.
+    """
+
+    raw: FileName = "machine_raw.bsg"
+    history: FileName = "build_history.json"
+    full_history: FileName = "build_history_full.json"
+    tuned: FileName = "machine_tuned.bsg"
+    trajectory: FileName = "trajectory.csv"
+    transcript: FileName = "chat_transcript.md"
+
+    @model_validator(mode="after")
+    def _all_differ(self) -> Self:
+        names = list(self.by_role().values())
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"two files are called {twice}")
+        return self
+
+    def by_role(self) -> dict[str, str]:
+        """The name of each file, by what it is."""
+        return dict(self.model_dump())
+
+
+class TrackerRules(_Form):
+    """What a sound tracker file is like.
+
+    Attributes:
+        rate_hz: Samples a second.
+        rate_within: By what share the mean rate may differ.
+        longest_gap_s: Between two samples, seconds.
+        largest_acceleration: What no machine's thrust exceeds, units/s²: beyond it a sample is a
+            jump.
+        mods: Ids of the mods that a machine file may ask for.
+    """
+
+    rate_hz: Positive = 10.0
+    rate_within: Share = 0.1
+    longest_gap_s: Positive = 0.5
+    largest_acceleration: Positive
+    mods: tuple[Annotated[str, Field(max_length=100)], ...] = ()
+
+
+class OrbitScore(_Form):
+    """How a flight around a planet is scored; what is not known is None, and asked for.
+
+    Attributes:
+        formula: Tells it from others.
+        progress: Weight of how many cycles were flown.
+        speed: Weight of the mean angular speed.
+        integrity: Weight of how whole the machine is at the end.
+        cycles: At how many cycles the first is full.
+        center: Of the planet, the game's axes, units.
+        omega_ref: At which angular speed the second is full, rad/s.
+        cost_penalty: Points taken for each unit of cost.
+    """
+
+    formula: Literal["orbit"]
+    progress: Share
+    speed: Share
+    integrity: Share
+    cycles: Positive
+    center: tuple[Coordinate, Coordinate, Coordinate] | None = None
+    omega_ref: Positive | None = None
+    cost_penalty: Annotated[float, Field(ge=0, le=1e6)] | None = None
+
+    @model_validator(mode="after")
+    def _sums_to_one(self) -> Self:
+        total = self.progress + self.speed + self.integrity
+        if abs(total - 1.0) > _WEIGHTS_SUM:
+            raise ValueError(f"the weights sum to {total:g}, not to 1")
+        return self
+
+
+class Season(_Form):
+    """A season.
+
+    Attributes:
+        name: In addresses and commands.
+        title: What people read.
+        about: What is asked for.
+        sources: Where what is stated here comes from.
+        opens: When packages are taken; None for always.
+        closes: Until when; None for always.
+        attempts_a_day: How many packages one owner may hand in a day; None for any number.
+        tracks: By name.
+        files: What a package's files are called.
+        dialect: The interface that the histories are of.
+        modules: What machines may be made of: a set, or modules' names.
+        tracker: What a sound tracker file is like.
+        score: How a flight is scored.
+    """
+
+    name: Name
+    title: Sentence
+    about: Sentence
+    sources: tuple[Sentence, ...] = ()
+    opens: AwareDatetime | None = None
+    closes: AwareDatetime | None = None
+    attempts_a_day: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    tracks: Annotated[dict[Name, Track], Field(min_length=1, max_length=20)]
+    files: PackageFiles = PackageFiles()
+    dialect: Literal["1.0", "2.0"]
+    modules: Literal["basic", "workshop", "all"] | tuple[str, ...] = "all"
+    tracker: TrackerRules
+    score: OrbitScore
+
+    @model_validator(mode="after")
+    def _is_possible(self) -> Self:
+        if self.opens and self.closes and self.closes <= self.opens:
+            raise ValueError("it closes before it opens")
+        known = module_set("all")
+        unknown = next((name for name in self.allowed if name not in known), None)
+        if unknown is not None:
+            raise ValueError(f"modules: there is no module {unknown!r}")
+        return self
+
+    @property
+    def allowed(self) -> frozenset[str]:
+        """The names of the modules that machines may be made of."""
+        chosen = module_set(self.modules) if isinstance(self.modules, str) else self.modules
+        return frozenset(chosen)
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """The parameters of the score that nobody has stated: an operator gives them."""
+        missing = [name for name, value in self.score.model_dump().items() if value is None]
+        tracks = (name for name, track in self.tracks.items() if track.coefficient is None)
+        return (*missing, *(f"coefficient.{name}" for name in tracks))
+
+    def with_parameters(self, parameters: dict[str, Any]) -> Season:
+        """The same season, some parameters of its score given.
+
+        Args:
+            parameters: By name, as in `unknown`.
+
+        Raises:
+            SeasonError: There is no such parameter, or a value makes no sense.
+        """
+        content = self.model_dump(mode="json")
+        for name, value in parameters.items():
+            kind, _, track = name.partition(".")
+            if kind == "coefficient" and track in content["tracks"]:
+                content["tracks"][track]["coefficient"] = value
+            elif name in content["score"] and name != "formula":
+                content["score"][name] = value
+            else:
+                choices = [*content["score"], *(f"coefficient.{track}" for track in self.tracks)]
+                raise SeasonError(
+                    f"{name} is no parameter of {self.name}; there are "
+                    f"{', '.join(choice for choice in choices if choice != 'formula')}"
+                )
+        return season_of(content, where=self.name)
+
+
+@cache
+def builtin_seasons() -> dict[str, Season]:
+    """The seasons that the product knows, by name."""
+    folder = resources.files(__package__).joinpath("seasons")
+    files = sorted((file.name, file) for file in folder.iterdir() if file.name.endswith(".yaml"))
+    seasons = [read_season(file.read_bytes(), where=name) for name, file in files]
+    return {season.name: season for season in seasons}
+
+
+def season_named(name: str) -> Season:
+    """A built-in season, or that of a file.
+
+    Args:
+        name: Its name, or the path of a YAML file.
+
+    Raises:
+        SeasonError: There is no such season, or its file is wrong.
+    """
+    if name in builtin_seasons():
+        return builtin_seasons()[name]
+    path = Path(name)
+    if path.suffix not in {".yaml", ".yml"}:
+        raise SeasonError(
+            f"there is no season {name[:60]!r}; there is {', '.join(builtin_seasons())}, or the "
+            "path of a .yaml file"
+        )
+    try:
+        with path.open("rb") as file:
+            return read_season(file.read(_MAX_BYTES + 1), where=path.name)
+    except OSError as error:
+        raise SeasonError(f"{name}: {error.strerror}") from error
+
+
+def read_season(data: bytes, *, where: str) -> Season:
+    """The season of a YAML text.
+
+    Args:
+        data: The text.
+        where: What messages call it.
+
+    Raises:
+        SeasonError: It is none; the message names the place.
+    """
+    if len(data) > _MAX_BYTES:
+        raise SeasonError(f"{where}: at most {_MAX_BYTES:,} bytes are read")
+    try:
+        content = yaml.safe_load(data)
+    except yaml.YAMLError as error:
+        raise SeasonError(f"{where}: not valid YAML: {' '.join(str(error).split())}") from error
+    return season_of(content, where=where)
+
+
+def season_of(content: object, *, where: str) -> Season:
+    """The season of a document's values; see `read_season`."""
+    try:
+        return Season.model_validate(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = ".".join(map(str, first["loc"]))
+        message = first["msg"].removeprefix("Value error, ")
+        raise SeasonError(f"{where}: {place + ': ' if place else ''}{message}") from error
