@@ -211,3 +211,13 @@ class Client:
     evidence = _call(Api.evidence)
     evidence_table = _call(Api.evidence_table)
     evidence_file = _call(Api.evidence_file)
+
+    seasons = _call(Api.seasons)
+    season = _call(Api.season)
+    season_board = _call(Api.season_board)
+    submit_package = _call(Api.submit_package)
+    packages = _call(Api.packages)
+    package = _call(Api.package)
+    package_file = _call(Api.package_file)
+    decide_package = _call(Api.decide_package)
+    withdraw_package = _call(Api.withdraw_package)

@@ -47,6 +47,14 @@ from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import TurnRecord, TurnResult, Turns
 from buildarena_store.jobs.verifications import Verification, Verifications
 from buildarena_store.metrics import STAGE_SECONDS, Metrics, MetricValues
+from buildarena_store.packages import (
+    Checked,
+    PackageChange,
+    Packages,
+    PackageState,
+    StoredPackage,
+    TooManyPackagesError,
+)
 from buildarena_store.states import (
     JobState,
     Outcome,
@@ -78,6 +86,7 @@ __all__ = [
     "Budgets",
     "CellId",
     "CellRecord",
+    "Checked",
     "Database",
     "EndedKeyError",
     "Event",
@@ -104,6 +113,9 @@ __all__ = [
     "NewSweep",
     "NotOwnedError",
     "Outcome",
+    "PackageChange",
+    "PackageState",
+    "Packages",
     "Results",
     "RolloutRecord",
     "RolloutRequest",
@@ -117,6 +129,7 @@ __all__ = [
     "Store",
     "StoreError",
     "StoredEvidence",
+    "StoredPackage",
     "StoredTask",
     "Sweep",
     "SweepProgress",
@@ -125,6 +138,7 @@ __all__ = [
     "Tasks",
     "TooManyFilesError",
     "TooManyLeasesError",
+    "TooManyPackagesError",
     "TransitionError",
     "TrialFilter",
     "TurnRecord",

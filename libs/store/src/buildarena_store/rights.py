@@ -15,7 +15,16 @@ from psycopg import sql
 from sqlalchemy import Connection, text
 
 _ACCOUNTS = ("api_keys", "names")
-_SUBMITTED = ("budgets", "job_wants", "evidence", "sweeps", "sweep_jobs", "tasks")
+_SUBMITTED = (
+    "budgets",
+    "job_wants",
+    "evidence",
+    "packages",
+    "package_changes",
+    "sweeps",
+    "sweep_jobs",
+    "tasks",
+)
 _WORK = ("artifacts", "attempts", "events", "job_artifacts", "jobs", "leases", "rollouts")
 _SESSIONS = ("external_calls", "journal")
 _FIGURES = ("board_changes", "figure_changes", "figures", "workers")

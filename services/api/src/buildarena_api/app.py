@@ -38,11 +38,13 @@ from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
+from buildarena_api.package_checks import PackageChecks
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
     archives,
     callers,
     catalogue,
+    challenges,
     comparisons,
     events,
     evidence,
@@ -68,6 +70,7 @@ from buildarena_api.runners.service import RunnerService
 from buildarena_pipeline import __version__
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.challenges.season import all_seasons
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
@@ -99,7 +102,7 @@ ORDINARY = (
     simulators,
     workers,
 )
-LIMITED_THEMSELVES = (events, exports, archives, evidence, comparisons, metrics)
+LIMITED_THEMSELVES = (events, exports, archives, evidence, challenges, comparisons, metrics)
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
 thread."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
@@ -122,16 +125,20 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
     hub = EventHub(watching)
     runners = RunnerService(context)
+    seasons = all_seasons(context.settings.seasons)
+    packages = PackageChecks(context, seasons)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         probes.start()
         reaper.start()
         runners.start()
+        packages.start()
         yield
         reaper.stop()
         await asyncio.to_thread(probes.close)
         runners.close()
+        packages.close()
         await hub.close()
         await rate_limits.close()
         watching.close()
@@ -172,6 +179,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.exporting = exporting
     app.state.hub = hub
     app.state.runners = runners
+    app.state.seasons = seasons
     app.state.key_checks = KeyChecks(watching)
     app.state.concurrency = usual_limits()
     app.state.body_buffers = BodyBuffers()
@@ -221,7 +229,7 @@ def _add_middleware(app: FastAPI) -> None:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
         BodyLimitMiddleware,
-        unlimited={archives.IMPORT_PATH, evidence.PATH},
+        unlimited={archives.IMPORT_PATH, evidence.PATH, challenges.PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
         most=runner.max_request_bytes,

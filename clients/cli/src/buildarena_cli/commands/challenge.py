@@ -1,4 +1,4 @@
-"""`buildarena challenge`: seasons, and packages against their rules, without any server."""
+"""`buildarena challenge`: packages against a season's rules, here or handed in to a service."""
 
 from __future__ import annotations
 
@@ -10,10 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from buildarena_cli.client import Client
 from buildarena_cli.errors import DONE, FAILED, CommandError
 from buildarena_cli.lazy import new_group
-from buildarena_cli.options import JsonOption
-from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.terminal.output import (
+    columns,
+    minute_of,
+    number,
+    print_json,
+    print_table,
+    say,
+)
 
 if TYPE_CHECKING:
     from buildarena_pipeline.challenges.checking import Report
@@ -25,6 +33,7 @@ DEFAULT_SEASON: Final = "s01-stable-orbit"
 SeasonName = Annotated[
     str, typer.Argument(help="Name of a season, or the path of its YAML file.", show_default=False)
 ]
+PackageId = Annotated[str, typer.Argument(help="Id of the package.")]
 SeasonOption = Annotated[
     str, typer.Option("--season", help="Name of a season, or the path of its YAML file.")
 ]
@@ -142,6 +151,102 @@ def table(
         numeric=("rank", "known", "at most", "cost"),
     )
     print_table(shown, rows)
+
+
+@app.command("submit")
+def submit(
+    package: Annotated[Path, typer.Argument(help="Folder or ZIP file with the package's files.")],
+    name: Annotated[str, typer.Option("--name", help="What the entry is called.")],
+    season: SeasonOption = DEFAULT_SEASON,
+    track: Annotated[str, typer.Option("--track", help="Track.")] = "autopilot",
+    *,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Hand in a package to a service, which checks it within seconds."""
+    from buildarena_pipeline.challenges.package import zipped_package
+
+    with _spelled():
+        data = zipped_package(package)
+    done = Client(url).submit_package(data, season=season, track=track, name=name)
+    if as_json:
+        print_json(done)
+        return
+    say(f"{done['id']}: {'handed in' if done['added'] else 'was there before; nothing changed'}")
+    say(f"`buildarena challenge package {done['id']}` shows what its checks find")
+
+
+@app.command("package")
+def show_package(
+    package: PackageId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
+) -> None:
+    """Show a package that was handed in, with every check."""
+    shown = Client(url).package(package)
+    if as_json:
+        print_json(shown)
+        return
+    say(f"{shown['id']}: {shown['name']}, {shown['season']}, {shown['track']}, {shown['state']}")
+    if shown["reason"]:
+        say(shown["reason"])
+    report = shown["report"] or {}
+    rows = [
+        [each["check"], "ok" if each["passed"] else "FAILED", each["sentence"]]
+        for each in report.get("findings", [])
+    ]
+    if rows:
+        print_table(columns("check", "", "found"), rows)
+    if shown["points"] is not None:
+        say(f"{shown['points']:.2f} points, cost {shown['cost']}")
+    for change in shown["changes"]:
+        say(f"{change['at']}: {change['state_before']} → {change['state']}: {change['reason']}")
+
+
+@app.command("board")
+def board(
+    season: SeasonName,
+    track: Annotated[str, typer.Option("--track", help="Track.")] = "autopilot",
+    *,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Show a season's board: equal points share a rank."""
+    rows = Client(url).season_board(season, track)
+    if as_json:
+        print_json(rows)
+        return
+    cells = [
+        [
+            *(str(row["rank"]), entry["name"], number(entry["points"], 2), str(entry["cost"])),
+            *(minute_of(entry["created_at"]), entry["state"], entry["id"]),
+        ]
+        for row in rows
+        for entry in (row["package"],)
+    ]
+    shown = columns(
+        *("rank", "name", "points", "cost", "handed in", "state", "id"),
+        numeric=("rank", "points", "cost"),
+    )
+    print_table(shown, cells)
+
+
+@app.command("decide")
+def decide(
+    package: PackageId,
+    state: Annotated[str, typer.Argument(help="accepted or refused.")],
+    reason: Annotated[str, typer.Option("--reason", help="Why; it stays with the package.")],
+    *,
+    url: UrlOption = DEFAULT_URL,
+) -> None:
+    """Accept or refuse a package that was checked; for admins."""
+    done = Client(url).decide_package(package, state=state, reason=reason)
+    say(f"{done['id']}: {done['state']}")
+
+
+@app.command("withdraw")
+def withdraw(package: PackageId, *, url: UrlOption = DEFAULT_URL) -> None:
+    """Take a package off its board."""
+    done = Client(url).withdraw_package(package)
+    say(f"{done['id']}: {done['state']}")
 
 
 def _season(name: str, settings: list[str] | None) -> Season:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,13 +13,52 @@ from buildarena_besiege.importing.xml_file import FileMachine
 from buildarena_pipeline.challenges.checking import Report, check_package
 from buildarena_pipeline.challenges.findings import CheckFailed
 from buildarena_pipeline.challenges.machines import read_actions, read_file
-from buildarena_pipeline.challenges.package import Package, PackageError, read_package
+from buildarena_pipeline.challenges.package import (
+    Package,
+    PackageError,
+    packed_package,
+    read_package,
+)
 from buildarena_pipeline.challenges.scores import FlightScore
 from buildarena_pipeline.challenges.season import Season
+from buildarena_store import Checked
 
 _WORDS: Final = frozenset({"note", "name", "machine_name"})
 """Arguments that name things: they make no other machine."""
 _DECIMALS: Final = 3
+
+
+def checked_package(data: bytes, season: Season, track: str) -> Checked:
+    """What the season says of a ZIP file, as the store keeps it.
+
+    Args:
+        data: The file.
+        season: Its season.
+        track: Its track.
+    """
+    try:
+        package = packed_package(data)
+    except PackageError as error:
+        return Checked(
+            passed=False,
+            reason=str(error),
+            report={"season": season.name, "track": track, "findings": [], "passed": False},
+            rules=season.digest,
+            points=None,
+            cost=None,
+            fingerprints=(),
+        )
+    report = check_package(package, season, track)
+    score = report.score
+    return Checked(
+        passed=report.passed,
+        reason=next((each.sentence for each in report.findings if not each.passed), ""),
+        report={**asdict(report), "passed": report.passed},
+        rules=season.digest,
+        points=None if score is None else score.points,
+        cost=None if score is None else score.cost,
+        fingerprints=sorted(fingerprints(package, season)),
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,20 +110,13 @@ def judge_folder(folder: Path, season: Season, track: str) -> tuple[Entry, ...]:
 def ranked(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     """The entries with their ranks: equal scores share the better one."""
     passing = [entry for entry in entries if not entry.refused and entry.score is not None]
-    points = [_points(entry) for entry in passing]
+    points = [entry.score.points for entry in passing if entry.score is not None]
     with_rank = [
         replace(entry, rank=1 + sum(other > own for other in points))
         for entry, own in zip(passing, points, strict=True)
     ]
     with_rank.sort(key=lambda entry: (entry.rank, entry.name))
     return (*with_rank, *(entry for entry in entries if entry not in passing))
-
-
-def _points(entry: Entry) -> float:
-    score = entry.score
-    if score is None:
-        return 0.0
-    return round(score.known if score.final is None else score.final, 9)
 
 
 def _judged(place: Path, season: Season, track: str) -> tuple[Entry, frozenset[str]]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import stat
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,6 +50,25 @@ def read_package(path: Path) -> Package:
             return packed_package(file.read(MAX_BYTES + 1))
     except OSError as error:
         raise PackageError(f"{path}: {error.strerror}") from error
+
+
+def zipped_package(path: Path) -> bytes:
+    """The bytes of a package as a ZIP file: of a folder's files equal ones have equal bytes.
+
+    Args:
+        path: A folder, or a ZIP file, which is left as it is.
+
+    Raises:
+        PackageError: It is neither, or breaks a bound.
+    """
+    if not path.is_dir():
+        read_package(path)
+        return path.read_bytes()
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in sorted(read_package(path).files.items()):
+            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
+    return packed.getvalue()
 
 
 def packed_package(data: bytes) -> Package:

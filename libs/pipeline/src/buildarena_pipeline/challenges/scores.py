@@ -55,6 +55,11 @@ class FlightScore:
     cost: int
     unknown: tuple[str, ...]
 
+    @property
+    def points(self) -> float:
+        """By which packages are ranked: the final score, or what of it is known."""
+        return round(self.known if self.final is None else self.final, 9)
+
 
 def score_flight(
     flight: TrackerFile, rule: OrbitScore, track: Track, *, cost: int, track_name: str

@@ -11,6 +11,7 @@ import yaml
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from buildarena_geometry.modules.sets import module_set
+from buildarena_store.ids import content_hash
 
 Name = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,39}$")]
 FileName = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,59}$")]
@@ -176,6 +177,11 @@ class Season(_Form):
         return frozenset(chosen)
 
     @property
+    def digest(self) -> str:
+        """Hash of all that it says: packages that were checked by other rules are checked again."""
+        return content_hash(self.model_dump(mode="json"))
+
+    @property
     def unknown(self) -> tuple[str, ...]:
         """The parameters of the score that nobody has stated: an operator gives them."""
         missing = [name for name, value in self.score.model_dump().items() if value is None]
@@ -214,6 +220,26 @@ def builtin_seasons() -> dict[str, Season]:
     files = sorted((file.name, file) for file in folder.iterdir() if file.name.endswith(".yaml"))
     seasons = [read_season(file.read_bytes(), where=name) for name, file in files]
     return {season.name: season for season in seasons}
+
+
+def all_seasons(folder: Path | None) -> dict[str, Season]:
+    """The built-in seasons and those of an operator's folder, which may replace them.
+
+    Args:
+        folder: With a YAML file for each; None without one.
+
+    Raises:
+        SeasonError: The folder cannot be read, or a file in it is wrong.
+    """
+    seasons = dict(builtin_seasons())
+    if folder is None:
+        return seasons
+    try:
+        files = sorted(each for each in folder.iterdir() if each.suffix in {".yaml", ".yml"})
+        own = [read_season(each.read_bytes(), where=each.name) for each in files]
+    except OSError as error:
+        raise SeasonError(f"{folder}: {error.strerror}") from error
+    return seasons | {season.name: season for season in own}
 
 
 def season_named(name: str) -> Season:

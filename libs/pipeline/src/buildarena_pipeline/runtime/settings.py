@@ -174,6 +174,10 @@ class Settings(BaseSettings):
     prompt_packs: Annotated[
         Path | None, Field(description="Folder of further prompt packs, one folder each")
     ] = None
+    seasons: Annotated[
+        Path | None,
+        Field(description="Folder with further seasons of challenges, a YAML file each"),
+    ] = None
     workflows: Annotated[
         dict[str, str],
         Field(description='Further workflows as JSON, {"name": "path/to/file.py:Class"}'),
