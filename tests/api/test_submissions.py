@@ -1,15 +1,13 @@
 """Packages at the API: handed in, checked once, seen by whom they concern, ranked, decided on."""
 
-import io
 import time
-import zipfile
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from threading import Thread
 
 import pytest
 from starlette.testclient import TestClient
-from support.challenge import CENTER, package_files
+from support.challenge import CENTER, packed
 from support.clients.tenants import WITH_KEYS, new_tenant, operator
 
 from buildarena_api import package_checks
@@ -22,17 +20,6 @@ from buildarena_store.artifacts import GarbageCollector
 PATH = "/v1/submissions"
 KNOWN = season_named("s01-stable-orbit").with_parameters({"center": list(CENTER), "omega_ref": 0.3})
 SEASONS = {KNOWN.name: KNOWN}
-
-
-def packed(machine: str = "three_blocks", note: str = "") -> bytes:
-    files = package_files(machine)
-    if note:
-        files["chat_transcript.md"] += note.encode()
-    data = io.BytesIO()
-    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(zipfile.ZipInfo(name), content)
-    return data.getvalue()
 
 
 def as_entry(name: str = "mine", track: str = "autopilot") -> dict[str, str]:

@@ -1,8 +1,10 @@
 """Packages of a challenge: public machines with flights and transcripts of our own."""
 
+import io
 import json
 import math
 import uuid
+import zipfile
 from pathlib import Path
 
 from buildarena_besiege.exporting.machine_file import Guids, block_records, machine_text
@@ -108,3 +110,15 @@ def braced_files() -> dict[str, bytes]:
         "trajectory.csv": flight.encode(),
         "chat_transcript.md": TRANSCRIPT.encode(),
     }
+
+
+def packed(machine: str = "three_blocks", note: str = "") -> bytes:
+    """A sound package as a ZIP file; another note, another file."""
+    files = package_files(machine)
+    if note:
+        files["chat_transcript.md"] += note.encode()
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(zipfile.ZipInfo(name), content)
+    return data.getvalue()
