@@ -7,6 +7,7 @@ equal verdicts of the engines in 95 %.
 """
 
 import argparse
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Any, Final
 from benchmarks.figures import tell
 from support.machines.piloted import Answer, experts_machine, listened, repeated, scored
 
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import Score, builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES
 from buildarena_simulation.control import channel
@@ -55,21 +56,37 @@ def random_program(machine: Machine) -> str:
     return RANDOM % ", ".join(f'"{name}"' for name in names)
 
 
-def in_world(name: str, engine: str, seed: int) -> dict[str, Any]:
-    """How the four do in one world."""
+def in_world(name: str, engine: str, players: Sequence[str], seed: int) -> dict[str, Score]:
+    """How players do in one world."""
     task = builtin_tasks()[name]
-    expert = experts_machine(task, seed % SEEDS_OF_DESIGNS)
-    own = scored(task, expert, engine, seed)
-    answers = answers_of(name, engine, seed % SEEDS_OF_DESIGNS)
-    return {
-        "expert": own.success,
-        "indicator": own.indicator,
-        "schedule": repeated(answers, task, expert, engine, seed).success,
-        "random": scored(
-            task, expert.with_controller(random_program(expert)), engine, seed
-        ).success,
-        "idle": scored(task, expert.with_controller(IDLE), engine, seed).success,
+    machine = experts_machine(task, seed % SEEDS_OF_DESIGNS)
+    plays: dict[str, Callable[[], Score]] = {
+        "expert": lambda: scored(task, machine, engine, seed),
+        "schedule": lambda: repeated(
+            answers_of(name, engine, seed % SEEDS_OF_DESIGNS), task, machine, engine, seed
+        ),
+        "random": lambda: scored(
+            task, machine.with_controller(random_program(machine)), engine, seed
+        ),
+        "idle": lambda: scored(task, machine.with_controller(IDLE), engine, seed),
     }
+    return {player: plays[player]() for player in players}
+
+
+def summed(rows: Sequence[Mapping[str, Score]]) -> dict[str, float]:
+    """Shares of worlds that each player passes, and the expert's mean indicator."""
+    shares = {player: mean(row[player].success for row in rows) for player in rows[0]}
+    if "expert" not in shares:
+        return shares
+    return {"indicator": round(mean(row["expert"].indicator for row in rows), 3), **shares}
+
+
+def equal_verdicts(rows: Sequence[Sequence[Mapping[str, Score]]]) -> float:
+    """In what share of worlds the engines say the same of all players."""
+    return mean(
+        len({tuple(score.success for score in row.values()) for row in world}) == 1
+        for world in zip(*rows, strict=True)
+    )
 
 
 def main() -> None:
@@ -78,23 +95,22 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     parser.add_argument("--worlds", type=int, default=WORLDS)
     parser.add_argument("--tasks", nargs="+", choices=TASKS, default=TASKS, metavar="TASK")
+    parser.add_argument("--players", nargs="+", choices=PLAYERS, default=PLAYERS, metavar="PLAYER")
     parser.add_argument("--processes", type=int)
     options = parser.parse_args()
     figures: dict[str, Any] = {}
     with ProcessPoolExecutor(options.processes) as pool:
         for name in options.tasks:
             rows = {
-                engine: list(pool.map(partial(in_world, name, engine), range(options.worlds)))
+                engine: list(
+                    pool.map(
+                        partial(in_world, name, engine, options.players), range(options.worlds)
+                    )
+                )
                 for engine in ENGINES
             }
-            verdicts = zip(*([row["expert"] for row in of] for of in rows.values()), strict=True)
-            figures[name] = {
-                engine: {
-                    "indicator": round(mean(row["indicator"] for row in of), 3),
-                    **{who: mean(row[who] for row in of) for who in PLAYERS},
-                }
-                for engine, of in rows.items()
-            } | {"equal_verdicts": mean(len(set(each)) == 1 for each in verdicts)}
+            figures[name] = {engine: summed(of) for engine, of in rows.items()}
+            figures[name]["equal_verdicts"] = equal_verdicts(list(rows.values()))
     tell({"worlds": options.worlds, **figures}, options.json)
 
 

@@ -214,7 +214,7 @@ def test_unknown_seasons_tracks_and_names_are_told_with_choices(people) -> None:
     wrong = {**as_entry(), "season": "s02"}
     refused = ann.ask("POST", PATH, params=wrong, content=b"")
     assert refused.status_code == 404
-    assert "there is s01-stable-orbit" in refused.json()["detail"]
+    assert "s01-stable-orbit" in refused.json()["detail"]
     refused = ann.ask("POST", PATH, params=as_entry(track="robots"), content=b"")
     assert "there is autopilot, copilot, human" in refused.json()["detail"]
     for name in ("", "x" * 81, "a\nb"):

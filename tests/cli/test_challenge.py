@@ -63,7 +63,7 @@ def test_parameters_complete_a_score(package: Path) -> None:
 
 
 def test_unknown_names_have_choices(package: Path) -> None:
-    assert "there is s01-stable-orbit" in run("check", package, "--season", "s02")[1]
+    assert "s01-stable-orbit" in run("check", package, "--season", "s02")[1]
     assert "there is autopilot, copilot, human" in run("check", package, "--track", "robots")[1]
     assert "No such file" in run("check", package / "nothing")[1]
 

@@ -75,12 +75,8 @@ def show_season(season: SeasonName, *, as_json: JsonOption = False) -> None:
     say(chosen.about)
     for name, track in chosen.tracks.items():
         say(f"  track {name}: {track.title}")
-    say(f"files: {', '.join(chosen.files.by_role().values())}")
-    score = chosen.score
-    say(
-        f"score: 100 ({score.progress:g} progress + {score.speed:g} speed + "
-        f"{score.integrity:g} integrity); progress is full at {score.cycles:g} cycles"
-    )
+    say(f"files: {', '.join((*chosen.score.file_names, chosen.transcript))}")
+    say(f"score: {chosen.score.in_words}")
     if chosen.unknown:
         say(f"not published: {', '.join(chosen.unknown)}; give them with --set")
     for source in chosen.sources:
@@ -287,7 +283,7 @@ def _print_report(report: Report) -> None:
     print_table(columns("check", "", "found"), rows)
     score = report.score
     if score is None:
-        say("No score: the flight is not sound.")
+        say("No score: what is scored breaks a rule.")
         return
     rows = [
         [

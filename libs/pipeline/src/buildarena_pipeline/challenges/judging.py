@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -19,8 +20,9 @@ from buildarena_pipeline.challenges.package import (
     packed_package,
     read_package,
 )
-from buildarena_pipeline.challenges.scores import FlightScore
-from buildarena_pipeline.challenges.season import Season
+from buildarena_pipeline.challenges.scores import PackageScore
+from buildarena_pipeline.challenges.season import Season, TrialsScore
+from buildarena_pipeline.challenges.trials import read_machine, shape_of
 from buildarena_store import Checked
 
 _WORDS: Final = frozenset({"note", "name", "machine_name"})
@@ -78,7 +80,7 @@ class Entry:
     rank: int | None = None
     report: Report | None = None
     refused: str = ""
-    score: FlightScore | None = None
+    score: PackageScore | None = None
     copies: tuple[str, ...] = ()
 
 
@@ -136,18 +138,22 @@ def fingerprints(package: Package, season: Season) -> frozenset[str]:
 
 
 def _fingerprints(package: Package, season: Season) -> Iterator[str]:
-    files = season.files
-    try:
-        if files.history in package.files:
-            actions = read_actions(package.files[files.history], files.history)
-            yield _digest([[_nameless(action)] for action in actions])
-    except CheckFailed:
-        pass
-    try:
-        if files.raw in package.files:
-            yield _digest(_shape(read_file(package.files[files.raw], files.raw)))
-    except CheckFailed:
-        pass
+    if isinstance(season.score, TrialsScore):
+        shapes = (_shape_of_file(package, name) for name in season.score.file_names)
+        yield from map(_digest, filter(None, shapes))
+        return
+    names = season.score.files
+    with suppress(CheckFailed, KeyError):
+        actions = read_actions(package.files[names.history], names.history)
+        yield _digest([_nameless(action) for action in actions])
+    with suppress(CheckFailed, KeyError):
+        yield _digest(_shape(read_file(package.files[names.raw], names.raw)))
+
+
+def _shape_of_file(package: Package, name: str) -> list[list[object]] | None:
+    with suppress(CheckFailed, KeyError):
+        return shape_of(read_machine(package.files[name], name))
+    return None
 
 
 def _nameless(action: dict[str, Any]) -> list[Any]:

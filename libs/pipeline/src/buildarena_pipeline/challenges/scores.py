@@ -1,15 +1,16 @@
-"""Scores of flights: each term by itself, and what is not known said instead of guessed."""
+"""Scores of packages: each term by itself, and what is not known said instead of guessed."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from buildarena_besiege.logs.tracker_file import Floats, TrackerFile
-from buildarena_pipeline.challenges.season import OrbitScore, Track
+from buildarena_pipeline.challenges.season import OrbitScore, Track, TrialsScore
 
 FULL: Final = 100.0
 """Points of a perfect performance."""
@@ -33,7 +34,7 @@ class Term:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FlightScore:
+class PackageScore:
     """The score of a package.
 
     Attributes:
@@ -63,7 +64,7 @@ class FlightScore:
 
 def score_flight(
     flight: TrackerFile, rule: OrbitScore, track: Track, *, cost: int, track_name: str
-) -> FlightScore:
+) -> PackageScore:
     """The score of a flight.
 
     Args:
@@ -80,21 +81,32 @@ def score_flight(
         _speed(rule, angle, lasted),
         _integrity(rule, float(flight.integrity[-1])),
     )
+    return summed(terms, rule, track, cost=cost, track_name=track_name)
+
+
+def summed(
+    terms: Sequence[Term],
+    rule: OrbitScore | TrialsScore,
+    track: Track,
+    *,
+    cost: int,
+    track_name: str,
+) -> PackageScore:
+    """The score of all terms; see `score_flight`."""
     known = sum(term.points * term.share for term in terms if term.share is not None)
     missing = sum(term.points for term in terms if term.share is None)
-    unknown = _unknown(rule, track, track_name)
     performance = None if missing else known
     final = None
     if performance is not None and track.coefficient is not None and rule.cost_penalty is not None:
         final = max(0.0, performance * track.coefficient - rule.cost_penalty * cost)
-    return FlightScore(
-        terms=terms,
+    return PackageScore(
+        terms=tuple(terms),
         performance=performance,
         known=known,
         at_most=known + missing,
         final=final,
         cost=cost,
-        unknown=unknown,
+        unknown=_unknown(rule, track, track_name),
     )
 
 
@@ -156,7 +168,7 @@ def _integrity(rule: OrbitScore, share: float) -> Term:
     )
 
 
-def _unknown(rule: OrbitScore, track: Track, track_name: str) -> tuple[str, ...]:
+def _unknown(rule: OrbitScore | TrialsScore, track: Track, track_name: str) -> tuple[str, ...]:
     missing = [name for name, value in rule.model_dump().items() if value is None]
     if track.coefficient is None:
         missing.append(f"coefficient.{track_name}")

@@ -46,7 +46,7 @@ class Track(_Form):
 
 
 class PackageFiles(_Form):
-    """What the files of a package are called.
+    """What the files of a flight's package are called.
 
     Attributes:
         raw: The machine that the history builds, as the game's file.
@@ -54,7 +54,6 @@ class PackageFiles(_Form):
         full_history: All that was asked for, queries and refused actions too.
         tuned: The machine that flew: keys and settings may differ from the raw one's.
         trajectory: What the tracker wrote of the flight.
-        transcript: The conversation with the builder.
     """
 
     raw: FileName = "machine_raw.bsg"
@@ -62,19 +61,6 @@ class PackageFiles(_Form):
     full_history: FileName = "build_history_full.json"
     tuned: FileName = "machine_tuned.bsg"
     trajectory: FileName = "trajectory.csv"
-    transcript: FileName = "chat_transcript.md"
-
-    @model_validator(mode="after")
-    def _all_differ(self) -> Self:
-        names = list(self.by_role().values())
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice is not None:
-            raise ValueError(f"two files are called {twice}")
-        return self
-
-    def by_role(self) -> dict[str, str]:
-        """The name of each file, by what it is."""
-        return dict(self.model_dump())
 
 
 class TrackerRules(_Form):
@@ -97,10 +83,13 @@ class TrackerRules(_Form):
 
 
 class OrbitScore(_Form):
-    """How a flight around a planet is scored; what is not known is None, and asked for.
+    """A flight in the game, around a planet; what is not known is None, and asked for.
 
     Attributes:
         formula: Tells it from others.
+        files: What the package's files are called, but for the transcript.
+        dialect: The interface that the histories are of.
+        tracker: What a sound tracker file is like.
         progress: Weight of how many cycles were flown.
         speed: Weight of the mean angular speed.
         integrity: Weight of how whole the machine is at the end.
@@ -111,6 +100,9 @@ class OrbitScore(_Form):
     """
 
     formula: Literal["orbit"]
+    files: PackageFiles = PackageFiles()
+    dialect: Literal["1.0", "2.0"]
+    tracker: TrackerRules
     progress: Share
     speed: Share
     integrity: Share
@@ -126,6 +118,52 @@ class OrbitScore(_Form):
             raise ValueError(f"the weights sum to {total:g}, not to 1")
         return self
 
+    @property
+    def file_names(self) -> tuple[str, ...]:
+        """What a package has, but for the transcript."""
+        return tuple(self.files.model_dump().values())
+
+    @property
+    def in_words(self) -> str:
+        """The formula as people read it."""
+        return (
+            f"100 ({self.progress:g} progress + {self.speed:g} speed + {self.integrity:g} "
+            f"integrity); progress is full at {self.cycles:g} cycles"
+        )
+
+
+class TrialsScore(_Form):
+    """Trials in our own physics: a machine for each of some tasks.
+
+    Attributes:
+        formula: Tells it from others.
+        tasks: For each task the indicator at which its share is full; all weigh the same.
+        cost_penalty: Points taken for each unit of cost of all machines together.
+    """
+
+    formula: Literal["trials"]
+    tasks: Annotated[dict[Name, Positive], Field(min_length=1, max_length=20)]
+    cost_penalty: Annotated[float, Field(ge=0, le=1e6)] | None = 0.0
+
+    @property
+    def file_names(self) -> tuple[str, ...]:
+        """What a package has, but for the transcript."""
+        return tuple(map(machine_file, self.tasks))
+
+    @property
+    def in_words(self) -> str:
+        """The formula as people read it."""
+        full = ", ".join(f"{name} at {indicator:g}" for name, indicator in self.tasks.items())
+        return f"100 · the mean over the tasks of indicator / full, at most 1; full are {full}"
+
+
+def machine_file(task: str) -> str:
+    """What the machine for a task is called in a package."""
+    return f"{task}.json"
+
+
+Score = Annotated[OrbitScore | TrialsScore, Field(discriminator="formula")]
+
 
 class Season(_Form):
     """A season.
@@ -139,11 +177,9 @@ class Season(_Form):
         closes: Until when; None for always.
         attempts_a_day: How many packages one owner may hand in a day; None for any number.
         tracks: By name.
-        files: What a package's files are called.
-        dialect: The interface that the histories are of.
+        transcript: What the conversation with the builder is called in a package.
         modules: What machines may be made of: a set, or modules' names.
-        tracker: What a sound tracker file is like.
-        score: How a flight is scored.
+        score: What is handed in, and how it is scored.
     """
 
     name: Name
@@ -154,16 +190,18 @@ class Season(_Form):
     closes: AwareDatetime | None = None
     attempts_a_day: Annotated[int, Field(ge=1, le=10_000)] | None = None
     tracks: Annotated[dict[Name, Track], Field(min_length=1, max_length=20)]
-    files: PackageFiles = PackageFiles()
-    dialect: Literal["1.0", "2.0"]
+    transcript: FileName = "chat_transcript.md"
     modules: Literal["basic", "workshop", "all"] | tuple[str, ...] = "all"
-    tracker: TrackerRules
-    score: OrbitScore
+    score: Score
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         if self.opens and self.closes and self.closes <= self.opens:
             raise ValueError("it closes before it opens")
+        names = (*self.score.file_names, self.transcript)
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"two files are called {twice}")
         known = module_set("all")
         unknown = next((name for name in self.allowed if name not in known), None)
         if unknown is not None:
@@ -180,6 +218,12 @@ class Season(_Form):
     def digest(self) -> str:
         """Hash of all that it says: packages that were checked by other rules are checked again."""
         return content_hash(self.model_dump(mode="json"))
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """The numbers of the score's formula, by name."""
+        others = {"formula", "files", "dialect", "tracker", "tasks"}
+        return tuple(name for name in type(self.score).model_fields if name not in others)
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -202,13 +246,12 @@ class Season(_Form):
             kind, _, track = name.partition(".")
             if kind == "coefficient" and track in content["tracks"]:
                 content["tracks"][track]["coefficient"] = value
-            elif name in content["score"] and name != "formula":
+            elif name in self.parameters:
                 content["score"][name] = value
             else:
-                choices = [*content["score"], *(f"coefficient.{track}" for track in self.tracks)]
+                choices = [*self.parameters, *(f"coefficient.{track}" for track in self.tracks)]
                 raise SeasonError(
-                    f"{name} is no parameter of {self.name}; there are "
-                    f"{', '.join(choice for choice in choices if choice != 'formula')}"
+                    f"{name} is no parameter of {self.name}; there is {', '.join(choices)}"
                 )
         return season_of(content, where=self.name)
 
