@@ -12,7 +12,7 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
 from pathlib import Path
 from statistics import mean
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from benchmarks.figures import tell
 from support.machines.piloted import Answer, experts_machine, listened, repeated, scored
@@ -56,7 +56,14 @@ def random_program(machine: Machine) -> str:
     return RANDOM % ", ".join(f'"{name}"' for name in names)
 
 
-def in_world(name: str, engine: str, players: Sequence[str], seed: int) -> dict[str, Score]:
+class Result(NamedTuple):
+    """Of a score what processes send each other."""
+
+    success: bool
+    indicator: float
+
+
+def in_world(name: str, engine: str, players: Sequence[str], seed: int) -> dict[str, Result]:
     """How players do in one world."""
     task = builtin_tasks()[name]
     machine = experts_machine(task, seed % SEEDS_OF_DESIGNS)
@@ -70,10 +77,11 @@ def in_world(name: str, engine: str, players: Sequence[str], seed: int) -> dict[
         ),
         "idle": lambda: scored(task, machine.with_controller(IDLE), engine, seed),
     }
-    return {player: plays[player]() for player in players}
+    scores = {player: plays[player]() for player in players}
+    return {player: Result(score.success, score.indicator) for player, score in scores.items()}
 
 
-def summed(rows: Sequence[Mapping[str, Score]]) -> dict[str, float]:
+def summed(rows: Sequence[Mapping[str, Result]]) -> dict[str, float]:
     """Shares of worlds that each player passes, and the expert's mean indicator."""
     shares = {player: mean(row[player].success for row in rows) for player in rows[0]}
     if "expert" not in shares:
@@ -81,7 +89,7 @@ def summed(rows: Sequence[Mapping[str, Score]]) -> dict[str, float]:
     return {"indicator": round(mean(row["expert"].indicator for row in rows), 3), **shares}
 
 
-def equal_verdicts(rows: Sequence[Sequence[Mapping[str, Score]]]) -> float:
+def equal_verdicts(rows: Sequence[Sequence[Mapping[str, Result]]]) -> float:
     """In what share of worlds the engines say the same of all players."""
     return mean(
         len({tuple(score.success for score in row.values()) for row in world}) == 1
