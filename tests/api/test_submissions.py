@@ -80,6 +80,17 @@ def test_a_package_is_taken_in_checked_and_ranked(people, checks) -> None:
     assert checks.check_waiting() == 0
 
 
+def test_a_look_at_a_package_keeps_nothing(people) -> None:
+    _, ann, _ = people
+    asked = {"season": KNOWN.name, "track": "autopilot"}
+    found = ann.ask("POST", f"{PATH}/check", params=asked, content=packed()).json()
+    assert found["passed"]
+    assert found["points"] > 70
+    found = ann.ask("POST", f"{PATH}/check", params=asked, content=b"PK").json()
+    assert "no sound ZIP file" in found["reason"]
+    assert ann.get(PATH) == []
+
+
 def test_a_newer_package_of_the_same_name_replaces_the_older(people, checks) -> None:
     _, ann, _ = people
     ids = []

@@ -1,12 +1,9 @@
 """Packages of a challenge: what is sound passes, and each thing that is not has its sentence."""
 
-import io
 import json
 import math
 import re
-import zipfile
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +11,11 @@ import pytest
 from support.challenge import (
     CENTER,
     MACHINES,
-    TRANSCRIPT,
     braced_files,
+    bridge_files,
     flight_text,
     package_files,
+    zipped,
 )
 from support.machines.families import car as family_car
 
@@ -31,7 +29,6 @@ from buildarena_pipeline.challenges.package import (
 )
 from buildarena_pipeline.challenges.scores import swept_angle
 from buildarena_pipeline.challenges.season import SeasonError, read_season, season_named
-from buildarena_worker.builtin.designs import DESIGNS
 
 S01 = season_named("s01-stable-orbit")
 KNOWN = S01.with_parameters({"center": list(CENTER), "omega_ref": 0.3})
@@ -277,29 +274,21 @@ def test_swinging_to_and_fro_goes_round_nothing() -> None:
     assert swept_angle(tilted, (0.0, 0.0, 0.0)) == pytest.approx(60.0, rel=1e-6)
 
 
-def packed(files: Files, *, folder: str = "") -> bytes:
-    data = io.BytesIO()
-    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in files.items():
-            archive.writestr(folder + name, content)
-    return data.getvalue()
-
-
 def test_folders_and_zip_files_are_packages(tmp_path: Path) -> None:
     files = package_files("three_blocks")
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
     assert read_package(tmp_path).files == files
-    assert packed_package(packed(files)).files == files
-    assert packed_package(packed(files, folder="ENTRY/")).files == files
+    assert packed_package(zipped(files)).files == files
+    assert packed_package(zipped(files, folder="ENTRY/")).files == files
 
 
 def test_hostile_packages_are_refused(tmp_path: Path) -> None:
-    bomb = packed({"trajectory.csv": b"0" * (15 << 20)})
+    bomb = zipped({"trajectory.csv": b"0" * (15 << 20)})
     with pytest.raises(PackageError, match="times as large as it is packed"):
         packed_package(bomb)
     with pytest.raises(PackageError, match="at most"):
-        packed_package(packed({"trajectory.csv": b"0" * (17 << 20)}))
+        packed_package(zipped({"trajectory.csv": b"0" * (17 << 20)}))
     with pytest.raises(PackageError, match="no sound ZIP"):
         packed_package(b"PK\x03\x04 and no more")
     (tmp_path / "trajectory.csv").symlink_to("/etc/passwd")
@@ -322,13 +311,13 @@ def test_other_encodings_have_a_sentence() -> None:
 
 
 def test_organisers_see_ranks_refusals_and_copies(tmp_path: Path) -> None:
-    (tmp_path / "first.zip").write_bytes(packed(package_files("three_blocks")))
-    (tmp_path / "other.zip").write_bytes(packed(package_files("five_blocks")))
+    (tmp_path / "first.zip").write_bytes(zipped(package_files("three_blocks")))
+    (tmp_path / "other.zip").write_bytes(zipped(package_files("five_blocks")))
     copied = package_files("three_blocks")
     history = json.loads(copied["build_history.json"])
     history[1]["params"]["note"] = "all my own"
     copied["build_history.json"] = json.dumps(history).encode()
-    (tmp_path / "copied.zip").write_bytes(packed(copied))
+    (tmp_path / "copied.zip").write_bytes(zipped(copied))
     (tmp_path / "broken.zip").write_bytes(b"PK")
     entries = {entry.name: entry for entry in judge_folder(tmp_path, KNOWN, "autopilot")}
     assert entries["first.zip"].copies == ("copied.zip",)
@@ -341,22 +330,8 @@ def test_organisers_see_ranks_refusals_and_copies(tmp_path: Path) -> None:
 BRIDGES = season_named("first-bridges")
 
 
-@cache
-def _bridge(task: str) -> bytes:
-    """The expert's machine for a task, as its actions."""
-    (part,) = DESIGNS[task](0).parts.values()
-    actions = [{"op": tool, "params": arguments} for tool, arguments in part.actions]
-    return json.dumps(actions).encode()
-
-
-def bridges() -> Files:
-    tasks = ("support-1", "support-2", "support-3")
-    machines = {f"{task}.json": _bridge(task) for task in tasks}
-    return {**machines, "chat_transcript.md": TRANSCRIPT.encode()}
-
-
 def test_bridges_are_tried_and_scored() -> None:
-    report = checked(bridges(), BRIDGES, "agent")
+    report = checked(bridge_files(), BRIDGES, "agent")
     assert report.passed, report.findings
     assert report.score is not None
     shares = [term.share for term in report.score.terms]
@@ -367,7 +342,7 @@ def test_bridges_are_tried_and_scored() -> None:
 
 def test_what_is_no_bridge_bears_nothing() -> None:
     car = json.dumps(family_car().to_document()).encode()
-    score = checked({**bridges(), "support-2.json": car}, BRIDGES, "agent").score
+    score = checked({**bridge_files(), "support-2.json": car}, BRIDGES, "agent").score
     assert score is not None
     assert score.terms[1].share == 0
     assert "the trial failed" in score.terms[1].sentence
@@ -380,21 +355,21 @@ def test_bridges_that_break_rules_have_sentences() -> None:
         (b"\xff", "machines", "support-2.json"),
         (json.dumps(refused).encode(), "machines", "action 2, fly, is refused"),
     ):
-        report = checked({**bridges(), "support-2.json": content}, BRIDGES, "agent")
+        report = checked({**bridge_files(), "support-2.json": content}, BRIDGES, "agent")
         failed = {each.check: each.sentence for each in report.findings if not each.passed}
         assert words in failed[check]
         assert report.score is None
     no_powered = BRIDGES.model_copy(update={"modules": ("Brace",)})
-    report = checked(bridges(), no_powered, "agent")
+    report = checked(bridge_files(), no_powered, "agent")
     assert "is no module of the season" in next(
         each.sentence for each in report.findings if each.check == "modules"
     )
 
 
 def test_bridges_of_another_are_copies(tmp_path: Path) -> None:
-    (tmp_path / "one.zip").write_bytes(packed(bridges()))
-    renamed = {**bridges(), "chat_transcript.md": b"All of it is mine. " * 20}
-    (tmp_path / "two.zip").write_bytes(packed(renamed))
+    (tmp_path / "one.zip").write_bytes(zipped(bridge_files()))
+    renamed = {**bridge_files(), "chat_transcript.md": b"All of it is mine. " * 20}
+    (tmp_path / "two.zip").write_bytes(zipped(renamed))
     entries = judge_folder(tmp_path, BRIDGES, "human")
     assert [entry.copies for entry in entries] == [("two.zip",), ("one.zip",)]
     assert [entry.rank for entry in entries] == [1, 1]

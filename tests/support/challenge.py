@@ -5,12 +5,14 @@ import json
 import math
 import uuid
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from buildarena_besiege.exporting.machine_file import Guids, block_records, machine_text
 from buildarena_besiege.logs.tracker_file import COLUMNS
 from buildarena_besiege.placement import GlobalPose
 from buildarena_geometry.machine_files import machine_of
+from buildarena_worker.builtin.designs import DESIGNS
 
 DATA = Path(__file__).parents[1] / "data" / "challenge"
 MACHINES = ("three_blocks", "five_blocks")
@@ -112,13 +114,28 @@ def braced_files() -> dict[str, bytes]:
     }
 
 
+def bridge_files() -> dict[str, bytes]:
+    """A package of first-bridges: the expert's machines, as their actions."""
+    files = {"chat_transcript.md": TRANSCRIPT.encode()}
+    for task in ("support-1", "support-2", "support-3"):
+        (part,) = DESIGNS[task](0).parts.values()
+        actions = [{"op": tool, "params": arguments} for tool, arguments in part.actions]
+        files[f"{task}.json"] = json.dumps(actions).encode()
+    return files
+
+
 def packed(machine: str = "three_blocks", note: str = "") -> bytes:
     """A sound package as a ZIP file; another note, another file."""
     files = package_files(machine)
     if note:
         files["chat_transcript.md"] += note.encode()
+    return zipped(files)
+
+
+def zipped(files: Mapping[str, bytes], *, folder: str = "") -> bytes:
+    """Files as a ZIP file, in a folder of it where one is named."""
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
-            archive.writestr(zipfile.ZipInfo(name), content)
+            archive.writestr(zipfile.ZipInfo(folder + name), content, zipfile.ZIP_DEFLATED)
     return data.getvalue()

@@ -96,6 +96,17 @@ const machine = createRoute({
   component: lazyRouteComponent(() => import("./pages/machine/MachinePage")),
 });
 
+const challenges = createRoute({
+  getParentRoute: () => root,
+  path: "/challenges",
+  component: lazyRouteComponent(() => import("./pages/challenges/ChallengesPage")),
+});
+const challenge = createRoute({
+  getParentRoute: () => root,
+  path: "/challenges/$name",
+  component: lazyRouteComponent(() => import("./pages/challenges/SeasonPage")),
+});
+
 export const router = createRouter({
   routeTree: root.addChildren([
     board,
@@ -111,6 +122,8 @@ export const router = createRouter({
     model,
     build,
     machine,
+    challenges,
+    challenge,
   ]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,

@@ -215,6 +215,7 @@ class Client:
     seasons = _call(Api.seasons)
     season = _call(Api.season)
     season_board = _call(Api.season_board)
+    check_package = _call(Api.check_package)
     submit_package = _call(Api.submit_package)
     packages = _call(Api.packages)
     package = _call(Api.package)

@@ -180,6 +180,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.hub = hub
     app.state.runners = runners
     app.state.seasons = seasons
+    app.state.package_checks = packages
     app.state.key_checks = KeyChecks(watching)
     app.state.concurrency = usual_limits()
     app.state.body_buffers = BodyBuffers()
@@ -229,7 +230,7 @@ def _add_middleware(app: FastAPI) -> None:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
         BodyLimitMiddleware,
-        unlimited={archives.IMPORT_PATH, evidence.PATH, challenges.PATH},
+        unlimited={archives.IMPORT_PATH, evidence.PATH, challenges.PATH, challenges.CHECK_PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
         most=runner.max_request_bytes,

@@ -83,18 +83,19 @@ class PackageChecks:
             count += 1
         return count
 
+    def look(self, data: bytes, season: Season, track: str) -> Checked:
+        """What a season says of a ZIP file that nobody hands in."""
+        try:
+            checked: Checked = self._checker.ask(Question(data=data, season=season, track=track))
+        except CheckFailedError as error:
+            return _refused(f"the package is too much: {error}", rules=season.digest)
+        return checked
+
     def _checked(self, package: StoredPackage) -> Checked:
         season = self._seasons.get(package.season)
         if season is None or package.track not in season.tracks:
             return _refused(f"there is no season {package.season} with a track {package.track}")
-        data = self._context.artifacts.get(package.hash)
-        try:
-            checked: Checked = self._checker.ask(
-                Question(data=data, season=season, track=package.track)
-            )
-        except CheckFailedError as error:
-            return _refused(f"the package is too much: {error}", rules=season.digest)
-        return checked
+        return self.look(self._context.artifacts.get(package.hash), season, package.track)
 
     def _check_safely(self) -> None:
         try:

@@ -11,6 +11,7 @@ from buildarena_client.paths import at
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
         PackageDetail,
+        PackageReport,
         PackageView,
         Ranked,
         ReceivedPackage,
@@ -44,6 +45,22 @@ class Challenges(Sender):
             track: The track's name.
         """
         return cast("list[Ranked]", await self.get(at("seasons", name, "board"), track=track))
+
+    async def check_package(
+        self, source: Path | bytes, *, season: str, track: str
+    ) -> PackageReport:
+        """What a season's checks find of a ZIP file; nothing of it is kept.
+
+        Args:
+            source: The file, or its bytes.
+            season: The season's name.
+            track: The track's name.
+        """
+        path = at("submissions", "check")
+        answer = await self.upload(
+            path, source, "application/zip", repeatable=True, season=season, track=track
+        )
+        return cast("PackageReport", answer)
 
     async def submit_package(
         self, source: Path | bytes, *, season: str, track: str, name: str

@@ -13,15 +13,23 @@ from buildarena_api.dependencies import ContextDep, ExportingDep
 from buildarena_api.http.access import Caller, CallerDep, admin_only
 from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.package_checks import PackageChecks
 from buildarena_pipeline.challenges.package import MAX_BYTES
 from buildarena_pipeline.challenges.season import Season
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import PackageState, StoredPackage, TooManyPackagesError
 
 PATH: Final = "/v1/submissions"
+CHECK_PATH: Final = "/v1/submissions/check"
 ZIP: Final = "application/zip"
 router = APIRouter(prefix="/v1", tags=["challenges"])
 _ORDINARY = [limited("ordinary")]
+_ZIP_BODY: Final[dict[str, Any]] = {
+    "requestBody": {
+        "required": True,
+        "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
 
 PackageId = Annotated[str, Path(pattern="^package_[0-9a-f]{20}$")]
 Reason = Annotated[str, Field(min_length=1, max_length=1000)]
@@ -78,6 +86,16 @@ class PackageDetail(PackageView):
     report: dict[str, Any] | None = Field(description="Every check, and the score term by term")
     changes: list[PackageChangeView]
     copies: list[str] = Field(description="Packages of others that are nearly the same; for admins")
+
+
+class PackageReport(BaseModel):
+    """What a season's checks find of a file."""
+
+    passed: bool
+    reason: str = Field(description='The first rule that it breaks, in a sentence; "" where none')
+    report: dict[str, Any] = Field(description="Every check, and the score term by term")
+    points: float | None = Field(description="By which it would be ranked")
+    cost: int | None
 
 
 class ReceivedPackage(PackageDetail):
@@ -137,6 +155,29 @@ def season_board(name: str, track: str, seasons: SeasonsDep, context: ContextDep
 
 
 @router.post(
+    "/submissions/check",
+    dependencies=[limited("packages", until="request")],
+    responses=problem_responses(404, 413, 429, 503),
+    openapi_extra=_ZIP_BODY,
+)
+async def check_package(
+    season: str, track: str, request: Request, exporting: ExportingDep
+) -> PackageReport:
+    """Says what a season's checks find of a ZIP file, and keeps nothing of it."""
+    rules = _season(seasons_of(request), season)
+    _require_track(rules, track)
+    checks: PackageChecks = request.app.state.package_checks
+    checked = await exporting.run(checks.look, await _received(request), rules, track)
+    return PackageReport(
+        passed=checked.passed,
+        reason=checked.reason,
+        report=dict(checked.report),
+        points=checked.points,
+        cost=checked.cost,
+    )
+
+
+@router.post(
     "/submissions",
     status_code=201,
     dependencies=[limited("packages", until="request")],
@@ -144,12 +185,7 @@ def season_board(name: str, track: str, seasons: SeasonsDep, context: ContextDep
         200: {"description": "It was there", "model": ReceivedPackage},
         **problem_responses(404, 409, 413, 429, 503),
     },
-    openapi_extra={
-        "requestBody": {
-            "required": True,
-            "content": {ZIP: {"schema": {"type": "string", "format": "binary"}}},
-        }
-    },
+    openapi_extra=_ZIP_BODY,
 )
 async def submit_package(
     request: Request,

@@ -1,0 +1,133 @@
+import { Alert, Button, FileButton, Group, Stack, Table, Text, TextInput } from "@mantine/core";
+import { IconFileZip } from "@tabler/icons-react";
+import { useEffect, useState, type DragEvent } from "react";
+import { number } from "../../format";
+import { ProblemNote } from "../../parts/Problem";
+import { Section } from "../../parts/Section";
+import { useHandIn, useLook, type Report, type Season } from "./queries";
+
+/** A package: dropped, checked, and only then handed in. */
+export function HandIn({ season, track, isOpen }: { season: Season; track: string; isOpen: boolean }) {
+  const look = useLook();
+  const handIn = useHandIn();
+  const [file, setFile] = useState<File | null>(null);
+  const [name, setName] = useState("");
+  const [over, setOver] = useState(false);
+  const { mutate, reset } = look;
+  useEffect(() => {
+    reset();
+    if (file !== null) mutate({ file, season: season.name, track });
+  }, [file, season.name, track, mutate, reset]);
+  const onDrop = (event: DragEvent): void => {
+    event.preventDefault();
+    setOver(false);
+    setFile(event.dataTransfer.files[0] ?? null);
+  };
+  return (
+    <Section title="Hand in a package">
+      <Stack gap="sm">
+        <div
+          className="drop"
+          data-over={over ? "" : undefined}
+          onDragOver={(event) => {
+            event.preventDefault();
+            setOver(true);
+          }}
+          onDragLeave={() => {
+            setOver(false);
+          }}
+          onDrop={onDrop}
+        >
+          <Stack align="center" gap="xs">
+            <IconFileZip size={32} aria-hidden />
+            <Text fw={600}>Drop a ZIP file with the package&apos;s files here</Text>
+            <FileButton onChange={setFile} accept=".zip,application/zip" inputProps={{ "aria-label": "Package" }}>
+              {(props) => (
+                <Button variant="default" loading={look.isPending} {...props}>
+                  Choose a file
+                </Button>
+              )}
+            </FileButton>
+            <Text size="xs" className="dimmed">
+              It is checked first; nothing is kept before you hand it in.
+            </Text>
+          </Stack>
+        </div>
+        {look.isError && <ProblemNote error={look.error} />}
+        {look.data !== undefined && file !== null && (
+          <>
+            <Alert
+              color={look.data.passed ? "teal" : "red"}
+              title={look.data.passed ? "✓ every rule is kept" : "✗ a rule is broken"}
+            >
+              {look.data.passed ? `${file.name} can be handed in.` : look.data.reason}
+            </Alert>
+            <Findings report={look.data.report as unknown as Report} />
+            <form
+              onSubmit={(event) => {
+                event.preventDefault();
+                handIn.mutate({ file, season: season.name, track, name });
+              }}
+            >
+              <Group align="end">
+                <TextInput
+                  label="Name of the entry"
+                  value={name}
+                  maxLength={80}
+                  required
+                  onChange={(event) => {
+                    setName(event.currentTarget.value);
+                  }}
+                />
+                <Button type="submit" disabled={!isOpen || !look.data.passed} loading={handIn.isPending}>
+                  Hand in
+                </Button>
+              </Group>
+            </form>
+            {!isOpen && <Text size="sm">The season takes no packages now.</Text>}
+          </>
+        )}
+        {handIn.isError && <ProblemNote error={handIn.error} />}
+        {handIn.data !== undefined && (
+          <Text size="sm" role="status">
+            {handIn.data.added ? "Handed in" : "It was there before; nothing changed"}: {handIn.data.id}
+          </Text>
+        )}
+      </Stack>
+    </Section>
+  );
+}
+
+function Findings({ report }: { report: Report }) {
+  const terms = report.score?.terms ?? [];
+  return (
+    <Table.ScrollContainer
+      minWidth={420}
+      type="native"
+      tabIndex={0}
+      role="region"
+      aria-label="What the checks say, scrolls sideways"
+    >
+      <Table fz="sm" aria-label="What the checks say" verticalSpacing={4}>
+        <Table.Tbody>
+          {report.findings.map(({ check, passed, sentence }) => (
+            <Table.Tr key={check}>
+              <Table.Th>{check}</Table.Th>
+              <Table.Td>{passed ? "✓" : "✗"}</Table.Td>
+              <Table.Td>{sentence}</Table.Td>
+            </Table.Tr>
+          ))}
+          {terms.map(({ name, points, share, sentence }) => (
+            <Table.Tr key={name}>
+              <Table.Th>{name}</Table.Th>
+              <Table.Td className="figures">
+                {share === null ? "?" : number(points * share, 2)} of {number(points, 2)}
+              </Table.Td>
+              <Table.Td>{sentence}</Table.Td>
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+    </Table.ScrollContainer>
+  );
+}
