@@ -40,8 +40,8 @@ BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
 OWN_PATHS: Final = frozenset(
     (
         *("v1", "docs", "openapi.json", "static-offline-docs"),
-        *("assets", "sweeps", "jobs", "tasks", "models", "compare", "build", "machine", "challenges"),
-        *("favicon.svg", "scheme.js", "index.html"),
+        *("assets", "sweeps", "jobs", "tasks", "models", "compare", "build", "machine"),
+        *("challenges", "favicon.svg", "scheme.js", "index.html"),
     )
 )
 """First parts of the API's and the dashboard's own paths; none can be a base path's."""
