@@ -96,6 +96,13 @@ def test_trials_that_a_machine_file_cannot_say_are_refused(task) -> None:
         prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
 
 
+def test_a_trial_with_a_boulder_is_refused_and_its_plain_file_is_not() -> None:
+    machine, scenario = built_with(ALL["Boulder"]), builtin_tasks()["throw-1"].scenario
+    with pytest.raises(MachineNotPlayableError, match="what a boulder touches: use another"):
+        prepare_run(machine, scenario, name="m", run_id="r")
+    assert b'id="36"' in plain_machine_file(machine, name="m")
+
+
 @pytest.mark.parametrize("task", ["mechanisms-1", "mechanisms-2", "flight-1"])
 def test_the_other_trials_of_the_workshop_are_written(task) -> None:
     run = prepare_run(built_with(ALL["Log"]), builtin_tasks()[task].scenario, name="m", run_id="r")
