@@ -45,7 +45,7 @@ CONTROL = [
 ]
 
 
-THROWING = ["throw-1"]
+THROWING = ["throw-1", "throw-2"]
 GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL, "throwing": THROWING}
 
 
@@ -117,8 +117,8 @@ TOLD = {
     ("mechanisms-5", "min_gates"): "at least seven gates",
     ("flight-1", "height"): "between z = 8.5 and z = 11.5",
     ("flight-1", "band"): "between z = 8.5 and z = 11.5",
-    ("throw-1", "max_error"): "strays by at most 3 %",
-    ("throw-1", "max_unexplained"): "at most 5 % more energy",
+    **{(name, "max_error"): "strays by at most 3 %" for name in THROWING},
+    **{(name, "max_unexplained"): "at most 5 % more energy" for name in THROWING},
 }
 
 

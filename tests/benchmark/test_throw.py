@@ -17,7 +17,7 @@ from support.machines.piloted import FASTER_FIRST, scored
 from buildarena_benchmark import Task, TaskError, builtin_tasks, load_task, score
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory, simulate
+from buildarena_simulation import MachineNotSimulable, Trajectory, simulate
 from buildarena_worker.builtin.designs import throwers
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST
 
@@ -78,7 +78,7 @@ def test_throwing_by_collapse(engine, monkeypatch) -> None:
     draft = KeyedDraft(modules="all")
     top = draft.row(draft.row(draft.start(), UP, 3)[-1], NORTH, 1)[-1]
     draft.attach(draft.attach(top, UP, "Bomb Holder"), UP, "Boulder")
-    topples = lax(min_distance=0.0, line="line", max_start_height=50.0)
+    topples = lax(min_distance=0.0, max_start_height=50.0)
     fails(scored(topples, draft.machine, engine, None))
 
 
@@ -110,6 +110,30 @@ def test_throwing_by_driving(engine) -> None:
     draft.press("UpArrow", 1.0, 3.0)
     result = scored(lax(min_distance=0.0), draft.machine, engine, None)
     assert (result.success, result.indicator) == (False, 0.0)
+
+
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_a_fence_is_cleared_or_not(engine) -> None:
+    """The same throw leaves a fence of 3 untouched; one of 40 is the first thing that it touches."""
+    fenced = builtin_tasks()["throw-2"]
+    machine, trial = honest(engine)
+    over = scored(fenced, machine, engine, None)
+    assert over.success
+    assert over.indicator == pytest.approx(score(TASK, machine, trial).indicator, abs=0.5)
+    north, *rest = fenced.scenario.terrain
+    wall = north.model_copy(update={"center": (0, 5.5, 20), "size": (24, 1, 40)})
+    terrain = {"terrain": (wall, *rest)}
+    walled = replace(fenced, scenario=fenced.scenario.model_copy(update=terrain))
+    against = scored(walled, machine, engine, None)
+    assert not against.success
+    assert 2 < against.metrics["distance"] < 4
+
+
+def test_a_machine_in_the_fences_place_is_refused() -> None:
+    draft = KeyedDraft(modules="all")
+    draft.attach(draft.row(draft.start(), EAST, 11)[-1], UP, "Boulder")
+    with pytest.raises(MachineNotSimulable, match="overlaps terrain 3"):
+        simulate(draft.machine, builtin_tasks()["throw-2"].scenario, "mujoco")
 
 
 def test_what_pushes_by_itself_is_no_part_of_the_task() -> None:

@@ -20,8 +20,8 @@ from buildarena_geometry import (
     load_catalogue,
     module_set,
     modules_named,
-    simulated_modules,
     replay,
+    simulated_modules,
 )
 from buildarena_geometry.modules.catalogue import read_modules
 

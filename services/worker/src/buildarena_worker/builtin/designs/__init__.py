@@ -61,6 +61,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "place-2": piloted.placer,
     "line-1": piloted.line_follower,
     "throw-1": throwers.catapult,
+    "throw-2": throwers.catapult,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

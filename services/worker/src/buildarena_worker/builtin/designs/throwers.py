@@ -51,10 +51,15 @@ def catapult(seed: int) -> Design:
     )
 
 
-def catapult_draft() -> tuple[Draft, list[str], str]:
-    """The machine, the ids of its springs, and that of its boulder."""
+def catapult_draft(*, aside: int = 0) -> tuple[Draft, list[str], str]:
+    """The machine, the ids of its springs, and that of its boulder.
+
+    Args:
+        aside: How far the starting block lies to the east of the foot.
+    """
     draft = Draft(modules="all")
-    beam = [draft.start("the front of the foot"), *_beam(draft)]
+    front = [draft.start("the front of the foot"), *draft.row("1", WEST, aside)][-1]
+    beam = [front, *draft.row(front, SOUTH, _FRONT + _BACK)]
     near, anchor, west = _feet(draft, beam)
     post = draft.row(beam[_FRONT], UP, _POST)
     _stays(draft, beam, post, west)
@@ -83,10 +88,6 @@ def catapult_draft() -> tuple[Draft, list[str], str]:
         draft.connect(end, base, way, side, connector="Spring")
     links = draft.machine.connectors.values()
     return draft, [link.id for link in links if link.module.name == "Spring"], boulder
-
-
-def _beam(draft: Draft) -> list[str]:
-    return draft.row("1", SOUTH, _FRONT + _BACK)
 
 
 def _feet(draft: Draft, beam: list[str]) -> tuple[str, str, str]:
