@@ -45,7 +45,7 @@ CONTROL = [
 ]
 
 
-THROWING = ["throw-1", "throw-2"]
+THROWING = ["throw-1", "throw-2", "throw-3"]
 GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL, "throwing": THROWING}
 
 

@@ -12,14 +12,20 @@ import numpy as np
 import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.headroom import drafted
-from support.machines.piloted import FASTER_FIRST, scored
+from support.machines.piloted import (
+    FASTER_FIRST,
+    experts_machine,
+    listened,
+    repeated,
+    scored,
+)
 
 from buildarena_benchmark import Task, TaskError, builtin_tasks, load_task, score
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Trajectory, simulate
 from buildarena_worker.builtin.designs import throwers
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
 
 TASK: Final = builtin_tasks()["throw-1"]
 BEST_PUBLISHED: Final = 9.8
@@ -73,13 +79,22 @@ def fails(result: Any, *flags: str) -> None:
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_throwing_by_collapse(engine, monkeypatch) -> None:
     """The same catapult on a post that breaks while it throws, and a mast that topples over."""
-    monkeypatch.setattr(throwers, "_stays", lambda *_: None)
+    monkeypatch.setattr(throwers, "_stays", _too_few_stays)
     fails(scored(TASK, experts(), engine, None), "came_apart")
     draft = KeyedDraft(modules="all")
     top = draft.row(draft.row(draft.start(), UP, 3)[-1], NORTH, 1)[-1]
     draft.attach(draft.attach(top, UP, "Bomb Holder"), UP, "Boulder")
     topples = lax(min_distance=0.0, max_start_height=50.0)
     fails(scored(topples, draft.machine, engine, None))
+
+
+def _too_few_stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
+    """The post is held along the foot and not across: it breaks when the arm is half way up."""
+    del west
+    for base, way in ((beam[2], NORTH), (beam[1], NORTH), (beam[10], SOUTH)):
+        draft.connect(post[-1], base, way, UP)
+    for side in (EAST, WEST):
+        draft.connect(beam[5], beam[9], side)
 
 
 @pytest.mark.samples(1)
@@ -114,7 +129,7 @@ def test_throwing_by_driving(engine) -> None:
 
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_fence_is_cleared_or_not(engine) -> None:
-    """The same throw leaves a fence of 3 untouched; one of 40 is the first thing that it touches."""
+    """The same throw leaves a fence of 3 untouched; one of 40 is what it touches first."""
     fenced = builtin_tasks()["throw-2"]
     machine, trial = honest(engine)
     over = scored(fenced, machine, engine, None)
@@ -134,6 +149,39 @@ def test_a_machine_in_the_fences_place_is_refused() -> None:
     draft.attach(draft.row(draft.start(), EAST, 11)[-1], UP, "Boulder")
     with pytest.raises(MachineNotSimulable, match="overlaps terrain 3"):
         simulate(draft.machine, builtin_tasks()["throw-2"].scenario, "mujoco")
+
+
+RING: Final = builtin_tasks()["throw-3"]
+FAR, NEAR = 6, 3
+"""Seeds whose rings lie at 40.7 and 17.1."""
+
+
+@pytest.mark.samples(2)
+@pytest.mark.parametrize("seed", [None, FAR, NEAR])
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_the_expert_hits_the_ring_wherever_it_lies(engine, seed) -> None:
+    result = scored(RING, experts_machine(RING), engine, seed)
+    assert result.success
+    assert result.indicator == pytest.approx(1 / (1 + result.metrics["miss"]), abs=1e-5)
+    assert result.metrics["miss"] <= RING.scenario.marks[0].radius
+
+
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_who_throws_as_in_the_exact_world_misses_where_the_ring_is_elsewhere(engine) -> None:
+    machine = experts_machine(RING)
+    exact, answers = listened(RING, machine, engine)
+    assert exact.success
+    elsewhere = repeated(answers, RING, machine, engine, FAR)
+    assert not elsewhere.success
+    assert elsewhere.metrics["miss"] > 8
+    assert elsewhere.indicator < 0.12
+
+
+def test_rings_lie_where_the_statement_tells() -> None:
+    places = [RING.scenario.world(seed).marks[0].center for seed in range(200)]
+    assert {(x, z) for x, _, z in places} == {(0, 0)}
+    assert all(17 <= north <= 42 for _, north, _ in places)
+    assert max(north for _, north, _ in places) - min(north for _, north, _ in places) > 23
 
 
 def test_what_pushes_by_itself_is_no_part_of_the_task() -> None:

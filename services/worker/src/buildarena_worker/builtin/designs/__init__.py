@@ -62,6 +62,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "line-1": piloted.line_follower,
     "throw-1": throwers.catapult,
     "throw-2": throwers.catapult,
+    "throw-3": throwers.aiming_catapult,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

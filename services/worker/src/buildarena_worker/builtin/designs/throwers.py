@@ -18,13 +18,14 @@ from buildarena_worker.builtin.designs.drafting import (
     Direction,
     Draft,
 )
+from buildarena_worker.builtin.designs.programs import listed, program_text
 
 _ARM, _TAIL, _POST, _FRONT, _BACK = 6, 4, 4, 4, 8
 _LEAN_DEG = 38.7
 """How far the arm hangs down behind: so its tip rests on the ground."""
 _CUP_DEG = 10.0
 """How far the cup leans outwards on the arm: the boulder rolls out of it in time."""
-_BEGINS_S = (1.5, 1.6, 1.7, 1.8, 1.9)
+_BEGINS_S = (1.52, 1.6, 1.68, 1.76, 1.84)
 """When the springs draw, by seed, seconds."""
 
 
@@ -48,6 +49,23 @@ def catapult(seed: int) -> Design:
                 {"time": _BEGINS_S[seed % len(_BEGINS_S)], "key": "Alpha1", "hold_for": 4.0}
             ],
         },
+    )
+
+
+def aiming_catapult(seed: int) -> Design:
+    """The same catapult in the middle, whose program draws as many springs as the ring asks for."""
+    draft, springs, _ = catapult_draft(aside=3)
+    return Design(
+        overall="A catapult whose arm swings above x = 0; fewer springs throw less far.",
+        parts={
+            "catapult": PartDesign(
+                description="A foot of 12, a post of 4, an arm of 6 with a tail of 4, 7 springs",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            "throwing", springs=listed(springs), begins=f"{_BEGINS_S[seed % len(_BEGINS_S)]:g}"
+        ),
     )
 
 
