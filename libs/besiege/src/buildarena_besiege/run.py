@@ -357,6 +357,7 @@ def _require_sayable(machine: Machine, scenario: Scenario) -> None:
         "the game has no line on the ground": scenario.line,
         "the game's machines do not lean at the start": on_ground.tilt_deg,
         "the game's machines face north at the start": on_ground.heading_deg,
+        "the game's levels have no turned boxes": any(box.heading_deg for box in scenario.terrain),
         "the game has one gravity and drives of one strength": not usual,
         "the game's logs do not tell what a boulder touches": any(
             block.module.is_loose for block in machine.blocks.values()
