@@ -43,7 +43,8 @@ _SURE = (
 HEAD = """# All modules
 
 What machines can be made of, from the module files; `make module-guide` writes this page again. The
-set `basic` has the paper's modules, `workshop` those and every further type that is simulated,
+set `basic` has the paper's modules, `workshop` those and every further type that is simulated but for
+what tasks must name (`by_name`),
 `all` every type that can be built; a task names the set it offers. Lengths are edges of a small
 block, masses the game's, forces the weights of a mass (mass·g), angles degrees. Pictures show a
 module standing on its root point: x red, y green, z blue, away from the face it sits on; letters

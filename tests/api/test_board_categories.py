@@ -10,8 +10,9 @@ CONTROL = {
     *("landing-1", "landing-2", "slalom-2", "hover-3", "hover-4"),
     *("balance-1", "balance-2", "walk-1", "walk-2", "place-2", "line-1"),
 }
+THROWING = {"throw-1", "throw-2", "throw-3"}
 WORKSHOP = {*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"}
-OTHERS = WORKSHOP | FAMILIES | CONTROL
+OTHERS = WORKSHOP | FAMILIES | CONTROL | THROWING
 
 
 def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
@@ -30,6 +31,7 @@ def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
         (None, ["headroom"], set(builtin_tasks()) - set(paper_tasks()) - OTHERS),
         (None, ["families"], FAMILIES),
         (None, ["control"], CONTROL),
+        (None, ["throwing"], THROWING),
         (None, ["support"], {"support-1", "support-2", "support-3"}),
         (["support-1"], ["flight"], None),
     ],

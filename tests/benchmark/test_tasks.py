@@ -45,12 +45,13 @@ CONTROL = [
 ]
 
 
-GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL}
+THROWING = ["throw-1", "throw-2", "throw-3"]
+GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL, "throwing": THROWING}
 
 
 def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
-    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL]
+    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL, *THROWING]
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         kind, _, level = name.rpartition("-")
@@ -95,7 +96,7 @@ def test_a_statement_tells_what_the_scorer_measures(tasks) -> None:
             assert "four powered wheels" in text
 
 
-@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM, *FAMILIES])
+@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM, *FAMILIES, *THROWING])
 def test_a_statement_tells_every_threshold(tasks, name) -> None:
     task = tasks[name]
     text = " ".join(task.statement.split())
@@ -116,6 +117,8 @@ TOLD = {
     ("mechanisms-5", "min_gates"): "at least seven gates",
     ("flight-1", "height"): "between z = 8.5 and z = 11.5",
     ("flight-1", "band"): "between z = 8.5 and z = 11.5",
+    **{(name, "max_error"): "strays by at most 3 %" for name in THROWING},
+    **{(name, "max_unexplained"): "at most 5 % more energy" for name in THROWING},
 }
 
 

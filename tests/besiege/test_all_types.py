@@ -15,6 +15,7 @@ from buildarena_besiege import (
 )
 from buildarena_geometry import Machine, module_set
 from buildarena_geometry.modules.module import Module
+from buildarena_simulation import Scenario
 
 ALL = module_set("all")
 BLOCKS = list(ALL.attachable)
@@ -94,6 +95,27 @@ def test_trials_that_a_machine_file_cannot_say_are_refused(task) -> None:
     scenario = builtin_tasks()[task].scenario
     with pytest.raises(MachineNotPlayableError, match="use another engine"):
         prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
+
+
+def test_a_level_with_a_quarter_pipe_is_written_and_one_that_is_turned_is_refused() -> None:
+    pipe = {"shape": "pipe", "center": [0, 6, 5], "radius": 5, "length": 6, "from_deg": 0}
+    for heading_deg in (0, 30):
+        terrain = [{**pipe, "to_deg": 90, "heading_deg": heading_deg}]
+        scenario = Scenario.model_validate({"duration_s": 2, "terrain": terrain})
+        if heading_deg:
+            with pytest.raises(MachineNotPlayableError, match="no turned boxes"):
+                prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
+        else:
+            run = prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
+            assert run.level is not None
+            assert run.level.count(b"<Object ID") == 12
+
+
+def test_a_trial_with_a_boulder_is_refused_and_its_plain_file_is_not() -> None:
+    machine, scenario = built_with(ALL["Boulder"]), builtin_tasks()["throw-1"].scenario
+    with pytest.raises(MachineNotPlayableError, match="what a boulder touches: use another"):
+        prepare_run(machine, scenario, name="m", run_id="r")
+    assert b'id="36"' in plain_machine_file(machine, name="m")
 
 
 @pytest.mark.parametrize("task", ["mechanisms-1", "mechanisms-2", "flight-1"])

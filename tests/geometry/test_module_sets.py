@@ -21,6 +21,7 @@ from buildarena_geometry import (
     module_set,
     modules_named,
     replay,
+    simulated_modules,
 )
 from buildarena_geometry.modules.catalogue import read_modules
 
@@ -48,7 +49,10 @@ def test_a_builder_gets_no_cargo_and_only_what_is_simulated():
         assert all(module.kind != "cargo" for module in module_set(name).values())
     assert all(module.simulated for module in module_set("workshop").values())
     left_out = set(module_set("all")) - set(module_set("workshop"))
-    assert not any(module_set("all")[name].simulated for name in left_out)
+    named = {name for name in left_out if module_set("all")[name].simulated}
+    assert named == {name for name, module in module_set("all").items() if module.by_name}
+    assert named == {"Boulder", "Bomb Holder"}
+    assert named <= set(simulated_modules())
 
 
 def test_a_choice_is_a_set_or_names():

@@ -12,9 +12,11 @@ Presses = Sequence[tuple[float, str, float]]
 """Time, key and duration, seconds."""
 
 
-def drafted(design: Design, presses: Presses | None = None) -> Machine:
+def drafted(
+    design: Design, presses: Presses | None = None, *, modules: str = "workshop"
+) -> Machine:
     """The machine of an expert's design of one sub-structure, driven by other presses if given."""
-    draft = KeyedDraft(modules="workshop")
+    draft = KeyedDraft(modules=modules)
     (part,) = design.parts.values()
     for name, arguments in part.actions:
         draft.do(name, **arguments)

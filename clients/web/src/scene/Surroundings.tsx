@@ -2,11 +2,11 @@ import { useFrame } from "@react-three/fiber";
 import { useMemo, useRef } from "react";
 import { DoubleSide, type Group } from "three";
 import type { Vector } from "./modules";
-import { lineStrip, markAt, posts, type Gate, type GroundLine, type Mark } from "./signs";
+import { lineStrip, markAt, posts, type Gate, type GroundLine, type Mark, turnOf } from "./signs";
 
 export interface Scenario {
   duration_s: number;
-  terrain: { center: Vector; size: Vector; slope_deg?: number }[];
+  terrain: { center: Vector; size: Vector; slope_deg?: number; heading_deg?: number }[];
   cargo: { size: Vector; drop_height: number; final_mass: number; at?: Vector | null; heading_deg?: number } | null;
   placement: { kind: string; gap?: number; lowest_center?: number; height?: number; velocity?: Vector };
   gates?: Gate[];
@@ -100,7 +100,7 @@ export function Surroundings({ scenario, floor = 0, time = 0 }: SurroundingsProp
     <>
       <Ground height={floor} />
       {terrain.map((box, index) => (
-        <mesh key={index} position={[...box.center]} rotation={[((box.slope_deg ?? 0) * Math.PI) / 180, 0, 0]}>
+        <mesh key={index} position={[...box.center]} rotation={turnOf(box)}>
           <boxGeometry args={[...box.size]} />
           <meshLambertMaterial color="#9aa38b" />
         </mesh>

@@ -1,10 +1,10 @@
-import { Matrix4, Vector3 } from "three";
+import { Euler, Matrix4, Vector3 } from "three";
 import { describe, expect, it } from "vitest";
 import { boundsOf, machineOf, readScene, type MachineScene } from "./machine";
 import { jointsOf, loadsAt, loadsOfBlocks, mostLoaded } from "./loads";
 import { moduleShape } from "./modules";
 import { poseAt } from "./playing";
-import { linePoints, lineStrip, markAt, posts } from "./signs";
+import { linePoints, lineStrip, markAt, posts, turnOf } from "./signs";
 import { instantAt, type Trial } from "./trial";
 
 const CYCLE: [number, number, number, number] = [0.5, 0.5, 0.5, 0.5];
@@ -201,5 +201,21 @@ describe("a line on the ground", () => {
       const [right, left] = [strip[k] ?? [0, 0, 0], strip[k + 1] ?? [0, 0, 0]];
       expect(Math.hypot(right[0] - left[0], right[1] - left[1])).toBeCloseTo(1);
     }
+  });
+});
+
+describe("a box of the terrain", () => {
+  it("rises to where it is turned", () => {
+    const up = (box: { slope_deg?: number; heading_deg?: number }) =>
+      new Vector3(0, 0, 1).applyEuler(new Euler(...turnOf(box))).toArray();
+    const [sine, cosine] = [0.5, Math.sqrt(0.75)];
+    for (const [box, expected] of [
+      [{}, [0, 0, 1]],
+      [{ slope_deg: 30 }, [0, -sine, cosine]],
+      [{ slope_deg: 30, heading_deg: 90 }, [-sine, 0, cosine]],
+    ] as const)
+      up(box).forEach((value, axis) => {
+        expect(value).toBeCloseTo(expected[axis] ?? 0, 12);
+      });
   });
 });

@@ -71,3 +71,8 @@ export function lineStrip(line: GroundLine): Vector[] {
     ] as Vector[];
   });
 }
+
+/** How a box stands: tilted about the east-west axis, then turned about the vertical, from north towards east. */
+export function turnOf(box: { slope_deg?: number; heading_deg?: number }): [number, number, number, "ZXY"] {
+  return [((box.slope_deg ?? 0) * Math.PI) / 180, 0, (-(box.heading_deg ?? 0) * Math.PI) / 180, "ZXY"];
+}

@@ -150,7 +150,7 @@ def prepare_run(
     """
     _require_name(name)
     _require_run_id(run_id)
-    _require_sayable(scenario)
+    _require_sayable(machine, scenario)
     prepared = prepared_machine(
         machine, scenario, run_id=run_id, controls=controls, new_guid=new_guid
     )
@@ -338,11 +338,11 @@ def _require_run_id(run_id: str) -> None:
         raise ValueError(f"a run's id is a text of 1 to {_LONGEST_RUN_ID} characters")
 
 
-def _require_sayable(scenario: Scenario) -> None:
-    """Refuses what a machine file cannot express: machines start at rest, below their cargo.
+def _require_sayable(machine: Machine, scenario: Scenario) -> None:
+    """Refuses what a machine file cannot express, or what a log cannot tell.
 
     Raises:
-        MachineNotPlayableError: The scenario is another; the message says what it asks for.
+        MachineNotPlayableError: The message says what is asked for.
     """
     cargo, place = scenario.cargo, scenario.placement
     on_ground = place if isinstance(place, GroundPlacement) else GroundPlacement()
@@ -357,7 +357,11 @@ def _require_sayable(scenario: Scenario) -> None:
         "the game has no line on the ground": scenario.line,
         "the game's machines do not lean at the start": on_ground.tilt_deg,
         "the game's machines face north at the start": on_ground.heading_deg,
+        "the game's levels have no turned boxes": any(box.heading_deg for box in scenario.terrain),
         "the game has one gravity and drives of one strength": not usual,
+        "the game's logs do not tell what a boulder touches": any(
+            block.module.is_loose for block in machine.blocks.values()
+        ),
     }
     for refusal, is_asked in asked.items():
         if is_asked:

@@ -12,7 +12,13 @@ from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine import Machine, replay
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.module import Catalogue, Face, Landmark, Module
-from buildarena_geometry.modules.sets import MODULE_SETS, catalogue_of, module_set, modules_named
+from buildarena_geometry.modules.sets import (
+    MODULE_SETS,
+    catalogue_of,
+    module_set,
+    modules_named,
+    simulated_modules,
+)
 from buildarena_geometry.modules.solids import Ball, Box, Cylinder
 from buildarena_geometry.outcomes import (
     Accepted,
@@ -78,6 +84,7 @@ __all__ = [
     "modules_named",
     "object_schema",
     "replay",
+    "simulated_modules",
     "step",
     "tool_definitions",
 ]

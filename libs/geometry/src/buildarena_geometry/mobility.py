@@ -94,7 +94,7 @@ def _edges(state: MachineState) -> tuple[list[_Edge], list[_Edge]]:
     joints: list[_Edge] = []
     for joint in state.joints():
         part = state.blocks[joint.part]
-        if joint.holds and part.module.rope_mount is None:
+        if joint.holds and part.module.rope_mount is None and not part.module.is_loose:
             (joints if _moves(part) else rigid).append(_Edge(joint.base, joint.part))
     rigid += [
         _Edge(link.start[0], link.end[0], link.id)

@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 def structure_of(machine: "Machine") -> Structure:
     """The structure of a machine.
 
-    Joints whose two sides were moved too far apart to hold are left out, so their blocks fall off.
+    Joints whose two sides were moved too far apart to hold are left out, so their blocks fall off,
+    and so are those of blocks that lie loose.
 
     Args:
         machine: The machine.
@@ -46,8 +47,9 @@ def structure_of(machine: "Machine") -> Structure:
     index = {part.id: i for i, part in enumerate(parts)}
     links, ropes = [], []
     for joint in machine.joints:
-        if joint.holds:
-            rope_mount = parts[index[joint.part]].module.rope_mount
+        module = parts[index[joint.part]].module
+        if joint.holds and not module.is_loose:
+            rope_mount = module.rope_mount
             if rope_mount is None:
                 links.append(_link(joint, index, parts))
             else:

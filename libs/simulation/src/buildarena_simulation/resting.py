@@ -127,7 +127,7 @@ class FaceFinder:
                 np.array(box.size) / 2,
             )
             for k, box in enumerate(world.terrain, 1)
-            if not box.slope_deg
+            if not box.slope_deg and not box.heading_deg
         ]
         if world.ground:
             self._tops.insert(0, (0, np.zeros(3), np.array([1e6, 1e6, 0.0])))

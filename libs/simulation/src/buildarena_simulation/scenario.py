@@ -8,12 +8,20 @@ may come from strangers, so every number has bounds within which the engines sta
 import math
 from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
 
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.draws import Draws, at_end, drawn
 from buildarena_simulation.line import Line
 from buildarena_simulation.offered import Senses
+from buildarena_simulation.rounded_terrain import with_boxes
 
 MAX_DURATION_S: Final = 600.0
 
@@ -51,11 +59,14 @@ class TerrainBox(_Document):
         size: (3,) full extents along its own axes: east, north and up before it is tilted, units.
         slope_deg: Tilt about the east-west axis through its centre, degrees; above 0 its top rises
             towards the north.
+        heading_deg: By how much it is turned about the vertical after that, from north towards
+            east, degrees.
     """
 
     center: tuple[Coordinate, Coordinate, Coordinate]
     size: tuple[TerrainExtent, TerrainExtent, TerrainExtent]
     slope_deg: Annotated[float, Field(gt=-90, lt=90)] = 0.0
+    heading_deg: Heading = 0.0
 
 
 class Cargo(_Document):
@@ -241,7 +252,8 @@ class Scenario(_Document):
 
     Attributes:
         duration_s: Length of the trial, seconds.
-        terrain: Fixed boxes besides the ground.
+        terrain: Fixed boxes besides the ground; task files may write pipes and cylinders, see
+            `buildarena_simulation.rounded_terrain`.
         cargo: The cargo, if the trial has one.
         placement: Where the machine is put.
         control: Who presses the keys.
@@ -265,7 +277,9 @@ class Scenario(_Document):
     """
 
     duration_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
-    terrain: Annotated[tuple[TerrainBox, ...], Field(max_length=64)] = ()
+    terrain: Annotated[
+        tuple[TerrainBox, ...], Field(max_length=64), BeforeValidator(with_boxes)
+    ] = ()
     cargo: Cargo | None = None
     placement: Annotated[Placement, Field(discriminator="kind")] = GroundPlacement()
     control: Control = Control()

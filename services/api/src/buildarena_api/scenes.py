@@ -89,7 +89,8 @@ class SceneView(BaseModel):
 
     scenario: dict[str, Any] = Field(
         description="As tasks have it: duration_s, terrain, cargo, placement, control. Terrain is "
-        "tilted by slope_deg about the east-west axis through its centre"
+        "tilted by slope_deg about the east-west axis through its centre, and then turned by "
+        "heading_deg about the vertical"
     )
     machine: MachineScene | None = Field(description="null while nothing was built")
 

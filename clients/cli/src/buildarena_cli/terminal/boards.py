@@ -49,6 +49,7 @@ ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
 RESULTS = ("success", "95 %", "indicator")
 PUBLISHED = ("model", *RESULTS, "parts", "requests", "tokens")
 LEAVING = ("requests", "parts", "tokens", "USD", "best", "score", "of it 95 %", "95 %", "indicator")
+PEERS = columns("model", "mean", "best", "spread", numeric=("mean", "best", "spread"))
 OVERALL = columns(
     *("#", "model", "place", "mean rank", "score", "success", "USD", "front"),
     numeric=("#", "place", "mean rank", "score", "success", "USD"),
@@ -114,7 +115,20 @@ def task_table(task: Mapping[str, Any]) -> None:
 def published_table(task: Mapping[str, Any]) -> None:
     """Prints the paper's figures of one task."""
     title = f"{task['task']}, as published: measured in the game, never ranked with ours"
-    _print_rows(PUBLISHED, task["published"], title=title)
+    if task["published"]:
+        _print_rows(PUBLISHED, task["published"], title=title)
+    for peer, peer_task in dict.fromkeys((r["peer"], r["peer_task"]) for r in task["peers"]):
+        rows = [
+            (
+                harmless(f"{row['model']} ({row['workflow']})"),
+                *(number(row[name]) for name in ("indicator_mean", "indicator_best")),
+                number(row["indicator_std"]),
+            )
+            for row in task["peers"]
+            if (row["peer"], row["peer_task"]) == (peer, peer_task)
+        ]
+        title = f"{peer_task} of {peer}, as published: its task and world, never ranked with ours"
+        print_table(PEERS, rows, title=title)
 
 
 def _print_rows(

@@ -10,6 +10,7 @@ import { Controls } from "./Controls";
 import { Exports } from "./Exports";
 import { HeatMap } from "./HeatMap";
 import { Overall } from "./Overall";
+import { Peers } from "./Peers";
 import { rankedOver, scopeOf } from "./scope";
 import { ScopeChips } from "./ScopeChips";
 import type { BoardSearch } from "../../api/board-search";
@@ -82,6 +83,7 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
                   {task.task}
                 </Title>
                 <TaskTable task={shown(task, search)} search={search} />
+                {search.paper === "yes" && <Peers task={task} />}
               </div>
             ))}
           </Stack>

@@ -26,6 +26,7 @@ from buildarena_benchmark.leaderboard.ended_jobs import (
 )
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
+from buildarena_benchmark.leaderboard.peers import PeerRow, peer_rows
 from buildarena_benchmark.leaderboard.plot_data import (
     FailureRow,
     cost_bins,
@@ -66,6 +67,7 @@ __all__ = [
     "EndedJob",
     "FailureRow",
     "OverallRow",
+    "PeerRow",
     "PublishedRow",
     "Tally",
     "TaskBoard",
@@ -81,6 +83,7 @@ __all__ = [
     "counted_trials",
     "failure_row",
     "failure_rows",
+    "peer_rows",
     "performance_table",
     "plain_table",
     "published_overall",

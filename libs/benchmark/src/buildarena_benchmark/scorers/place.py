@@ -17,11 +17,11 @@ from buildarena_benchmark.scorers.measures.marks import (
 from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
+    BASE_MOVED,
     CAME_APART,
     FORCES_NOT_MEASURED,
     NOT_CARRIED,
     Deciding,
-    Flag,
     Metric,
     Scorer,
     Verdict,
@@ -47,12 +47,6 @@ _PUT_DOWN: Final = 0.1
 
 _SLACK: Final = 0.05
 """A cargo that slides along the wall's top sinks in so far, units."""
-
-
-BASE_MOVED: Final = Flag(
-    name="base_moved",
-    meaning="The starting block did not stay where it was.",
-)
 
 
 class PlaceScoring(Document):

@@ -50,6 +50,7 @@ NOT_CARRIED: Final = Flag(
 CAME_APART: Final = Flag(
     name="came_apart", meaning="Parts came off the machine before its work was done."
 )
+BASE_MOVED: Final = Flag(name="base_moved", meaning="The starting block did not stay where it was.")
 START_TOO_HIGH: Final = Flag(
     name="start_too_high",
     meaning="Something started at or above the height that the task allows.",

@@ -29,6 +29,7 @@ from buildarena_geometry import (
     catalogue_of,
     module_set,
     modules_named,
+    simulated_modules,
 )
 from buildarena_simulation import Scenario
 
@@ -47,7 +48,7 @@ def _plain(text: str) -> str:
 
 def _known_module(name: str) -> str:
     # Cargo is placed by the scenario, never by a builder.
-    simulated = module_set("workshop")
+    simulated = simulated_modules()
     if name not in simulated:
         message = f"there is no module {name!r}"
         if name in module_set("all"):

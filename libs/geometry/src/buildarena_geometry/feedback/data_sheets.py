@@ -50,6 +50,8 @@ def _motion(module: Module) -> Iterator[str]:
         yield from _joint(module, joint_type, module.joint)
     if joint_type == "mount":
         yield "its mount does not break"
+    if module.is_loose:
+        yield "nothing holds it on its face"
     if module.gear is not None:
         yield f"pitch radius {plain(module.gear.pitch_radius)}"
     if module.rope_mount is not None:

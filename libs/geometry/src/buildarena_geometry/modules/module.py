@@ -31,7 +31,9 @@ Kind = Literal[
     "cargo",
 ]
 ATTACHABLE_KINDS = ("block", "joint", "wheel", "flight", "cannon", "torch", "device")
-JointType = Literal["attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity"]
+JointType = Literal[
+    "attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity", "loose"
+]
 Link = Literal["rigid", "rope", "spring"]
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 _FACING = -0.9  # cosine; a face that looks this way looks at the block it sits on
@@ -148,8 +150,8 @@ class Physics(Form, frozen=True, kw_only=True):
 
     Attributes:
         joint_type: what holds it to the face it sits on: an ordinary attachment, a mount that
-            practically never breaks, or a joint it moves on: an axle, a hinge, a slider, a ball, or
-            a constant-velocity joint.
+            practically never breaks, a joint it moves on: an axle, a hinge, a slider, a ball, or a
+            constant-velocity joint, or nothing: what is loose lies there.
         mass_at: where its mass lies: at the point shown as its position, or in the middle of its
             body.
         structural: whether it is part of the frame that bears loads: what a far end can grab, and
@@ -201,6 +203,7 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
         brief: what models read about it in a list; "" for the first sentence of its description.
         categories: the groups it is looked up in; the first one is its own.
         simulated: whether both engines have its physics; without, it can be built and not tried.
+        by_name: whether only tasks that name it offer it: no set but "all" has it.
         default_keys: the keys the game binds to its actions by default, by action.
         sources: where a figure comes from, by its name: a confidence ("known", "community",
             "chosen" or "unknown"), or that and the source or reason after a colon.
@@ -229,6 +232,7 @@ class ModuleFields(Forces, frozen=True, kw_only=True):
     brief: Annotated[str, Meta(max_length=100)] = ""
     categories: tuple[Name, ...] = ()
     simulated: bool = True
+    by_name: bool = False
     default_keys: dict[str, Name] = field(default_factory=dict)
     sources: dict[str, str] = field(default_factory=dict)
 
@@ -272,6 +276,11 @@ class Module(ModuleFields, frozen=True, kw_only=True):
     def attachable(self) -> bool:
         """Whether it can be attached to a face."""
         return self.kind in ATTACHABLE_KINDS
+
+    @property
+    def is_loose(self) -> bool:
+        """Whether it lies on its face and nothing holds it there."""
+        return self.physics is not None and self.physics.joint_type == "loose"
 
     @property
     def spins(self) -> bool:

@@ -22,7 +22,8 @@ def module_set(name: str) -> Catalogue:
 
     Args:
         name: "basic" (the paper's modules), "workshop" (those, and every further type that both
-            engines simulate) or "all" (every type that can be built).
+            engines simulate, but those that tasks offer by name) or "all" (every type that can be
+            built).
 
     Returns:
         The basic modules, then the further ones by their number in Besiege. Cargo, which no builder
@@ -36,7 +37,11 @@ def module_set(name: str) -> Catalogue:
     if name == "basic":
         return Catalogue(basic_modules())
     built = [module for module in basic_modules() if module.kind != "cargo"]
-    further = [extended for extended in extended_modules() if name == "all" or extended.simulated]
+    further = [
+        extended
+        for extended in extended_modules()
+        if name == "all" or (extended.simulated and not extended.by_name)
+    ]
     return Catalogue((*built, *further))
 
 
@@ -81,6 +86,12 @@ def modules_of_action(arguments: Mapping[str, object]) -> Iterator[Module]:
         module = module_set("all").named(written) if isinstance(written, str) else None
         if module is not None:
             yield module
+
+
+@cache
+def simulated_modules() -> Catalogue:
+    """The modules that a task can offer by name: all that both engines simulate."""
+    return Catalogue(tuple(module for module in module_set("all").values() if module.simulated))
 
 
 @cache

@@ -13,7 +13,7 @@ from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board as RankedBoard
-from buildarena_benchmark.leaderboard import Cell, published_overall, published_rows
+from buildarena_benchmark.leaderboard import Cell, peer_rows, published_overall, published_rows
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_pipeline.catalog.models import ModelRegistry
@@ -115,6 +115,18 @@ class PublishedView(_View):
     requests_mean: float | None
 
 
+class PeerView(_View):
+    """What another benchmark published of its task, in its world: never ranked with ours."""
+
+    peer: str = Field(description="The other benchmark")
+    peer_task: str = Field(description="What it calls its task")
+    model: str
+    workflow: str
+    indicator_mean: float
+    indicator_best: float
+    indicator_std: float
+
+
 class TaskBoard(_View):
     """All models on one task, the best first."""
 
@@ -126,6 +138,9 @@ class TaskBoard(_View):
     unit: str
     rows: list[Row]
     published: list[PublishedView]
+    peers: list[PeerView] = Field(
+        default=[], description="What other benchmarks published of the task most like this one"
+    )
 
 
 class OverallView(_View):
@@ -264,6 +279,7 @@ def board_view(
                 unit=task.indicator.unit if task else "",
                 rows=[row(ranked, found.task) for ranked in found.rows],
                 published=_published(found.task, registry),
+                peers=_peers(found.task),
             )
             for found, task in ((found, tasks[found.task]) for found in board.tasks)
         ],
@@ -309,4 +325,11 @@ def _published(task: str, registry: ModelRegistry) -> list[PublishedView]:
             }
         )
         for row in published_rows().get(task, ())
+    ]
+
+
+def _peers(task: str) -> list[PeerView]:
+    return [
+        PeerView.model_validate({name: getattr(row, name) for name in PeerView.model_fields})
+        for row in peer_rows().get(task, ())
     ]

@@ -34,12 +34,19 @@ def extents(machine: "Machine", trajectory: "Trajectory", *, axis: int) -> tuple
         trajectory: The trial.
         axis: 0 east, 1 north, 2 up.
     """
+    return reaches(machine, trajectory, np.eye(3)[axis])
+
+
+def reaches(
+    machine: "Machine", trajectory: "Trajectory", direction: Series
+) -> tuple[Series, Series]:
+    """The same along any direction (3,), unit length, world frame."""
     low = np.full(trajectory.positions.shape[:2], np.inf)
     high = -low
     for column, name in enumerate(trajectory.block_ids):
         block = machine.blocks[name]
-        way = rotations(trajectory.quaternions[:, column])[:, axis]
-        place = trajectory.positions[:, column, axis].astype(np.float64)
+        way = direction @ rotations(trajectory.quaternions[:, column])
+        place = trajectory.positions[:, column].astype(np.float64) @ direction
         for solid in block.module.body:
             middle, reach = _along(block, solid, way)
             low[:, column] = np.minimum(low[:, column], place + middle - reach)

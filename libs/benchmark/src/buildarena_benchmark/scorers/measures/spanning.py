@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from buildarena_benchmark.scorers.measures.components import groups_of, spans_of
 from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_benchmark.scorers.measures.series import gravity_of
-from buildarena_simulation.scenario import SpanPlacement
+from buildarena_simulation.scenario import SpanPlacement, TerrainBox
+from buildarena_simulation.terrain import shape_of
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
@@ -195,12 +196,17 @@ def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
         return None
     edge = scenario.placement.gap / 2 - _EDGE
     reach = [
-        (box.center[1] - box.size[1] / 2, box.center[1] + box.size[1] / 2)
-        for box in scenario.terrain
+        (box.center[1] - reach, box.center[1] + reach)
+        for box, reach in ((box, _reach(box)) for box in scenario.terrain)
     ]
     south = [i for i, (_, high) in enumerate(reach) if high <= -edge]
     north = [i for i, (low, _) in enumerate(reach) if low >= edge]
     return (south, north) if south and north else None
+
+
+def _reach(box: TerrainBox) -> float:
+    """How far a terrain box reaches to the north and south of its centre, units."""
+    return float(shape_of(box).reach()[1]) if box.heading_deg else box.size[1] / 2
 
 
 def _share(part: float, whole: float) -> float:

@@ -16,12 +16,14 @@ from buildarena_simulation.engines.base import World, quaternion_of
 from buildarena_simulation.engines.mujoco.model_joints import JointText
 from buildarena_simulation.engines.mujoco.xml_text import opened, tag
 from buildarena_simulation.engines.shared.joint_frames import is_simple
+from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD
 from buildarena_simulation.structure.grips import Hold
 from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solid
+from buildarena_simulation.terrain import shape_of
 
 _SIZE_OF_FORM: Final = {
     ShapeKind.BOX: [0, 1, 2],
@@ -159,9 +161,15 @@ def _static(world: World) -> Iterator[str]:
             type="box",
             size=np.array(box.size) / 2,
             pos=box.center,
-            euler=(math.radians(box.slope_deg), 0.0, 0.0),
+            **_turn_of(box),
             **surface,
         )
+
+
+def _turn_of(box: TerrainBox) -> dict[str, object]:
+    if not box.heading_deg:
+        return {"euler": (math.radians(box.slope_deg), 0.0, 0.0)}
+    return {"quat": quaternion_of(shape_of(box).rotation)}
 
 
 def _cargo(world: World, mass: float) -> Iterator[str]:

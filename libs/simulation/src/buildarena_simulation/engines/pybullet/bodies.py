@@ -13,6 +13,7 @@ from buildarena_simulation.engines.pybullet.hinges import HingedComponent
 from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.structure.model import FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.terrain import shape_of
 
 with quiet_output():
     import pybullet
@@ -141,6 +142,8 @@ def start_world(
         surfaces[add_box(client, half, (0.0, 0.0, -1.0), mass=0.0)] = 0
     for k, box in enumerate(world.terrain, 1):
         turn = pybullet.getQuaternionFromEuler((math.radians(box.slope_deg), 0.0, 0.0))
+        if box.heading_deg:
+            turn = quaternion_of(shape_of(box).rotation)[[1, 2, 3, 0]].tolist()
         half = (box.size[0] / 2, box.size[1] / 2, box.size[2] / 2)
         surfaces[add_box(client, half, box.center, mass=0.0, turn=turn)] = k
     cargo = world.cargo

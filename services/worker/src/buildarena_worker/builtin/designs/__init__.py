@@ -16,6 +16,7 @@ from buildarena_worker.builtin.designs import (
     risers,
     rockets,
     rovers,
+    throwers,
     vehicles,
     walkers,
 )
@@ -59,6 +60,9 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "walk-2": walkers.corner_walker,
     "place-2": piloted.placer,
     "line-1": piloted.line_follower,
+    "throw-1": throwers.catapult,
+    "throw-2": throwers.catapult,
+    "throw-3": throwers.aiming_catapult,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

@@ -1,0 +1,147 @@
+"""Round terrain as task files write it: pipes and cylinders, which become fixed boxes.
+
+What a scenario holds, what engines collide with and what films and pages draw are the boxes.
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Final, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+_DIGITS: Final = 6
+"""A box's figures have so many digits behind the point, alike on all processors."""
+
+_UPRIGHT: Final = 90.0
+
+Place = Annotated[float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
+Extent = Annotated[float, Field(ge=0.1, le=1000)]
+Angle = Annotated[float, Field(allow_inf_nan=False, ge=-180, le=180)]
+
+
+class _Round(BaseModel):
+    """What pipes and cylinders have in common: they lie along their axis.
+
+    Attributes:
+        center: (3,) middle of the axis, world frame, units.
+        radius: Of the surface, units: a pipe's inner one, a cylinder's outer one. The boxes touch
+            it in their middles.
+        length: Along the axis, units.
+        heading_deg: The axis runs from west to east; by how much all of it is turned about the
+            vertical, from north towards east, degrees. At 90 a whole pipe is a ring that is seen
+            from the south.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    center: tuple[Place, Place, Place]
+    radius: Extent
+    length: Extent
+    heading_deg: Angle = 0.0
+
+    def _box(self, angle: float, apart: float, width: float, height: float) -> dict[str, Any]:
+        """A box whose height points away from the axis.
+
+        Args:
+            angle: Where it lies, from straight down towards what is ahead, degrees.
+            apart: From the axis to its centre, units.
+            width: Across, units.
+            height: Away from the axis, units.
+        """
+        turn, heading = math.radians(angle), math.radians(self.heading_deg)
+        ahead, down = apart * math.sin(turn), apart * math.cos(turn)
+        x, y, z = self.center
+        slope = (angle + _UPRIGHT) % (2 * _UPRIGHT) - _UPRIGHT  # a box looks the same upside down
+        if math.isclose(abs(slope), _UPRIGHT):
+            slope, width, height = 0.0, height, width
+        center = (x + ahead * math.sin(heading), y + ahead * math.cos(heading), z - down)
+        return {
+            "center": [round(value, _DIGITS) + 0.0 for value in center],
+            "size": [round(value, _DIGITS) for value in (self.length, width, height)],
+            "slope_deg": round(slope, _DIGITS) + 0.0,
+            "heading_deg": self.heading_deg,
+        }
+
+
+class Pipe(_Round):
+    """A pipe, or a part of one: quarter pipes, half pipes, arches and rings.
+
+    Attributes:
+        from_deg: Where it begins, from straight down towards what is ahead, degrees: a quarter
+            pipe that rises to the north reaches from 0 to 90, a half pipe from -90 to 90.
+        to_deg: Where it ends.
+        thickness: Of its wall, which lies outside the radius, units.
+        segments: Of how many boxes it is made.
+    """
+
+    shape: Literal["pipe"]
+    from_deg: Angle = -180.0
+    to_deg: Angle = 180.0
+    thickness: Annotated[float, Field(ge=0.1, le=100)] = 0.5
+    segments: Annotated[int, Field(ge=1, le=64)] = 12
+
+    @model_validator(mode="after")
+    def _is_an_arc(self) -> Self:
+        if self.arc <= 0:
+            raise ValueError(f"to_deg {self.to_deg:g} is not beyond from_deg {self.from_deg:g}")
+        if self.arc / self.segments > _UPRIGHT:
+            raise ValueError(f"{self.segments} segments are too few for {self.arc:g} degrees")
+        return self
+
+    @property
+    def arc(self) -> float:
+        """From its beginning to its end, degrees."""
+        return self.to_deg - self.from_deg
+
+    def boxes(self) -> Iterator[dict[str, Any]]:
+        """Its segments, as a scenario has boxes."""
+        each = self.arc / self.segments
+        outer = self.radius + self.thickness
+        width = 2 * outer * math.tan(math.radians(each / 2))
+        for number in range(self.segments):
+            angle = self.from_deg + (number + 0.5) * each
+            yield self._box(angle, self.radius + self.thickness / 2, width, self.thickness)
+
+
+class Cylinder(_Round):
+    """A solid cylinder that lies; half in the ground it is a hump.
+
+    Attributes:
+        sides: How many its surface has; even.
+    """
+
+    shape: Literal["cylinder"]
+    sides: Annotated[int, Field(ge=4, le=64, multiple_of=2)] = 16
+
+    def boxes(self) -> Iterator[dict[str, Any]]:
+        """One box for every two opposite sides, as a scenario has boxes."""
+        width = 2 * self.radius * math.tan(math.pi / self.sides)
+        for number in range(self.sides // 2):
+            yield self._box(number * 360.0 / self.sides, 0.0, width, 2 * self.radius)
+
+
+_SHAPES: Final[TypeAdapter[Pipe | Cylinder]] = TypeAdapter(
+    Annotated[Pipe | Cylinder, Field(discriminator="shape")]
+)
+
+
+def with_boxes(terrain: Any) -> Any:
+    """Terrain as a task file has it, with boxes in place of what is round.
+
+    Raises:
+        ValueError: Something round is none; the message names its number and what is wrong.
+    """
+    if not isinstance(terrain, list | tuple):
+        return terrain
+    made: list[Any] = []
+    for number, entry in enumerate(terrain):
+        if not isinstance(entry, Mapping) or "shape" not in entry:
+            made.append(entry)
+            continue
+        try:
+            made.extend(_SHAPES.validate_python(dict(entry)).boxes())
+        except ValidationError as error:
+            wrong = error.errors()[0]
+            place = ".".join(str(part) for part in (number, *wrong["loc"]))
+            raise ValueError(f"{place}: {wrong['msg']}") from error
+    return made

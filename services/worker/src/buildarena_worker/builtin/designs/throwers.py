@@ -1,0 +1,142 @@
+"""Machines that throw a boulder: an arm on a swivel that springs whip round."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+import math
+
+from buildarena_worker.builtin.designs.design import Design, PartDesign
+from buildarena_worker.builtin.designs.drafting import (
+    DOWN,
+    EAST,
+    NORTH,
+    SOUTH,
+    UP,
+    WEST,
+    Direction,
+    Draft,
+)
+from buildarena_worker.builtin.designs.programs import listed, program_text
+
+_ARM, _TAIL, _POST, _FRONT, _BACK = 6, 4, 4, 4, 8
+_LEAN_DEG = 38.7
+"""How far the arm hangs down behind: so its tip rests on the ground."""
+_CUP_DEG = 10.0
+"""How far the cup leans outwards on the arm: the boulder rolls out of it in time."""
+_BEGINS_S = (1.52, 1.6, 1.68, 1.76, 1.84)
+"""When the springs draw, by seed, seconds."""
+
+
+def catapult(seed: int) -> Design:
+    """A catapult whose springs all draw at one key."""
+    draft, springs, _ = catapult_draft()
+    return Design(
+        overall="An arm on a swivel with a cup behind and springs in front, on a long foot.",
+        parts={
+            "catapult": PartDesign(
+                description="A foot of 12, a post of 4, an arm of 6 with a tail of 4, 7 springs",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "All springs draw together once the boulder lies still.",
+            "control_config": [
+                {"block": spring, "action": "contract", "keys": ["Alpha1"]} for spring in springs
+            ],
+            "control_sequence": [
+                {"time": _BEGINS_S[seed % len(_BEGINS_S)], "key": "Alpha1", "hold_for": 4.0}
+            ],
+        },
+    )
+
+
+def aiming_catapult(seed: int) -> Design:
+    """The same catapult in the middle, whose program draws as many springs as the ring asks for."""
+    draft, springs, _ = catapult_draft(aside=3)
+    return Design(
+        overall="A catapult whose arm swings above x = 0; fewer springs throw less far.",
+        parts={
+            "catapult": PartDesign(
+                description="A foot of 12, a post of 4, an arm of 6 with a tail of 4, 7 springs",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            "throwing", springs=listed(springs), begins=f"{_BEGINS_S[seed % len(_BEGINS_S)]:g}"
+        ),
+    )
+
+
+def catapult_draft(*, aside: int = 0) -> tuple[Draft, list[str], str]:
+    """The machine, the ids of its springs, and that of its boulder.
+
+    Args:
+        aside: How far the starting block lies to the east of the foot.
+    """
+    draft = Draft(modules="all")
+    front = [draft.start("the front of the foot"), *draft.row("1", WEST, aside)][-1]
+    beam = [front, *draft.row(front, SOUTH, _FRONT + _BACK)]
+    near, anchor, west = _feet(draft, beam)
+    post = draft.row(beam[_FRONT], UP, _POST)
+    _stays(draft, beam, post, west)
+    swivel = draft.attach(post[-1], EAST, "Swivel")
+    draft.do("twist_block", block_id=swivel, angle=-_LEAN_DEG)
+    back, ahead, above, below = (_leaning(way, _LEAN_DEG) for way in (SOUTH, NORTH, UP, DOWN))
+    hub = draft.attach(swivel, EAST)
+    arm, tail = draft.row(hub, back, _ARM), draft.row(hub, ahead, _TAIL)
+    tip = draft.attach(arm[-1], EAST)
+    draft.do("twist_block", block_id=tip, angle=-_CUP_DEG)
+    out = _leaning(UP, _LEAN_DEG + _CUP_DEG)
+    boulder = draft.attach(draft.attach(tip, out, "Bomb Holder"), out, "Boulder")
+    mast = draft.row(hub, above, 2)[-1]
+    for end, way in ((arm[3], back), (tail[-1], ahead)):
+        draft.connect(mast, end, way, above)
+        draft.connect(mast, end, EAST)
+    for end, way, base, side in (
+        (tail[-1], below, anchor, UP),
+        (tail[-1], EAST, anchor, EAST),
+        (tail[-1], ahead, anchor, NORTH),
+        (tail[-1], WEST, near, UP),
+        (tail[-2], EAST, near, NORTH),
+        (tail[-2], below, anchor, SOUTH),
+        (tail[-2], WEST, beam[1], DOWN),
+    ):
+        draft.connect(end, base, way, side, connector="Spring")
+    links = draft.machine.connectors.values()
+    return draft, [link.id for link in links if link.module.name == "Spring"], boulder
+
+
+def _feet(draft: Draft, beam: list[str]) -> tuple[str, str, str]:
+    """Heavy feet to both sides; the eastern front's blocks, and the western one at the post."""
+    near = draft.attach(beam[1], EAST)
+    anchor = draft.attach(near, EAST)
+    draft.attach(draft.attach(beam[1], WEST), WEST, "Log", note="weight")
+    draft.attach(anchor, EAST, "Log", note="weight")
+    for base in (beam[_FRONT], beam[-1]):
+        west = draft.attach(base, WEST)
+        for foot, side in ((west, WEST), (draft.attach(base, EAST), EAST)):
+            draft.attach(foot, side, "Log", note="weight")
+        if base == beam[_FRONT]:
+            middle = west
+    return near, anchor, middle
+
+
+def _stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
+    """Braces from the top of the post to the foot, and along the foot behind it."""
+    draft.connect(post[-1], beam[_FRONT - 2], NORTH, UP)
+    draft.connect(post[-1], beam[1], NORTH, UP)
+    draft.connect(post[-1], beam[_FRONT + 6], SOUTH, UP)
+    draft.connect(post[-1], west, WEST, UP)
+    draft.connect(post[-2], beam[_FRONT - 1], NORTH, UP)
+    draft.connect(post[-2], beam[_FRONT + 1], SOUTH, UP)
+    for side in (EAST, WEST):
+        draft.connect(beam[_FRONT + 1], beam[_FRONT + 5], side)
+
+
+def _leaning(way: Direction, angle_deg: float) -> Direction:
+    """A direction turned about the axis to the east: what looked south looks down a little."""
+    x, y, z = way
+    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    return (x, y * cosine - z * sine, y * sine + z * cosine)

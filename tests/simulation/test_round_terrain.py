@@ -1,0 +1,140 @@
+"""Pipes, rings and cylinders as terrain: what their boxes are, and that engines touch them."""
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from support.machines.drafts import KeyedDraft
+from support.machines.piloted import FASTER_FIRST
+
+from buildarena_simulation import Scenario, simulate
+from buildarena_simulation.terrain import shape_of
+from buildarena_worker.builtin.designs.drafting import UP
+
+QUARTER = {
+    "shape": "pipe",
+    "center": [0, 6, 5],
+    "radius": 5,
+    "length": 6,
+    "from_deg": 0,
+    "to_deg": 90,
+}
+RING = {"shape": "pipe", "center": [0, 8, 4], "radius": 3, "length": 1, "heading_deg": 90}
+HUMP = {"shape": "cylinder", "center": [0, 5, 0], "radius": 2, "length": 8}
+
+
+def scenario(*terrain, duration_s: float = 2.0, **fields) -> Scenario:
+    return Scenario.model_validate({"duration_s": duration_s, "terrain": terrain, **fields})
+
+
+def distances(*terrain, points: np.ndarray) -> np.ndarray:
+    """From points (K, 3) to the nearest box, (K,), units; 0 inside."""
+    shapes = [shape_of(box) for box in scenario(*terrain).terrain]
+    local = [(points - s.center) @ s.rotation for s in shapes]
+    gaps = [np.maximum(np.abs(p) - s.half_extents, 0) for p, s in zip(local, shapes, strict=True)]
+    return np.min([np.linalg.norm(gap, axis=1) for gap in gaps], axis=0)
+
+
+def circle(center, radius: float, angles: np.ndarray, heading_deg: float) -> np.ndarray:
+    """Points at angles from straight down towards what is ahead, (K, 3)."""
+    heading, turn = math.radians(heading_deg), np.radians(angles)
+    ahead = radius * np.sin(turn)
+    offsets = [ahead * math.sin(heading), ahead * math.cos(heading), -radius * np.cos(turn)]
+    return np.array(center) + np.array(offsets).T
+
+
+@pytest.mark.parametrize(
+    ("pipe", "angles"),
+    [
+        (QUARTER, np.linspace(0, 90, 50)),
+        ({**QUARTER, "heading_deg": 30}, np.linspace(0, 90, 50)),
+        ({**QUARTER, "from_deg": -90}, np.linspace(-90, 90, 50)),
+        (RING, np.linspace(-180, 180, 90)),
+    ],
+    ids=["quarter", "turned", "half", "ring"],
+)
+def test_a_pipes_inside_is_a_circle_without_gaps(pipe, angles) -> None:
+    """Within what a polygon of so many sides strays from its circle; it is free inside."""
+    center, radius = pipe["center"], pipe["radius"]
+    stray = radius / math.cos(math.radians(180 / 12)) - radius
+    heading = pipe.get("heading_deg", 0)
+    middle = circle(center, radius + 0.25, angles, heading)
+    assert distances(pipe, points=middle).max() < 0.01
+    inside = distances(pipe, points=circle(center, radius - 0.5, angles, heading))
+    assert inside.min() >= 0.5 - 1e-6
+    assert inside.max() <= 0.5 + stray + 0.01
+
+
+def test_a_cylinder_is_solid_and_round() -> None:
+    angles = np.linspace(-180, 180, 120)
+    for radius in (0.1, 1.0, 1.95):
+        assert distances(HUMP, points=circle(HUMP["center"], radius, angles, 0)).max() < 1e-6
+    outside = distances(HUMP, points=circle(HUMP["center"], 3.0, angles, 0))
+    assert outside.min() > 0.95
+    assert outside.max() < 1.0 + 1e-6
+
+
+def test_what_is_round_is_boxes_from_then_on_and_boxes_stay_as_they_were() -> None:
+    wall = {"center": [0, 9, 1], "size": [2, 1, 2]}
+    world = scenario(wall, RING)
+    assert len(world.terrain) == 13
+    assert Scenario.model_validate_json(world.model_dump_json()) == world
+    assert scenario(wall).model_dump(mode="json")["terrain"] == [{**wall, "slope_deg": 0.0}]
+
+
+def fallen(engine: str, *terrain, height: float) -> np.ndarray:
+    """Where a block is that is let go above (0, 0), and a boulder on it, (T, 2, 3)."""
+    draft = KeyedDraft(modules="all")
+    draft.attach(draft.start(), UP, "Boulder")
+    placement = {"kind": "released", "height": height}
+    return simulate(
+        draft.machine, scenario(*terrain, duration_s=3.0, placement=placement), engine
+    ).positions.astype(float)
+
+
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_a_ring_that_is_seen_from_the_south_bears_what_falls_into_it(engine) -> None:
+    ring = {**RING, "center": [0, 0, 4], "length": 4}
+    block, boulder = fallen(engine, ring, height=2).swapaxes(0, 1)
+    assert block[-1, 2] == pytest.approx(1.5, abs=0.1)
+    for path, reach in ((block, 0.5), (boulder, 0.85)):
+        apart = np.hypot(path[:, 0], path[:, 2] - 4)
+        assert apart.max() < 3.2 - reach
+
+
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+@pytest.mark.parametrize("heading_deg", [0, 90])
+def test_what_falls_beside_the_middle_of_a_half_pipe_slides_there(engine, heading_deg) -> None:
+    """From where its wall rises by 50 degrees: more than friction holds."""
+    aside = 4 * math.sin(math.radians(50))
+    center = [-aside, 0, 4.6] if heading_deg else [0, -aside, 4.6]
+    half = {**QUARTER, "center": center, "radius": 4, "from_deg": -90, "heading_deg": heading_deg}
+    block = fallen(engine, half, height=2.4)[:, 0]
+    across = block[:, 0 if heading_deg else 1]
+    assert across.min() < -1.5
+    apart = np.hypot(across - (-aside), block[:, 2] - 4.6)
+    assert apart.max() < 4.2
+    along = block[:, 1 if heading_deg else 0]
+    assert np.abs(along).max() < 0.5
+
+
+@pytest.mark.parametrize(
+    ("entry", "why"),
+    [
+        ({**RING, "segments": 1}, "1 segments are too few for 360 degrees"),
+        ({**QUARTER, "to_deg": -10}, "not beyond from_deg"),
+        ({**HUMP, "sides": 5}, "multiple of 2"),
+        ({**HUMP, "shape": "cone"}, "0: Input tag 'cone'.*'pipe', 'cylinder'"),
+        ({**HUMP, "bend": 5}, "0.cylinder.bend"),
+        ({**RING, "segments": 64, "radius": -1}, "0.pipe.radius"),
+    ],
+)
+def test_what_is_round_and_wrong_is_named(entry, why) -> None:
+    with pytest.raises(ValidationError, match=why):
+        scenario(entry)
+
+
+def test_more_boxes_than_a_scenario_may_have_are_refused() -> None:
+    with pytest.raises(ValidationError, match="at most 64"):
+        scenario({**RING, "segments": 40}, {**RING, "segments": 40})
