@@ -303,6 +303,13 @@ describe("sweeps", () => {
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Resume" }).waitFor();
     expect((await ask<Schemas["SweepView"]>(`/v1/sweeps/${id}`)).state).toBe("paused");
+    await page.getByText(/^1 on hold before/).waitFor();
+    await page.getByRole("button", { name: "Budget…" }).click();
+    await page.getByLabel("US dollars").fill("12.5");
+    await page.getByRole("button", { name: "Set the budget" }).click();
+    await page.getByText("of $12.50").waitFor();
+    const raised = await ask<Schemas["SweepView"]>(`/v1/sweeps/${id}`);
+    expect([raised.state, raised.budget?.max_cost_usd, raised.budget?.max_requests]).toEqual(["paused", 12.5, null]);
     await page.getByRole("button", { name: "Cancel…" }).click();
     await page.getByRole("button", { name: "Cancel the sweep" }).click();
     await expect.poll(() => page.getByText("cancelled: 2").count(), { timeout: 10_000 }).toBe(1);

@@ -187,6 +187,8 @@ class Client:
     estimate_sweep = _call(Api.estimate_sweep)
     pause_sweep = _call(Api.pause_sweep)
     resume_sweep = _call(Api.resume_sweep)
+    set_sweep_budget = _call(Api.set_sweep_budget)
+    sweep_forecast = _call(Api.sweep_forecast)
     cancel_sweep = _call(Api.cancel_sweep)
     retry_sweep = _call(Api.retry_sweep)
     sweep_results = _call(Api.sweep_results)

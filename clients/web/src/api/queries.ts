@@ -14,6 +14,7 @@ export type Row = Schema<"Row">;
 export type TaskBoard = Schema<"TaskBoard">;
 export type OverallView = Schema<"OverallView">;
 export type SweepView = Schema<"SweepView">;
+export type Forecast = Schema<"ForecastView">;
 export type JobView = Schema<"JobView">;
 export type JobDetail = Schema<"JobDetail">;
 export type TaskView = Schema<"TaskView">;
@@ -73,6 +74,14 @@ export const sweep = (id: string) =>
   queryOptions({
     queryKey: ["sweep", id],
     queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } })),
+  });
+
+/** When a sweep ends and what it comes to cost, as the service foretells it. */
+export const sweepForecast = (id: string) =>
+  queryOptions({
+    queryKey: ["sweep-forecast", id],
+    queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}/forecast", { params: { path: { sweep_id: id } } })),
+    refetchInterval: every(2 * LIVE_MS),
   });
 
 export const sweepTroubles = (id: string) =>

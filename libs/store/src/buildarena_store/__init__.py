@@ -54,6 +54,7 @@ from buildarena_store.states import (
     SweepState,
 )
 from buildarena_store.store import Store, open_store
+from buildarena_store.sweeps.forecasts import SweepForecast
 from buildarena_store.sweeps.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
 from buildarena_store.tasks import StoredTask, Tasks
 from buildarena_store.text import clean
@@ -119,6 +120,7 @@ __all__ = [
     "StoredEvidence",
     "StoredTask",
     "Sweep",
+    "SweepForecast",
     "SweepProgress",
     "SweepState",
     "Sweeps",

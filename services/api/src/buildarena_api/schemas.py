@@ -220,6 +220,29 @@ class SweepView(_Answer):
     )
 
 
+class ForecastView(_Answer):
+    """What is to come of a sweep, from what ran so far."""
+
+    jobs_left: int = Field(description="Jobs that have not ended")
+    jobs_per_minute: float | None = Field(
+        description="How fast jobs are scored, over the last hundred; null until five were, and "
+        "unless the sweep is active"
+    )
+    ends_at: datetime | None = Field(description="When the last one ends at that rate")
+    cost_usd_left: float = Field(
+        description="What the jobs left come to cost yet, by the mean cost of the same model on "
+        "the same task, or on other tasks"
+    )
+    cost_usd_total: float = Field(description="The same with what was spent")
+    budget_usd_short: float | None = Field(
+        description="How many dollars the budget lacks for that; null when it has no limit in "
+        "dollars, 0 when it is enough"
+    )
+    unknown_models: list[str] = Field(
+        description="Models of which no job has been scored yet: the costs leave them out"
+    )
+
+
 class TroubleView(_Answer):
     """Attempts at a sweep's jobs that failed alike; faults never count as failures of a model."""
 

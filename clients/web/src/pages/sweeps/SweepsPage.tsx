@@ -4,7 +4,7 @@ import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { sweeps, type SweepView } from "../../api/queries";
 import { isSite } from "../../api/site";
-import { count, dollars, words } from "../../format";
+import { count, dollars, stateWords, words } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { has, useCaller } from "../../parts/may";
 import { Answered, Empty } from "../../parts/States";
@@ -105,7 +105,7 @@ export function SweepState({ state }: { state: string }) {
       tt="none"
       styles={{ root: { color: "var(--mantine-color-text)", minWidth: "max-content" } }}
     >
-      {words(state)}
+      {stateWords(state)}
     </Badge>
   );
 }
