@@ -231,6 +231,46 @@ describe("what a board is about", () => {
   });
 });
 
+describe("failures", () => {
+  it("open from a bar, are summed by reason, narrowed down and sorted", async () => {
+    const { page, context } = await opened("/");
+    const bar = page.locator(".plot a[aria-label*='failed']").first();
+    const told = /: (\d+) /.exec((await bar.getAttribute("aria-label")) ?? "")?.[1];
+    await bar.scrollIntoViewIfNeeded();
+    await bar.click();
+    await page.waitForURL(/\/jobs\?/);
+    const summary = page.getByRole("region", { name: "How these jobs ended" });
+    await summary.getByText(`${told ?? ""} job`).waitFor();
+    await page.goto(`${URL_OF_SERVICE}/jobs`);
+    await summary.getByRole("link", { name: /^success/ }).click();
+    await page.waitForURL(/outcome=success/);
+    const wanted = await ask<Schemas["JobPage"]>("/v1/jobs?outcome=success&sort=indicator&order=desc&state=done");
+    await page.getByRole("button", { name: "Indicator" }).click();
+    await page.waitForURL(/sort=indicator/);
+    const first = wanted.jobs[0]?.id.slice(0, 12) ?? "none";
+    await expect.poll(() => page.locator("tbody tr").first().textContent()).toContain(first);
+    await page.getByRole("button", { name: "More filters" }).click();
+    await page.getByLabel("Took from, min").fill("1000");
+    await page.keyboard.press("Enter");
+    await page.getByText("No job is like that").waitFor();
+    expect(page.url()).toContain("duration_min_s=60000");
+    await context.close();
+  });
+
+  it("are found by what was said, in the turn that said it", async () => {
+    const { page, context } = await opened("/jobs");
+    await page.getByRole("link", { name: "Search transcripts" }).click();
+    await page.getByLabel("Words").fill("block");
+    await page.getByRole("button", { name: "Search", exact: true }).click();
+    const hit = page.locator("article.turn").first();
+    const [, turn] = /turn (\d+)/.exec((await hit.getByRole("link").textContent()) ?? "") ?? [];
+    expect(await hit.locator("mark").count()).toBeGreaterThan(0);
+    await hit.getByRole("link").click();
+    await page.locator(`article[data-turn="${turn ?? ""}"][data-chosen]`).waitFor();
+    await context.close();
+  });
+});
+
 describe("sweeps", () => {
   it.each([
     ["/sweeps/new", 1280],

@@ -161,6 +161,8 @@ class Client:
     export_leaderboard = _call(Api.export_leaderboard)
 
     jobs = _iteration(Api.jobs)
+    job_summary = _call(Api.job_summary)
+    search_transcripts = _call(Api.search_transcripts)
     job = _call(Api.job)
     submit_job = _call(Api.submit_job)
     cancel_job = _call(Api.cancel_job)

@@ -60,6 +60,7 @@ from buildarena_api.routes import (
     simulators,
     sweeps,
     tasks,
+    transcript_search,
     trials,
     verifications,
     workers,
@@ -87,6 +88,7 @@ ORDINARY = (
     sessions,
     machines,
     replays,  # before jobs, whose artifacts have paths like theirs
+    transcript_search,
     trials,
     pictures,
     jobs,

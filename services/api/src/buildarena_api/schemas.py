@@ -141,6 +141,24 @@ class JobPage(_Answer):
     next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")
 
 
+class EndingView(_Answer):
+    """Jobs that stand or ended alike."""
+
+    state: AnyJobState
+    outcome: AnyOutcome | None = Field(description="null while they have not ended")
+    reason: str | None = Field(description="Class of the failure")
+    jobs: int
+
+
+class JobSummaryView(_Answer):
+    """What a list of jobs comes to."""
+
+    jobs: int
+    all_counted: bool = Field(description="false when there are more than were counted")
+    endings: list[EndingView] = Field(description="The most frequent first")
+    flags: dict[str, int] = Field(description="Jobs with each flag, the most frequent first")
+
+
 LOST: Final = (
     "Requests whose replies may have been paid for and are in no journal: the process that sent "
     "them was killed, or their lease had ended"

@@ -5,9 +5,22 @@ import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { entriesOf, keyOf } from "./entries";
 import { SCORE, sharedRanks } from "../../parts/ranks";
+import { SortHead, useSorting } from "../../parts/SortHead";
+import type { Values } from "../../parts/sorting";
 import type { BoardSearch } from "../../api/board-search";
 
 type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
+
+const VALUES: Values<OverallView> = {
+  model: (row) => row.model,
+  rank: (row) => row.rank,
+  mean: (row) => row.mean_rank,
+  score: (row) => row.score_mean,
+  success: (row) => row.success_rate_mean,
+  cost: (row) => row.cost_usd_mean,
+  tokens: (row) => row.output_tokens_mean,
+  trials: (row) => row.trials,
+};
 
 /** Models ranked over all tasks of the board, with the intervals of their places. */
 export function Overall({ board, search }: { board: Board; search: BoardSearch }) {
@@ -15,6 +28,7 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
   const labels = new Map(entriesOf(board, true).map((entry) => [entry.key, entry.label]));
   const published = search.paper === "yes" ? board.published : [];
   const most = Math.max(1, ...[...overall, ...published].map((row) => row.rank_high ?? 1));
+  const { rows, head } = useSorting(overall, VALUES);
   const ties = sharedRanks(overall);
   const paperTies = sharedRanks(published);
   return (
@@ -22,21 +36,35 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
       <Table verticalSpacing={7} className="sticky-first" highlightOnHover>
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Model</Table.Th>
-            <Table.Th className="figures">Rank</Table.Th>
+            <SortHead name="model" {...head}>
+              Model
+            </SortHead>
+            <SortHead name="rank" figures {...head}>
+              Rank
+            </SortHead>
             <Table.Th>Place, 95 % interval</Table.Th>
-            <Table.Th className="figures">Mean rank</Table.Th>
-            <Table.Th className="figures" title={SCORE}>
+            <SortHead name="mean" figures {...head}>
+              Mean rank
+            </SortHead>
+            <SortHead name="score" figures title={SCORE} {...head}>
               Score
-            </Table.Th>
-            <Table.Th className="figures">Success, mean of tasks</Table.Th>
-            <Table.Th className="figures">$ a job</Table.Th>
-            <Table.Th className="figures">Output tokens</Table.Th>
-            <Table.Th className="figures">Trials</Table.Th>
+            </SortHead>
+            <SortHead name="success" figures {...head}>
+              Success, mean of tasks
+            </SortHead>
+            <SortHead name="cost" figures {...head}>
+              $ a job
+            </SortHead>
+            <SortHead name="tokens" figures {...head}>
+              Output tokens
+            </SortHead>
+            <SortHead name="trials" figures {...head}>
+              Trials
+            </SortHead>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {overall.map((row) => (
+          {rows.map((row) => (
             <OverallRow
               key={keyOf(row)}
               row={row}

@@ -6,6 +6,7 @@ import { every, isSite } from "../../api/site";
 import { sweep as sweepQuery, type SweepView } from "../../api/queries";
 import { count } from "../../format";
 import { Ago } from "../../parts/Ago";
+import { JobsSummary } from "../../parts/JobsSummary";
 import { JobsTable } from "../../parts/JobsTable";
 import { Section } from "../../parts/Section";
 import { ProblemNote } from "../../parts/Problem";
@@ -50,7 +51,10 @@ export default function SweepPage() {
                 <Grid moment={moment} sweep={id} />
               </Section>
               <Section title="Jobs">
-                <JobsTable jobs={moment.jobs} />
+                <Stack gap="sm">
+                  <JobsSummary search={{ sweep: sweep.id }} />
+                  <JobsTable jobs={moment.jobs} />
+                </Stack>
               </Section>
             </>
           )}
