@@ -107,6 +107,16 @@ describe("every figure of the board", () => {
     });
   });
 
+  it("is summed up in one sentence on top, the service's", async () => {
+    const said = page
+      .getByRole("status")
+      .filter({ hasText: board.verdict?.sentence ?? "nothing" })
+      .first();
+    expect(await said.textContent()).toContain(board.verdict?.sentence);
+    const heading = await page.locator("section[aria-label=Overall]").boundingBox();
+    expect((await said.boundingBox())?.y ?? Infinity).toBeLessThan(heading?.y ?? 0);
+  });
+
   it("of each task is the service's", async () => {
     for (const task of board.tasks) {
       const shown = await textsOf(page, `table[aria-label="Models on ${task.task}"]`);

@@ -12,6 +12,7 @@ import { HeatMap } from "./HeatMap";
 import { Overall } from "./Overall";
 import { rankedOver, scopeOf } from "./scope";
 import { ScopeChips } from "./ScopeChips";
+import { Verdict } from "./Verdict";
 import type { BoardSearch } from "../../api/board-search";
 
 const BoardPlots = lazy(() => import("./BoardPlots"));
@@ -56,6 +57,7 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
   }
   return (
     <>
+      <Verdict board={found} search={search} />
       <Controls board={found} search={search} />
       <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
         {found.overall.length === 0 ? (

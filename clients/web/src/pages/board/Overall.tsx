@@ -71,6 +71,7 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
               label={labels.get(keyOf(row)) ?? row.model}
               most={most}
               tied={row.rank !== null && ties.has(row.rank)}
+              over={board.ranked.length}
             />
           ))}
           {published.map((row) => (
@@ -135,7 +136,16 @@ function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean })
   );
 }
 
-function OverallRow({ row, label, most, tied }: { row: OverallView; label: string; most: number; tied: boolean }) {
+interface RowOf {
+  row: OverallView;
+  label: string;
+  most: number;
+  tied: boolean;
+  /** How many tasks the ranking is over. */
+  over: number;
+}
+
+function OverallRow({ row, label, most, tied, over }: RowOf) {
   return (
     <Table.Tr>
       <Table.Td>
@@ -158,7 +168,7 @@ function OverallRow({ row, label, most, tied }: { row: OverallView; label: strin
         </Group>
         {row.missing.length > 0 && (
           <Text size="xs" className="dimmed">
-            not ranked: no counted job on {row.missing.join(", ")}
+            not ranked yet: {over - row.missing.length} of {over} tasks are in, none counted on {row.missing.join(", ")}
           </Text>
         )}
       </Table.Td>

@@ -47,6 +47,7 @@ from buildarena_benchmark.leaderboard.tallies import (
     tallied,
     tally_between,
 )
+from buildarena_benchmark.leaderboard.verdict import Verdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
@@ -73,6 +74,7 @@ __all__ = [
     "TestCache",
     "Total",
     "TrackBoard",
+    "Verdict",
     "choose_cells",
     "compare_models",
     "cost_bins",
@@ -90,4 +92,5 @@ __all__ = [
     "summarise_tallies",
     "tallied",
     "tally_between",
+    "verdict_of",
 ]
