@@ -160,6 +160,7 @@ def test_a_sweep_is_paused_resumed_cancelled_and_retried(client, make) -> None:
     assert client.resume_sweep(sweep, budget={"max_requests": 5})["state"] == "active"
     assert client.set_sweep_budget(sweep, {"max_requests": 7})["budget"]["max_requests"] == 7
     assert client.sweep_forecast(sweep)["jobs_left"] == 1
+    assert client.versions()["error"] == 0.05
     assert client.job_summary(sweep=sweep)["jobs"] == 1
     assert client.search_transcripts("nobody said this", sweep=sweep)["matches"] == []
     job = next(iter(client.jobs(sweep=sweep)))["id"]

@@ -367,6 +367,22 @@ describe("sweeps", () => {
   });
 });
 
+it("the method is a click away from the board, with the versions in use", async () => {
+  const { page, context } = await opened("/");
+  await page.getByRole("link", { name: "Method", exact: true }).click();
+  await page.getByRole("heading", { name: "What is not claimed" }).waitFor();
+  const used = await ask<Schemas["VersionsView"]>("/v1/versions");
+  const shown = await textsOf(page, 'table[aria-label="Versions in use"]');
+  const simulators = used.simulators.map(({ name, version }) => [`Simulator ${name}`, version]);
+  expect(shown.map((cells) => cells.at(-1))).toEqual([
+    used.buildarena,
+    used.feedback,
+    String(used.scorers),
+    ...simulators.map((cells) => cells[1]),
+  ]);
+  await context.close();
+});
+
 it("a link on another site opens a page", async () => {
   const context = await browser.newContext();
   const page = await context.newPage();

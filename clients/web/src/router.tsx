@@ -90,6 +90,11 @@ const model = createRoute({
   component: lazyRouteComponent(() => import("./pages/models/ModelPage")),
 });
 
+const method = createRoute({
+  getParentRoute: () => root,
+  path: "/method",
+  component: lazyRouteComponent(() => import("./pages/MethodPage")),
+});
 const build = createRoute({
   getParentRoute: () => root,
   path: "/build",
@@ -116,6 +121,7 @@ export const router = createRouter({
     tasks,
     task,
     model,
+    method,
     build,
     machine,
   ]),

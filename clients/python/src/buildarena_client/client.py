@@ -146,6 +146,7 @@ class Client:
     add_task = _call(Api.add_task)
     models = _call(Api.models)
     scorers = _call(Api.scorers)
+    versions = _call(Api.versions)
     simulators = _call(Api.simulators)
     modules = _call(Api.modules)
     module_model = _call(Api.module_model)

@@ -65,6 +65,14 @@ export const caller = () =>
     queryFn: () => taken(client.GET("/v1/caller", {})),
   });
 
+/** What results depend on besides model and task. */
+export const versions = () =>
+  queryOptions({
+    queryKey: ["versions"],
+    staleTime: 60_000,
+    queryFn: () => taken(client.GET("/v1/versions", {})),
+  });
+
 export const sweeps = (cursor?: string) =>
   queryOptions({
     queryKey: ["sweeps", cursor ?? ""],

@@ -63,6 +63,7 @@ from buildarena_api.routes import (
     transcript_search,
     trials,
     verifications,
+    versions,
     workers,
 )
 from buildarena_api.runners.service import RunnerService
@@ -99,6 +100,7 @@ ORDINARY = (
     callers,
     keys,
     simulators,
+    versions,
     workers,
 )
 LIMITED_THEMSELVES = (events, exports, archives, evidence, comparisons, metrics)

@@ -95,7 +95,7 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
       <Group>
         <Text size="xs" className="dimmed">
           Intervals hold at 95 %. Places are given with the interval that holds them; models whose trials do not show
-          which is better are tied and share a rank.
+          which is better are tied and share a rank. <Link to="/method">How ranks and intervals come about</Link>
         </Text>
       </Group>
     </>
