@@ -35,6 +35,7 @@ Timestamp = Annotated[str, "date-time"]
 FILTERS: Final = {
     "BoardFilters": ("/v1/leaderboard", "Which jobs a leaderboard is made of."),
     "JobFilters": ("/v1/jobs", "Which jobs are listed, and in which order."),
+    "JobSummaryFilters": ("/v1/jobs/summary", "Which jobs are counted."),
 }
 """Parameters that methods pass on, by the route that takes them."""
 PAGING: Final = {"cursor", "limit"}

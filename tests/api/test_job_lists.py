@@ -2,13 +2,14 @@
 
 import base64
 import json
+from collections import Counter
 
 import pytest
-from support.jobs import claim, finish, journal_entry
+from support.jobs import claim, execute, finish, journal_entry
 
 from buildarena_store import Usage
 
-SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed"]
+SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"]
 
 
 @pytest.fixture
@@ -83,6 +84,76 @@ def test_indicators_are_filtered_by_range(api) -> None:
     assert found(indicator_min=0.1, indicator_max=0.1) == [0.1] * 4
     assert found(indicator_min=8) == []
     assert found(indicator_min=1, indicator_max=0) == []
+
+
+@pytest.mark.usefixtures("jobs")
+def test_costs_are_filtered_by_range_as_far_as_they_are_known(api) -> None:
+    def costs(**params: object) -> list[float]:
+        return sorted(job["usage"]["cost_usd"] for job in pages(api, 2, **params))
+
+    assert costs(cost_min_usd=1) == [1.0] * 4 + [2.0] * 2
+    assert costs(cost_max_usd=1, state="done") == [0.0] * 2 + [1.0] * 4
+    assert costs(cost_min_usd=1.5, cost_max_usd=3, sort="cost") == [2.0] * 2
+    agents = [job for job in pages(api, 5, cost_max_usd=0) if job["model"] == "agent/me"]
+    assert agents == [], "nobody knows what an agent's jobs cost"
+
+
+def test_durations_are_filtered_by_range_and_go_from_start_to_end(api, context, jobs) -> None:
+    ended = sorted(job["id"] for job in jobs if job["state"] == "done")
+    for number, id_ in enumerate(ended):
+        execute(
+            context,
+            "UPDATE jobs SET finished_at = started_at + make_interval(secs => :s) WHERE id = :id",
+            {"s": 10 * number, "id": id_},
+        )
+
+    def took(**params: object) -> list[str]:
+        return sorted(job["id"] for job in pages(api, 2, **params))
+
+    assert took(duration_min_s=20) == ended[2:]
+    assert took(duration_max_s=20) == ended[:3], "jobs under way have taken no time yet"
+    assert took(duration_min_s=20, duration_max_s=20.5, sort="finished") == ended[2:3]
+    assert api.get("/v1/jobs", params={"duration_min_s": -1}).status_code == 422
+
+
+@pytest.mark.usefixtures("jobs")
+def test_a_category_is_all_its_tasks(api) -> None:
+    def tasks(*names: str) -> set[str]:
+        return {job["task"] for job in pages(api, 4, category=list(names))}
+
+    assert tasks("support") == {"support-1"}
+    assert tasks("support", "lift") == {"support-1", "lift-1"}
+    assert tasks("mechanisms") == set()
+    answer = api.get("/v1/jobs", params={"category": "bridges"})
+    assert answer.status_code == 422
+    assert "support" in answer.json()["errors"][0]["choices"]
+
+
+def test_a_summary_counts_what_the_list_shows(api, context, jobs) -> None:
+    ended = [job["id"] for job in jobs if job["state"] == "done"]
+    execute(
+        context,
+        "UPDATE jobs SET outcome = 'unsuccessful', success = false, reason = 'broke', "
+        """flags = '["upside_down", "hovering"]' WHERE id = ANY(:ids)""",
+        {"ids": ended[:3]},
+    )
+    for wanted in (
+        {},
+        {"task": "lift-1"},
+        {"reason": "broke"},
+        {"text": "idle"},
+        {"state": "queued"},
+    ):
+        listed = pages(api, 1000, **wanted)
+        counted = api.get("/v1/jobs/summary", params=wanted).json()
+        kinds = Counter((job["state"], job["outcome"], job["reason"]) for job in listed)
+        endings = counted["endings"]
+        assert {(e["state"], e["outcome"], e["reason"]): e["jobs"] for e in endings} == kinds
+        assert [e["jobs"] for e in endings] == sorted((e["jobs"] for e in endings), reverse=True)
+        assert (counted["jobs"], counted["all_counted"]) == (len(listed), True)
+        assert counted["flags"] == Counter(flag for job in listed for flag in job["flags"] or ())
+    assert api.get("/v1/jobs/summary", params={"reason": "luck"}).status_code == 422
+    assert api.get("/v1/jobs/summary", params={"sweep": "sweep_0"}).status_code == 404
 
 
 @pytest.mark.parametrize("bad", ["nan", "inf", "-inf", "x", ""])

@@ -158,6 +158,11 @@ def test_a_sweep_is_paused_resumed_cancelled_and_retried(client, make) -> None:
     assert client.pause_sweep(sweep)["state"] == "paused"
     assert client.wait_for_sweep(sweep)["state"] == "paused"
     assert client.resume_sweep(sweep, budget={"max_requests": 5})["state"] == "active"
+    assert client.set_sweep_budget(sweep, {"max_requests": 7})["budget"]["max_requests"] == 7
+    assert client.sweep_forecast(sweep)["jobs_left"] == 1
+    assert client.versions()["error"] == 0.05
+    assert client.job_summary(sweep=sweep)["jobs"] == 1
+    assert client.search_transcripts("nobody said this", sweep=sweep)["matches"] == []
     job = next(iter(client.jobs(sweep=sweep)))["id"]
     with pytest.raises(TimedOutError, match=f"{job} has not ended"):
         client.wait_for_job(job, timeout_s=0)

@@ -9,7 +9,16 @@ from sqlalchemy import text
 from support.jobs import cancel, claim, journal_entry, set_budget
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import JournalEntry, Lease, Need, NewSweep, StaleLeaseError, Usage
+from buildarena_store import (
+    BudgetLimits,
+    JournalEntry,
+    Lease,
+    Need,
+    NewSweep,
+    StaleLeaseError,
+    TransitionError,
+    Usage,
+)
 
 NEED = Need(cost_usd=Decimal("0.30"), tokens=300)
 
@@ -215,6 +224,45 @@ def test_a_held_job_that_is_wanted_again_is_paid_by_who_wants_it(context, sweep)
     sweep(0, name="sweep_b")
     (job,) = context.store.jobs.page(limit=2)
     assert (job.state, job.payer) == ("queued", "sweep_b")
+
+
+def test_what_needs_nothing_lacks_nothing_of_an_overspent_budget(context, sweep) -> None:
+    sweep(0, max_cost_usd=Decimal("0.50"))
+    lease = claim(context)
+    context.store.journal.append(lease, reply(cost="0.75"))
+    free = Need(cost_usd=Decimal(), tokens=300)
+    assert context.store.budgets.reserve(lease, free) is None
+    shortage = context.store.budgets.reserve(lease, NEED)
+    assert shortage is not None
+    assert shortage.limit == "max_cost_usd"
+
+
+def test_a_budget_is_raised_in_every_state_but_cancelled(context, sweep) -> None:
+    name = sweep(0, max_requests=1)
+    lifecycle, sweeps = context.store.lifecycle, context.store.sweeps
+    lifecycle.set_budget(name, BudgetLimits(max_requests=2))
+    assert sweeps.get(name).state == "active"
+    lifecycle.pause(name)
+    lifecycle.set_budget(name, BudgetLimits(max_requests=3))
+    assert (sweeps.get(name).state, sweeps.progress(name).stages) == (
+        "paused",
+        {"construct on_hold": 1},
+    )
+    lifecycle.resume(name)
+    with lifecycle.command() as connection:
+        lifecycle.exhaust(name, "used up", connection=connection)
+    assert sweeps.progress(name).stages == {"construct on_hold": 1}
+    lifecycle.set_budget(name, BudgetLimits(max_requests=4))
+    assert (sweeps.get(name).state, sweeps.progress(name).stages) == (
+        "active",
+        {"construct queued": 1},
+    )
+    budget = context.store.budgets.get(name)
+    assert budget is not None
+    assert budget.limits.max_requests == 4
+    lifecycle.cancel(name)
+    with pytest.raises(TransitionError, match="is cancelled"):
+        lifecycle.set_budget(name, BudgetLimits(max_requests=5))
 
 
 def test_many_workers_together_never_reserve_more_than_there_is(context, sweep) -> None:

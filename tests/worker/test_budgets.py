@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from support.jobs import execute
 from support.stages import work
 
 from buildarena_pipeline.catalog.specs import Budget, SweepSpec
@@ -42,6 +43,27 @@ def test_a_small_token_budget_stops_before_the_first_request(context, submission
     (job,) = context.store.jobs.page(limit=2)
     assert job.outcome is None
     assert "max_tokens is 1,000, 0 is spent" in job.detail
+
+
+def test_what_costs_nothing_goes_on_when_the_dollars_are_used_up(
+    context, submissions, monkeypatch
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "never-sent")
+    models = ["openai/gpt-4o", "builtin/idle"]
+    spec = SweepSpec(
+        **{**PAYLOAD, "models": models}, seeds=[0, 1], budget=Budget(max_cost_usd=0.000001)
+    )
+    sweep_id = submissions.submit_sweep(spec).sweep.id
+    # The dollars are used up before anything else has begun.
+    execute(context, "UPDATE jobs SET queue = 'later' WHERE model = 'builtin/idle'")
+    work(context, queues=("construct",))
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+    execute(context, "UPDATE jobs SET queue = 'construct' WHERE model = 'builtin/idle'")
+    work(context)
+    progress = context.store.sweeps.progress(sweep_id)
+    assert progress.stages == {"construct on_hold": 2}
+    assert progress.outcomes == {"construction_failed": 2}
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
 
 
 def test_resuming_a_finished_sweep_does_nothing_twice(context, submissions) -> None:

@@ -107,6 +107,16 @@ describe("every figure of the board", () => {
     });
   });
 
+  it("is summed up in one sentence on top, the service's", async () => {
+    const said = page
+      .getByRole("status")
+      .filter({ hasText: board.verdict?.sentence ?? "nothing" })
+      .first();
+    expect(await said.textContent()).toContain(board.verdict?.sentence);
+    const heading = await page.locator("section[aria-label=Overall]").boundingBox();
+    expect((await said.boundingBox())?.y ?? Infinity).toBeLessThan(heading?.y ?? 0);
+  });
+
   it("of each task is the service's", async () => {
     for (const task of board.tasks) {
       const shown = await textsOf(page, `table[aria-label="Models on ${task.task}"]`);
@@ -231,6 +241,46 @@ describe("what a board is about", () => {
   });
 });
 
+describe("failures", () => {
+  it("open from a bar, are summed by reason, narrowed down and sorted", async () => {
+    const { page, context } = await opened("/");
+    const bar = page.locator(".plot a[aria-label*='failed']").first();
+    const told = /: (\d+) /.exec((await bar.getAttribute("aria-label")) ?? "")?.[1];
+    await bar.scrollIntoViewIfNeeded();
+    await bar.click();
+    await page.waitForURL(/\/jobs\?/);
+    const summary = page.getByRole("region", { name: "How these jobs ended" });
+    await summary.getByText(`${told ?? ""} job`).waitFor();
+    await page.goto(`${URL_OF_SERVICE}/jobs`);
+    await summary.getByRole("link", { name: /^success/ }).click();
+    await page.waitForURL(/outcome=success/);
+    const wanted = await ask<Schemas["JobPage"]>("/v1/jobs?outcome=success&sort=indicator&order=desc&state=done");
+    await page.getByRole("button", { name: "Indicator" }).click();
+    await page.waitForURL(/sort=indicator/);
+    const first = wanted.jobs[0]?.id.slice(0, 12) ?? "none";
+    await expect.poll(() => page.locator("tbody tr").first().textContent()).toContain(first);
+    await page.getByRole("button", { name: "More filters" }).click();
+    await page.getByLabel("Took from, min").fill("1000");
+    await page.keyboard.press("Enter");
+    await page.getByText("No job is like that").waitFor();
+    expect(page.url()).toContain("duration_min_s=60000");
+    await context.close();
+  });
+
+  it("are found by what was said, in the turn that said it", async () => {
+    const { page, context } = await opened("/jobs");
+    await page.getByRole("link", { name: "Search transcripts" }).click();
+    await page.getByLabel("Words").fill("block");
+    await page.getByRole("button", { name: "Search", exact: true }).click();
+    const hit = page.locator("article.turn").first();
+    const [, turn] = /turn (\d+)/.exec((await hit.getByRole("link").textContent()) ?? "") ?? [];
+    expect(await hit.locator("mark").count()).toBeGreaterThan(0);
+    await hit.getByRole("link").click();
+    await page.locator(`article[data-turn="${turn ?? ""}"][data-chosen]`).waitFor();
+    await context.close();
+  });
+});
+
 describe("sweeps", () => {
   it.each([
     ["/sweeps/new", 1280],
@@ -303,11 +353,34 @@ describe("sweeps", () => {
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Resume" }).waitFor();
     expect((await ask<Schemas["SweepView"]>(`/v1/sweeps/${id}`)).state).toBe("paused");
+    await page.getByText(/^1 on hold before/).waitFor();
+    await page.getByRole("button", { name: "Budget…" }).click();
+    await page.getByLabel("US dollars").fill("12.5");
+    await page.getByRole("button", { name: "Set the budget" }).click();
+    await page.getByText("of $12.50").waitFor();
+    const raised = await ask<Schemas["SweepView"]>(`/v1/sweeps/${id}`);
+    expect([raised.state, raised.budget?.max_cost_usd, raised.budget?.max_requests]).toEqual(["paused", 12.5, null]);
     await page.getByRole("button", { name: "Cancel…" }).click();
     await page.getByRole("button", { name: "Cancel the sweep" }).click();
     await expect.poll(() => page.getByText("cancelled: 2").count(), { timeout: 10_000 }).toBe(1);
     await context.close();
   });
+});
+
+it("the method is a click away from the board, with the versions in use", async () => {
+  const { page, context } = await opened("/");
+  await page.getByRole("link", { name: "Method", exact: true }).click();
+  await page.getByRole("heading", { name: "What is not claimed" }).waitFor();
+  const used = await ask<Schemas["VersionsView"]>("/v1/versions");
+  const shown = await textsOf(page, 'table[aria-label="Versions in use"]');
+  const simulators = used.simulators.map(({ name, version }) => [`Simulator ${name}`, version]);
+  expect(shown.map((cells) => cells.at(-1))).toEqual([
+    used.buildarena,
+    used.feedback,
+    String(used.scorers),
+    ...simulators.map((cells) => cells[1]),
+  ]);
+  await context.close();
 });
 
 it("a link on another site opens a page", async () => {

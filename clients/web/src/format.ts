@@ -60,6 +60,21 @@ export function words(name: string): string {
   return name.replaceAll("_", " ");
 }
 
+const STATES: Readonly<Record<string, string>> = {
+  "construct queued": "waiting to be built",
+  "construct running": "being built",
+  "construct on_hold": "on hold before they are built",
+  "simulate queued": "waiting for their trial",
+  "simulate running": "in their trial",
+  "simulate on_hold": "on hold before their trial",
+  budget_exhausted: "stopped: budget used up",
+};
+
+/** What a state is called where people read it; the command line has the same. */
+export function stateWords(name: string): string {
+  return STATES[name] ?? words(name);
+}
+
 /** What is measured, with its unit; a ratio has none. */
 export function measured(indicator: string, unit: string): string {
   return unit === "1" ? words(indicator) : `${words(indicator)}, ${unit}`;

@@ -9,7 +9,7 @@ import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
 import { readBuildSearch } from "./pages/workbench/search";
 import { readCompareSearch } from "./pages/compare/search";
-import { readJobSearch, readJobsSearch } from "./api/jobs-search";
+import { readJobSearch, readJobsSearch, readTranscriptsSearch } from "./api/jobs-search";
 import { Missing, RootError, Shell } from "./parts/Shell";
 
 function readTrack(raw: Record<string, unknown>): { track?: string } {
@@ -52,7 +52,13 @@ const jobs = createRoute({
   getParentRoute: () => root,
   path: "/jobs",
   validateSearch: readJobsSearch,
-  component: lazyRouteComponent(() => import("./pages/job/JobsPage")),
+  component: lazyRouteComponent(() => import("./pages/jobs/JobsPage")),
+});
+const transcripts = createRoute({
+  getParentRoute: () => root,
+  path: "/transcripts",
+  validateSearch: readTranscriptsSearch,
+  component: lazyRouteComponent(() => import("./pages/jobs/TranscriptsPage")),
 });
 const job = createRoute({
   getParentRoute: () => root,
@@ -84,6 +90,11 @@ const model = createRoute({
   component: lazyRouteComponent(() => import("./pages/models/ModelPage")),
 });
 
+const method = createRoute({
+  getParentRoute: () => root,
+  path: "/method",
+  component: lazyRouteComponent(() => import("./pages/MethodPage")),
+});
 const build = createRoute({
   getParentRoute: () => root,
   path: "/build",
@@ -115,11 +126,13 @@ export const router = createRouter({
     twoSweeps,
     sweep,
     jobs,
+    transcripts,
     job,
     compare,
     tasks,
     task,
     model,
+    method,
     build,
     machine,
     challenges,

@@ -1,20 +1,53 @@
 import type { JobFilters } from "./queries";
 
-const NAMES = [
+const TEXTS = [
   ...(["task", "model", "sweep", "state", "outcome", "reason", "flag"] as const),
-  ...(["track", "task_version", "configuration", "since", "until"] as const),
+  ...(["track", "task_version", "configuration", "since", "until", "text"] as const),
 ] as const;
+const NUMBERS = ["cost_min_usd", "cost_max_usd", "duration_min_s", "duration_max_s"] as const;
+const SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"] as const;
 
 /** What the address of a list of jobs says. */
-export type JobsSearch = Pick<JobFilters, (typeof NAMES)[number]>;
+export type JobsSearch = Pick<
+  JobFilters,
+  (typeof TEXTS)[number] | (typeof NUMBERS)[number] | "category" | "sort" | "order"
+>;
 
 /** Reads an address; the API refuses what no job can have, and says what would be valid. */
 export function readJobsSearch(raw: Record<string, unknown>): JobsSearch {
-  const found = NAMES.flatMap((name) => {
-    const value = raw[name];
+  // An address may spell a text like a number: "text=5".
+  const texts = TEXTS.flatMap((name) => {
+    const value = typeof raw[name] === "number" ? String(raw[name]) : raw[name];
     return typeof value === "string" && value !== "" ? [[name, value]] : [];
   });
-  return Object.fromEntries(found) as JobsSearch;
+  const numbers = NUMBERS.flatMap((name) => {
+    const value = Number(raw[name] === "" ? NaN : (raw[name] ?? NaN));
+    return value >= 0 && Number.isFinite(value) ? [[name, value]] : [];
+  });
+  const categories = (Array.isArray(raw.category) ? raw.category : [raw.category]).filter(
+    (one) => typeof one === "string" && one !== "",
+  );
+  return {
+    ...(Object.fromEntries([...texts, ...numbers]) as JobsSearch),
+    ...(categories.length > 0 ? { category: categories as string[] } : {}),
+    ...(SORTS.some((sort) => sort === raw.sort) ? { sort: raw.sort as JobsSearch["sort"] } : {}),
+    ...(raw.order === "asc" ? { order: "asc" } : {}),
+  };
+}
+
+/** What the address of a search through transcripts says. */
+export interface TranscriptsSearch {
+  text?: string;
+  task?: string;
+  model?: string;
+}
+
+export function readTranscriptsSearch(raw: Record<string, unknown>): TranscriptsSearch {
+  const text = (value: unknown): string | undefined => {
+    const words = typeof value === "number" ? String(value) : value;
+    return typeof words === "string" && words !== "" ? words : undefined;
+  };
+  return { text: text(raw.text), task: text(raw.task), model: text(raw.model) };
 }
 
 /** What the address of a job says: how far it is built, which part is chosen, or that the trial is shown. */
@@ -26,6 +59,8 @@ export interface JobSearch {
   t?: number;
   /** The number of the rollout that is shown. */
   rollout?: number;
+  /** The turn of the transcript that is shown first. */
+  turn?: number;
   /** From where it is seen, see `writtenLook`. */
   camera?: string;
 }
@@ -39,6 +74,7 @@ export function readJobSearch(raw: Record<string, unknown>): JobSearch {
     view: raw.view === "trial" ? "trial" : undefined,
     t: typeof raw.t === "number" && raw.t >= 0 && Number.isFinite(raw.t) ? raw.t : undefined,
     rollout: typeof raw.rollout === "number" && Number.isSafeInteger(raw.rollout) ? raw.rollout : undefined,
+    turn: typeof raw.turn === "number" && Number.isSafeInteger(raw.turn) && raw.turn >= 0 ? raw.turn : undefined,
     camera: typeof raw.camera === "string" && raw.camera.length < 100 ? raw.camera : undefined,
   };
 }

@@ -1,7 +1,9 @@
+import { secondsBetween } from "../format";
 import type { components } from "./contract";
 
 type JobView = components["schemas"]["JobView"];
 type JobPage = components["schemas"]["JobPage"];
+type JobSummary = components["schemas"]["JobSummaryView"];
 
 /** The rows of a site's jobs, and which of them are kept with everything they made. */
 export interface Rows {
@@ -32,7 +34,18 @@ const SORTED: Readonly<Record<string, (job: JobView) => Value>> = {
   task: (job) => job.task,
   model: (job) => job.model,
   seed: (job) => job.seed,
+  outcome: (job) => job.outcome,
 };
+
+/** What is bounded from below and above, by the name of the bounds' parameters. */
+const BOUNDED: Readonly<Record<string, (job: JobView) => number | null | undefined>> = {
+  "indicator_min indicator_max": (job) => job.indicator,
+  "cost_min_usd cost_max_usd": (job) => job.usage.cost_usd,
+  "duration_min_s duration_max_s": (job) => secondsBetween(job.started_at, job.finished_at),
+};
+
+/** The names of the tasks of each category, for lists of a category's jobs. */
+export type Categories = ReadonlyMap<string, ReadonlySet<string>>;
 
 const TIMES = new Set(["created", "finished"]);
 
@@ -58,21 +71,21 @@ function ended(job: JobView, since: string | null, until: string | null): boolea
   );
 }
 
-function holds(job: JobView, words: URLSearchParams): boolean {
+function holds(job: JobView, words: URLSearchParams, categories: Categories): boolean {
   for (const [name, read] of Object.entries(EQUAL)) {
     const wanted = words.get(name);
     if (wanted !== null && read(job) !== wanted) return false;
   }
-  const [flag, least, most, text, prefix] = [
-    words.get("flag"),
-    words.get("indicator_min"),
-    words.get("indicator_max"),
-    words.get("text"),
-    words.get("id_prefix"),
-  ];
+  const [flag, text, prefix] = [words.get("flag"), words.get("text"), words.get("id_prefix")];
   if (flag !== null && !(job.flags ?? []).includes(flag)) return false;
-  if (least !== null && (job.indicator === null || job.indicator < Number(least))) return false;
-  if (most !== null && (job.indicator === null || job.indicator > Number(most))) return false;
+  const wanted = words.getAll("category");
+  if (wanted.length > 0 && !wanted.some((name) => categories.get(name)?.has(job.task))) return false;
+  for (const [names, read] of Object.entries(BOUNDED)) {
+    const [least, most] = names.split(" ").map((name) => words.get(name));
+    const value = read(job);
+    if (least != null && (value == null || value < Number(least))) return false;
+    if (most != null && (value == null || value > Number(most))) return false;
+  }
   if (prefix !== null && !job.id.startsWith(prefix)) return false;
   if (
     text !== null &&
@@ -84,22 +97,45 @@ function holds(job: JobView, words: URLSearchParams): boolean {
   return ended(job, words.get("since"), words.get("until"));
 }
 
-/** A page of jobs, filtered and sorted as the service does it; a cursor is the place where it begins. */
-export function listed(rows: Rows, words: URLSearchParams): JobPage {
+const NONE: Categories = new Map();
+
+function chosen(rows: Rows, words: URLSearchParams, categories: Categories): JobView[] {
   const sweep = words.get("sweep");
   const all = sweep === null ? rows.jobs : (rows.sweeps[sweep] ?? []).flatMap((place) => rows.jobs[place] ?? []);
+  return all.filter((job) => holds(job, words, categories));
+}
+
+/** What a list comes to, as the service counts it. */
+export function summed(rows: Rows, words: URLSearchParams, categories: Categories = NONE): JobSummary {
+  const jobs = chosen(rows, words, categories);
+  const endings = new Map<string, JobSummary["endings"][number]>();
+  const flags = new Map<string, number>();
+  for (const { state, outcome, reason, flags: own } of jobs) {
+    const key = JSON.stringify([state, outcome, reason]);
+    const ending = endings.get(key) ?? { state, outcome, reason, jobs: 0 };
+    endings.set(key, { ...ending, jobs: ending.jobs + 1 });
+    for (const flag of own ?? []) flags.set(flag, (flags.get(flag) ?? 0) + 1);
+  }
+  return {
+    jobs: jobs.length,
+    all_counted: true,
+    endings: [...endings.values()].sort((a, b) => b.jobs - a.jobs),
+    flags: Object.fromEntries([...flags].sort((a, b) => b[1] - a[1])),
+  };
+}
+
+/** A page of jobs, filtered and sorted as the service does it; a cursor is the place where it begins. */
+export function listed(rows: Rows, words: URLSearchParams, categories: Categories = NONE): JobPage {
   const by = words.get("sort") ?? "created";
   const value = SORTED[by] ?? ((job: JobView) => job.created_at);
   const sign = words.get("order") === "asc" ? 1 : -1;
-  const found = all
-    .filter((job) => holds(job, words))
-    .sort((a, b) => {
-      const [one, other] = [value(a), value(b)];
-      // Jobs without such a figure come last, in both directions.
-      if (one === null || other === null)
-        return Number(one === null) - Number(other === null) || sign * (a.id < b.id ? -1 : 1);
-      return sign * (compare(one, other, by) || (a.id < b.id ? -1 : 1));
-    });
+  const found = chosen(rows, words, categories).sort((a, b) => {
+    const [one, other] = [value(a), value(b)];
+    // Jobs without such a figure come last, in both directions.
+    if (one === null || other === null)
+      return Number(one === null) - Number(other === null) || sign * (a.id < b.id ? -1 : 1);
+    return sign * (compare(one, other, by) || (a.id < b.id ? -1 : 1));
+  });
   const begin = Number(words.get("cursor") ?? 0);
   const end = begin + Number(words.get("limit") ?? 100);
   return { jobs: found.slice(begin, end), next_cursor: end < found.length ? String(end) : null };

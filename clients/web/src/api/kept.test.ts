@@ -1,6 +1,6 @@
 import { describe, expect, it } from "vitest";
 import { keyOf } from "./kept";
-import { listed, type Rows } from "./kept-jobs";
+import { listed, summed, type Rows } from "./kept-jobs";
 
 describe("keyOf", () => {
   const key = (address: string): string => keyOf(new URL(address, "http://here/some/where/"));
@@ -42,6 +42,30 @@ describe("listed", () => {
     listed(rows, new URLSearchParams(words))
       .jobs.map((one) => one.id)
       .join("");
+
+  it("counts, bounds and sorts as the service does", () => {
+    const more = {
+      ...rows,
+      jobs: [
+        job("a", { state: "done", outcome: "limit", reason: "tokens", usage: { cost_usd: 2 }, flags: ["odd"] }),
+        job("b", { state: "done", outcome: "limit", reason: "tokens", usage: { cost_usd: 1 }, task: "u" }),
+        job("c", { state: "queued", outcome: null }),
+      ],
+    } as unknown as Rows;
+    const ids = (words: string): string[] =>
+      listed(more, new URLSearchParams(words), new Map([["k", new Set(["u"])]])).jobs.map((one) => one.id);
+    expect(ids("cost_min_usd=1.5")).toEqual(["a"]);
+    expect(ids("cost_max_usd=1.5")).toEqual(["b"]);
+    expect(ids("category=k")).toEqual(["b"]);
+    expect(ids("sort=outcome&order=asc").at(-1)).toBe("c");
+    const counted = summed(more, new URLSearchParams(""));
+    expect(counted.endings).toEqual([
+      { state: "done", outcome: "limit", reason: "tokens", jobs: 2 },
+      { state: "queued", outcome: null, reason: null, jobs: 1 },
+    ]);
+    expect([counted.jobs, counted.flags]).toEqual([3, { odd: 1 }]);
+    expect(summed(more, new URLSearchParams("reason=x")).jobs).toBe(0);
+  });
 
   it("has jobs without a figure last, in both directions, and equal ones by their ids in the direction asked for", () => {
     expect(ids("sort=indicator")).toBe("cdab");

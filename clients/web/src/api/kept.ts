@@ -1,4 +1,4 @@
-import { listed, type Rows } from "./kept-jobs";
+import { listed, summed, type Categories, type Rows } from "./kept-jobs";
 import { ApiError } from "./problem";
 import { SITE, type Site } from "./site";
 
@@ -68,6 +68,19 @@ async function ofJob(id: string, key: string): Promise<Response> {
   return found(files.answers[key], "This file of the job was left out of this site.");
 }
 
+const LISTS: Readonly<Record<string, typeof listed | typeof summed>> = {
+  "/v1/jobs": listed,
+  "/v1/jobs/summary": summed,
+};
+
+async function categoriesOf(site: Site): Promise<Categories> {
+  const name = site.answers["/v1/tasks"];
+  const tasks = name == null ? [] : await once<{ name: string; category: string }[]>(name);
+  const found = new Map<string, Set<string>>();
+  for (const task of tasks) found.set(task.category, (found.get(task.category) ?? new Set()).add(task.name));
+  return found;
+}
+
 /** Answers a request from a site's files, as the service would. */
 export async function keptAnswer(request: Request): Promise<Response> {
   if (request.method !== "GET")
@@ -79,7 +92,11 @@ export async function keptAnswer(request: Request): Promise<Response> {
   const url = new URL(request.url);
   if (url.pathname === "/v1/caller") return Response.json(READER);
   const site = await readSite();
-  if (url.pathname === "/v1/jobs") return Response.json(listed(await once<Rows>(site.jobs), url.searchParams));
+  const kept = LISTS[url.pathname];
+  if (kept !== undefined) {
+    const categories = url.searchParams.has("category") ? await categoriesOf(site) : undefined;
+    return Response.json(kept(await once<Rows>(site.jobs), url.searchParams, categories));
+  }
   const key = keyOf(url);
   const job = JOB.exec(url.pathname)?.[1];
   if (job !== undefined) return ofJob(decodeURIComponent(job), key);

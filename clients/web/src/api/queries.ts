@@ -1,5 +1,6 @@
 import { keepPreviousData, queryOptions } from "@tanstack/react-query";
 import type { BoardSearch } from "./board-search";
+import type { TranscriptsSearch } from "./jobs-search";
 import { client, jsonOf, taken, type Schema } from "./client";
 import type { paths } from "./contract";
 import { readSite } from "./kept";
@@ -14,6 +15,9 @@ export type Row = Schema<"Row">;
 export type TaskBoard = Schema<"TaskBoard">;
 export type OverallView = Schema<"OverallView">;
 export type SweepView = Schema<"SweepView">;
+export type Forecast = Schema<"ForecastView">;
+export type JobSummary = Schema<"JobSummaryView">;
+export type TranscriptMatch = Schema<"TranscriptMatchView">;
 export type JobView = Schema<"JobView">;
 export type JobDetail = Schema<"JobDetail">;
 export type TaskView = Schema<"TaskView">;
@@ -61,6 +65,14 @@ export const caller = () =>
     queryFn: () => taken(client.GET("/v1/caller", {})),
   });
 
+/** What results depend on besides model and task. */
+export const versions = () =>
+  queryOptions({
+    queryKey: ["versions"],
+    staleTime: 60_000,
+    queryFn: () => taken(client.GET("/v1/versions", {})),
+  });
+
 export const sweeps = (cursor?: string) =>
   queryOptions({
     queryKey: ["sweeps", cursor ?? ""],
@@ -73,6 +85,14 @@ export const sweep = (id: string) =>
   queryOptions({
     queryKey: ["sweep", id],
     queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } })),
+  });
+
+/** When a sweep ends and what it comes to cost, as the service foretells it. */
+export const sweepForecast = (id: string) =>
+  queryOptions({
+    queryKey: ["sweep-forecast", id],
+    queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}/forecast", { params: { path: { sweep_id: id } } })),
+    refetchInterval: every(2 * LIVE_MS),
   });
 
 export const sweepTroubles = (id: string) =>
@@ -98,6 +118,23 @@ export const deadLetters = (id: string) =>
       taken(
         client.GET("/v1/jobs", { params: { query: { sweep: id, outcome: "errored", sort: "finished", limit: 100 } } }),
       ),
+  });
+
+/** What a list of jobs comes to. */
+export const jobSummary = (filters: JobFilters) =>
+  queryOptions({
+    queryKey: ["job-summary", filters],
+    queryFn: () => taken(client.GET("/v1/jobs/summary", { params: { query: filters } })),
+    placeholderData: keepPreviousData,
+    refetchInterval: every(2 * LIVE_MS),
+  });
+
+/** Turns of all jobs in which words stand. */
+export const transcriptSearch = ({ text = "", task, model }: TranscriptsSearch) =>
+  queryOptions({
+    queryKey: ["transcripts", text, task, model],
+    queryFn: () => taken(client.GET("/v1/transcripts", { params: { query: { text, task, model } } })),
+    staleTime: 60_000,
   });
 
 export const jobPage = (filters: JobFilters) => client.GET("/v1/jobs", { params: { query: filters } });

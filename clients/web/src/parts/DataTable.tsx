@@ -1,4 +1,6 @@
 import { Table } from "@mantine/core";
+import { SortHead, useSorting } from "./SortHead";
+import { valueOfText, type Values } from "./sorting";
 
 /** The figures of a drawing, for those who want to read them. */
 export function DataTable({
@@ -12,6 +14,10 @@ export function DataTable({
   columns: readonly string[];
   rows: readonly (readonly string[])[];
 }) {
+  const values: Values<readonly string[]> = Object.fromEntries(
+    columns.map((column, index) => [column, (row: readonly string[]) => valueOfText(row[index] ?? "")]),
+  );
+  const { rows: sorted, head } = useSorting(rows, values);
   return (
     <details>
       <summary style={{ cursor: "pointer", fontSize: 13 }}>{title}</summary>
@@ -26,14 +32,14 @@ export function DataTable({
           <Table.Thead>
             <Table.Tr>
               {columns.map((column, index) => (
-                <Table.Th key={column} className={index === 0 ? undefined : "figures"}>
+                <SortHead key={column} name={column} figures={index > 0} {...head}>
                   {column}
-                </Table.Th>
+                </SortHead>
               ))}
             </Table.Tr>
           </Table.Thead>
           <Table.Tbody>
-            {rows.map((row) => (
+            {sorted.map((row) => (
               <Table.Tr key={row.join(" ")}>
                 {row.map((value, index) => (
                   <Table.Td key={columns[index]} className={index === 0 ? undefined : "figures"}>

@@ -1,17 +1,43 @@
 import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import { useVirtualizer } from "@tanstack/react-virtual";
-import { memo, useRef } from "react";
+import { memo, useRef, useState } from "react";
 import type { JobView } from "../api/queries";
-import { dollars, number, words } from "../format";
+import { dollars, duration, number, secondsBetween, words } from "../format";
 import { Ago } from "./Ago";
 import { OutcomeBadge } from "./Outcome";
+import { SortHead } from "./SortHead";
+import { sortedRows, type Sorting, type Values } from "./sorting";
 
 const ROW_PX = 41;
 const HEIGHT_PX = 620;
 
+const VALUES: Values<JobView> = {
+  task: (job) => job.task,
+  model: (job) => job.model,
+  seed: (job) => job.seed,
+  outcome: (job) => job.outcome ?? job.state,
+  indicator: (job) => job.indicator,
+  cost: (job) => job.usage.cost_usd,
+  finished: (job) => job.finished_at,
+};
+
+/** The names of the columns, as the service sorts by them. */
+export type JobSort = "task" | "model" | "seed" | "outcome" | "indicator" | "cost" | "finished";
+
+interface Listed {
+  jobs: readonly JobView[];
+  onEnd?: () => void;
+  /** How the service sorted them, where it does; rows that are all here are sorted here. */
+  sorting?: Sorting | null;
+  onSort?: (to: Sorting) => void;
+}
+
 /** A list of jobs of any length: only the rows in sight are drawn. */
-export function JobsTable({ jobs, onEnd }: { jobs: readonly JobView[]; onEnd?: () => void }) {
+export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Listed) {
+  const [own, setOwn] = useState<Sorting | null>(null);
+  const jobs = onSort === undefined ? sortedRows(listed, own, VALUES) : listed;
+  const head = { sorting: onSort === undefined ? own : (asked ?? null), onSort: onSort ?? setOwn };
   const frame = useRef<HTMLDivElement>(null);
   const rows = useVirtualizer({
     count: jobs.length,
@@ -34,17 +60,32 @@ export function JobsTable({ jobs, onEnd }: { jobs: readonly JobView[]; onEnd?: (
       role="region"
       aria-label={`${jobs.length} jobs, scrolls`}
     >
-      <Table stickyHeader highlightOnHover miw={860} aria-rowcount={jobs.length + 1}>
+      <Table stickyHeader highlightOnHover miw={940} aria-rowcount={jobs.length + 1}>
         <Table.Thead>
           <Table.Tr>
             <Table.Th>Job</Table.Th>
-            <Table.Th>Task</Table.Th>
-            <Table.Th>Model</Table.Th>
-            <Table.Th className="figures">Seed</Table.Th>
-            <Table.Th>State</Table.Th>
-            <Table.Th className="figures">Indicator</Table.Th>
-            <Table.Th className="figures">Cost</Table.Th>
-            <Table.Th>Ended</Table.Th>
+            <SortHead name="task" {...head}>
+              Task
+            </SortHead>
+            <SortHead name="model" {...head}>
+              Model
+            </SortHead>
+            <SortHead name="seed" figures {...head}>
+              Seed
+            </SortHead>
+            <SortHead name="outcome" {...head}>
+              State
+            </SortHead>
+            <SortHead name="indicator" figures {...head}>
+              Indicator
+            </SortHead>
+            <SortHead name="cost" figures {...head}>
+              Cost
+            </SortHead>
+            <Table.Th className="figures">Took</Table.Th>
+            <SortHead name="finished" figures {...head}>
+              Ended
+            </SortHead>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
@@ -94,7 +135,8 @@ const JobRow = memo(function JobRow({ job, index }: { job: JobView; index: numbe
         {number(job.indicator)}
       </Table.Td>
       <Table.Td className="figures">{dollars(job.usage.cost_usd)}</Table.Td>
-      <Table.Td style={{ whiteSpace: "nowrap" }}>
+      <Table.Td className="figures">{duration(secondsBetween(job.started_at, job.finished_at))}</Table.Td>
+      <Table.Td className="figures">
         <Ago time={job.finished_at} />
       </Table.Td>
     </Table.Tr>

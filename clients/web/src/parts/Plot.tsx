@@ -1,8 +1,10 @@
 import * as ObservablePlot from "@observablehq/plot";
 import { useElementSize } from "@mantine/hooks";
+import { useRouter } from "@tanstack/react-router";
 import { useEffect, useRef } from "react";
 
 const NARROW = 260;
+const XLINK = "http://www.w3.org/1999/xlink";
 
 /** A drawing of statistics, as wide as its place; `label` says it to those who don't see it. */
 export default function Plot({
@@ -13,12 +15,19 @@ export default function Plot({
   label: string;
 }) {
   const { ref: frame, width } = useElementSize();
+  const router = useRouter();
   const place = useRef<HTMLDivElement>(null);
   useEffect(() => {
     if (place.current === null || width < NARROW / 2) return;
     const drawn = ObservablePlot.plot({ ...options(Math.max(NARROW, width)), width: Math.max(NARROW, width) });
-    drawn.setAttribute("role", "img");
+    const links = [...drawn.querySelectorAll("a")].filter((link) => link.hasAttributeNS(XLINK, "href"));
+    // What is an image has nothing to press in it.
+    drawn.setAttribute("role", links.length > 0 ? "group" : "img");
     drawn.setAttribute("aria-label", label);
+    for (const link of links) {
+      link.setAttribute("href", link.getAttributeNS(XLINK, "href") ?? "");
+      link.setAttribute("aria-label", link.querySelector("title")?.textContent ?? "");
+    }
     // The whole has a label; groups without a role may have none.
     for (const part of drawn.querySelectorAll("g[aria-label]")) part.removeAttribute("aria-label");
     place.current.replaceChildren(drawn);
@@ -28,7 +37,17 @@ export default function Plot({
   }, [options, width, label]);
   return (
     <div ref={frame}>
-      <div ref={place} className="plot" />
+      {/* Links of a drawing are no links of the router: it is told where they lead. */}
+      <div
+        ref={place}
+        className="plot"
+        onClick={(event) => {
+          const to = event.target instanceof Element ? event.target.closest("a")?.getAttribute("href") : null;
+          if (to == null || to.startsWith("#") || event.metaKey || event.ctrlKey || event.shiftKey) return;
+          event.preventDefault();
+          router.history.push(to);
+        }}
+      />
     </div>
   );
 }

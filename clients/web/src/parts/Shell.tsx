@@ -102,6 +102,9 @@ export function Shell() {
               </Group>
             </Group>
             <Group gap={6}>
+              <Anchor component={Link} to="/method" size="sm" c="inherit">
+                Method
+              </Anchor>
               {!isSite && (
                 <>
                   <Anchor href={beside("docs")} size="sm" c="inherit">

@@ -6,32 +6,63 @@ import type { BoardSearch } from "../api/board-search";
 import { jobsBehind } from "./jobs-behind";
 import { count, dollars, measured, number, percent, places, successes } from "../format";
 import { Interval } from "./Interval";
+import { SortHead, useSorting } from "./SortHead";
+import type { Values } from "./sorting";
+
+const VALUES: Values<Row> = {
+  model: (row) => row.model,
+  rank: (row) => row.rank,
+  success: (row) => row.success_rate,
+  indicator: (row) => row.indicator_mean,
+  score: (row) => row.score,
+  best: (row) => row.indicator_best,
+  parts: (row) => row.parts_mean,
+  cost: (row) => row.cost_per_success_usd,
+  refused: (row) => row.invalid_action_rate,
+};
 
 /** All models on one task, the best first. */
 export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: BoardSearch }) {
   const ties = sharedRanks(task.rows);
+  const { rows, head } = useSorting(task.rows, VALUES);
   const several = new Set(task.rows.map((row) => row.model)).size < task.rows.length;
   return (
     <Table.ScrollContainer minWidth={820} type="native">
       <Table highlightOnHover className="sticky-first" aria-label={`Models on ${task.task}`}>
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Model</Table.Th>
-            <Table.Th className="figures">Rank</Table.Th>
+            <SortHead name="model" {...head}>
+              Model
+            </SortHead>
+            <SortHead name="rank" figures {...head}>
+              Rank
+            </SortHead>
             <Table.Th className="figures">Place</Table.Th>
-            <Table.Th>Success, 95 % interval</Table.Th>
-            <Table.Th className="figures">{measured(task.indicator, task.unit)}</Table.Th>
-            <Table.Th className="figures" title={SCORE}>
+            <SortHead name="success" figures {...head}>
+              Success, 95 % interval
+            </SortHead>
+            <SortHead name="indicator" figures {...head}>
+              {measured(task.indicator, task.unit)}
+            </SortHead>
+            <SortHead name="score" figures title={SCORE} {...head}>
               Score
-            </Table.Th>
-            <Table.Th className="figures">Best</Table.Th>
-            <Table.Th className="figures">Parts</Table.Th>
-            <Table.Th className="figures">$ a success</Table.Th>
-            <Table.Th className="figures">Refused</Table.Th>
+            </SortHead>
+            <SortHead name="best" figures {...head}>
+              Best
+            </SortHead>
+            <SortHead name="parts" figures {...head}>
+              Parts
+            </SortHead>
+            <SortHead name="cost" figures {...head}>
+              $ a success
+            </SortHead>
+            <SortHead name="refused" figures {...head}>
+              Refused
+            </SortHead>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {task.rows.map((row) => (
+          {rows.map((row) => (
             <TaskRow
               key={`${row.model} ${row.configuration}`}
               row={row}

@@ -62,6 +62,7 @@ from buildarena_store.states import (
     SweepState,
 )
 from buildarena_store.store import Store, open_store
+from buildarena_store.sweeps.forecasts import SweepForecast
 from buildarena_store.sweeps.sweeps import NewSweep, Sweep, SweepProgress, Sweeps
 from buildarena_store.tasks import StoredTask, Tasks
 from buildarena_store.text import clean
@@ -132,6 +133,7 @@ __all__ = [
     "StoredPackage",
     "StoredTask",
     "Sweep",
+    "SweepForecast",
     "SweepProgress",
     "SweepState",
     "Sweeps",

@@ -21,7 +21,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.dialects.postgresql import JSON, JSONB
 
-from buildarena_store.states import JobState, VerificationState
+from buildarena_store.states import TURN, JobState, VerificationState
 
 metadata = MetaData(
     naming_convention={
@@ -254,6 +254,16 @@ journal = Table(
     Column("owner", Text),
     time_column("created_at", now=True),
 )
+# The words of transcripts, for searches through all of them: what models said, what they and
+# agents were answered. Of very long texts the beginning: a row that no index takes is no row.
+REPLY_WORDS = text("to_tsvector('english'::regconfig, \"left\"(reply ->> 'text'::text, 100000))")
+FEEDBACK_WORDS = text(
+    "\nCASE\n    WHEN length(data::text) < 100000 THEN to_tsvector('english'::regconfig, "
+    "jsonb_path_query_array(data, '$.\"results\"[*][2]'::jsonpath))\n    "
+    "ELSE NULL::tsvector\nEND"
+)
+ANSWER_WORDS = text("to_tsvector('english'::regconfig, \"left\"(feedback, 100000))")
+Index("ix_journal_words", REPLY_WORDS, postgresql_using="gin", _table=journal)
 Index("ix_journal_owner", journal.c.owner, postgresql_where=journal.c.owner.is_not(None))
 
 external_calls = Table(
@@ -269,6 +279,8 @@ external_calls = Table(
     Column("feedback", Text, nullable=False),
     time_column("at", now=True),
 )
+
+Index("ix_external_calls_words", ANSWER_WORDS, postgresql_using="gin", _table=external_calls)
 
 rollouts = Table(
     "rollouts",
@@ -373,6 +385,13 @@ events = Table(
 )
 Index("ix_events_job", events.c.job_id, events.c.id)
 Index("ix_events_sweep", events.c.sweep_id, events.c.id)
+Index(
+    "ix_events_words",
+    FEEDBACK_WORDS,
+    postgresql_using="gin",
+    postgresql_where=events.c.kind == TURN,
+    _table=events,
+)
 
 
 workers = Table(

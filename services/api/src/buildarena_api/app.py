@@ -62,8 +62,10 @@ from buildarena_api.routes import (
     simulators,
     sweeps,
     tasks,
+    transcript_search,
     trials,
     verifications,
+    versions,
     workers,
 )
 from buildarena_api.runners.service import RunnerService
@@ -90,6 +92,7 @@ ORDINARY = (
     sessions,
     machines,
     replays,  # before jobs, whose artifacts have paths like theirs
+    transcript_search,
     trials,
     pictures,
     jobs,
@@ -100,6 +103,7 @@ ORDINARY = (
     callers,
     keys,
     simulators,
+    versions,
     workers,
 )
 LIMITED_THEMSELVES = (events, exports, archives, evidence, challenges, comparisons, metrics)

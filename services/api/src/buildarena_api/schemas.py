@@ -141,6 +141,24 @@ class JobPage(_Answer):
     next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")
 
 
+class EndingView(_Answer):
+    """Jobs that stand or ended alike."""
+
+    state: AnyJobState
+    outcome: AnyOutcome | None = Field(description="null while they have not ended")
+    reason: str | None = Field(description="Class of the failure")
+    jobs: int
+
+
+class JobSummaryView(_Answer):
+    """What a list of jobs comes to."""
+
+    jobs: int
+    all_counted: bool = Field(description="false when there are more than were counted")
+    endings: list[EndingView] = Field(description="The most frequent first")
+    flags: dict[str, int] = Field(description="Jobs with each flag, the most frequent first")
+
+
 LOST: Final = (
     "Requests whose replies may have been paid for and are in no journal: the process that sent "
     "them was killed, or their lease had ended"
@@ -217,6 +235,29 @@ class SweepView(_Answer):
     last_event: int = Field(
         description="What later requests answer holds every event up to this one: whoever has "
         "read the jobs gives it as `Last-Event-ID` and hears only what happened since"
+    )
+
+
+class ForecastView(_Answer):
+    """What is to come of a sweep, from what ran so far."""
+
+    jobs_left: int = Field(description="Jobs that have not ended")
+    jobs_per_minute: float | None = Field(
+        description="How fast jobs are scored, over the last hundred; null until five were, and "
+        "unless the sweep is active"
+    )
+    ends_at: datetime | None = Field(description="When the last one ends at that rate")
+    cost_usd_left: float = Field(
+        description="What the jobs left come to cost yet, by the mean cost of the same model on "
+        "the same task, or on other tasks"
+    )
+    cost_usd_total: float = Field(description="The same with what was spent")
+    budget_usd_short: float | None = Field(
+        description="How many dollars the budget lacks for that; null when it has no limit in "
+        "dollars, 0 when it is enough"
+    )
+    unknown_models: list[str] = Field(
+        description="Models of which no job has been scored yet: the costs leave them out"
     )
 
 

@@ -7,7 +7,7 @@ from typing import assert_never
 
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.catalog.prices import price_usd
+from buildarena_pipeline.catalog.prices import free_models, price_usd
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import has_data_sheets, worlds_of
@@ -176,8 +176,10 @@ class ConstructHandler:
                 notified_at=None,
                 detail=shortage.detail,
             )
+            # Dollars that are used up keep nobody from what costs none.
+            free = free_models(self._registry) if shortage.limit == "max_cost_usd" else ()
             self._store.lifecycle.exhaust(
-                shortage.budget_id, shortage.detail, connection=connection
+                shortage.budget_id, shortage.detail, connection=connection, free_models=free
             )
 
     def _suspend(self, lease: Lease, session: Session, suspended: Suspended) -> None:

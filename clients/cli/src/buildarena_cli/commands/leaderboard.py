@@ -86,6 +86,8 @@ def leaderboard(
 
 def _show(board: dict[str, Any], *, details: bool, published: bool) -> None:
     say(f"Track {board['track']}")
+    if board["verdict"] is not None and board["overall"]:
+        say(board["verdict"]["sentence"])
     if not details:
         say()
         overview(board, published=published)

@@ -27,7 +27,12 @@ from buildarena_cli.options import (
 )
 from buildarena_cli.terminal.completion import complete_model, complete_task
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
-from buildarena_cli.terminal.progress import exit_code, watch_sweep
+from buildarena_cli.terminal.progress import (
+    exit_code,
+    forecast_lines,
+    in_plain_words,
+    watch_sweep,
+)
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import BoardPower, SweepEstimate, SweepView
@@ -158,7 +163,11 @@ def show_sweep(
     whole = whole_id(client, "sweep", sweep_id)
     if wait:
         raise typer.Exit(exit_code(_watch(client, whole, as_json=as_json)))
-    _show(client.get(at("sweeps", whole)), as_json=as_json)
+    sweep = client.sweep(whole)
+    _show(sweep, as_json=as_json)
+    if not as_json and sweep["progress"]["done"] < sweep["progress"]["total"]:
+        for line in forecast_lines(client.sweep_forecast(whole)):
+            say(line)
 
 
 @app.command("pause")
@@ -183,6 +192,28 @@ def resume_sweep(
     budget = budget_of(max_cost_usd, max_tokens, max_requests)
     body = {"budget": budget}
     _change(url, sweep_id, "resume", body, as_json=as_json)
+
+
+@app.command("budget")
+def set_budget(
+    sweep_id: SweepId,
+    *,
+    max_cost_usd: MaxCostOption = None,
+    max_tokens: MaxTokensOption = None,
+    max_requests: MaxRequestsOption = None,
+    url: UrlOption = DEFAULT_URL,
+    as_json: JsonOption = False,
+) -> None:
+    """Set a sweep's budget while it runs or after it was used up; what is not given is unlimited.
+
+    What was spent before counts. A sweep whose budget was used up goes on.
+    """
+    budget = budget_of(max_cost_usd, max_tokens, max_requests)
+    if budget is None:
+        raise typer.BadParameter("give --max-cost-usd, --max-tokens or --max-requests")
+    client = Client(url)
+    path = at("sweeps", whole_id(client, "sweep", sweep_id), "budget")
+    _show(client.put(path, budget), as_json=as_json)
 
 
 @app.command("retry")
@@ -269,10 +300,10 @@ def _show(sweep: SweepView, *, as_json: bool) -> None:
         print_json(sweep)
         return
     progress = sweep["progress"]
-    say(f"{sweep['id']} {sweep['name']!r}: {sweep['state']}")
+    say(f"{sweep['id']} {sweep['name']!r}: {in_plain_words(sweep['state'])}")
     say(f"{progress['done']} of {progress['total']} jobs ended")
     for name, count in {**progress["stages"], **progress["outcomes"]}.items():
-        say(f"  {count:>6}  {name}")
+        say(f"  {count:>6}  {in_plain_words(name)}")
     say(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
     if progress.get("lost_requests"):
         say(f"{progress['lost_requests']:,} more may have been paid for: their replies were lost")
@@ -323,8 +354,8 @@ def _by(rise: float | None) -> str:
 def _show_limit(sweep: SweepView) -> None:
     if sweep["state"] == "budget_exhausted":
         say(
-            f"The budget is used up: `buildarena sweep resume {sweep['id']} --max-cost-usd …` "
-            "gives it more."
+            f"The budget is used up: `buildarena sweep budget {sweep['id']} --max-cost-usd …` "
+            "gives it more, and it goes on."
         )
 
 

@@ -125,6 +125,7 @@ class Collected:
 
     def _models(self) -> None:
         used = {job["model"] for job in self._scope.jobs}
+        self._put("/v1/versions", document(self._client.get("/v1/versions")))
         listed = self._client.get("/v1/models")
         self._put("/v1/models", document([model for model in listed if model["name"] in used]))
 

@@ -5,19 +5,57 @@ from __future__ import annotations
 import time
 from typing import TYPE_CHECKING
 
-from buildarena_cli.client import Client
+from buildarena_cli.client import Client, UnreachableError
 from buildarena_cli.errors import DONE, PARTIAL
-from buildarena_cli.terminal.output import is_terminal, say
+from buildarena_cli.terminal.output import is_terminal, minute_of, say
 from buildarena_client.waiting import sweep_has_stopped
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import SweepView
+    from buildarena_client.schemas import ForecastView, SweepView
 
 POLL_S = 0.3
+FORECAST_S = 5.0
+"""Seconds between two looks at the forecast, which hardly moves in them."""
 PLAIN_PAUSE_S = 1.7
 """How much longer lines wait for the next, once a job has ended."""
 FAULTS = ("errored", "cancelled")
 """Outcomes of jobs that were not scored, as the API spells them."""
+
+
+WORDS = {
+    "construct queued": "waiting to be built",
+    "construct running": "being built",
+    "construct on_hold": "on hold before they are built",
+    "simulate queued": "waiting for their trial",
+    "simulate running": "in their trial",
+    "simulate on_hold": "on hold before their trial",
+    "budget_exhausted": "stopped, as its budget is used up",
+}
+"""What the API's names of states mean; the dashboard has the same."""
+
+
+def in_plain_words(state: str) -> str:
+    """What a state, stage or outcome is called where people read it."""
+    return WORDS.get(state, state.replace("_", " "))
+
+
+def forecast_lines(forecast: ForecastView) -> list[str]:
+    """What is to come of a sweep, as lines to print."""
+    lines = []
+    rate, end = forecast["jobs_per_minute"], forecast["ends_at"]
+    if rate is not None and end is not None:
+        lines.append(
+            f"{forecast['jobs_left']:,} jobs left at {rate:.2g} a minute: "
+            f"ends about {minute_of(end)} UTC"
+        )
+    unknown = ", ".join(forecast["unknown_models"])
+    but = f", without {unknown}, of which nothing has ended yet" if unknown else ""
+    if forecast["cost_usd_total"] or not unknown:
+        left, total = forecast["cost_usd_left"], forecast["cost_usd_total"]
+        lines.append(f"about ${left:.2f} still to spend, ${total:.2f} in all{but}")
+    if forecast["budget_usd_short"]:
+        lines.append(f"the budget lacks about ${forecast['budget_usd_short']:.2f} for that")
+    return lines
 
 
 def watch_sweep(client: Client, sweep_id: str) -> SweepView:
@@ -43,7 +81,6 @@ def _watch_bars(client: Client, sweep_id: str) -> SweepView:
         Progress,
         TextColumn,
         TimeElapsedColumn,
-        TimeRemainingColumn,
     )
     from rich.table import Column
 
@@ -53,8 +90,6 @@ def _watch_bars(client: Client, sweep_id: str) -> SweepView:
         BarColumn(bar_width=12, table_column=Column(min_width=12)),
         MofNCompleteColumn(table_column=whole),
         TimeElapsedColumn(table_column=whole.copy()),
-        TextColumn("left", table_column=Column(min_width=4)),
-        TimeRemainingColumn(table_column=whole.copy()),
         # What a narrow terminal has no room for is cut here.
         TextColumn(
             "{task.fields[note]}",
@@ -63,6 +98,7 @@ def _watch_bars(client: Client, sweep_id: str) -> SweepView:
         ),
         expand=True,
     )
+    ahead = _Ahead(client, sweep_id)
     with bars:
         built = bars.add_task("machines built", total=None, note="")
         scored = bars.add_task("jobs scored", total=None, note="")
@@ -80,9 +116,32 @@ def _watch_bars(client: Client, sweep_id: str) -> SweepView:
                 scored,
                 total=progress["total"],
                 completed=progress["done"],
-                note=f"${progress['cost_usd']:.2f}  {_counted(progress['outcomes'])}",
+                note=f"${progress['cost_usd']:.2f}{ahead.note()}  {_counted(progress['outcomes'])}",
             )
     return sweep
+
+
+class _Ahead:
+    """The forecast of a sweep that is watched, asked for now and then."""
+
+    def __init__(self, client: Client, sweep_id: str) -> None:
+        self._client, self._sweep_id = client, sweep_id
+        self._asked_at = time.monotonic()
+        self._note = ""
+
+    def note(self) -> str:
+        """When it ends and what it comes to cost, as far as that is known."""
+        if time.monotonic() - self._asked_at < FORECAST_S:
+            return self._note
+        self._asked_at = time.monotonic()
+        try:
+            forecast = self._client.sweep_forecast(self._sweep_id)
+        except UnreachableError:
+            return self._note
+        end = forecast["ends_at"]
+        about = "" if end is None else f", ends about {minute_of(end)} UTC"
+        self._note = f" of about ${forecast['cost_usd_total']:.2f}{about}"
+        return self._note
 
 
 def _watch_lines(client: Client, sweep_id: str) -> SweepView:

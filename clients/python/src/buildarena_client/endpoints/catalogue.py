@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         SimulatorView,
         TaskDetail,
         TaskView,
+        VersionsView,
         WorkerView,
     )
 
@@ -67,6 +68,10 @@ class Catalogue(Sender):
         """
         modules = await self.get("/v1/modules", set=of_set, task=task, version=version)
         return cast("list[ModuleView]", modules)
+
+    async def versions(self) -> VersionsView:
+        """The versions that results depend on, and the constants of the boards' statistics."""
+        return cast("VersionsView", await self.get("/v1/versions"))
 
     async def simulators(self) -> list[SimulatorView]:
         """What jobs can name as their simulator, and whether it is served at the moment."""

@@ -19,9 +19,12 @@ if TYPE_CHECKING:
         JobDetail,
         JobFileView,
         JobFilters,
+        JobSummaryFilters,
+        JobSummaryView,
         JobView,
         ReplayView,
         SceneView,
+        TranscriptMatchesView,
         VerificationView,
     )
 
@@ -43,6 +46,32 @@ class Jobs(Sender):
             filters: Which jobs, and in which order.
         """
         return self._listed("/v1/jobs", "jobs", limit, page, dict(filters))
+
+    async def job_summary(self, **filters: Unpack[JobSummaryFilters]) -> JobSummaryView:
+        """How many of some jobs ended how, for which reasons, and with which flags."""
+        return cast("JobSummaryView", await self.get("/v1/jobs/summary", **filters))
+
+    async def search_transcripts(
+        self,
+        words: str,
+        *,
+        limit: int = 50,
+        task: str | None = None,
+        model: str | None = None,
+        sweep: str | None = None,
+    ) -> TranscriptMatchesView:
+        """Turns of all jobs in which words stand, in what was said or answered.
+
+        Args:
+            words: As search engines take them: ``"a phrase"``, ``or``, ``-not``.
+            limit: Turns at most, 1 to 200.
+            task: Only of jobs on this task.
+            model: Only of this model's jobs.
+            sweep: Only of this sweep's jobs.
+        """
+        narrowed = {"task": task, "model": model, "sweep": sweep}
+        answer = await self.get("/v1/transcripts", text=words, limit=limit, **narrowed)
+        return cast("TranscriptMatchesView", answer)
 
     async def job(self, job_id: str) -> JobDetail:
         """A job with its manifest, attempts and artifacts."""

@@ -18,6 +18,7 @@ from buildarena_client.waiting import POLL_S, require_time, sweep_has_stopped
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
         Budget,
+        ForecastView,
         ImportedView,
         Result,
         SweepAccepted,
@@ -92,6 +93,14 @@ class Sweeps(Sender):
         """Resumes a paused sweep, or one whose budget is used up, with a larger one if given."""
         body = {} if budget is None else {"budget": budget}
         return cast("SweepView", await self.post(at("sweeps", sweep_id, "resume"), body))
+
+    async def set_sweep_budget(self, sweep_id: str, budget: Budget) -> SweepView:
+        """Replaces a sweep's budget; one whose budget was used up goes on."""
+        return cast("SweepView", await self.put(at("sweeps", sweep_id, "budget"), budget))
+
+    async def sweep_forecast(self, sweep_id: str) -> ForecastView:
+        """When a sweep ends and what it comes to cost, from what ran so far."""
+        return cast("ForecastView", await self.get(at("sweeps", sweep_id, "forecast")))
 
     async def cancel_sweep(self, sweep_id: str) -> SweepView:
         """Ends a sweep's jobs that have not ended and that nobody else wants."""

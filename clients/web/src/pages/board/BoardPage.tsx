@@ -13,6 +13,7 @@ import { Overall } from "./Overall";
 import { Peers } from "./Peers";
 import { rankedOver, scopeOf } from "./scope";
 import { ScopeChips } from "./ScopeChips";
+import { Verdict } from "./Verdict";
 import type { BoardSearch } from "../../api/board-search";
 
 const BoardPlots = lazy(() => import("./BoardPlots"));
@@ -57,6 +58,7 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
   }
   return (
     <>
+      <Verdict board={found} search={search} />
       <Controls board={found} search={search} />
       <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
         {found.overall.length === 0 ? (
@@ -95,7 +97,7 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
       <Group>
         <Text size="xs" className="dimmed">
           Intervals hold at 95 %. Places are given with the interval that holds them; models whose trials do not show
-          which is better are tied and share a rank.
+          which is better are tied and share a rank. <Link to="/method">How ranks and intervals come about</Link>
         </Text>
       </Group>
     </>

@@ -23,7 +23,7 @@ export default function BoardPlots({ board, search }: { board: Board; search: Bo
           <Section title="Difficulty dimensions">
             <Radar figures={found} entries={entries} />
           </Section>
-          <Failures figures={found} entries={entries} />
+          <Failures figures={found} entries={entries} search={search} />
         </SimpleGrid>
       )}
     </Answered>

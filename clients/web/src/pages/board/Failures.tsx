@@ -1,8 +1,11 @@
 import { Text } from "@mantine/core";
 import * as Plot from "@observablehq/plot";
+import { useRouter } from "@tanstack/react-router";
 import type { Figures } from "../../api/queries";
 import { count, percent, words } from "../../format";
+import type { BoardSearch } from "../../api/board-search";
 import { DataTable } from "../../parts/DataTable";
+import { jobsEndedSo } from "../../parts/jobs-behind";
 import Drawing from "../../parts/Plot";
 import { Section } from "../../parts/Section";
 import { keyOf, type Entry } from "./entries";
@@ -15,20 +18,29 @@ interface Part {
   name: string;
   count: number;
   share: number;
+  /** Where the jobs behind it are listed, if they are. */
+  href?: string | undefined;
+}
+
+interface Counted {
+  label: string;
+  counts: Readonly<Record<string, number>>;
+  /** Where the jobs of one of its names are listed. */
+  hrefOf?: (name: string) => string | undefined;
 }
 
 /** Counts by model and name as shares of the model's sum; success first, then the most frequent names. */
-export function partsOf(counted: readonly { label: string; counts: Readonly<Record<string, number>> }[]): Part[] {
+export function partsOf(counted: readonly Counted[]): Part[] {
   const sums = new Map<string, number>();
   for (const { counts } of counted) {
     for (const [name, n] of Object.entries(counts)) sums.set(name, (sums.get(name) ?? 0) + n);
   }
   const names = [...sums].sort(foremost).map(([name]) => name);
-  return counted.flatMap(({ label, counts }) => {
+  return counted.flatMap(({ label, counts, hrefOf }) => {
     const total = Object.values(counts).reduce((sum, n) => sum + n, 0);
     return names.flatMap((name) => {
       const n = counts[name] ?? 0;
-      return n === 0 ? [] : [{ label, name: words(name), count: n, share: n / total }];
+      return n === 0 ? [] : [{ label, name: words(name), count: n, share: n / total, href: hrefOf?.(name) }];
     });
   });
 }
@@ -59,7 +71,21 @@ export function drawnParts(parts: readonly Part[]): Part[] {
 }
 
 /** How jobs end, and why actions are refused. */
-export function Failures({ figures, entries }: { figures: Figures; entries: readonly Entry[] }) {
+export function Failures({
+  figures,
+  entries,
+  search,
+}: {
+  figures: Figures;
+  entries: readonly Entry[];
+  search: BoardSearch;
+}) {
+  const router = useRouter();
+  const hrefOf = (row: Figures["failures"][number], ended: string): string | undefined => {
+    const jobs = jobsEndedSo(row, ended, figures.track, search);
+    if (jobs === null) return undefined;
+    return router.history.createHref(router.buildLocation({ to: "/jobs", search: jobs }).href);
+  };
   const rows = entries.flatMap((entry) => {
     const found = figures.failures.find((one) => keyOf(one) === entry.key);
     return found === undefined ? [] : [{ ...found, label: entry.label }];
@@ -68,10 +94,15 @@ export function Failures({ figures, entries }: { figures: Figures; entries: read
   return (
     <>
       <Section title="How jobs end, and why they fail">
+        <Text size="sm" className="dimmed">
+          A bar opens the jobs behind it.
+        </Text>
         <Shares
           name="How jobs end"
           what="jobs"
-          parts={partsOf(rows.map((row) => ({ label: row.label, counts: row.outcomes })))}
+          parts={partsOf(
+            rows.map((row) => ({ label: row.label, counts: row.outcomes, hrefOf: (name) => hrefOf(row, name) })),
+          )}
           labels={rows.map((row) => row.label)}
         />
       </Section>
@@ -116,7 +147,15 @@ function Shares({ name, what, parts, labels }: { name: string; what: string; par
     x: { label: `share of ${what}, %`, percent: true, domain: [0, 100], grid: true },
     y: { label: null, domain: labels },
     marks: [
-      Plot.barX(drawn, { x: "share", y: "label", fill: "name", inset: 0.5, order: null }),
+      Plot.barX(drawn, {
+        x: "share",
+        y: "label",
+        fill: "name",
+        inset: 0.5,
+        order: null,
+        href: "href",
+        title: (part: Part) => `${part.label}: ${part.count} ${part.name}`,
+      }),
       // A bar's number stands in it, so that nobody depends on its colour.
       Plot.text(
         drawn,
@@ -129,6 +168,7 @@ function Shares({ name, what, parts, labels }: { name: string; what: string; par
           stroke: "#ffffff",
           strokeWidth: 3,
           fontWeight: "600",
+          pointerEvents: "none",
         }),
       ),
     ],

@@ -5,9 +5,22 @@ import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { entriesOf, keyOf } from "./entries";
 import { SCORE, sharedRanks } from "../../parts/ranks";
+import { SortHead, useSorting } from "../../parts/SortHead";
+import type { Values } from "../../parts/sorting";
 import type { BoardSearch } from "../../api/board-search";
 
 type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
+
+const VALUES: Values<OverallView> = {
+  model: (row) => row.model,
+  rank: (row) => row.rank,
+  mean: (row) => row.mean_rank,
+  score: (row) => row.score_mean,
+  success: (row) => row.success_rate_mean,
+  cost: (row) => row.cost_usd_mean,
+  tokens: (row) => row.output_tokens_mean,
+  trials: (row) => row.trials,
+};
 
 /** Models ranked over all tasks of the board, with the intervals of their places. */
 export function Overall({ board, search }: { board: Board; search: BoardSearch }) {
@@ -15,6 +28,7 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
   const labels = new Map(entriesOf(board, true).map((entry) => [entry.key, entry.label]));
   const published = search.paper === "yes" ? board.published : [];
   const most = Math.max(1, ...[...overall, ...published].map((row) => row.rank_high ?? 1));
+  const { rows, head } = useSorting(overall, VALUES);
   const ties = sharedRanks(overall);
   const paperTies = sharedRanks(published);
   return (
@@ -22,27 +36,42 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
       <Table verticalSpacing={7} className="sticky-first" highlightOnHover>
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Model</Table.Th>
-            <Table.Th className="figures">Rank</Table.Th>
+            <SortHead name="model" {...head}>
+              Model
+            </SortHead>
+            <SortHead name="rank" figures {...head}>
+              Rank
+            </SortHead>
             <Table.Th>Place, 95 % interval</Table.Th>
-            <Table.Th className="figures">Mean rank</Table.Th>
-            <Table.Th className="figures" title={SCORE}>
+            <SortHead name="mean" figures {...head}>
+              Mean rank
+            </SortHead>
+            <SortHead name="score" figures title={SCORE} {...head}>
               Score
-            </Table.Th>
-            <Table.Th className="figures">Success, mean of tasks</Table.Th>
-            <Table.Th className="figures">$ a job</Table.Th>
-            <Table.Th className="figures">Output tokens</Table.Th>
-            <Table.Th className="figures">Trials</Table.Th>
+            </SortHead>
+            <SortHead name="success" figures {...head}>
+              Success, mean of tasks
+            </SortHead>
+            <SortHead name="cost" figures {...head}>
+              $ a job
+            </SortHead>
+            <SortHead name="tokens" figures {...head}>
+              Output tokens
+            </SortHead>
+            <SortHead name="trials" figures {...head}>
+              Trials
+            </SortHead>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {overall.map((row) => (
+          {rows.map((row) => (
             <OverallRow
               key={keyOf(row)}
               row={row}
               label={labels.get(keyOf(row)) ?? row.model}
               most={most}
               tied={row.rank !== null && ties.has(row.rank)}
+              over={board.ranked.length}
             />
           ))}
           {published.map((row) => (
@@ -107,7 +136,16 @@ function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean })
   );
 }
 
-function OverallRow({ row, label, most, tied }: { row: OverallView; label: string; most: number; tied: boolean }) {
+interface RowOf {
+  row: OverallView;
+  label: string;
+  most: number;
+  tied: boolean;
+  /** How many tasks the ranking is over. */
+  over: number;
+}
+
+function OverallRow({ row, label, most, tied, over }: RowOf) {
   return (
     <Table.Tr>
       <Table.Td>
@@ -130,7 +168,7 @@ function OverallRow({ row, label, most, tied }: { row: OverallView; label: strin
         </Group>
         {row.missing.length > 0 && (
           <Text size="xs" className="dimmed">
-            not ranked: no counted job on {row.missing.join(", ")}
+            not ranked yet: {over - row.missing.length} of {over} tasks are in, none counted on {row.missing.join(", ")}
           </Text>
         )}
       </Table.Td>

@@ -132,7 +132,7 @@ function Room({ job }: { job: JobDetail }) {
             found === null || found.turns.length === 0 ? (
               <Empty title={ended ? "This job has no transcript" : "No turn was taken yet"} />
             ) : (
-              <TranscriptView turns={found.turns} build={build} />
+              <TranscriptView turns={found.turns} build={build} chosen={search.turn} />
             )
           }
         </Answered>

@@ -9,7 +9,16 @@ const ESTIMATE_PX = 140;
 const HEIGHT_PX = 760;
 
 /** A session's turns, virtualised: only those in sight are drawn. */
-export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build: Build }) {
+export function TranscriptView({
+  turns,
+  build,
+  chosen,
+}: {
+  turns: readonly Turn[];
+  build: Build;
+  /** The turn that the address names: shown first, and marked. */
+  chosen?: number | undefined;
+}) {
   const [role, setRole] = useState<string | null>(null);
   const [refusedOnly, setRefusedOnly] = useState(false);
   const [text, setText] = useState("");
@@ -26,6 +35,11 @@ export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build
   useInStep(build, shown, frame, (place) => {
     list.scrollToIndex(place, { align: "center" });
   });
+  const place = chosen === undefined ? -1 : shown.findIndex((turn) => turn.index === chosen);
+  useEffect(() => {
+    if (place >= 0) list.scrollToIndex(place, { align: "start" });
+    // eslint-disable-next-line react-hooks/exhaustive-deps -- only what the address says scrolls
+  }, [place]);
   const roles = [...new Set(turns.map((turn) => turn.role))];
   const latest = useRef(build.go);
   useEffect(() => {
@@ -91,7 +105,7 @@ export function TranscriptView({ turns, build }: { turns: readonly Turn[]; build
                 {turn !== undefined && (
                   <TurnCard
                     turn={turn}
-                    marked={markedIn(build.markedAction, turn.index)}
+                    marked={markedIn(build.markedAction, turn.index) ?? (turn.index === chosen ? -1 : null)}
                     stepOf={build.stepOf}
                     go={go}
                   />

@@ -12,7 +12,7 @@ export default function Drawings({ figures, entries }: { figures: Figures; entri
       <Section title="Difficulty dimensions">
         <Radar figures={figures} entries={entries} />
       </Section>
-      <Failures figures={figures} entries={entries} />
+      <Failures figures={figures} entries={entries} search={{}} />
     </SimpleGrid>
   );
 }

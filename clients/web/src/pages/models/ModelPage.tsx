@@ -7,6 +7,7 @@ import { board, figures, type Board, type Figures, type OverallView } from "../.
 import { count, dollars, duration, number, percent, places, secondsBetween } from "../../format";
 import { Fact } from "../../parts/Fact";
 import { DataTable } from "../../parts/DataTable";
+import { JobsSummary } from "../../parts/JobsSummary";
 import { Gallery } from "../../parts/Gallery";
 import { Section } from "../../parts/Section";
 import { Answered, Empty, Loading } from "../../parts/States";
@@ -70,6 +71,7 @@ function Profile({ board: found, name }: { board: Board; name: string }) {
       </Answered>
       <Best name={name} track={found.track ?? undefined} />
       <Section title="Task by task">
+        <JobsSummary search={{ model: name, track: found.track ?? undefined, state: "done" }} />
         <Stack gap="lg">
           {tasks.map((task) => (
             <div key={task.task}>

@@ -7,6 +7,7 @@ import { client, taken } from "../../api/client";
 import { headline } from "../../api/problem";
 import { sweep as sweepQuery, type SweepView } from "../../api/queries";
 import { mayChange, useCaller } from "../../parts/may";
+import { BudgetForm } from "./BudgetForm";
 import { possible } from "./live";
 
 type Act = "pause" | "resume" | "cancel" | "retry";
@@ -59,6 +60,7 @@ export function Actions({ sweep }: { sweep: SweepView }) {
         button("resume", "Resume", <IconPlayerPlay size={15} aria-hidden />, () => {
           doing.mutate("resume");
         })}
+      {can.length > 0 && <BudgetForm sweep={sweep} />}
       {(sweep.progress.outcomes.errored ?? 0) > 0 &&
         sweep.state !== "cancelled" &&
         button(

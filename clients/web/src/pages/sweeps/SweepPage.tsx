@@ -1,19 +1,19 @@
-import { Badge, Button, Group, Progress, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Badge, Button, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link } from "@tanstack/react-router";
 import type { StreamState } from "../../api/events";
 import { every, isSite } from "../../api/site";
 import { sweep as sweepQuery, type SweepView } from "../../api/queries";
-import { compact, count, dollars, duration, number, percent } from "../../format";
-import { Fact } from "../../parts/Fact";
+import { count } from "../../format";
 import { Ago } from "../../parts/Ago";
+import { JobsSummary } from "../../parts/JobsSummary";
 import { JobsTable } from "../../parts/JobsTable";
 import { Section } from "../../parts/Section";
 import { ProblemNote } from "../../parts/Problem";
 import { Answered, Loading } from "../../parts/States";
 import { Actions } from "./Actions";
 import { Grid } from "./Grid";
-import type { Rate } from "./live";
+import { SweepFacts } from "./SweepFacts";
 import { OutcomeBar, SweepState } from "./SweepsPage";
 import { DeadLetters, Troubles } from "./Troubles";
 import { useLiveJobs } from "./useLiveJobs";
@@ -32,7 +32,7 @@ export default function SweepPage() {
       {(sweep) => (
         <Stack gap="lg">
           <Head sweep={sweep} stream={stream} />
-          <Facts sweep={sweep} rate={moment?.rate ?? null} />
+          <SweepFacts sweep={sweep} />
           <DeadLetters sweep={sweep} />
           <Troubles id={id} />
           {moment === null && (error === null ? <Loading rows={8} /> : <ProblemNote error={error} />)}
@@ -51,7 +51,10 @@ export default function SweepPage() {
                 <Grid moment={moment} sweep={id} />
               </Section>
               <Section title="Jobs">
-                <JobsTable jobs={moment.jobs} />
+                <Stack gap="sm">
+                  <JobsSummary search={{ sweep: sweep.id }} />
+                  <JobsTable jobs={moment.jobs} />
+                </Stack>
               </Section>
             </>
           )}
@@ -101,63 +104,5 @@ function LiveMark({ state }: { state: StreamState }) {
     <Badge variant="dot" color={colour} tt="none" role="status">
       {label}
     </Badge>
-  );
-}
-
-/** How much of a budget is used; nothing where there is none. */
-function shareOf(spent: number | null | undefined, most: number | null | undefined): number | undefined {
-  return spent == null || most == null || most === 0 ? undefined : spent / most;
-}
-
-function Facts({ sweep, rate }: { sweep: SweepView; rate: Rate | null }) {
-  const { progress, budget } = sweep;
-  const speed = rate ?? { perMinute: null, leftSeconds: null };
-  const running = sweep.state === "active";
-  const facts: readonly [string, string, string, number?][] = [
-    [
-      "Jobs ended",
-      `${count(progress.done)} of ${count(progress.total)}`,
-      Object.entries(progress.stages)
-        .map(([name, n]) => `${n} ${name}`)
-        .join(", "),
-    ],
-    [
-      "Rate",
-      speed.perMinute === null ? "–" : `${number(speed.perMinute)} a minute`,
-      running && (speed.leftSeconds ?? 0) >= 1 ? `about ${duration(speed.leftSeconds)} left` : "",
-    ],
-    [
-      "Spent",
-      dollars(progress.cost_usd),
-      budget?.max_cost_usd == null ? "no budget in dollars" : `of ${dollars(budget.max_cost_usd)}`,
-      shareOf(budget?.spent_cost_usd, budget?.max_cost_usd),
-    ],
-    [
-      "Model requests",
-      count(progress.requests),
-      budget?.max_requests == null ? "" : `of ${count(budget.max_requests)}`,
-      shareOf(budget?.spent_requests, budget?.max_requests),
-    ],
-    ["Tokens", `${compact(progress.input_tokens)} in`, `${compact(progress.output_tokens)} out`],
-  ];
-  return (
-    <SimpleGrid cols={{ base: 2, sm: 3, md: 5 }}>
-      {facts.map(([name, value, note, share]) => (
-        <Fact key={name} name={name} value={value}>
-          <Text size="xs" className="dimmed">
-            {note}
-          </Text>
-          {share !== undefined && (
-            <Progress
-              value={Math.min(100, 100 * share)}
-              size="sm"
-              mt={4}
-              color={share > 0.9 ? "orange" : "blue"}
-              aria-label={`${name}: ${percent(share)} of the budget`}
-            />
-          )}
-        </Fact>
-      ))}
-    </SimpleGrid>
   );
 }

@@ -4,9 +4,11 @@ import { Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { sweeps, type SweepView } from "../../api/queries";
 import { isSite } from "../../api/site";
-import { count, dollars, words } from "../../format";
+import { count, dollars, stateWords, words } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { has, useCaller } from "../../parts/may";
+import { SortHead, useSorting } from "../../parts/SortHead";
+import type { Values } from "../../parts/sorting";
 import { Answered, Empty } from "../../parts/States";
 import { OUTCOME_COLOURS } from "../../theme";
 
@@ -48,23 +50,7 @@ export default function SweepsPage() {
             </Empty>
           ) : (
             <Table.ScrollContainer minWidth={720} type="native">
-              <Table highlightOnHover verticalSpacing="sm">
-                <Table.Thead>
-                  <Table.Tr>
-                    <Table.Th>Sweep</Table.Th>
-                    <Table.Th>State</Table.Th>
-                    <Table.Th w="30%">Progress</Table.Th>
-                    <Table.Th className="figures">Jobs</Table.Th>
-                    <Table.Th className="figures">Spent</Table.Th>
-                    <Table.Th>Submitted</Table.Th>
-                  </Table.Tr>
-                </Table.Thead>
-                <Table.Tbody>
-                  {page.sweeps.map((sweep) => (
-                    <SweepRow key={sweep.id} sweep={sweep} />
-                  ))}
-                </Table.Tbody>
-              </Table>
+              <SweepRows sweeps={page.sweeps} />
               <Group mt="sm" gap="xs">
                 {cursors.length > 0 && (
                   <Button
@@ -97,6 +83,50 @@ export default function SweepsPage() {
   );
 }
 
+const VALUES: Values<SweepView> = {
+  name: (row) => row.name,
+  state: (row) => row.state,
+  progress: (row) => row.progress.done / Math.max(1, row.progress.total),
+  jobs: (row) => row.progress.total,
+  spent: (row) => row.progress.cost_usd,
+  submitted: (row) => row.created_at,
+};
+
+function SweepRows({ sweeps: listed }: { sweeps: readonly SweepView[] }) {
+  const { rows, head } = useSorting(listed, VALUES);
+  return (
+    <Table highlightOnHover verticalSpacing="sm">
+      <Table.Thead>
+        <Table.Tr>
+          <SortHead name="name" {...head}>
+            Sweep
+          </SortHead>
+          <SortHead name="state" {...head}>
+            State
+          </SortHead>
+          <SortHead name="progress" {...head}>
+            Progress
+          </SortHead>
+          <SortHead name="jobs" figures {...head}>
+            Jobs
+          </SortHead>
+          <SortHead name="spent" figures {...head}>
+            Spent
+          </SortHead>
+          <SortHead name="submitted" {...head}>
+            Submitted
+          </SortHead>
+        </Table.Tr>
+      </Table.Thead>
+      <Table.Tbody>
+        {rows.map((sweep) => (
+          <SweepRow key={sweep.id} sweep={sweep} />
+        ))}
+      </Table.Tbody>
+    </Table>
+  );
+}
+
 export function SweepState({ state }: { state: string }) {
   return (
     <Badge
@@ -105,7 +135,7 @@ export function SweepState({ state }: { state: string }) {
       tt="none"
       styles={{ root: { color: "var(--mantine-color-text)", minWidth: "max-content" } }}
     >
-      {words(state)}
+      {stateWords(state)}
     </Badge>
   );
 }
@@ -144,7 +174,7 @@ function SweepRow({ sweep }: { sweep: SweepView }) {
       <Table.Td>
         <SweepState state={sweep.state} />
       </Table.Td>
-      <Table.Td>
+      <Table.Td w="30%">
         <OutcomeBar sweep={sweep} />
       </Table.Td>
       <Table.Td className="figures">

@@ -4,13 +4,23 @@ import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { client, taken } from "../../api/client";
 import { headline } from "../../api/problem";
-import { deadLetters, sweepTroubles, type JobView, type SweepView } from "../../api/queries";
+import { deadLetters, sweepTroubles, type JobView, type SweepView, type Trouble } from "../../api/queries";
 import { count, words } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { mayChange, useCaller } from "../../parts/may";
 import { Section } from "../../parts/Section";
+import { SortHead, useSorting } from "../../parts/SortHead";
+import type { Values } from "../../parts/sorting";
 
 const MAX_SHOWN = 20;
+const VALUES: Values<Trouble> = {
+  what: (row) => row.detail ?? row.result,
+  model: (row) => row.model,
+  stage: (row) => row.stage,
+  attempts: (row) => row.attempts,
+  jobs: (row) => row.jobs,
+  last: (row) => row.newest,
+};
 
 /** Jobs that faults ended, with their reasons: they are in no average until they are retried. */
 export function DeadLetters({ sweep }: { sweep: SweepView }) {
@@ -79,6 +89,7 @@ export function DeadLetters({ sweep }: { sweep: SweepView }) {
 /** What went wrong at providers and workers and was, or is, tried again. */
 export function Troubles({ id }: { id: string }) {
   const found = useQuery(sweepTroubles(id)).data ?? [];
+  const { rows, head } = useSorting(found, VALUES);
   if (found.length === 0) return null;
   const attempts = found.reduce((sum, one) => sum + one.attempts, 0);
   return (
@@ -97,16 +108,28 @@ export function Troubles({ id }: { id: string }) {
         <Table fz="sm">
           <Table.Thead>
             <Table.Tr>
-              <Table.Th>What</Table.Th>
-              <Table.Th>Model</Table.Th>
-              <Table.Th>Stage</Table.Th>
-              <Table.Th className="figures">Attempts</Table.Th>
-              <Table.Th className="figures">Jobs</Table.Th>
-              <Table.Th>Last</Table.Th>
+              <SortHead name="what" {...head}>
+                What
+              </SortHead>
+              <SortHead name="model" {...head}>
+                Model
+              </SortHead>
+              <SortHead name="stage" {...head}>
+                Stage
+              </SortHead>
+              <SortHead name="attempts" figures {...head}>
+                Attempts
+              </SortHead>
+              <SortHead name="jobs" figures {...head}>
+                Jobs
+              </SortHead>
+              <SortHead name="last" {...head}>
+                Last
+              </SortHead>
             </Table.Tr>
           </Table.Thead>
           <Table.Tbody>
-            {found.map((one) => (
+            {rows.map((one) => (
               <Table.Tr key={`${one.model} ${one.stage} ${one.result} ${one.detail ?? ""}`}>
                 <Table.Td style={{ overflowWrap: "anywhere" }}>
                   {one.detail ?? (one.result === "lost" ? "its worker was lost" : "a fault")}

@@ -5,6 +5,8 @@ import { sweepComparison, sweeps, type SweepComparison } from "../../api/queries
 import { count, number, percent, successes, trackLabel } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { Section } from "../../parts/Section";
+import { SortHead, useSorting } from "../../parts/SortHead";
+import type { Values } from "../../parts/sorting";
 import { Answered, Empty } from "../../parts/States";
 
 const route = getRouteApi("/sweeps/compare");
@@ -119,24 +121,49 @@ function signed(points: number): string {
   return `${points > 0 ? "+" : points < 0 ? "−" : ""}${Math.abs(100 * points).toFixed(0)}`;
 }
 
+const VALUES: Values<Pair["tasks"][number]> = {
+  task: (row) => row.task,
+  first: (row) => row.successes[0] / row.trials[0],
+  second: (row) => row.successes[1] / row.trials[1],
+  difference: (row) => row.difference,
+  pairs: (row) => row.success?.pairs ?? 0,
+  p: (row) => row.success_p,
+  indicator: (row) => row.indicator_p,
+};
+
 function Differences({ pair }: { pair: Pair }) {
+  const { rows, head } = useSorting(pair.tasks, VALUES);
   return (
     <>
       <Table.ScrollContainer minWidth={760} type="native">
         <Table className="sticky-first" aria-label={`Differences, ${pair.first}`}>
           <Table.Thead>
             <Table.Tr>
-              <Table.Th>Task</Table.Th>
-              <Table.Th className="figures">First</Table.Th>
-              <Table.Th className="figures">Second</Table.Th>
-              <Table.Th>Difference, percentage points, 95 %</Table.Th>
-              <Table.Th className="figures">Pairs</Table.Th>
-              <Table.Th className="figures">p, success</Table.Th>
-              <Table.Th className="figures">p, indicator</Table.Th>
+              <SortHead name="task" {...head}>
+                Task
+              </SortHead>
+              <SortHead name="first" figures {...head}>
+                First
+              </SortHead>
+              <SortHead name="second" figures {...head}>
+                Second
+              </SortHead>
+              <SortHead name="difference" figures {...head}>
+                Difference, percentage points, 95 %
+              </SortHead>
+              <SortHead name="pairs" figures {...head}>
+                Pairs
+              </SortHead>
+              <SortHead name="p" figures {...head}>
+                p, success
+              </SortHead>
+              <SortHead name="indicator" figures {...head}>
+                p, indicator
+              </SortHead>
             </Table.Tr>
           </Table.Thead>
           <Table.Tbody>
-            {pair.tasks.map((task) => (
+            {rows.map((task) => (
               <Table.Tr key={task.task}>
                 <Table.Td style={{ whiteSpace: "nowrap" }}>
                   <Link className="quiet" to="/tasks/$name" params={{ name: task.task }}>

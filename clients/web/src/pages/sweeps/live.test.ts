@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { ServiceEvent } from "../../api/events";
 import type { JobView } from "../../api/queries";
-import { LiveJobs, possible, rate } from "./live";
+import { LiveJobs, possible } from "./live";
 
 function job(id: string, change: Partial<JobView> = {}): JobView {
   const fresh = { id, task: "lift-1", model: "m", state: "queued", stage: "construct", outcome: null };
@@ -107,15 +107,6 @@ describe("what is read", () => {
     for (const end of ends) jobs.apply([end]);
     expect(performance.now() - start).toBeLessThan(1_000);
     expect([...jobs.moment().totals]).toEqual([["success", 10_000]]);
-  });
-});
-
-describe("the rate", () => {
-  it("is not told of too few ends, and nothing is left when all ended", () => {
-    expect(rate([], 1)).toEqual({ perMinute: null, leftSeconds: null });
-    expect(rate([5, 5, 5], 1)).toEqual({ perMinute: null, leftSeconds: null });
-    expect(rate([0, 10_000, 20_000], 0)).toEqual({ perMinute: 6, leftSeconds: 0 });
-    expect(rate([20_000, 0, 10_000], 2).leftSeconds).toBe(20);
   });
 });
 

@@ -41,26 +41,6 @@ export interface Moment {
   cells: ReadonlyMap<string, ReadonlyMap<string, CellCounts>>;
   totals: ReadonlyMap<string, number>;
   tasks: readonly string[];
-  rate: Rate;
-}
-
-export interface Rate {
-  perMinute: number | null;
-  leftSeconds: number | null;
-}
-
-const WINDOW_MS = 5 * 60_000;
-const FEWEST = 3;
-
-/** How fast jobs end, by those of the last five minutes before the newest end. */
-export function rate(ends: readonly number[], left: number): Rate {
-  let newest = -Infinity;
-  for (const end of ends) newest = Math.max(newest, end);
-  const recent = ends.filter((end) => end > newest - WINDOW_MS);
-  const span = recent.reduce((most, end) => Math.max(most, newest - end), 0);
-  if (recent.length < FEWEST || span <= 0) return { perMinute: null, leftSeconds: null };
-  const perMs = (recent.length - 1) / span;
-  return { perMinute: perMs * 60_000, leftSeconds: left === 0 ? 0 : left / perMs / 1000 };
 }
 
 function standing(job: JobView): string {
@@ -75,7 +55,6 @@ export class LiveJobs {
   private readonly places = new Map<string, number>();
   private readonly cells = new Map<string, Map<string, { total: number; counts: Map<string, number> }>>();
   private readonly totals = new Map<string, number>();
-  private readonly ends = new Map<string, number>();
   private readonly tasks = new Set<string>();
 
   /** Takes in jobs as they were read; what events have said since stays. */
@@ -113,7 +92,6 @@ export class LiveJobs {
       cells: this.cells,
       totals: this.totals,
       tasks: [...this.tasks].sort(),
-      rate: rate([...this.ends.values()], this.jobs.length - this.ends.size),
     };
   }
 
@@ -136,9 +114,6 @@ export class LiveJobs {
       else counts.set(name, n);
     }
     this.tasks.add(job.task);
-    if (by === 1 && job.finished_at !== null && job.state === "done")
-      this.ends.set(job.id, Date.parse(job.finished_at));
-    else this.ends.delete(job.id);
   }
 }
 

@@ -4,6 +4,7 @@ import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { board, task as taskQuery, type TaskDetail } from "../../api/queries";
 import { measured, words } from "../../format";
+import { JobsSummary } from "../../parts/JobsSummary";
 import { Markdown } from "../../parts/Markdown";
 import { Section } from "../../parts/Section";
 import { Answered, Empty, Loading } from "../../parts/States";
@@ -82,7 +83,10 @@ function Standings({ task }: { task: TaskDetail }) {
               {ranked === undefined || ranked.rows.length === 0 ? (
                 <Empty title="No job of this task has ended on this track" />
               ) : (
-                <TaskTable task={ranked} />
+                <Stack gap="sm">
+                  <JobsSummary search={{ task: task.name, track: found.track ?? undefined, state: "done" }} />
+                  <TaskTable task={ranked} />
+                </Stack>
               )}
             </Section>
             {found.track !== null && (

@@ -48,6 +48,7 @@ from buildarena_benchmark.leaderboard.tallies import (
     tallied,
     tally_between,
 )
+from buildarena_benchmark.leaderboard.verdict import Verdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
@@ -75,6 +76,7 @@ __all__ = [
     "TestCache",
     "Total",
     "TrackBoard",
+    "Verdict",
     "choose_cells",
     "compare_models",
     "cost_bins",
@@ -93,4 +95,5 @@ __all__ = [
     "summarise_tallies",
     "tallied",
     "tally_between",
+    "verdict_of",
 ]

@@ -16,6 +16,7 @@ from buildarena_benchmark.statistics.economy import TokenBin, cost_per_success, 
 from buildarena_benchmark.statistics.means import MIN_SUCCESSES, mean_interval
 from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
 from buildarena_benchmark.statistics.power import (
+    ERROR,
     BoardPower,
     board_power,
     detectable_difference,
@@ -37,6 +38,7 @@ from buildarena_benchmark.statistics.ranking import (
 )
 
 __all__ = [
+    "ERROR",
     "MIN_SUCCESSES",
     "Agreement",
     "BoardPower",

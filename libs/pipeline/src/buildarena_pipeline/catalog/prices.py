@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from buildarena_pipeline.catalog.models import ModelEntry
+from buildarena_pipeline.catalog.models import ModelEntry, ModelRegistry
 
 PER_MILLION = Decimal(1_000_000)
 CENT_FRACTION = Decimal("0.000001")
@@ -40,3 +40,13 @@ def price_usd(
     except LookupError:
         return Decimal()
     return Decimal(price.total_price).quantize(CENT_FRACTION)
+
+
+def free_models(registry: ModelRegistry) -> list[str]:
+    """Names of the models whose requests cost nothing, or have no known price."""
+    million = int(PER_MILLION)
+    return [
+        name
+        for name, entry in registry.models.items()
+        if not price_usd(entry, input_tokens=million, output_tokens=million, cached_tokens=0)
+    ]

@@ -41,7 +41,7 @@ OWN_PATHS: Final = frozenset(
     (
         *("v1", "docs", "openapi.json", "static-offline-docs"),
         *("assets", "sweeps", "jobs", "tasks", "models", "compare", "build", "machine"),
-        *("challenges", "favicon.svg", "scheme.js", "index.html"),
+        *("challenges", "transcripts", "method", "favicon.svg", "scheme.js", "index.html"),
     )
 )
 """First parts of the API's and the dashboard's own paths; none can be a base path's."""

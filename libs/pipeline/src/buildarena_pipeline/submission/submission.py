@@ -150,6 +150,16 @@ class Submissions:
         self._context.store.lifecycle.resume(sweep_id, limits)
         notify_waiting(self._context, CONSTRUCT_QUEUE)
 
+    def set_budget(self, sweep_id: str, budget: Budget) -> None:
+        """Gives a sweep another budget; one whose budget was used up goes on.
+
+        Raises:
+            UnknownIdError: There is no such sweep.
+            TransitionError: It is cancelled.
+        """
+        self._context.store.lifecycle.set_budget(sweep_id, budget.as_limits())
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
+
     def estimate(self, spec: SweepSpec) -> SweepEstimate:
         """What a sweep would use, without storing anything.
 

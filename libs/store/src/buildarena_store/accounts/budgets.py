@@ -79,11 +79,13 @@ class Shortage:
 
     Attributes:
         budget_id: The budget that lacks the means.
+        limit: The limit that is reached, by its name in `BudgetLimits`.
         detail: What is lacking, for people.
         temporary: Whether open requests may give back enough, so that waiting helps.
     """
 
     budget_id: str
+    limit: str
     detail: str
     temporary: bool
 
@@ -248,12 +250,13 @@ def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) ->
         ("max_requests", limits.max_requests, budget.spent_requests, reserved[2], 1),
     )
     for name, limit, spent, reserved_now, wanted in rows:
-        if limit is None or spent + reserved_now + wanted <= limit:
+        # What needs nothing lacks nothing, even of a budget that was overspent a little.
+        if limit is None or not wanted or spent + reserved_now + wanted <= limit:
             continue
         temporary = spent + wanted <= limit
         detail = (
             f"budget of {budget.id}: {name} is {limit:,}, {spent:,} is spent, and the next "
             f"request may use {wanted:,}"
         )
-        return Shortage(budget_id=budget.id, detail=detail, temporary=temporary)
+        return Shortage(budget_id=budget.id, limit=name, detail=detail, temporary=temporary)
     return None

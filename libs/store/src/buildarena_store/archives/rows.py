@@ -47,6 +47,8 @@ def _require_storable(value: object) -> None:
         raise ValueError("a whole number beyond 2**53")
     if isinstance(value, str) and "\0" in value:
         raise ValueError("a text with a NUL character")
+    if isinstance(value, str) and any("\ud800" <= character <= "\udfff" for character in value):
+        raise ValueError("a text with half a surrogate pair")
 
 
 def _past(value: datetime) -> datetime:

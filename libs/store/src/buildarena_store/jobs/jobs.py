@@ -15,6 +15,7 @@ from buildarena_store.errors import UnknownIdError
 from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, NewJob
 from buildarena_store.jobs.pages import JobFilter, Order, SortValue, distinct_values, read_page
+from buildarena_store.jobs.summaries import JobSummary, summarise
 from buildarena_store.jobs.transitions import REOPENED, transition
 from buildarena_store.rows import bound_texts, columns_of, rows_of, value_of
 from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, Outcome, Stage
@@ -100,6 +101,12 @@ class Jobs:
             connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
             rows = read_page(connection, chosen, order or Order(), after, limit)
             return [value_of(Job, row) for row in rows]
+
+    def summary(self, wanted: JobFilter) -> JobSummary:
+        """How many of some jobs ended how, for which reasons, and with which flags."""
+        with self._database.transaction() as connection:
+            connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
+            return summarise(connection, wanted)
 
     def attempts(self, job_id: str) -> list[Attempt]:
         """Every attempt at the job, oldest first."""

@@ -18,6 +18,7 @@ from sqlalchemy import (
     Text,
     TextClause,
     and_,
+    extract,
     func,
     literal_column,
     or_,
@@ -31,7 +32,7 @@ from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
 from buildarena_store.tables import COST_OR_NULL, jobs, sweep_jobs
 
-Sort = Literal["created", "finished", "indicator", "cost", "task", "model", "seed"]
+Sort = Literal["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"]
 SortValue = datetime | float | Decimal | str | int | None
 
 _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
@@ -44,9 +45,11 @@ _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
         "task": jobs.c.task,
         "model": jobs.c.model,
         "seed": jobs.c.seed,
+        "outcome": jobs.c.outcome,
     }
 )
-ENDED_ONLY: Final[frozenset[Sort]] = frozenset({"finished", "indicator"})
+_DURATION_S: Final = extract("epoch", jobs.c.finished_at - jobs.c.started_at)
+ENDED_ONLY: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "outcome"})
 """What only jobs that have ended have."""
 MAX_SORTED: Final = 40_000
 """Jobs that are sorted for a page; of more, the first are found along the order's index."""
@@ -55,7 +58,7 @@ BEGINNING: Final = 10_000
 each must be read."""
 _ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
 """What can stand in an id."""
-NULLABLE: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "cost"})
+NULLABLE: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "cost", "outcome"})
 """What a job may lack; those that do come last, in both directions."""
 
 
@@ -78,10 +81,15 @@ class JobFilter:
 
     Attributes:
         sweep_id: Only this sweep's jobs.
+        tasks: Only jobs on these tasks.
         flag: Only jobs with this flag.
         id_prefix: Only jobs whose id begins like this.
         indicator_min: Only jobs with this indicator or a greater one.
         indicator_max: Only jobs with this indicator or a smaller one.
+        cost_min_usd: Only jobs that cost as much or more, in US dollars, as far as that is known.
+        cost_max_usd: Only jobs that cost as much or less.
+        duration_min_s: Only jobs that took as long or longer, from start to end.
+        duration_max_s: Only jobs that took as long or shorter.
         text: Only jobs in whose id, task, model, reason or detail it stands, in any case.
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
@@ -89,10 +97,15 @@ class JobFilter:
     """
 
     sweep_id: str | None = None
+    tasks: Sequence[str] | None = None
     flag: str | None = None
     id_prefix: str | None = None
     indicator_min: float | None = None
     indicator_max: float | None = None
+    cost_min_usd: Decimal | None = None
+    cost_max_usd: Decimal | None = None
+    duration_min_s: float | None = None
+    duration_max_s: float | None = None
     text: str | None = None
     since: datetime | None = None
     until: datetime | None = None
@@ -109,6 +122,7 @@ def sort_value(job: Job, by: Sort) -> SortValue:
         "task": job.task,
         "model": job.model,
         "seed": job.seed,
+        "outcome": job.outcome,
     }
     return values[by]
 
@@ -307,6 +321,19 @@ def distinct_values(column: ColumnElement[Any]) -> TextClause:
     )
 
 
+def conditions_of(connection: Connection, wanted: JobFilter) -> list[ColumnElement[bool]]:
+    """What a filter comes to.
+
+    Args:
+        connection: Where the values are that a text stands in.
+        wanted: Which jobs.
+    """
+    found = _conditions(wanted)
+    if wanted.text is not None:
+        found.append(or_(*_ways_to_hold(connection, wanted.text)))
+    return found
+
+
 def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
     """What a filter comes to, but for its text."""
     found = [jobs.c[name] == value for name, value in wanted.equals.items() if value is not None]
@@ -317,10 +344,11 @@ def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
         found.append(jobs.c.flags.contains([wanted.flag]))
     if wanted.id_prefix is not None:
         found.append(begins_with(jobs.c.id, wanted.id_prefix))
-    if wanted.indicator_min is not None:
-        found.append(jobs.c.indicator >= wanted.indicator_min)
-    if wanted.indicator_max is not None:
-        found.append(jobs.c.indicator <= wanted.indicator_max)
+    found += _within(jobs.c.indicator, wanted.indicator_min, wanted.indicator_max)
+    found += _within(_COLUMNS["cost"], wanted.cost_min_usd, wanted.cost_max_usd)
+    found += _within(_DURATION_S, wanted.duration_min_s, wanted.duration_max_s)
+    if wanted.tasks is not None:
+        found.append(jobs.c.task == func.any(bound_texts(wanted.tasks)))
     if wanted.since is not None:
         found.append(jobs.c.finished_at >= wanted.since)
     if wanted.until is not None:
@@ -332,9 +360,17 @@ def _conditions(wanted: JobFilter) -> list[ColumnElement[bool]]:
     return found
 
 
+def _within(
+    column: ColumnElement[Any], least: float | Decimal | None, most: float | Decimal | None
+) -> list[ColumnElement[bool]]:
+    found = [] if least is None else [column >= least]
+    return found if most is None else [*found, column <= most]
+
+
 def _means_ended(wanted: JobFilter) -> bool:
     """Whether only jobs that have ended can be meant."""
-    ended = wanted.since, wanted.until, wanted.equals.get("outcome")
+    durations = wanted.duration_min_s, wanted.duration_max_s
+    ended = wanted.since, wanted.until, wanted.equals.get("outcome"), *durations
     return any(value is not None for value in ended) or (
         wanted.equals.get("state") == JobState.DONE
     )

@@ -17,6 +17,12 @@ from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_store.database import Database
 from buildarena_store.jobs.leases import Lease
+from buildarena_store.jobs.transcript_search import (
+    TranscriptFilter,
+    TranscriptMatches,
+    has_words,
+    search_transcripts,
+)
 from buildarena_store.states import TURN, JobState
 from buildarena_store.text import clean
 
@@ -102,6 +108,16 @@ class Turns:
         given = {"job_id": lease.job.id, "token": lease.token, "data": clean(data)}
         with self._database.statement() as connection:
             connection.execute(_APPEND, given)
+
+    def search(self, words: str, wanted: TranscriptFilter, *, limit: int) -> TranscriptMatches:
+        """The turns of all jobs in which words stand, see `search_transcripts`."""
+        with self._database.transaction() as connection:
+            return search_transcripts(connection, words, wanted, limit=limit)
+
+    def has_words(self, words: str) -> bool:
+        """Whether there is anything to search for."""
+        with self._database.statement() as connection:
+            return has_words(connection, words)
 
     def count(self, job_id: str) -> int:
         """How many turns of a job are there."""

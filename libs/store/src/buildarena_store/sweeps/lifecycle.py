@@ -8,7 +8,7 @@ decides about a shared job holds until its commit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -77,6 +77,22 @@ class SweepLifecycle:
             if limits is not None:
                 self._budgets.set(sweep_id, limits, connection=connection)
             self._release(sweep_id, self._sweep(sweep_id, connection).owner, connection)
+
+    def set_budget(self, sweep_id: str, limits: BudgetLimits) -> None:
+        """Gives a sweep another budget; one whose budget was used up goes on, a paused one waits.
+
+        Raises:
+            UnknownIdError: There is no such sweep.
+            TransitionError: It is cancelled.
+        """
+        with self.command() as connection:
+            sweep = self._sweep(sweep_id, connection)
+            if sweep.state == SweepState.CANCELLED:
+                raise TransitionError("sweep", sweep_id, sweep.state, SweepState.ACTIVE)
+            self._budgets.set(sweep_id, limits, connection=connection)
+            if sweep.state == SweepState.BUDGET_EXHAUSTED:
+                self._move(sweep_id, SweepState.ACTIVE, connection)
+                self._release(sweep_id, sweep.owner, connection)
 
     def ensure_active(
         self, sweep_id: str, limits: BudgetLimits | None, *, connection: Connection
@@ -204,8 +220,15 @@ class SweepLifecycle:
                 require_room(job.owner, connection=connection)
         return bool(retried)
 
-    def exhaust(self, budget_id: str, detail: str, *, connection: Connection) -> list[str]:
-        """Stops the sweeps of a used-up budget; nothing new of them starts.
+    def exhaust(
+        self,
+        budget_id: str,
+        detail: str,
+        *,
+        connection: Connection,
+        free_models: Collection[str] = (),
+    ) -> list[str]:
+        """Stops the sweeps of a used-up budget; nothing new of them starts that needs of it.
 
         Jobs that somebody else wants who pays now go over to them; the waiting ones among the
         others are put on hold.
@@ -214,6 +237,7 @@ class SweepLifecycle:
             budget_id: Id of the sweep or key whose budget it is.
             detail: What is lacking, for people.
             connection: A transaction of `command`.
+            free_models: Models that need nothing of what is used up: their jobs go on.
 
         Returns:
             Ids of the sweeps that were stopped.
@@ -227,6 +251,7 @@ class SweepLifecycle:
         paid = (
             or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id),
             jobs.c.stage == Stage.CONSTRUCT,
+            jobs.c.model.not_in(sorted(free_models)),
         )
         claims.hand_over(*paid, connection=connection, except_owner=budget_id)
         transition(

@@ -19,6 +19,7 @@ from buildarena_store.errors import UnknownIdError
 from buildarena_store.ids import begins_with
 from buildarena_store.rows import bound_texts, columns_of, value_of
 from buildarena_store.states import AttemptResult, JobState, SweepState
+from buildarena_store.sweeps.forecasts import SweepForecast, read_forecast
 from buildarena_store.tables import attempts, jobs, sweep_jobs, sweeps
 
 
@@ -206,6 +207,16 @@ class Sweeps:
             for row in connection.execute(_FIGURES, {"ids": list(ids)}):
                 amounts[row.key[0]].append(row)
         return {id_: _progress(rows) for id_, rows in amounts.items()}
+
+    def forecast(self, sweep_id: str) -> SweepForecast:
+        """When a sweep ends and what it comes to cost, from what ran so far.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        state = self.get(sweep_id).state
+        with self._database.transaction() as connection:
+            return read_forecast(connection, sweep_id, state)
 
     def troubles(self, sweep_id: str, *, limit: int) -> list[Trouble]:
         """Attempts at the sweep's jobs that faults ended or whose worker was lost, newest first.

@@ -13,7 +13,8 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from buildarena_api.dashboard.files import INDEX, PageFile
 
 PAGE: Final = re.compile(
-    r"/(?:(?:sweeps|jobs|tasks|models|compare|build|machine|challenges)(?:/[^\x00-\x1f\x7f]*)?)?"
+    r"/(?:(?:sweeps|jobs|transcripts|tasks|models|compare|method|build|machine|challenges)"
+    r"(?:/[^\x00-\x1f\x7f]*)?)?"
 )
 """Addresses of pages: the page itself reads which, so all of them get the same file."""
 _SOURCES: Final = {

@@ -91,7 +91,7 @@ def _plain_value(order: Order, plain: Any) -> SortValue:
         return plain
     if order.by == "seed" and type(plain) is int and abs(plain) <= MAX_INTEGER:
         return plain
-    if order.by in {"task", "model"} and isinstance(plain, str) and "\0" not in plain:
+    if order.by in {"task", "model", "outcome"} and isinstance(plain, str) and "\0" not in plain:
         return plain
     raise ValueError("a value of another kind")
 

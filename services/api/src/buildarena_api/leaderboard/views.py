@@ -13,7 +13,13 @@ from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board as RankedBoard
-from buildarena_benchmark.leaderboard import Cell, peer_rows, published_overall, published_rows
+from buildarena_benchmark.leaderboard import (
+    Cell,
+    peer_rows,
+    published_overall,
+    published_rows,
+    verdict_of,
+)
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_pipeline.catalog.models import ModelRegistry
@@ -187,6 +193,23 @@ class PublishedOverall(_View):
     rank_high: int
 
 
+class VerdictView(_View):
+    """What the overall ranking comes to, by the same tests as its ranks."""
+
+    sentence: str = Field(description="Who is best, and whether the trials show it; for people")
+    leaders: list[str] = Field(
+        description="Models that share the first rank; none when nobody is ranked or has succeeded"
+    )
+    proven: bool = Field(
+        description="Whether one model is better than every other ranked one beyond chance"
+    )
+    seeds_to_separate: int | None = Field(
+        description="Seeds of each model on each task that would tell the first two of several "
+        "leaders apart, if their success rates stay as they are; null without a tie, and where "
+        "more seeds would not help"
+    )
+
+
 class Board(UnderPolicy):
     """The leaderboard of one track."""
 
@@ -196,6 +219,7 @@ class Board(UnderPolicy):
     tasks: list[TaskBoard]
     overall: list[OverallView] = Field(default=[])
     ranked: list[str] = Field(default=[], description="Tasks that `overall` is over")
+    verdict: VerdictView | None = Field(default=None, description="null when `overall` has no row")
     published: list[PublishedOverall] = Field(default=[])
 
 
@@ -265,6 +289,7 @@ def board_view(
             }
         )
 
+    verdict = verdict_of(board.overall, len(board.ranked), is_baseline)
     return Board(
         track=track,
         tracks=tracks,
@@ -293,6 +318,7 @@ def board_view(
             for place in board.overall
         ],
         ranked=list(board.ranked),
+        verdict=None if verdict is None else VerdictView.model_validate(verdict),
         published=published_ranking(),
     )
 

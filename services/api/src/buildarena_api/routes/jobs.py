@@ -3,51 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import datetime
 from hashlib import sha256
 from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Response
 
-from buildarena_api.dependencies import ContextDep, IdPrefix, RegistryDep, SubmissionsDep, Track
+from buildarena_api.dependencies import ContextDep, RegistryDep, SubmissionsDep
 from buildarena_api.http import cursors
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.http.weights import HEAVIEST, rows, weighs
-from buildarena_api.leaderboard.filters import require_zones, unknown
+from buildarena_api.job_filters import JobFilterDep, require_known, weight_of_search
 from buildarena_api.routes.transcripts import as_markdown
 from buildarena_api.schemas import (
-    AnyJobState,
-    AnyOutcome,
     AttemptView,
     JobDetail,
     JobFileView,
     JobPage,
+    JobSummaryView,
     JobView,
 )
 from buildarena_api.withholding import require_told
-from buildarena_benchmark import ValidationIssue
-from buildarena_benchmark.scorers.registry import known_flags
-from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.notify import notify_waiting
 from buildarena_pipeline.turns import Transcripts
 from buildarena_store import Job
 from buildarena_store.artifacts.kinds import MEDIA_TYPES
-from buildarena_store.jobs.pages import JobFilter, Order, Sort, sort_value
+from buildarena_store.jobs.pages import Order, Sort, sort_value
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 DEFAULT_LIMIT: Final = 100
 
-SEARCHED: Final = {"text": 10, "flag": 10, "indicator_min": 2, "indicator_max": 2}
-"""What filters weigh for which jobs are searched, beyond their rows."""
-
 
 def _weight_of_list(query: Mapping[str, str]) -> int:
-    searching = sum(units for name, units in SEARCHED.items() if name in query)
-    return min(HEAVIEST, rows(query, default=DEFAULT_LIMIT) + searching)
+    return min(HEAVIEST, rows(query, default=DEFAULT_LIMIT) + weight_of_search(query))
+
+
+def _weight_of_summary(query: Mapping[str, str]) -> int:
+    return min(HEAVIEST, 5 + weight_of_search(query))
 
 
 ARTIFACT_TYPES = {
@@ -71,37 +66,8 @@ def submit_job(
 def list_jobs(
     context: ContextDep,
     registry: RegistryDep,
+    wanted: JobFilterDep,
     *,
-    sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
-    task: Annotated[str | None, Query()] = None,
-    model: Annotated[str | None, Query()] = None,
-    track: Annotated[Track | None, Query()] = None,
-    task_version: Annotated[str | None, Query()] = None,
-    configuration: Annotated[
-        str | None, Query(description="Of the model: hash of its decoding and limits too")
-    ] = None,
-    since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
-    until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
-    state: Annotated[AnyJobState | None, Query()] = None,
-    outcome: Annotated[AnyOutcome | None, Query()] = None,
-    reason: Annotated[str | None, Query(description="Class of the failure")] = None,
-    flag: Annotated[str | None, Query(description="Only jobs with this flag")] = None,
-    indicator_min: Annotated[
-        float | None, Query(allow_inf_nan=False, description="Only with at least this indicator")
-    ] = None,
-    indicator_max: Annotated[
-        float | None, Query(allow_inf_nan=False, description="Only with at most this indicator")
-    ] = None,
-    text: Annotated[
-        str | None,
-        Query(
-            min_length=1,
-            max_length=100,
-            description="Only jobs in whose id, task, model, reason or detail it stands, in any "
-            "case",
-        ),
-    ] = None,
-    id_prefix: IdPrefix = None,
     sort: Annotated[
         Sort, Query(description="Jobs without such a figure come last, in both directions")
     ] = "created",
@@ -116,41 +82,15 @@ def list_jobs(
     A value that no job can have is refused with the choices. A cursor is good for the order that
     it was made in.
     """
-    require_zones(since=since, until=until)
-    if sweep is not None:
-        context.store.sweeps.get(sweep)
     in_order = Order(by=sort, descending=order == "desc")
     found = context.store.jobs.page(
         limit=limit,
         after=None if cursor is None else cursors.decode_in(cursor, in_order),
         order=in_order,
-        wanted=JobFilter(
-            sweep_id=sweep,
-            flag=flag,
-            id_prefix=id_prefix,
-            indicator_min=indicator_min,
-            indicator_max=indicator_max,
-            text=text,
-            since=since,
-            until=until,
-            equals={
-                "task": task,
-                "task_version": task_version,
-                "model": model,
-                "model_hash": configuration,
-                "track": track,
-                "state": state,
-                "outcome": outcome,
-                "reason": reason,
-            },
-        ),
+        wanted=wanted,
     )
     if not found:
-        _require_known(
-            context,
-            registry,
-            {"task": task, "model": model, "track": track, "reason": reason, "flag": flag},
-        )
+        require_known(context, registry, wanted)
     more = len(found) == limit
     page = JobPage(
         jobs=[JobView.of(job) for job in found],
@@ -164,32 +104,16 @@ def _cursor(order: Order, job: Job) -> str:
     return cursors.encode_in(order, sort_value(job, order.by), job.id)
 
 
-def _require_known(
-    context: Context, registry: ModelRegistry, given: Mapping[str, str | None]
-) -> None:
-    """Refuses values that are in no job, and in nothing that a job could be submitted with."""
-    known = {
-        "task": lambda: list(context.tasks.newest()),
-        "model": lambda: list(registry.models),
-        "flag": lambda: list(known_flags()),
-    }
-    for name, value in given.items():
-        if value is None:
-            continue
-        choices = known.get(name, list)()
-        if value in choices:
-            continue
-        if name == "flag":
-            used = context.store.jobs.used_flags([value])
-        else:
-            used = context.store.jobs.distinct(name)
-        if value in used or not (choices or used):
-            continue
-        if choices:
-            raise unknown(name, value, list(dict.fromkeys([*choices, *used])))
-        message = f"no job has the {name} {value!r}"
-        problem = ValidationIssue(path=name, message=message, choices=tuple(used))
-        raise ProblemError(422, f"{name}: {message}", errors=[problem])
+@router.get("/summary", responses=problem_responses(404, 422, 503))
+@weighs(_weight_of_summary)
+def summarise_jobs(
+    context: ContextDep, registry: RegistryDep, wanted: JobFilterDep
+) -> JobSummaryView:
+    """Counts a list's jobs by how they ended, by reason and by flag: what stands above the list."""
+    counted = context.store.jobs.summary(wanted)
+    if not counted.jobs:
+        require_known(context, registry, wanted)
+    return JobSummaryView.model_validate(counted)
 
 
 @router.get("/{job_id}", responses=problem_responses(404, 503))

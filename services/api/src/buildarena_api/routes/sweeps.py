@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from decimal import Decimal
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Header, Query, Response
@@ -17,6 +18,7 @@ from buildarena_api.http.weights import rows, weighs
 from buildarena_api.schemas import (
     DONE,
     BudgetView,
+    ForecastView,
     ProgressView,
     SweepAccepted,
     SweepEstimate,
@@ -138,6 +140,23 @@ def resume_sweep(
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
+@router.put("/{sweep_id}/budget", responses=problem_responses(404, 409, 422, 503))
+def set_sweep_budget(
+    sweep_id: str,
+    body: Budget,
+    context: ContextDep,
+    caller: CallerDep,
+    submissions: SubmissionsDep,
+) -> SweepView:
+    """Sets the sweep's budget, whatever was spent before included; it replaces the one before.
+
+    A sweep whose budget was used up goes on, a paused one stays paused.
+    """
+    _require_owner(context, caller, sweep_id)
+    submissions.set_budget(sweep_id, body)
+    return _view(context, context.store.sweeps.get(sweep_id))
+
+
 @router.post("/{sweep_id}/cancel", responses=problem_responses(404, 409, 503))
 def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Ends the sweep's jobs that have not ended and that nobody else wants.
@@ -191,6 +210,27 @@ def list_sweeps(
 def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
     """Shows a sweep and its progress."""
     return _view(context, context.store.sweeps.get(sweep_id))
+
+
+@router.get("/{sweep_id}/forecast", responses=problem_responses(404, 503))
+@weighs(3)
+def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
+    """Forecasts when a sweep ends and what it comes to cost, from what ran so far."""
+    store = context.store
+    ahead, budget = store.sweeps.forecast(sweep_id), store.budgets.get(sweep_id)
+    most = None if budget is None else budget.limits.max_cost_usd
+    short = None
+    if budget is not None and most is not None:
+        short = float(max(Decimal(), budget.spent_cost_usd + ahead.own_cost_usd_left - most))
+    return ForecastView(
+        jobs_left=ahead.jobs_left,
+        jobs_per_minute=ahead.jobs_per_minute,
+        ends_at=ahead.ends_at,
+        cost_usd_left=float(ahead.cost_usd_left),
+        cost_usd_total=float(store.sweeps.progress(sweep_id).cost_usd + ahead.cost_usd_left),
+        budget_usd_short=short,
+        unknown_models=list(ahead.unknown_models),
+    )
 
 
 @router.get("/{sweep_id}/troubles", responses=problem_responses(404, 503))

@@ -1,0 +1,108 @@
+import { Progress, SimpleGrid, Text } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import type { ReactNode } from "react";
+import { sweepForecast, type Forecast, type SweepView } from "../../api/queries";
+import { isSite } from "../../api/site";
+import { compact, count, dollars, duration, number, percent, stateWords } from "../../format";
+import { Fact } from "../../parts/Fact";
+
+/** How much of a budget is used; nothing where there is none. */
+function shareOf(spent: number | null | undefined, most: number | null | undefined): number | undefined {
+  return spent == null || most == null || most === 0 ? undefined : spent / most;
+}
+
+interface Shown {
+  name: string;
+  value: string;
+  notes: readonly ReactNode[];
+  share?: number | undefined;
+}
+
+function rateOf(forecast: Forecast | undefined): Shown {
+  const rate = forecast?.jobs_per_minute ?? null;
+  if (forecast === undefined || rate === null) return { name: "Rate", value: "–", notes: [] };
+  const end = forecast.ends_at;
+  return {
+    name: "Rate",
+    value: `${number(rate)} a minute`,
+    notes: [
+      end !== null && (
+        <time dateTime={end} title={`about ${new Date(end).toLocaleString()}`}>
+          {forecast.jobs_left < rate
+            ? "less than a minute left"
+            : `about ${duration((60 * forecast.jobs_left) / rate)} left`}
+        </time>
+      ),
+    ],
+  };
+}
+
+function spentOf({ progress, budget }: SweepView, forecast: Forecast | undefined): Shown {
+  const short = forecast?.budget_usd_short ?? 0;
+  const unknown = forecast?.unknown_models ?? [];
+  return {
+    name: "Spent",
+    value: dollars(progress.cost_usd),
+    notes: [
+      budget?.max_cost_usd == null ? "no budget in dollars" : `of ${dollars(budget.max_cost_usd)}`,
+      forecast !== undefined && forecast.cost_usd_left > 0 && `about ${dollars(forecast.cost_usd_total)} in all`,
+      unknown.length > 0 && `no cost known yet: ${unknown.join(", ")}`,
+      short > 0 && <b>the budget lacks about {dollars(short)}</b>,
+    ],
+    share: shareOf(budget?.spent_cost_usd, budget?.max_cost_usd),
+  };
+}
+
+/** Where a sweep is, how fast it goes, and what it costs and comes to cost. */
+export function SweepFacts({ sweep }: { sweep: SweepView }) {
+  const { progress, budget } = sweep;
+  const open = !isSite && progress.done < progress.total;
+  const asked = useQuery({ ...sweepForecast(sweep.id), enabled: open });
+  const forecast = open ? asked.data : undefined;
+  const facts: readonly Shown[] = [
+    {
+      name: "Jobs ended",
+      value: `${count(progress.done)} of ${count(progress.total)}`,
+      notes: Object.entries(progress.stages).map(([name, n]) => `${count(n)} ${stateWords(name)}`),
+    },
+    rateOf(forecast),
+    spentOf(sweep, forecast),
+    {
+      name: "Model requests",
+      value: count(progress.requests),
+      notes: [budget?.max_requests != null && `of ${count(budget.max_requests)}`],
+      share: shareOf(budget?.spent_requests, budget?.max_requests),
+    },
+    {
+      name: "Tokens",
+      value: `${compact(progress.input_tokens)} in`,
+      notes: [
+        `${compact(progress.output_tokens)} out`,
+        budget?.max_tokens != null && `of ${compact(budget.max_tokens)} together`,
+      ],
+      share: shareOf(budget?.spent_tokens, budget?.max_tokens),
+    },
+  ];
+  return (
+    <SimpleGrid cols={{ base: 2, sm: 3, md: 5 }}>
+      {facts.map(({ name, value, notes, share }) => (
+        <Fact key={name} name={name} value={value}>
+          {notes.map((note, index) => (
+            <Text key={index} size="xs" className="dimmed">
+              {note}
+            </Text>
+          ))}
+          {share !== undefined && (
+            <Progress
+              value={Math.min(100, 100 * share)}
+              size="sm"
+              mt={4}
+              color={share > 0.9 ? "orange" : "blue"}
+              aria-label={`${name}: ${percent(share)} of the budget`}
+            />
+          )}
+        </Fact>
+      ))}
+    </SimpleGrid>
+  );
+}

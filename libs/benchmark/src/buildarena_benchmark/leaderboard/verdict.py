@@ -1,0 +1,167 @@
+"""What a board says in a sentence or two: who is best, and whether the trials show it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from buildarena_benchmark.leaderboard.overall import OverallRow
+from buildarena_benchmark.statistics.power import ERROR, trials_needed
+
+Labels = Mapping[tuple[str, str], str]
+"""What rows are called, by model and configuration."""
+NAMED = 3
+"""Models that a sentence names; further ones are counted."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """What the ranking over a board's tasks comes to.
+
+    Attributes:
+        sentence: For people.
+        leaders: Models that share the first rank; empty when nobody is ranked or has succeeded.
+        proven: Whether one model is better than every other ranked one beyond chance.
+        seeds_to_separate: Trials of each model on each task that would tell the first two of
+            several leaders apart in four of five boards, if their success rates stay as they are;
+            None without a tie, and where these rates are equal.
+    """
+
+    sentence: str
+    leaders: Sequence[str]
+    proven: bool
+    seeds_to_separate: int | None
+
+
+def verdict_of(
+    overall: Sequence[OverallRow], tasks: int, is_baseline: Callable[[str], bool]
+) -> Verdict | None:
+    """The verdict of a ranking, by the same tests as its ranks; None without any row.
+
+    Args:
+        overall: Its rows, the best first.
+        tasks: How many tasks it is over.
+        is_baseline: Whether a model is there for comparison only.
+    """
+    if not overall:
+        return None
+    ranked = [row for row in overall if row.rank is not None]
+    over = "this task" if tasks == 1 else f"these {tasks} tasks"
+    if not ranked:
+        counted = "this task" if tasks == 1 else f"all {tasks} tasks"
+        return _nobody(f"Nobody is ranked yet: no model has counted jobs on {counted}.")
+    if not any(row.success_rate_mean for row in ranked):
+        return _nobody(f"Nobody is best on {over}: no ranked model has succeeded.")
+    labels = _labels(overall, is_baseline)
+    leaders = [row for row in ranked if row.rank == 1]
+    proven = len(ranked) > 1 and leaders[0].rank_high == 1
+    seeds = None
+    if len(leaders) > 1:
+        seeds = _seeds(leaders[0], leaders[1], models=len(ranked), tasks=tasks)
+        sentence = _tie(leaders, labels, over, seeds)
+    else:
+        sentence = _lead(leaders[0], ranked, labels, over)
+    if all(is_baseline(row.model) for row in leaders):
+        sentence += _best_model(ranked, labels, is_baseline)
+    return Verdict(
+        sentence=sentence,
+        leaders=[row.model for row in leaders],
+        proven=proven,
+        seeds_to_separate=seeds,
+    )
+
+
+def _nobody(sentence: str) -> Verdict:
+    return Verdict(sentence=sentence, leaders=[], proven=False, seeds_to_separate=None)
+
+
+def _lead(leader: OverallRow, ranked: Sequence[OverallRow], labels: Labels, over: str) -> str:
+    """Of a single model in front."""
+    name, others = labels[_key(leader)], len(ranked) - 1
+    share = f"{_percent(leader.success_rate_mean)} of its trials succeed"
+    if not others:
+        return f"{name} alone is ranked on {over}: {share}."
+    # The place's interval ends where the models begin that it is better than.
+    behind = len(ranked) - (leader.rank_high or len(ranked))
+    rest = "the other ranked model" if others == 1 else f"each of the {others} other ranked models"
+    if behind == others:
+        return f"{name} is best on {over}, better than {rest} beyond chance: {share}."
+    return (
+        f"{name} stands first on {over} ({share}), but is better beyond chance than only {behind} "
+        f"of the {others} other ranked models."
+    )
+
+
+def _tie(leaders: Sequence[OverallRow], labels: Labels, over: str, seeds: int | None) -> str:
+    """Of several models in front."""
+    names = [labels[_key(row)] for row in leaders]
+    sentence = (
+        f"{_listed(names)} are tied for first on {over}: the trials do not show which is better."
+    )
+    first, second = leaders[0], leaders[1]
+    rates = f"{_percent(first.success_rate_mean)} and {_percent(second.success_rate_mean)}"
+    if seeds is None:
+        return sentence
+    return (
+        f"{sentence} About {seeds:,} seeds of each on each task would tell {names[0]} from "
+        f"{names[1]}, if {rates} of their trials go on to succeed."
+    )
+
+
+def _best_model(
+    ranked: Sequence[OverallRow], labels: Labels, is_baseline: Callable[[str], bool]
+) -> str:
+    """Where the best of those stands that are no baselines, behind a baseline in front."""
+    for row in ranked:
+        if not is_baseline(row.model):
+            place = f"{row.rank_low}"
+            if row.rank_high != row.rank_low:
+                place += f" to {row.rank_high}"
+            return f" The best model that is no baseline is {labels[_key(row)]}, at place {place}."
+    return ""
+
+
+def _seeds(first: OverallRow, second: OverallRow, *, models: int, tasks: int) -> int | None:
+    """Trials on each task that would separate two models, as `board_power` reckons.
+
+    None where their success rates are equal, or where so many trials were made already: then it is
+    not by their number that the two are tied.
+    """
+    rates = first.success_rate_mean, second.success_rate_mean
+    if rates[0] is None or rates[1] is None:
+        return None
+    claims = math.comb(models, 2) * (tasks + 1 if tasks > 1 else 1)
+    needed = trials_needed(rates[0], rates[1], error=ERROR / claims)
+    if needed is None:
+        return None
+    each = math.ceil(needed / tasks)
+    made = min(first.trials, second.trials) / tasks
+    return each if each > made else None
+
+
+def _key(row: OverallRow) -> tuple[str, str]:
+    return row.model, row.configuration
+
+
+def _labels(overall: Sequence[OverallRow], is_baseline: Callable[[str], bool]) -> Labels:
+    """A model's name, with what tells its configurations apart where it has several."""
+    several = Counter(row.model for row in overall)
+    return {
+        _key(row): row.model
+        + (f" ({row.configuration[:8]})" if several[row.model] > 1 else "")
+        + (" (a baseline)" if is_baseline(row.model) else "")
+        for row in overall
+    }
+
+
+def _listed(names: Sequence[str]) -> str:
+    shown = list(names[:NAMED])
+    if len(names) > NAMED:
+        shown.append(f"{len(names) - NAMED} others")
+    return f"{', '.join(shown[:-1])} and {shown[-1]}"
+
+
+def _percent(share: float | None) -> str:
+    return "no" if share is None else f"{100 * share:.0f} %"

@@ -1,0 +1,163 @@
+"""Which jobs a request means: the filters of lists and of what is counted over them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from decimal import Decimal
+from typing import Annotated, Final
+
+from fastapi import Depends, Query
+
+from buildarena_api.dependencies import ContextDep, IdPrefix, Track
+from buildarena_api.http.problems import ProblemError
+from buildarena_api.leaderboard.filters import require_zones, unknown
+from buildarena_api.schemas import AnyJobState, AnyOutcome
+from buildarena_benchmark import ValidationIssue
+from buildarena_benchmark.scorers.registry import known_flags
+from buildarena_pipeline.catalog.models import ModelRegistry
+from buildarena_pipeline.runtime.context import Context
+from buildarena_store.jobs.pages import JobFilter
+
+SEARCHED: Final[Mapping[str, int]] = {
+    "text": 10,
+    "flag": 10,
+    "duration_min_s": 10,
+    "duration_max_s": 10,
+    "indicator_min": 2,
+    "indicator_max": 2,
+    "cost_min_usd": 2,
+    "cost_max_usd": 2,
+}
+"""What filters weigh for which jobs are searched, beyond their rows."""
+
+Amount = Annotated[float | None, Query(ge=0, le=1e12, allow_inf_nan=False)]
+
+
+def weight_of_search(query: Mapping[str, str]) -> int:
+    """What the filters of a query weigh."""
+    return sum(units for name, units in SEARCHED.items() if name in query)
+
+
+def job_filter(
+    context: ContextDep,
+    *,
+    sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
+    task: Annotated[str | None, Query()] = None,
+    category: Annotated[
+        list[str] | None, Query(description="Only jobs on tasks of these categories")
+    ] = None,
+    model: Annotated[str | None, Query()] = None,
+    track: Annotated[Track | None, Query()] = None,
+    task_version: Annotated[str | None, Query()] = None,
+    configuration: Annotated[
+        str | None, Query(description="Of the model: hash of its decoding and limits too")
+    ] = None,
+    since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
+    until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
+    state: Annotated[AnyJobState | None, Query()] = None,
+    outcome: Annotated[AnyOutcome | None, Query()] = None,
+    reason: Annotated[str | None, Query(description="Class of the failure")] = None,
+    flag: Annotated[str | None, Query(description="Only jobs with this flag")] = None,
+    indicator_min: Annotated[
+        float | None, Query(allow_inf_nan=False, description="Only with at least this indicator")
+    ] = None,
+    indicator_max: Annotated[
+        float | None, Query(allow_inf_nan=False, description="Only with at most this indicator")
+    ] = None,
+    cost_min_usd: Amount = None,
+    cost_max_usd: Amount = None,
+    duration_min_s: Amount = None,
+    duration_max_s: Amount = None,
+    text: Annotated[
+        str | None,
+        Query(
+            min_length=1,
+            max_length=100,
+            description="Only jobs in whose id, task, model, reason or detail it stands, in any "
+            "case",
+        ),
+    ] = None,
+    id_prefix: IdPrefix = None,
+) -> JobFilter:
+    """What the parameters mean.
+
+    Raises:
+        ProblemError: A time has no zone, or a category is unknown.
+        NotFoundError: The sweep is unknown.
+    """
+    require_zones(since=since, until=until)
+    if sweep is not None:
+        context.store.sweeps.get(sweep)
+    return JobFilter(
+        sweep_id=sweep,
+        tasks=None if category is None else _tasks_of(context, category),
+        flag=flag,
+        id_prefix=id_prefix,
+        indicator_min=indicator_min,
+        indicator_max=indicator_max,
+        cost_min_usd=None if cost_min_usd is None else Decimal(str(cost_min_usd)),
+        cost_max_usd=None if cost_max_usd is None else Decimal(str(cost_max_usd)),
+        duration_min_s=duration_min_s,
+        duration_max_s=duration_max_s,
+        text=text,
+        since=since,
+        until=until,
+        equals={
+            "task": task,
+            "task_version": task_version,
+            "model": model,
+            "model_hash": configuration,
+            "track": track,
+            "state": state,
+            "outcome": outcome,
+            "reason": reason,
+        },
+    )
+
+
+JobFilterDep = Annotated[JobFilter, Depends(job_filter)]
+
+
+def _tasks_of(context: Context, categories: Sequence[str]) -> tuple[str, ...]:
+    """Names of the tasks of some categories."""
+    tasks = context.tasks.newest().values()
+    known = sorted({task.category for task in tasks})
+    for name in categories:
+        if name not in known:
+            raise unknown("category", name, known)
+    return tuple(sorted(task.name for task in tasks if task.category in categories))
+
+
+def require_known(context: Context, registry: ModelRegistry, wanted: JobFilter) -> None:
+    """Refuses values that are in no job, and in nothing that a job could be submitted with.
+
+    Raises:
+        ProblemError: One is; it lists the choices.
+    """
+    given = {name: wanted.equals.get(name) for name in ("task", "model", "track", "reason")}
+    for name, value in {**given, "flag": wanted.flag}.items():
+        if value is not None:
+            _require_known(context, registry, name, str(value))
+
+
+def _require_known(context: Context, registry: ModelRegistry, name: str, value: str) -> None:
+    known = {
+        "task": lambda: list(context.tasks.newest()),
+        "model": lambda: list(registry.models),
+        "flag": lambda: list(known_flags()),
+    }
+    choices = known.get(name, list)()
+    if value in choices:
+        return
+    if name == "flag":
+        used = context.store.jobs.used_flags([value])
+    else:
+        used = context.store.jobs.distinct(name)
+    if value in used or not (choices or used):
+        return
+    if choices:
+        raise unknown(name, value, list(dict.fromkeys([*choices, *used])))
+    message = f"no job has the {name} {value!r}"
+    problem = ValidationIssue(path=name, message=message, choices=tuple(used))
+    raise ProblemError(422, f"{name}: {message}", errors=[problem])
