@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Self
 
-from buildarena_geometry import Accepted, Machine, module_set
+from buildarena_geometry import Accepted, Machine, simulated_modules
 
 Action = dict[str, Any]
 Actions = list[Action]
@@ -90,7 +90,7 @@ def replayed(
     Returns:
         The machine and the accepted actions, with the ids they have now.
     """
-    machine = Machine(available=available, catalogue=module_set("workshop"))
+    machine = Machine(available=available, catalogue=simulated_modules())
     kept: Actions = []
     names: dict[str, str] = {}
     for action in actions:

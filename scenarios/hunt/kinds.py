@@ -4,10 +4,15 @@ from typing import Final
 
 from buildarena_benchmark import builtin_tasks
 
-KINDS: Final = ("support", "transport", "lift", "mechanisms", "flight", "control")
+KINDS: Final = ("support", "transport", "lift", "mechanisms", "flight", "control", "throwing")
 
-_FAMILIES: Final = {"budget": "support", "repair": "transport", "identify": "flight"}
-"""What sort of machine a family asks for."""
+_FAMILIES: Final = {
+    "budget": "support",
+    "repair": "transport",
+    "identify": "flight",
+    "throw": "throwing",
+}
+"""What sort of machine a family asks for, where its name does not say so."""
 
 
 def kind_of(task: str) -> str:
