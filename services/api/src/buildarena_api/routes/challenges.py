@@ -140,12 +140,17 @@ def show_season(name: str, seasons: SeasonsDep) -> SeasonView:
 
 
 @router.get("/seasons/{name}/board", dependencies=_ORDINARY, responses=problem_responses(404, 503))
-def season_board(name: str, track: str, seasons: SeasonsDep, context: ContextDep) -> list[Ranked]:
+def season_board(
+    name: str, seasons: SeasonsDep, context: ContextDep, track: str | None = None
+) -> list[Ranked]:
     """Ranks a track's packages by their points, the cheaper and then the earlier first.
 
-    Of packages of one owner and name the newest stands for all.
+    Of packages of one owner and name the newest stands for all. Without a track it is the season's
+    first.
     """
-    _require_track(_season(seasons, name), track)
+    season = _season(seasons, name)
+    track = track or next(iter(season.tracks))
+    _require_track(season, track)
     rows = context.store.packages.board(name, track)
     points = [row.points or 0.0 for row in rows]
     return [
@@ -157,7 +162,7 @@ def season_board(name: str, track: str, seasons: SeasonsDep, context: ContextDep
 @router.post(
     "/submissions/check",
     dependencies=[limited("packages", until="request")],
-    responses=problem_responses(404, 413, 429, 503),
+    responses=problem_responses(404, 413, 422, 429, 503),
     openapi_extra=_ZIP_BODY,
 )
 async def check_package(
@@ -183,7 +188,7 @@ async def check_package(
     dependencies=[limited("packages", until="request")],
     responses={
         200: {"description": "It was there", "model": ReceivedPackage},
-        **problem_responses(404, 409, 413, 429, 503),
+        **problem_responses(404, 409, 413, 422, 429, 503),
     },
     openapi_extra=_ZIP_BODY,
 )
@@ -212,7 +217,7 @@ async def submit_package(
     return ReceivedPackage(added=added, **detail.model_dump())
 
 
-@router.get("/submissions", dependencies=_ORDINARY, responses=problem_responses(503))
+@router.get("/submissions", dependencies=_ORDINARY, responses=problem_responses(422, 503))
 def list_packages(
     context: ContextDep,
     caller: CallerDep,
@@ -227,7 +232,9 @@ def list_packages(
 
 
 @router.get(
-    "/submissions/{package}", dependencies=_ORDINARY, responses=problem_responses(403, 404, 503)
+    "/submissions/{package}",
+    dependencies=_ORDINARY,
+    responses=problem_responses(403, 404, 422, 503),
 )
 def show_package(
     package: PackageId,
@@ -245,7 +252,7 @@ def show_package(
     "/submissions/{package}/file",
     dependencies=_ORDINARY,
     response_class=Response,
-    responses={200: {"content": {ZIP: {}}}, **problem_responses(403, 404, 503)},
+    responses={200: {"content": {ZIP: {}}}, **problem_responses(403, 404, 422, 503)},
 )
 def package_file(
     package: PackageId,
@@ -281,7 +288,7 @@ def decide_package(
 @router.post(
     "/submissions/{package}/withdraw",
     dependencies=_ORDINARY,
-    responses=problem_responses(403, 404, 409, 503),
+    responses=problem_responses(403, 404, 409, 422, 503),
 )
 def withdraw_package(package: PackageId, context: ContextDep, caller: CallerDep) -> PackageDetail:
     """Takes a package off its board; its owner or an admin may."""
