@@ -212,8 +212,8 @@ def test_heartbeats_change_a_narrow_row_and_no_index(context, add, cost) -> None
     assert after["jobs"][0] - before["jobs"][0] <= 2 * len(held)
     (all_before, hot_before), (all_after, hot_after) = before["leases"], after["leases"]
     assert all_after - all_before >= 1000
-    # A snapshot of somebody else, such as autovacuum's, keeps old versions of rows for a moment, two
-    # rounds of forty for example. With an index on what changes no update would be one.
+    # A snapshot of somebody else, such as autovacuum's, keeps old versions of rows for a moment:
+    # two rounds of forty, for example. With an index on what changes no update would be one.
     assert hot_after - hot_before >= 0.8 * (all_after - all_before)
     assert (ask(context, WRITTEN)[0] - written) / heartbeats < 900
 
