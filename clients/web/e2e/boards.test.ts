@@ -367,6 +367,27 @@ describe("sweeps", () => {
   });
 });
 
+it("two rows of the board are compared in two ticks and a click, in the board's scope", async () => {
+  const scope = encodeURIComponent('["support"]');
+  const { page, context } = await opened(`/?category=${scope}`);
+  await page.getByLabel("Compare builtin/expert").check();
+  await page.getByText("Tick a second model").waitFor();
+  await page.getByLabel("Compare builtin/idle").check();
+  await page.getByRole("link", { name: "Compare builtin/expert and builtin/idle" }).click();
+  await page.waitForURL(/\/compare\?/);
+  expect(decodeURIComponent(page.url())).toContain("support");
+  const found = await ask<Schemas["Comparison"]>(
+    "/v1/leaderboard/compare?first=builtin/expert&second=builtin/idle&category=support",
+  );
+  await page.getByText("First minus second").waitFor();
+  const shown = await textsOf(page, "div[aria-label='Both models task by task, scrolls'] table");
+  expect(shown.map(([task]) => task)).toEqual(found.tasks.map(({ task }) => task));
+  expect(await page.getByRole("status").first().textContent()).toContain("builtin/expert");
+  expect(await page.getByLabel("Second model").first().inputValue()).toBe("builtin/idle");
+  expect(await page.getByLabel("Tasks", { exact: true }).first().inputValue()).toBe("Bridges");
+  await context.close();
+});
+
 it("the method is a click away from the board, with the versions in use", async () => {
   const { page, context } = await opened("/");
   await page.getByRole("link", { name: "Method", exact: true }).click();
