@@ -185,10 +185,12 @@ function OverallRow({ row, label, most, tied, over, ticked, onTick }: RowOf) {
     <Table.Tr>
       <Table.Td>
         <Group gap={6} maw={{ base: 150, sm: 420 }}>
-          <Checkbox size="xs" checked={ticked} onChange={onTick} aria-label={`Compare ${label}`} />
-          <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>
-            <b>{label}</b>
-          </Link>
+          <Group gap={6} wrap="nowrap">
+            <Checkbox size="xs" checked={ticked} onChange={onTick} aria-label={`Compare ${label}`} />
+            <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>
+              <b>{label}</b>
+            </Link>
+          </Group>
           {row.baseline && (
             <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
               baseline
