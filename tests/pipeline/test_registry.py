@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.catalog.prices import free_models
 from buildarena_pipeline.catalog.prompt_packs import PromptPacks, read_pack
 from buildarena_pipeline.catalog.specs import ClosedLoop
 from buildarena_pipeline.catalog.tracks import make_track
@@ -147,3 +148,18 @@ def test_a_malformed_published_pack_is_named(
 def test_a_bad_workflow_setting_is_named(target: str) -> None:
     with pytest.raises(StartupError, match="workflow 'mine'"):
         workflow_sources({"mine": target})
+
+
+def test_only_what_is_known_to_cost_nothing_is_free(tmp_path) -> None:
+    file = tmp_path / "models.yaml"
+    file.write_text(
+        "providers:\n  own: {protocol: openai, base_url: 'http://127.0.0.1:9/v1'}\n"
+        "models:\n"
+        "  - {name: own/unpriced, provider: own, model: nobody-knows-it}\n"
+        "  - {name: own/local, provider: own, model: local, price: {input: 0, output: 0}}\n"
+        "  - {name: own/cached, provider: own, model: c, price: {input: 0, output: 0, cached: 1}}\n"
+        "  - {name: own/dear, provider: own, model: dear, price: {input: 1, output: 0}}\n"
+    )
+    free = free_models(load_registry(file))
+    assert {"own/local", "builtin/expert", "builtin/idle"} <= set(free)
+    assert not {"own/unpriced", "own/cached", "own/dear"} & set(free)

@@ -2,7 +2,7 @@ import { readFileSync } from "node:fs";
 import type { Browser, BrowserContext, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
-import { expectNoSeriousFault, launched, URL_OF_SERVICE, type Visit, visit } from "./browser";
+import { ask, expectNoSeriousFault, launched, textsOf, URL_OF_SERVICE, type Visit, visit } from "./browser";
 import { count, dollars, number, percent, places } from "../src/format";
 
 type Schemas = components["schemas"];
@@ -14,28 +14,8 @@ const WAITING = { tasks: [TASK], models: ["builtin/expert"], simulator: "pybulle
 
 let browser: Browser;
 
-async function ask<Data>(path: string, body?: unknown): Promise<Data> {
-  const init =
-    body === undefined
-      ? {}
-      : { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
-  const answer = await fetch(URL_OF_SERVICE + path, init);
-  expect(answer.ok, path).toBe(true);
-  return (await answer.json()) as Data;
-}
-
 function opened(path: string, url = URL_OF_SERVICE, width = 1280): Promise<Visit> {
   return visit(browser, path, { url, width, scheme: width < 800 ? "dark" : "light" });
-}
-
-async function textsOf(page: Page, table: string): Promise<string[][]> {
-  return page
-    .locator(table)
-    .evaluate((found) =>
-      [...found.querySelectorAll("tbody tr")].map((row) =>
-        [...row.children].map((cell) => (cell as HTMLElement).textContent.trim()),
-      ),
-    );
 }
 
 /** The rows of a Markdown table that follows a heading, by column. */
@@ -241,46 +221,6 @@ describe("what a board is about", () => {
   });
 });
 
-describe("failures", () => {
-  it("open from a bar, are summed by reason, narrowed down and sorted", async () => {
-    const { page, context } = await opened("/");
-    const bar = page.locator(".plot a[aria-label*='failed']").first();
-    const told = /: (\d+) /.exec((await bar.getAttribute("aria-label")) ?? "")?.[1];
-    await bar.scrollIntoViewIfNeeded();
-    await bar.click();
-    await page.waitForURL(/\/jobs\?/);
-    const summary = page.getByRole("region", { name: "How these jobs ended" });
-    await summary.getByText(`${told ?? ""} job`).waitFor();
-    await page.goto(`${URL_OF_SERVICE}/jobs`);
-    await summary.getByRole("link", { name: /^success/ }).click();
-    await page.waitForURL(/outcome=success/);
-    const wanted = await ask<Schemas["JobPage"]>("/v1/jobs?outcome=success&sort=indicator&order=desc&state=done");
-    await page.getByRole("button", { name: "Indicator" }).click();
-    await page.waitForURL(/sort=indicator/);
-    const first = wanted.jobs[0]?.id.slice(0, 12) ?? "none";
-    await expect.poll(() => page.locator("tbody tr").first().textContent()).toContain(first);
-    await page.getByRole("button", { name: "More filters" }).click();
-    await page.getByLabel("Took from, min").fill("1000");
-    await page.keyboard.press("Enter");
-    await page.getByText("No job is like that").waitFor();
-    expect(page.url()).toContain("duration_min_s=60000");
-    await context.close();
-  });
-
-  it("are found by what was said, in the turn that said it", async () => {
-    const { page, context } = await opened("/jobs");
-    await page.getByRole("link", { name: "Search transcripts" }).click();
-    await page.getByLabel("Words").fill("block");
-    await page.getByRole("button", { name: "Search", exact: true }).click();
-    const hit = page.locator("article.turn").first();
-    const [, turn] = /turn (\d+)/.exec((await hit.getByRole("link").textContent()) ?? "") ?? [];
-    expect(await hit.locator("mark").count()).toBeGreaterThan(0);
-    await hit.getByRole("link").click();
-    await page.locator(`article[data-turn="${turn ?? ""}"][data-chosen]`).waitFor();
-    await context.close();
-  });
-});
-
 describe("sweeps", () => {
   it.each([
     ["/sweeps/new", 1280],
@@ -365,22 +305,6 @@ describe("sweeps", () => {
     await expect.poll(() => page.getByText("cancelled: 2").count(), { timeout: 10_000 }).toBe(1);
     await context.close();
   });
-});
-
-it("the method is a click away from the board, with the versions in use", async () => {
-  const { page, context } = await opened("/");
-  await page.getByRole("link", { name: "Method", exact: true }).click();
-  await page.getByRole("heading", { name: "What is not claimed" }).waitFor();
-  const used = await ask<Schemas["VersionsView"]>("/v1/versions");
-  const shown = await textsOf(page, 'table[aria-label="Versions in use"]');
-  const simulators = used.simulators.map(({ name, version }) => [`Simulator ${name}`, version]);
-  expect(shown.map((cells) => cells.at(-1))).toEqual([
-    used.buildarena,
-    used.feedback,
-    String(used.scorers),
-    ...simulators.map((cells) => cells[1]),
-  ]);
-  await context.close();
 });
 
 it("a link on another site opens a page", async () => {

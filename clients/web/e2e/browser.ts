@@ -103,3 +103,25 @@ export async function openSession(agent: string, seed = 0, more: Record<string, 
   if (!answer.ok) throw new Error(await answer.text());
   return ((await answer.json()) as { id: string }).id;
 }
+
+/** The service's answer to a GET, or to a POST of a body. */
+export async function ask<Data>(path: string, body?: unknown): Promise<Data> {
+  const init =
+    body === undefined
+      ? {}
+      : { method: "POST", body: JSON.stringify(body), headers: { "Content-Type": "application/json" } };
+  const answer = await fetch(URL_OF_SERVICE + path, init);
+  expect(answer.ok, path).toBe(true);
+  return (await answer.json()) as Data;
+}
+
+/** What the cells of a table's body say, row by row. */
+export async function textsOf(page: Page, table: string): Promise<string[][]> {
+  return page
+    .locator(table)
+    .evaluate((found) =>
+      [...found.querySelectorAll("tbody tr")].map((row) =>
+        [...row.children].map((cell) => (cell as HTMLElement).textContent.trim()),
+      ),
+    );
+}

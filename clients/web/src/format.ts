@@ -77,7 +77,9 @@ export function stateWords(name: string): string {
 
 /** What is measured, with its unit; a ratio has none. */
 export function measured(indicator: string, unit: string): string {
-  return unit === "1" ? words(indicator) : `${words(indicator)}, ${unit}`;
+  if (unit === "1") return words(indicator);
+  const per = /^1\/(\w+?)s?$/.exec(unit)?.[1];
+  return per === undefined ? `${words(indicator)}, ${unit}` : `${words(indicator)}, per ${per}`;
 }
 
 /** "five-role · pybullet 3", for a track's long name. */

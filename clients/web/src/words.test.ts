@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { refusal, headline, ApiError } from "./api/problem";
 import { readEvent } from "./api/events";
-import { bytes, dollars, duration, number, percent, places, trackLabel } from "./format";
+import { bytes, dollars, duration, measured, number, percent, places, trackLabel } from "./format";
 import { chosenTurns, callLine, type Turn } from "./pages/job/transcript";
 import { goalOf } from "./pages/tasks/goal";
 
@@ -19,6 +19,12 @@ describe("figures", () => {
     expect(bytes(2048)).toBe("2.0 KiB");
     expect(duration(3725)).toBe("1 h 2 min");
     expect(places(1, 1)).toBe("1");
+  });
+
+  it("have units that can be read aloud", () => {
+    expect(measured("nearness", "1/units")).toBe("nearness, per unit");
+    expect(measured("time_at_height", "s")).toBe("time at height, s");
+    expect(measured("glide_ratio", "1")).toBe("glide ratio");
   });
 
   it("leave a strange track as it is", () => {

@@ -40,6 +40,11 @@ export function ProblemNote({ error, retry }: { error: unknown; retry?: () => vo
           </List>
         )}
         {asksForKey && <KeyField />}
+        {error instanceof ApiError && error.status === 404 && (
+          <Text size="sm">
+            <Link to="/">The leaderboard</Link>, <Link to="/jobs">all jobs</Link>, <Link to="/tasks">all tasks</Link>
+          </Text>
+        )}
         {retry !== undefined && !asksForKey && (
           <Group>
             <Button size="xs" variant="default" onClick={retry}>

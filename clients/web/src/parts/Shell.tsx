@@ -6,6 +6,7 @@ import {
   Group,
   Popover,
   Text,
+  Title,
   useComputedColorScheme,
   useMantineColorScheme,
 } from "@mantine/core";
@@ -15,7 +16,6 @@ import { Link, Outlet, useRouterState } from "@tanstack/react-router";
 import { useEffect } from "react";
 import { site } from "../api/queries";
 import { beside, isSite } from "../api/site";
-import { Empty } from "./States";
 import { KeyField, useKey } from "./KeyField";
 import { ProblemNote } from "./Problem";
 import { SiteNote } from "./SiteNote";
@@ -78,14 +78,14 @@ export function Shell() {
             gap="xs"
             wrap={isSite ? "nowrap" : "wrap"}
           >
-            <Group gap="md">
+            <Group gap="md" className="site-places">
               <Link className="quiet" to="/" aria-label="BuildArena, start">
                 <Group gap={8} wrap="nowrap">
                   <img src={beside("favicon.svg")} width={24} height={24} alt="" />
                   <Text fw={700}>BuildArena</Text>
                 </Group>
               </Link>
-              <Group component="nav" gap="sm" aria-label="Pages">
+              <Group component="nav" gap="sm" aria-label="Pages" className="site-nav">
                 {places.map(({ to, label }) => (
                   <Anchor
                     key={to}
@@ -168,11 +168,12 @@ function SchemeButton() {
 
 export function Missing() {
   return (
-    <Empty title="There is no such page">
-      <Anchor component={Link} to="/" inherit>
-        To the leaderboard
-      </Anchor>
-    </Empty>
+    <>
+      <Title order={1}>There is no such page</Title>
+      <Text mt="sm">
+        <Link to="/">The leaderboard</Link>, <Link to="/jobs">all jobs</Link>, <Link to="/tasks">all tasks</Link>
+      </Text>
+    </>
   );
 }
 

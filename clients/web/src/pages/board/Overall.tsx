@@ -1,9 +1,12 @@
-import { Badge, Group, Table, Text, Tooltip } from "@mantine/core";
+import { Badge, Button, Checkbox, Group, Table, Text, Tooltip } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import type { Board, OverallView } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
-import { entriesOf, keyOf } from "./entries";
+import { useState } from "react";
+import { isSite } from "../../api/site";
+import { scoped } from "../compare/search";
+import { entriesOf, keyOf, namesOf } from "./entries";
 import { SCORE, sharedRanks } from "../../parts/ranks";
 import { SortHead, useSorting } from "../../parts/SortHead";
 import type { Values } from "../../parts/sorting";
@@ -29,71 +32,101 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
   const published = search.paper === "yes" ? board.published : [];
   const most = Math.max(1, ...[...overall, ...published].map((row) => row.rank_high ?? 1));
   const { rows, head } = useSorting(overall, VALUES);
+  const [ticked, setTicked] = useState<readonly string[]>([]);
+  const names = namesOf(board);
+  const tick = (key: string): void => {
+    // A third takes the place of the first.
+    setTicked(ticked.includes(key) ? ticked.filter((one) => one !== key) : [...ticked, key].slice(-2));
+  };
   const ties = sharedRanks(overall);
   const paperTies = sharedRanks(published);
   return (
-    <Table.ScrollContainer minWidth={720} type="native">
-      <Table verticalSpacing={7} className="sticky-first" highlightOnHover>
-        <Table.Thead>
-          <Table.Tr>
-            <SortHead name="model" {...head}>
-              Model
-            </SortHead>
-            <SortHead name="rank" figures {...head}>
-              Rank
-            </SortHead>
-            <Table.Th>Place, 95 % interval</Table.Th>
-            <SortHead name="mean" figures {...head}>
-              Mean rank
-            </SortHead>
-            <SortHead name="score" figures title={SCORE} {...head}>
-              Score
-            </SortHead>
-            <SortHead name="success" figures {...head}>
-              Success, mean of tasks
-            </SortHead>
-            <SortHead name="cost" figures {...head}>
-              $ a job
-            </SortHead>
-            <SortHead name="tokens" figures {...head}>
-              Output tokens
-            </SortHead>
-            <SortHead name="trials" figures {...head}>
-              Trials
-            </SortHead>
-          </Table.Tr>
-        </Table.Thead>
-        <Table.Tbody>
-          {rows.map((row) => (
-            <OverallRow
-              key={keyOf(row)}
-              row={row}
-              label={labels.get(keyOf(row)) ?? row.model}
-              most={most}
-              tied={row.rank !== null && ties.has(row.rank)}
-              over={board.ranked.length}
-            />
-          ))}
-          {published.map((row) => (
-            <Table.Tr key={`paper ${row.model}`} className="ghost">
-              <Table.Td>
-                <Group gap={6} maw={{ base: 150, sm: 420 }}>
-                  {row.model}
-                  <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
-                    paper
-                  </Badge>
-                </Group>
-              </Table.Td>
-              <Place row={row} most={most} tied={paperTies.has(row.rank)} />
-              <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
-              <Table.Td colSpan={5} className="dimmed">
-                ranked by the paper’s own trials, among its models only
-              </Table.Td>
+    <>
+      <Ticked models={ticked.flatMap((key) => names.get(key) ?? [])} board={board} search={search} />
+      <Table.ScrollContainer minWidth={720} type="native">
+        <Table verticalSpacing={7} className="sticky-first" highlightOnHover>
+          <Table.Thead>
+            <Table.Tr>
+              <SortHead name="model" {...head}>
+                Model
+              </SortHead>
+              <SortHead name="rank" figures {...head}>
+                Rank
+              </SortHead>
+              <Table.Th>Place, 95 % interval</Table.Th>
+              <SortHead name="mean" figures {...head}>
+                Mean rank
+              </SortHead>
+              <SortHead name="score" figures title={SCORE} {...head}>
+                Score
+              </SortHead>
+              <SortHead name="success" figures {...head}>
+                Success, mean of tasks
+              </SortHead>
+              <SortHead name="cost" figures {...head}>
+                $ a job
+              </SortHead>
+              <SortHead name="tokens" figures {...head}>
+                Output tokens
+              </SortHead>
+              <SortHead name="trials" figures {...head}>
+                Trials
+              </SortHead>
             </Table.Tr>
-          ))}
-        </Table.Tbody>
-      </Table>
-    </Table.ScrollContainer>
+          </Table.Thead>
+          <Table.Tbody>
+            {rows.map((row) => (
+              <OverallRow
+                key={keyOf(row)}
+                row={row}
+                label={labels.get(keyOf(row)) ?? row.model}
+                most={most}
+                tied={row.rank !== null && ties.has(row.rank)}
+                over={board.ranked.length}
+                ticked={ticked.includes(keyOf(row))}
+                onTick={() => {
+                  tick(keyOf(row));
+                }}
+              />
+            ))}
+            {published.map((row) => (
+              <Table.Tr key={`paper ${row.model}`} className="ghost">
+                <Table.Td>
+                  <Group gap={6} maw={{ base: 150, sm: 420 }}>
+                    {row.model}
+                    <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
+                      paper
+                    </Badge>
+                  </Group>
+                </Table.Td>
+                <Place row={row} most={most} tied={paperTies.has(row.rank)} />
+                <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
+                <Table.Td colSpan={5} className="dimmed">
+                  ranked by the paper’s own trials, among its models only
+                </Table.Td>
+              </Table.Tr>
+            ))}
+          </Table.Tbody>
+        </Table>
+      </Table.ScrollContainer>
+    </>
+  );
+}
+
+/** What the two ticked rows lead to, the board's scope with them. */
+function Ticked({ models, board, search }: { models: readonly string[]; board: Board; search: BoardSearch }) {
+  const [first, second] = models;
+  if (first === undefined) return null;
+  if (second === undefined) return <Text size="sm">Tick a second model to compare it with {first}.</Text>;
+  const scope = isSite ? { track: board.track ?? undefined } : { ...scoped(search), track: board.track ?? undefined };
+  return (
+    <Button
+      size="xs"
+      mb="xs"
+      renderRoot={(props) => <Link to="/compare" search={{ models: `${first},${second}`, ...scope }} {...props} />}
+    >
+      Compare {first} and {second}
+    </Button>
   );
 }
 
@@ -143,16 +176,21 @@ interface RowOf {
   tied: boolean;
   /** How many tasks the ranking is over. */
   over: number;
+  ticked: boolean;
+  onTick: () => void;
 }
 
-function OverallRow({ row, label, most, tied, over }: RowOf) {
+function OverallRow({ row, label, most, tied, over, ticked, onTick }: RowOf) {
   return (
     <Table.Tr>
       <Table.Td>
         <Group gap={6} maw={{ base: 150, sm: 420 }}>
-          <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>
-            <b>{label}</b>
-          </Link>
+          <Group gap={6} wrap="nowrap">
+            <Checkbox size="xs" checked={ticked} onChange={onTick} aria-label={`Compare ${label}`} />
+            <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>
+              <b>{label}</b>
+            </Link>
+          </Group>
           {row.baseline && (
             <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
               baseline

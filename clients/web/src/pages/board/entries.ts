@@ -46,3 +46,17 @@ export function entriesOf(board: Board, baselines: boolean): Entry[] {
 export function cellOf(task: TaskBoard, entry: Named): Row | undefined {
   return task.rows.find((row) => row.model === entry.model && row.configuration === entry.configuration);
 }
+
+/** How the service is asked for each row of a board: by its model, and its configuration where a model has several. */
+export function namesOf(board: Board): Map<string, string> {
+  const rows = [...board.overall, ...board.tasks.flatMap((task) => task.rows)];
+  const configurations = new Map<string, Set<string>>();
+  for (const { model, configuration } of rows)
+    configurations.set(model, (configurations.get(model) ?? new Set()).add(configuration));
+  return new Map(
+    rows.map((row) => {
+      const several = (configurations.get(row.model)?.size ?? 0) > 1;
+      return [keyOf(row), several ? `${row.model}@${row.configuration.slice(0, 8)}` : row.model];
+    }),
+  );
+}

@@ -4,7 +4,8 @@ import { useState } from "react";
 import { Section } from "../../parts/Section";
 import { ComparedJobs } from "./ComparedJobs";
 import { ComparedModels } from "./ComparedModels";
-import type { CompareSearch } from "./search";
+import { ModelPickers } from "./ModelPickers";
+import { scoped, type CompareSearch } from "./search";
 
 const route = getRouteApi("/compare");
 
@@ -19,7 +20,7 @@ export default function ComparePage() {
         <ComparedJobs key={`${search.a} ${search.b}`} ids={[search.a, search.b]} />
       )}
       {first !== undefined && first !== "" && second !== undefined && second !== "" && (
-        <ComparedModels first={first} second={second} track={search.track} />
+        <ComparedModels first={first} second={second} scope={scoped(search)} />
       )}
       <Chooser key={JSON.stringify(search)} search={search} />
     </Stack>
@@ -29,8 +30,6 @@ export default function ComparePage() {
 function Chooser({ search }: { search: CompareSearch }) {
   const navigate = useNavigate({ from: "/compare" });
   const [jobs, setJobs] = useState([search.a ?? "", search.b ?? ""]);
-  const [models, setModels] = useState(search.models ?? "");
-  const named = models.split(",").filter((name) => name.trim() !== "");
   return (
     <Section title="Choose what to compare">
       <form
@@ -58,28 +57,7 @@ function Chooser({ search }: { search: CompareSearch }) {
           </Button>
         </Group>
       </form>
-      <form
-        onSubmit={(event) => {
-          event.preventDefault();
-          void navigate({ search: { models: named.map((name) => name.trim()).join(","), track: search.track } });
-        }}
-      >
-        <Group align="end">
-          <TextInput
-            label="Two models"
-            placeholder="maker/one, maker/other"
-            value={models}
-            onChange={(event) => {
-              setModels(event.currentTarget.value);
-            }}
-            w={400}
-            maw="100%"
-          />
-          <Button type="submit" variant="default" disabled={named.length !== 2}>
-            Compare models
-          </Button>
-        </Group>
-      </form>
+      <ModelPickers search={search} />
       <Text size="xs" className="dimmed" mt="xs">
         The address of this page says what is compared, so it can be sent to a colleague.
       </Text>

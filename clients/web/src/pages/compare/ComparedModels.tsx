@@ -2,27 +2,31 @@ import { Stack, Table, Text } from "@mantine/core";
 import { queryOptions, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { client, taken, type Schema } from "../../api/client";
-import type { JobView } from "../../api/queries";
-import { number, percent, successes, words } from "../../format";
+import { boardQuery, type JobView } from "../../api/queries";
+import { number, successes, words } from "../../format";
 import { OutcomeBadge } from "../../parts/Outcome";
 import { Section } from "../../parts/Section";
+import { SortHead, useSorting } from "../../parts/SortHead";
+import type { Values } from "../../parts/sorting";
 import { Answered, Empty } from "../../parts/States";
+import type { Scoped } from "./search";
+import { verdictOf, type Comparison } from "./verdict";
 
-type Comparison = Schema<"Comparison">;
-
-const comparison = (first: string, second: string, track: string | undefined) =>
+const comparison = (first: string, second: string, scope: Scoped) =>
   queryOptions({
-    queryKey: ["compare", first, second, track ?? ""],
+    queryKey: ["compare", first, second, boardQuery(scope)],
     // The generated client takes pairs for lists of any length.
     queryFn: async () =>
       (await taken(
-        client.GET("/v1/leaderboard/compare", { params: { query: { first, second, track } } }),
+        client.GET("/v1/leaderboard/compare", { params: { query: { first, second, ...boardQuery(scope) } } }),
       )) as Comparison,
   });
 
 async function endedJobs(model: string, task: string): Promise<JobView[]> {
-  const query = { model: model.split("@")[0], task, state: "done" as const, limit: 1000 };
-  return (await taken(client.GET("/v1/jobs", { params: { query } }))).jobs;
+  const [name, configuration = ""] = model.split("@");
+  const query = { model: name, task, state: "done" as const, limit: 1000 };
+  const { jobs } = await taken(client.GET("/v1/jobs", { params: { query } }));
+  return jobs.filter((job) => job.configuration.startsWith(configuration));
 }
 
 /** The jobs of two models with the same task and seed that ended differently. */
@@ -53,8 +57,8 @@ export function differing(a: readonly JobView[], b: readonly JobView[], track: s
 }
 
 /** Two models on all tasks that both played, with the paired test and the cases where they differ. */
-export function ComparedModels({ first, second, track }: { first: string; second: string; track: string | undefined }) {
-  const query = useQuery(comparison(first, second, track));
+export function ComparedModels({ first, second, scope }: { first: string; second: string; scope: Scoped }) {
+  const query = useQuery(comparison(first, second, scope));
   return (
     <Section title={`${first} and ${second}`}>
       <Answered query={query}>
@@ -63,6 +67,9 @@ export function ComparedModels({ first, second, track }: { first: string; second
             <Empty title="They share no task on this track" />
           ) : (
             <Stack>
+              <Text fw={600} role="status">
+                {verdictOf(found)}
+              </Text>
               <Duels found={found} />
               <Cases found={found} />
             </Stack>
@@ -78,22 +85,49 @@ function p(value: number | null | undefined): string {
   return value < 0.001 ? "< 0.001" : value.toFixed(3);
 }
 
+/** "+40", for a difference of shares in percentage points. */
+function points(share: number): string {
+  return `${share > 0 ? "+" : share < 0 ? "−" : ""}${Math.abs(100 * share).toFixed(0)}`;
+}
+
+const VALUES: Values<Comparison["tasks"][number]> = {
+  task: (row) => row.task,
+  first: (row) => row.successes[0] / row.trials[0],
+  second: (row) => row.successes[1] / row.trials[1],
+  difference: (row) => row.difference,
+  success: (row) => row.success_p,
+  indicator: (row) => row.indicator_p,
+};
+
 function Duels({ found }: { found: Comparison }) {
+  const { rows, head } = useSorting(found.tasks, VALUES);
   return (
     <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Both models task by task, scrolls">
       <Table miw={760} className="figures">
         <Table.Thead>
           <Table.Tr>
-            <Table.Th>Task</Table.Th>
-            <Table.Th className="figures">{found.first}</Table.Th>
-            <Table.Th className="figures">{found.second}</Table.Th>
-            <Table.Th className="figures">Difference, 95 %</Table.Th>
-            <Table.Th>Success, paired test</Table.Th>
-            <Table.Th>Indicator, paired test</Table.Th>
+            <SortHead name="task" {...head}>
+              Task
+            </SortHead>
+            <SortHead name="first" figures {...head}>
+              {found.first}
+            </SortHead>
+            <SortHead name="second" figures {...head}>
+              {found.second}
+            </SortHead>
+            <SortHead name="difference" figures {...head}>
+              Difference, percentage points
+            </SortHead>
+            <SortHead name="success" {...head}>
+              Success, paired test
+            </SortHead>
+            <SortHead name="indicator" {...head}>
+              Indicator, paired test
+            </SortHead>
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {found.tasks.map((task) => (
+          {rows.map((task) => (
             <Table.Tr key={task.task}>
               <Table.Td>
                 <Link to="/tasks/$name" params={{ name: task.task }}>
@@ -106,7 +140,7 @@ function Duels({ found }: { found: Comparison }) {
                 </Table.Td>
               ))}
               <Table.Td className="figures">
-                {percent(task.difference)} ({percent(task.low)} to {percent(task.high)})
+                {points(task.difference)} (95 %: {points(task.low)} to {points(task.high)})
               </Table.Td>
               <Table.Td>
                 <Tested test={task.success} adjusted={task.success_p} />
@@ -119,7 +153,8 @@ function Duels({ found }: { found: Comparison }) {
         </Table.Tbody>
       </Table>
       <Text size="xs" className="dimmed" mt="xs">
-        Paired on shared seeds; p adjusted over all tests of this table (Holm). Track: {found.track}.
+        First minus second. Paired on shared seeds; p adjusted over all tests of this table (Holm). Track: {found.track}
+        .
       </Text>
     </div>
   );

@@ -1,17 +1,26 @@
-/** What is compared: two jobs, or two models on one track. */
-export interface CompareSearch {
+import { readSearch, type BoardSearch } from "../../api/board-search";
+
+/** What of a board's address a comparison of models keeps: the same jobs are compared that the board counts. */
+export type Scoped = Pick<BoardSearch, "track" | "category" | "task" | "policy" | "since" | "until">;
+
+/** What is compared: two jobs, or two models on the jobs of a board. */
+export interface CompareSearch extends Scoped {
   a?: string;
   b?: string;
   models?: string;
-  track?: string;
 }
 
-const NAMES = ["a", "b", "models", "track"] as const;
+const NAMES = ["a", "b", "models"] as const;
+
+/** A board's choice of jobs, without what only changes how the board looks. */
+export function scoped({ track, category, task, policy, since, until }: BoardSearch): Scoped {
+  return { track, category, task, policy, since, until };
+}
 
 export function readCompareSearch(raw: Record<string, unknown>): CompareSearch {
   const found = NAMES.flatMap((name) => {
     const value = raw[name];
     return typeof value === "string" && value.trim() !== "" ? [[name, value.trim()]] : [];
   });
-  return Object.fromEntries(found) as CompareSearch;
+  return { ...scoped(readSearch(raw)), ...(Object.fromEntries(found) as CompareSearch) };
 }

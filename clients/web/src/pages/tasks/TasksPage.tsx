@@ -41,7 +41,7 @@ function TaskCard({ task }: { task: TaskView }) {
         <Link className="quiet" to="/tasks/$name" params={{ name: task.name }}>
           <b>{task.title}</b>
         </Link>
-        <Group gap={4} wrap="nowrap">
+        <Group gap={4} wrap="nowrap" style={{ flexShrink: 0 }}>
           {task.custom && (
             <Badge size="sm" variant="outline" color="grape" tt="none">
               custom

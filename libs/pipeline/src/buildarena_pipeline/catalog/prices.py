@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from buildarena_pipeline.catalog.models import ModelEntry, ModelRegistry
+from buildarena_pipeline.catalog.models import BUILTIN_PROTOCOL, ModelEntry, ModelRegistry
 
 PER_MILLION = Decimal(1_000_000)
 CENT_FRACTION = Decimal("0.000001")
@@ -43,10 +43,11 @@ def price_usd(
 
 
 def free_models(registry: ModelRegistry) -> list[str]:
-    """Names of the models whose requests cost nothing, or have no known price."""
-    million = int(PER_MILLION)
-    return [
-        name
-        for name, entry in registry.models.items()
-        if not price_usd(entry, input_tokens=million, output_tokens=million, cached_tokens=0)
-    ]
+    """Names of the models that are known to cost nothing: what has no price may cost anything."""
+    return [name for name, entry in registry.models.items() if _is_free(entry, registry)]
+
+
+def _is_free(entry: ModelEntry, registry: ModelRegistry) -> bool:
+    if entry.price is not None:
+        return not (entry.price.input or entry.price.output or entry.price.cached)
+    return registry.provider_of(entry).protocol == BUILTIN_PROTOCOL
