@@ -21,9 +21,9 @@ from buildarena_cli.local import free_port
 from buildarena_client import Client, ClientError
 from buildarena_store import Database
 
-PACKAGES = int(os.environ.get("CHAOS_PACKAGES", "20"))
-PEOPLE = int(os.environ.get("CHAOS_PEOPLE", "5"))
-KILLS = int(os.environ.get("CHAOS_KILLS", "2"))
+PACKAGES = int(os.environ.get("CHAOS_PACKAGES", "8"))
+PEOPLE = int(os.environ.get("CHAOS_PEOPLE", "4"))
+KILLS = int(os.environ.get("CHAOS_KILLS", "1"))
 ADMIN = "an operator's secret"
 LATER = "UPDATE packages SET claimed_at = claimed_at - interval '1 hour' WHERE state = 'checking'"
 

@@ -105,8 +105,8 @@ def test_one_more_end_moves_a_rate_of_hundreds_by_little(api, context) -> None:
     execute(
         context,
         "UPDATE jobs SET state = 'done', outcome = 'success', success = true, finished_at = "
-        "now() - number * interval '30 seconds' FROM (SELECT id, row_number() OVER () AS number "
-        "FROM jobs LIMIT 150) AS ended WHERE ended.id = jobs.id",
+        "now() - number * interval '60 seconds' FROM (SELECT id, row_number() OVER (PARTITION BY "
+        "task) AS number FROM jobs) AS ended WHERE ended.id = jobs.id AND number <= 75",
     )
     before = ahead(api, sweep)["jobs_per_minute"]
     assert before == pytest.approx(2, rel=0.03)

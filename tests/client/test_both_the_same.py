@@ -65,8 +65,10 @@ CALLED = {
     "export": "export_leaderboard",
     "show_evidence": "evidence_table",
     "agreement_table": "agreement",
+    "forecast_sweep": "sweep_forecast",
     "stream_job": "job_events",
     "stream_sweep": "sweep_events",
+    "summarise_jobs": "job_summary",
     "try_file": "try_machine",
     "verify": "verify_leaderboard",
 }

@@ -38,7 +38,7 @@ ENDLESS = b"data: " + b"x" * MAX_EVENT_BYTES
 AWAY = answer(503, b'{"detail": "away", "errors": []}', Retry_After="0")
 NOTHING_TWICE = {
     *("cancel_job", "retry_job", "verify_job", "verify_leaderboard", "add_task"),
-    *("pause_sweep", "resume_sweep", "cancel_sweep", "retry_sweep"),
+    *("pause_sweep", "resume_sweep", "cancel_sweep", "retry_sweep", "set_sweep_budget"),
     *("call_tool", "test_session", "submit_session", "import_sweep"),
 }
 """Methods that change something more when they are sent again."""

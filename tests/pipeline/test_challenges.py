@@ -19,8 +19,9 @@ from support.challenge import (
 )
 from support.machines.families import car as family_car
 
+from buildarena_geometry.machine_files import machine_of
 from buildarena_pipeline.challenges.checking import Report, check_package
-from buildarena_pipeline.challenges.judging import judge_folder
+from buildarena_pipeline.challenges.judging import fingerprints, judge_folder
 from buildarena_pipeline.challenges.package import (
     Package,
     PackageError,
@@ -366,13 +367,19 @@ def test_bridges_that_break_rules_have_sentences() -> None:
     )
 
 
-def test_bridges_of_another_are_copies(tmp_path: Path) -> None:
-    (tmp_path / "one.zip").write_bytes(zipped(bridge_files()))
-    renamed = {**bridge_files(), "chat_transcript.md": b"All of it is mine. " * 20}
-    (tmp_path / "two.zip").write_bytes(zipped(renamed))
-    entries = judge_folder(tmp_path, BRIDGES, "human")
-    assert [entry.copies for entry in entries] == [("two.zip",), ("one.zip",)]
-    assert [entry.rank for entry in entries] == [1, 1]
+def test_bridges_of_another_are_copies() -> None:
+    own = fingerprints(Package(bridge_files()), BRIDGES)
+    assert len(own) == 3
+    documents = {
+        name: json.dumps(machine_of(json.loads(content), where=name).to_document()).encode()
+        for name, content in bridge_files().items()
+        if name.endswith(".json")
+    }
+    assert fingerprints(Package(documents), BRIDGES) == own
+    moved = json.loads(bridge_files()["support-1.json"])[:-1]
+    other = {**documents, "support-1.json": json.dumps(moved).encode()}
+    assert len(fingerprints(Package(other), BRIDGES) & own) >= 2
+    assert fingerprints(Package({"support-1.json": b"nothing"}), BRIDGES) == frozenset()
 
 
 def test_a_wrong_season_is_told_where(tmp_path: Path) -> None:

@@ -291,7 +291,8 @@ def test_what_the_game_cannot_tell_or_do_is_refused(scenario, words) -> None:
 NOT_STAGED = [
     name
     for name, task in builtin_tasks().items()
-    if task.scenario.senses is not None and name != "slalom-2"
+    # What throws is refused for its boulder, which this machine has not.
+    if task.scenario.senses is not None and name not in {"slalom-2", "throw-3"}
 ]
 
 

@@ -359,9 +359,9 @@ def _require_sayable(machine: Machine, scenario: Scenario) -> None:
         "the game's machines face north at the start": on_ground.heading_deg,
         "the game's levels have no turned boxes": any(box.heading_deg for box in scenario.terrain),
         "the game has one gravity and drives of one strength": not usual,
-        "the game's logs do not tell what a boulder touches": any(
-            block.module.is_loose for block in machine.blocks.values()
-        ),
+        # What is thrown over a line is judged by what it touches on its way.
+        "the game's logs do not tell what a boulder touches": scenario.gates
+        and any(block.module.is_loose for block in machine.blocks.values()),
     }
     for refusal, is_asked in asked.items():
         if is_asked:
