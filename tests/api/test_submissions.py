@@ -55,7 +55,7 @@ def test_the_service_checks_what_comes_by_itself(context) -> None:
         while (shown := ann.get(f"{PATH}/{made['id']}"))["state"] != "scored":
             assert time.monotonic() < until, shown
             time.sleep(0.1)
-        assert shown["report"]["score"]["unknown"][0] == "center"
+        assert shown["report"]["score"]["unknown"][0] == "omega_ref"
 
 
 def test_a_package_is_taken_in_checked_and_ranked(people, checks) -> None:

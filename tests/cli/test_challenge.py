@@ -33,7 +33,7 @@ def test_a_sound_package_passes_and_says_what_is_not_known(package: Path) -> Non
     code, text = run("check", package)
     assert code == 0
     assert "the 3 actions build the 3 blocks" in text
-    assert "not published, to be given with --set: center" in text
+    assert "not published, to be given with --set: omega_ref" in text
 
 
 def test_a_broken_rule_ends_with_one(package: Path) -> None:

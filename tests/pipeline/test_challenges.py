@@ -254,7 +254,8 @@ def test_a_score_is_what_a_hand_calculates(flight: str) -> None:
 
 
 def test_what_is_not_known_is_said_and_not_guessed() -> None:
-    score = checked(package_files("five_blocks")).score
+    nowhere = S01.with_parameters({"center": None})
+    score = checked(package_files("five_blocks"), nowhere).score
     assert score is not None
     assert (score.performance, score.known, score.at_most) == (None, 10.0, 100.0)
     assert score.unknown[:2] == ("center", "omega_ref")
