@@ -11,7 +11,7 @@ from pathlib import Path
 from buildarena_client import Client, ClientError
 from buildarena_inspect.errors import BuildarenaInspectError
 from buildarena_inspect.importing import Imported, bring
-from buildarena_inspect.logs import LoggedSample, Unusable, logged_samples
+from buildarena_inspect.logs import LoggedSample, Unusable, logged_samples, state_of
 from buildarena_inspect.ranking import ranked
 
 
@@ -45,6 +45,7 @@ def _import(given: argparse.Namespace) -> int:
     clean = True
     with Client(given.url) as service:
         for path in _files(given.logs):
+            clean &= _counted(path)
             for sample in islice(logged_samples(path), given.limit):
                 found: Imported | Unusable = (
                     sample
@@ -71,11 +72,12 @@ def _told(found: Imported | Unusable) -> bool:
 
 def _rank(given: argparse.Namespace) -> int:
     samples: list[LoggedSample] = []
-    left = 0
+    clean = True
     for path in _files(given.logs):
+        clean &= _counted(path)
         for sample in logged_samples(path):
             if isinstance(sample, Unusable):
-                left += 1
+                clean = False
                 _say(f"{sample.sample} epoch {sample.epoch}: left out: {sample.why}")
             else:
                 samples.append(sample)
@@ -87,7 +89,14 @@ def _rank(given: argparse.Namespace) -> int:
             rate = "-" if row.success_rate_mean is None else f"{row.success_rate_mean:.0%}"
             before = " " * len(f"{simulator}: ")
             _say(f"{before}{rank:>4}  {mean:>9}  {rate:>7}  {row.trials:>6}  {row.model}")
-    return 1 if left else 0
+    return 0 if clean else 1
+
+
+def _counted(path: Path) -> bool:
+    """Says how many samples a log has; whether these are all that were planned."""
+    state = state_of(path)
+    _say(state.sentence)
+    return state.is_whole
 
 
 def _files(places: Sequence[Path]) -> list[Path]:

@@ -83,6 +83,51 @@ class Unusable:
     why: str
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogState:
+    """How far a log's evaluation came.
+
+    Attributes:
+        name: Of the file.
+        samples: How many it has.
+        planned: How many it was to have; None where it does not say.
+        status: Inspect's word: started, success, cancelled or error.
+    """
+
+    name: str
+    samples: int
+    planned: int | None
+    status: str
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all that was planned is there."""
+        return self.status == "success" and (self.planned is None or self.samples >= self.planned)
+
+    @property
+    def sentence(self) -> str:
+        """How many samples there are, and what is missing."""
+        planned = "" if self.planned is None else f" of {self.planned}"
+        count = f"{self.name}: {self.samples}{planned} samples"
+        if self.is_whole:
+            return count
+        if self.status == "success":
+            return f"{count}: it is partial"
+        return f"{count}: it is unfinished ({self.status})"
+
+
+def state_of(path: Path) -> LogState:
+    """How far a log's evaluation came.
+
+    Raises:
+        LogError: The file is no log.
+    """
+    header, summaries = _opened(path)
+    ids = header.eval.dataset.sample_ids
+    planned = len(ids) * (header.eval.config.epochs or 1) if ids else None
+    return LogState(name=path.name, samples=len(summaries), planned=planned, status=header.status)
+
+
 def logged_samples(path: Path) -> Iterator[LoggedSample | Unusable]:
     """The samples of a log, one after the other.
 
