@@ -151,3 +151,12 @@ def test_a_services_answers_as_frames(service, kind) -> None:
     assert len(results) == 6
     overall = leaderboard_frame(client.leaderboard(), overall=True, kind=kind)
     assert len(overall) in {0, 2}
+
+
+@pytest.mark.parametrize("kind", ["pandas", "polars"])
+def test_columns_stand_in_the_order_in_which_people_read(kind) -> None:
+    columns = list(jobs_frame([], kind=kind).columns)
+    assert columns[:7] == ["id", "task", "model", "seed", "outcome", "success", "indicator"]
+    assert len(columns) == len(set(columns))
+    assert list(sweeps_frame([], kind=kind).columns)[:2] == ["id", "name"]
+    assert list(results_frame([], kind=kind).columns)[1:4] == ["task", "model", "seed"]

@@ -46,6 +46,11 @@ PANDAS: Final = {
 UNIONS: Final = (types.UnionType, Union)
 TASK_COLUMNS: Final = ("task", "version", "indicator", "unit", "custom")
 """What a leaderboard's row says of its task."""
+FIRST: Final = (
+    *("id", "job", "job_id", "name", "task", "model", "seed"),
+    *("outcome", "success", "indicator"),
+)
+"""What people read first, in this order, where rows have it; the rest is as in the contract."""
 
 Columns = dict[str, str]
 """Types by name: time, float, int, bool, text, list, json; `?` for what may be missing."""
@@ -113,7 +118,10 @@ def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind
 
 
 def _frame(rows: Iterable[Any], row_type: Any, kind: Kind) -> Any:
-    return _made(rows, _columns(row_type), kind)
+    columns = _columns(row_type)
+    first = [name for name in FIRST if name in columns]
+    ordered = {name: columns[name] for name in dict.fromkeys((*first, *columns))}
+    return _made(rows, ordered, kind)
 
 
 def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> Any:
