@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 from dataclasses import replace
 
 import pytest
@@ -187,6 +189,23 @@ def test_states_are_values_and_lead_back(bridge_calls) -> None:
     played(elsewhere, bridge_calls[6:])
     assert elsewhere.submit().trial.score == ways[0].trial.score
     assert Snapshot.from_document(elsewhere.state().as_document()).done
+
+
+@pytest.mark.parametrize(
+    "copied",
+    [copy.deepcopy, lambda state: pickle.loads(pickle.dumps(state))],
+    ids=["copy", "pickle"],
+)
+def test_states_are_copied_and_sent_to_processes_after_a_trial_too(bridge_calls, copied) -> None:
+    environment = played(Environment("support-1", simulator="mujoco", rewards=ALL), bridge_calls)
+    for kept in (environment.state(), environment.submit() and environment.state()):
+        other = copied(kept)
+        assert other.as_document() == kept.as_document()
+        elsewhere = Environment("support-1", simulator="mujoco", rewards=ALL)
+        elsewhere.restore(other)
+        assert elsewhere.done == kept.done
+    assert elsewhere.reward == environment.reward
+    assert (other.trials[0].trajectory.positions == kept.trials[0].trajectory.positions).all()
 
 
 def test_states_of_assemblies_lead_back(experts) -> None:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from buildarena_benchmark.scorers.measures.stability import is_unstable
@@ -55,13 +54,13 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
         return Score(
             success=False,
             indicator=0.0,
-            metrics=MappingProxyType(metrics),
+            metrics=metrics,
             flags=(*flags, UNSTABLE.name),
         )
     return Score(
         success=verdict.success,
         indicator=verdict.indicator,
-        metrics=MappingProxyType(metrics),
+        metrics=metrics,
         flags=flags,
     )
 
@@ -95,7 +94,7 @@ def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:
     """
     del task  # every task's failure looks the same; the argument keeps the call like `score`
     metrics = _machine_metrics(machine) if machine is not None else {}
-    return Score(success=False, indicator=0.0, metrics=MappingProxyType(metrics), flags=())
+    return Score(success=False, indicator=0.0, metrics=metrics, flags=())
 
 
 def _finite(metrics: Mapping[str, Metric]) -> dict[str, Metric]:

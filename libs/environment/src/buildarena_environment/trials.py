@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any, Final, Protocol, Self
 
 import numpy as np
@@ -66,7 +65,7 @@ class Trial:
         measured = Score(
             success=bool(document["success"]),
             indicator=float(document["indicator"]),
-            metrics=MappingProxyType(dict(document["metrics"])),
+            metrics=dict(document["metrics"]),
             flags=tuple(document["flags"]),
         )
         return cls(
