@@ -18,6 +18,7 @@ from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
 
 from buildarena_environment import UnknownChoiceError
 from buildarena_openenv import BuildAction, BuildClient
+from buildarena_openenv import server as module
 from buildarena_openenv.environment import Terms
 from buildarena_openenv.server import build_app
 
@@ -142,3 +143,21 @@ def test_the_description_is_one_that_openenv_reads() -> None:
     assert manifest.name == "buildarena"
     module, _, name = yaml.safe_load((ROOM / "openenv.yaml").read_text())["app"].partition(":")
     assert isinstance(getattr(importlib.import_module(module), name), FastAPI)
+
+
+def test_weights_of_rewards_are_named_where_the_server_starts(monkeypatch, capsys) -> None:
+    offered: list[Terms] = []
+    monkeypatch.setattr(module, "build_app", lambda terms, **_: offered.append(terms))
+    monkeypatch.setattr(module.uvicorn, "run", lambda *_, **__: None)
+    module.main(["--reward", "success=1", "--reward", "indicator=0.5"])
+    module.main([])
+    assert [terms.rewards for terms in offered] == [{"success": 1.0, "indicator": 0.5}, None]
+    for wrong in ("indicator", "indicator=much", "indicator=nan"):
+        with pytest.raises(SystemExit) as ended:
+            module.main(["--reward", wrong])
+        assert ended.value.code == 2
+        assert "expected NAME=WEIGHT" in capsys.readouterr().err
+    monkeypatch.undo()
+    with pytest.raises(SystemExit):
+        module.main(["--reward", "beauty=1"])
+    assert "constraint_progress" in capsys.readouterr().err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Final
@@ -12,7 +13,7 @@ from fastapi import FastAPI
 from openenv.core.env_server.http_server import create_app
 from openenv.core.env_server.types import ConcurrencyConfig
 
-from buildarena_environment import DEFAULT_STEPS, TrialPool
+from buildarena_environment import DEFAULT_STEPS, REWARDS, TrialPool
 from buildarena_openenv.body_limit import BodyLimitMiddleware
 from buildarena_openenv.environment import (
     DEFAULT_TASK,
@@ -79,11 +80,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--port", type=int, default=8000)
     parser.add_argument("--task", default=DEFAULT_TASK, help="of episodes whose client names none")
     parser.add_argument("--simulator", default=DEFAULT_ENGINE)
+    parser.add_argument(
+        "--reward",
+        action="append",
+        type=_weight,
+        metavar="NAME=WEIGHT",
+        help=f"of {', '.join(REWARDS)}; may be given again; success=1 without one",
+    )
     parser.add_argument("--max-steps", type=int, default=DEFAULT_STEPS)
     parser.add_argument("--max-sessions", type=int, default=MAX_SESSIONS)
     parser.add_argument("--processes", type=int, default=None, help="that try machines")
     given = parser.parse_args(arguments)
-    terms = Terms(task=given.task, simulator=given.simulator, max_steps=given.max_steps)
+    terms = Terms(
+        task=given.task,
+        simulator=given.simulator,
+        max_steps=given.max_steps,
+        rewards=None if given.reward is None else dict(given.reward),
+    )
     try:
         app = build_app(terms, max_sessions=given.max_sessions, processes=given.processes)
     except ValueError as error:
@@ -95,6 +108,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         ws_max_size=MAX_MESSAGE,
         limit_concurrency=CONNECTIONS * given.max_sessions,
     )
+
+
+def _weight(text: str) -> tuple[str, float]:
+    name, equals, weight = text.partition("=")
+    try:
+        value = float(weight) if equals else math.nan
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(
+            f"{text[:60]!r}: expected NAME=WEIGHT, such as indicator=0.5"
+        )
+    return name, value
 
 
 if __name__ == "__main__":
