@@ -39,6 +39,28 @@ export async function taken<Data>(asked: Promise<{ data?: Data; error?: unknown;
   return answer.data;
 }
 
+/** The answer to a file that is sent as it is. */
+export async function sentFile<Data>(
+  path: string,
+  query: Record<string, string>,
+  file: File,
+  type = "application/octet-stream",
+): Promise<Data> {
+  let response: Response;
+  try {
+    response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, {
+      method: "POST",
+      body: file,
+      headers: { ...authorization(), "Content-Type": type },
+    });
+  } catch {
+    throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
+  }
+  const answer = (await response.json().catch(() => null)) as unknown;
+  if (!response.ok) throw refusal(response.status, answer);
+  return answer as Data;
+}
+
 /** Bytes that the contract does not describe, such as artifacts. */
 export async function bytesOf(path: string, accept = "*/*"): Promise<ArrayBuffer> {
   let response: Response;

@@ -47,14 +47,13 @@ from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import TurnRecord, TurnResult, Turns
 from buildarena_store.jobs.verifications import Verification, Verifications
 from buildarena_store.metrics import STAGE_SECONDS, Metrics, MetricValues
-from buildarena_store.packages import (
+from buildarena_store.package_values import (
     Checked,
     PackageChange,
-    Packages,
     PackageState,
     StoredPackage,
-    TooManyPackagesError,
 )
+from buildarena_store.packages import Packages, TooManyPackagesError
 from buildarena_store.states import (
     JobState,
     Outcome,

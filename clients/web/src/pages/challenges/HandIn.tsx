@@ -1,7 +1,8 @@
-import { Alert, Button, FileButton, Group, Stack, Table, Text, TextInput } from "@mantine/core";
+import { Alert, Button, Group, Stack, Table, Text, TextInput } from "@mantine/core";
 import { IconFileZip } from "@tabler/icons-react";
-import { useEffect, useState, type DragEvent } from "react";
+import { useEffect, useState } from "react";
 import { number } from "../../format";
+import { DropZone } from "../../parts/DropZone";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
 import { useHandIn, useLook, type Report, type Season } from "./queries";
@@ -12,47 +13,23 @@ export function HandIn({ season, track, isOpen }: { season: Season; track: strin
   const handIn = useHandIn();
   const [file, setFile] = useState<File | null>(null);
   const [name, setName] = useState("");
-  const [over, setOver] = useState(false);
   const { mutate, reset } = look;
   useEffect(() => {
     reset();
     if (file !== null) mutate({ file, season: season.name, track });
   }, [file, season.name, track, mutate, reset]);
-  const onDrop = (event: DragEvent): void => {
-    event.preventDefault();
-    setOver(false);
-    setFile(event.dataTransfer.files[0] ?? null);
-  };
   return (
     <Section title="Hand in a package">
       <Stack gap="sm">
-        <div
-          className="drop"
-          data-over={over ? "" : undefined}
-          onDragOver={(event) => {
-            event.preventDefault();
-            setOver(true);
-          }}
-          onDragLeave={() => {
-            setOver(false);
-          }}
-          onDrop={onDrop}
-        >
-          <Stack align="center" gap="xs">
-            <IconFileZip size={32} aria-hidden />
-            <Text fw={600}>Drop a ZIP file with the package&apos;s files here</Text>
-            <FileButton onChange={setFile} accept=".zip,application/zip" inputProps={{ "aria-label": "Package" }}>
-              {(props) => (
-                <Button variant="default" loading={look.isPending} {...props}>
-                  Choose a file
-                </Button>
-              )}
-            </FileButton>
-            <Text size="xs" className="dimmed">
-              It is checked first; nothing is kept before you hand it in.
-            </Text>
-          </Stack>
-        </div>
+        <DropZone
+          icon={<IconFileZip size={32} aria-hidden />}
+          title="Drop a ZIP file with the package's files here"
+          hint="It is checked first; nothing is kept before you hand it in."
+          label="Package"
+          accept=".zip,application/zip"
+          busy={look.isPending}
+          onFile={setFile}
+        />
         {look.isError && <ProblemNote error={look.error} />}
         {look.data !== undefined && file !== null && (
           <>

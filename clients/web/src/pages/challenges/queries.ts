@@ -1,8 +1,5 @@
 import { queryOptions, useMutation, useQueryClient } from "@tanstack/react-query";
-import { client, taken, type Schema } from "../../api/client";
-import { authorization } from "../../api/key";
-import { ApiError, refusal } from "../../api/problem";
-import { BASE } from "../../api/site";
+import { client, sentFile, taken, type Schema } from "../../api/client";
 
 export type SeasonView = Awaited<ReturnType<typeof askedFor>>;
 export type Season = SeasonView["season"];
@@ -27,6 +24,7 @@ export interface Report {
 }
 
 const EVERY_MS = 5000;
+const ZIP = "application/zip";
 
 export const seasons = () => queryOptions({ queryKey: ["seasons"], queryFn: () => taken(client.GET("/v1/seasons")) });
 
@@ -48,22 +46,6 @@ export const ownPackages = (name: string) =>
     refetchInterval: EVERY_MS,
   });
 
-async function sent<Data>(path: string, query: Record<string, string>, file: Blob): Promise<Data> {
-  let response: Response;
-  try {
-    response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, {
-      method: "POST",
-      body: file,
-      headers: { ...authorization(), "Content-Type": "application/zip" },
-    });
-  } catch {
-    throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
-  }
-  const answer = (await response.json().catch(() => null)) as unknown;
-  if (!response.ok) throw refusal(response.status, answer);
-  return answer as Data;
-}
-
 interface Entry {
   file: File;
   season: string;
@@ -74,14 +56,14 @@ interface Entry {
 export const useLook = () =>
   useMutation({
     mutationFn: ({ file, ...query }: Entry) =>
-      sent<Schema<"PackageReport">>("/v1/submissions/check", { ...query }, file),
+      sentFile<Schema<"PackageReport">>("/v1/submissions/check", { ...query }, file, ZIP),
   });
 
 export const useHandIn = () => {
   const known = useQueryClient();
   return useMutation({
     mutationFn: ({ file, ...query }: Entry & { name: string }) =>
-      sent<Schema<"ReceivedPackage">>("/v1/submissions", { ...query }, file),
+      sentFile<Schema<"ReceivedPackage">>("/v1/submissions", { ...query }, file, ZIP),
     onSuccess: (_, { season: name }) => known.invalidateQueries({ queryKey: ["seasons", name] }),
   });
 };

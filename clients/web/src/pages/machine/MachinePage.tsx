@@ -1,10 +1,11 @@
-import { Alert, Button, FileButton, Group, List, Select, Stack, Text, Title } from "@mantine/core";
+import { Alert, Button, Group, List, Select, Stack, Text, Title } from "@mantine/core";
 import { IconFileUpload, IconPlayerPlay } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { SimulatorSelect, useSimulator } from "../../parts/SimulatorSelect";
-import { lazy, Suspense, useState, type DragEvent } from "react";
+import { lazy, Suspense, useState } from "react";
 import { tasks as tasksQuery } from "../../api/queries";
 import { bytes, number } from "../../format";
+import { DropZone } from "../../parts/DropZone";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
 import { Loading } from "../../parts/States";
@@ -20,18 +21,12 @@ export default function MachinePage() {
   const look = useLook();
   const trial = useTrial();
   const [task, setTask] = useState(FIRST);
-  const [over, setOver] = useState(false);
-  const open = (file: File | null | undefined, of = task): void => {
+  const open = (file: File | null, of = task): void => {
     if (file == null) return;
     trial.reset();
     look.mutate({ file, task: of });
   };
   const dropped = look.data;
-  const onDrop = (event: DragEvent): void => {
-    event.preventDefault();
-    setOver(false);
-    open(event.dataTransfer.files[0]);
-  };
   return (
     <Stack gap="md">
       <div>
@@ -41,39 +36,17 @@ export default function MachinePage() {
           run; what you try stands on no leaderboard.
         </Text>
       </div>
-      <div
-        className="drop"
-        data-over={over ? "" : undefined}
-        onDragOver={(event) => {
-          event.preventDefault();
-          setOver(true);
+      <DropZone
+        icon={<IconFileUpload size={32} aria-hidden />}
+        title="Drop a machine document (JSON), a machine file of the game (.bsg) or a GLB here"
+        hint="Machines up to 2 MiB and 2,000 parts, GLB up to 16 MiB."
+        label="Machine file"
+        accept=".json,.bsg,.glb,application/json,model/gltf-binary"
+        busy={look.isPending}
+        onFile={(file) => {
+          open(file);
         }}
-        onDragLeave={() => {
-          setOver(false);
-        }}
-        onDrop={onDrop}
-      >
-        <Stack align="center" gap="xs">
-          <IconFileUpload size={32} aria-hidden />
-          <Text fw={600}>Drop a machine document (JSON), a machine file of the game (.bsg) or a GLB here</Text>
-          <FileButton
-            onChange={(file) => {
-              open(file);
-            }}
-            accept=".json,.bsg,.glb,application/json,model/gltf-binary"
-            inputProps={{ "aria-label": "Machine file" }}
-          >
-            {(props) => (
-              <Button variant="default" loading={look.isPending} {...props}>
-                Choose a file
-              </Button>
-            )}
-          </FileButton>
-          <Text size="xs" className="dimmed">
-            Machines up to 2 MiB and 2,000 parts, GLB up to 16 MiB.
-          </Text>
-        </Stack>
-      </div>
+      />
       {look.isError && <ProblemNote error={look.error} />}
       {look.data !== undefined && (
         <Section

@@ -1,9 +1,7 @@
 import { useMutation } from "@tanstack/react-query";
-import type { Schema } from "../../api/client";
-import { authorization } from "../../api/key";
+import { sentFile, type Schema } from "../../api/client";
 import { ApiError, refusal } from "../../api/problem";
 import type { JobView } from "../../api/queries";
-import { BASE } from "../../api/site";
 import type { GlbShape } from "./glb";
 
 export type Check = Schema<"MachineCheckView">;
@@ -15,22 +13,6 @@ export interface Dropped {
   file: File;
   glb: GlbShape | null;
   check: Check | null;
-}
-
-async function sent<Data>(path: string, query: Record<string, string>, file: File): Promise<Data> {
-  let response: Response;
-  try {
-    response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, {
-      method: "POST",
-      body: file,
-      headers: { ...authorization(), "Content-Type": "application/octet-stream" },
-    });
-  } catch {
-    throw new ApiError(0, null, "no answer came: is it running, and is the network there?");
-  }
-  const answer = (await response.json().catch(() => null)) as unknown;
-  if (!response.ok) throw refusal(response.status, answer);
-  return answer as Data;
 }
 
 /** What a file is told to be by its first bytes, and what it holds. */
@@ -46,7 +28,7 @@ async function looked(file: File, task: string | null): Promise<Dropped> {
     throw new Error(
       `a machine's file may have at most ${MAX_BYTES / 1024 / 1024} MiB; this one has ${(file.size / 1024 / 1024).toFixed(1)} MiB`,
     );
-  return { file, glb: null, check: await sent<Check>("/v1/machines/check", task === null ? {} : { task }, file) };
+  return { file, glb: null, check: await sentFile<Check>("/v1/machines/check", task === null ? {} : { task }, file) };
 }
 
 /** The same, and a refusal that names the file. */
@@ -65,6 +47,6 @@ export const useLook = () =>
 
 /** A machine's file put through a task's trial, on no leaderboard. */
 export const triedFile = ({ file, ...query }: { file: File; task: string; simulator: string }) =>
-  sent<JobView>("/v1/machines/trials", query, file);
+  sentFile<JobView>("/v1/machines/trials", query, file);
 
 export const useTrial = () => useMutation({ mutationFn: triedFile });

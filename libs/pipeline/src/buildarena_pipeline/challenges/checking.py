@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -17,6 +18,7 @@ from buildarena_pipeline.challenges.flights import (
     require_sound,
     require_target,
 )
+from buildarena_pipeline.challenges.likeness import digest, nameless, shape_of_file
 from buildarena_pipeline.challenges.machines import (
     cost_of,
     read_actions,
@@ -42,6 +44,7 @@ from buildarena_pipeline.challenges.trials import (
     read_machine,
     require_modules,
     require_playable,
+    shape_of,
     task_named,
     term_of,
 )
@@ -71,7 +74,7 @@ class Report:
         return all(finding.passed for finding in self.findings)
 
 
-class _Contents:
+class Contents:
     """A package's files, and what every season asks of them."""
 
     def __init__(self, package: Package, season: Season, track: str) -> None:
@@ -96,6 +99,21 @@ class _Contents:
     def score(self) -> PackageScore:
         """The score; `scored_checks` passed."""
         raise NotImplementedError
+
+    def fingerprints(self) -> frozenset[str]:
+        """What near-copies share, as far as the files can be read."""
+        raise NotImplementedError
+
+    def report(self) -> Report:
+        """Every check, and the score where what is scored keeps the rules."""
+        findings = tuple(_finding(name, check) for name, check in self.checks.items())
+        failed = {finding.check for finding in findings if not finding.passed}
+        return Report(
+            season=self.season.name,
+            track=self.track_name,
+            findings=findings,
+            score=None if failed & self.scored_checks else self.score(),
+        )
 
     def file(self, name: str) -> bytes:
         """A file's bytes.
@@ -138,7 +156,7 @@ class _Contents:
         return f"{len(text):,} characters"
 
 
-class _Flight(_Contents):
+class _Flight(Contents):
     """A flight in the game: histories, machines and what the tracker wrote."""
 
     def __init__(self, package: Package, season: Season, track: str, rule: OrbitScore) -> None:
@@ -170,7 +188,7 @@ class _Flight(_Contents):
             "programs": self._programs,
             "tuned": self._tuned,
             "target": self._target,
-            "samples": self._samples,
+            "samples": lambda: self.soundness,
             "jumps": self._jumps,
         }
 
@@ -183,6 +201,14 @@ class _Flight(_Contents):
         return score_flight(
             self.flight, self.rule, self.track, cost=cost, track_name=self.track_name
         )
+
+    def fingerprints(self) -> frozenset[str]:
+        prints = set()
+        with suppress(CheckFailed):
+            prints.add(digest([nameless(action) for action in self.valid]))
+        with suppress(CheckFailed):
+            prints.add(digest(shape_of_file(self.raw)))
+        return frozenset(prints)
 
     def _history(self) -> str:
         names = (self.names.history, self.names.raw)
@@ -209,25 +235,39 @@ class _Flight(_Contents):
     def _target(self) -> str:
         return require_target(self.flight, self.raw, self.names.trajectory)
 
-    def _samples(self) -> str:
+    @cached_property
+    def soundness(self) -> str:
         return require_sound(self.flight, self.rule.tracker, self.names.trajectory)
 
     def _jumps(self) -> str:
-        self._samples()
+        # Steps between samples mean something only where these are sound.
+        _ = self.soundness
         return require_no_jump(self.flight, self.rule.tracker, self.names.trajectory)
 
 
-class _Trials(_Contents):
+class _Trials(Contents):
     """Machines for some tasks, which are tried here."""
 
     def __init__(self, package: Package, season: Season, track: str, rule: TrialsScore) -> None:
         super().__init__(package, season, track)
-        self.rule = rule
+        self.rule, self._read = rule, dict[str, Machine]()
 
     @cached_property
     def machines(self) -> dict[str, Machine]:
-        names = {task: machine_file(task) for task in self.rule.tasks}
-        return {task: read_machine(self.file(name), name) for task, name in names.items()}
+        return {task: self._machine(task) for task in self.rule.tasks}
+
+    def _machine(self, task: str) -> Machine:
+        if task not in self._read:
+            name = machine_file(task)
+            self._read[task] = read_machine(self.file(name), name)
+        return self._read[task]
+
+    def fingerprints(self) -> frozenset[str]:
+        prints = set()
+        for task in self.rule.tasks:
+            with suppress(CheckFailed):
+                prints.add(digest(shape_of(self._machine(task))))
+        return frozenset(prints)
 
     @property
     def own_checks(self) -> dict[str, Callable[[], str]]:
@@ -269,14 +309,15 @@ def check_package(package: Package, season: Season, track: str) -> Report:
     Raises:
         SeasonError: The season has no such track.
     """
-    contents = _contents(package, season, track)
-    findings = tuple(_finding(name, check) for name, check in contents.checks.items())
-    failed = {finding.check for finding in findings if not finding.passed}
-    score = None if failed & contents.scored_checks else contents.score()
-    return Report(season=season.name, track=track, findings=findings, score=score)
+    return contents_of(package, season, track).report()
 
 
-def _contents(package: Package, season: Season, track: str) -> _Contents:
+def contents_of(package: Package, season: Season, track: str) -> Contents:
+    """The package's files, each read once and only where a check needs it.
+
+    Raises:
+        SeasonError: The season has no such track.
+    """
     if track not in season.tracks:
         raise SeasonError(
             f"{season.name} has no track {track[:40]!r}; there is {', '.join(season.tracks)}"

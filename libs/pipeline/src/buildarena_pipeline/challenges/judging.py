@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any, Final
 
-from buildarena_besiege.importing.xml_file import FileMachine
-from buildarena_pipeline.challenges.checking import Report, check_package
-from buildarena_pipeline.challenges.findings import CheckFailed
-from buildarena_pipeline.challenges.machines import read_actions, read_file
+from buildarena_pipeline.challenges.checking import Report, contents_of
 from buildarena_pipeline.challenges.package import (
     Package,
     PackageError,
     packed_package,
     read_package,
 )
-from buildarena_pipeline.challenges.scores import PackageScore
-from buildarena_pipeline.challenges.season import Season, TrialsScore
-from buildarena_pipeline.challenges.trials import read_machine, shape_of
+from buildarena_pipeline.challenges.scores import PackageScore, ranks_of
+from buildarena_pipeline.challenges.season import Season
 from buildarena_store import Checked
-
-_WORDS: Final = frozenset({"note", "name", "machine_name"})
-"""Arguments that name things: they make no other machine."""
-_DECIMALS: Final = 3
 
 
 def checked_package(data: bytes, season: Season, track: str) -> Checked:
@@ -50,7 +38,8 @@ def checked_package(data: bytes, season: Season, track: str) -> Checked:
             cost=None,
             fingerprints=(),
         )
-    report = check_package(package, season, track)
+    contents = contents_of(package, season, track)
+    report = contents.report()
     score = report.score
     return Checked(
         passed=report.passed,
@@ -59,7 +48,7 @@ def checked_package(data: bytes, season: Season, track: str) -> Checked:
         rules=season.digest,
         points=None if score is None else score.points,
         cost=None if score is None else score.cost,
-        fingerprints=sorted(fingerprints(package, season)),
+        fingerprints=sorted(contents.fingerprints()),
     )
 
 
@@ -114,8 +103,7 @@ def ranked(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     passing = [entry for entry in entries if not entry.refused and entry.score is not None]
     points = [entry.score.points for entry in passing if entry.score is not None]
     with_rank = [
-        replace(entry, rank=1 + sum(other > own for other in points))
-        for entry, own in zip(passing, points, strict=True)
+        replace(entry, rank=rank) for entry, rank in zip(passing, ranks_of(points), strict=True)
     ]
     with_rank.sort(key=lambda entry: (entry.rank, entry.name))
     return (*with_rank, *(entry for entry in entries if entry not in passing))
@@ -126,56 +114,16 @@ def _judged(place: Path, season: Season, track: str) -> tuple[Entry, frozenset[s
         package = read_package(place)
     except PackageError as error:
         return Entry(name=place.name, refused=str(error)), frozenset()
-    report = check_package(package, season, track)
+    contents = contents_of(package, season, track)
+    report = contents.report()
     refused = next((each.sentence for each in report.findings if not each.passed), "")
     entry = Entry(name=place.name, report=report, refused=refused, score=report.score)
-    return entry, fingerprints(package, season)
+    return entry, contents.fingerprints()
 
 
 def fingerprints(package: Package, season: Season) -> frozenset[str]:
-    """What near-copies share: the history without names, and the raw machine without guids."""
-    return frozenset(_fingerprints(package, season))
-
-
-def _fingerprints(package: Package, season: Season) -> Iterator[str]:
-    if isinstance(season.score, TrialsScore):
-        shapes = (_shape_of_file(package, name) for name in season.score.file_names)
-        yield from map(_digest, filter(None, shapes))
-        return
-    names = season.score.files
-    with suppress(CheckFailed, KeyError):
-        actions = read_actions(package.files[names.history], names.history)
-        yield _digest([_nameless(action) for action in actions])
-    with suppress(CheckFailed, KeyError):
-        yield _digest(_shape(read_file(package.files[names.raw], names.raw)))
-
-
-def _shape_of_file(package: Package, name: str) -> list[list[object]] | None:
-    with suppress(CheckFailed, KeyError):
-        return shape_of(read_machine(package.files[name], name))
-    return None
-
-
-def _nameless(action: dict[str, Any]) -> list[Any]:
-    arguments = action.get("params", action.get("arguments", {}))
-    kept = {name: value for name, value in arguments.items() if name not in _WORDS}
-    return [action.get("op", action.get("name")), kept]
-
-
-def _shape(machine: FileMachine) -> list[Any]:
-    """A machine's blocks, in no order: a block and its turn, whichever sign the turn is written."""
-    return sorted(
-        [block.type, *_rounded(block.position), *_rounded(map(abs, block.rotation))]
-        for block in machine.blocks
-    )
-
-
-def _rounded(numbers: Any) -> list[float]:
-    return [round(number, _DECIMALS) + 0.0 for number in numbers]
-
-
-def _digest(content: list[Any]) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+    """What near-copies share: the history without names, and machines without guids."""
+    return contents_of(package, season, next(iter(season.tracks))).fingerprints()
 
 
 def _copies(k: int, prints: Sequence[frozenset[str]], names: Sequence[str]) -> Iterator[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any, Final, Protocol
 
 from buildarena_besiege.errors import MachineFileError
@@ -240,7 +241,8 @@ def _spelled(action: dict[str, Any]) -> str:
     return json.dumps([_name_of(action), arguments], sort_keys=True)
 
 
-def _names_by_type() -> dict[int, str]:
+@cache
+def _names_by_type() -> Mapping[int, str]:
     return {module.besiege_id: module.name for module in module_set("all").values()}
 
 

@@ -110,6 +110,14 @@ def summed(
     )
 
 
+def ranks_of(points: Sequence[float]) -> list[int]:
+    """The rank of each score, 1 for the greatest; equal scores share the better one."""
+    first: dict[float, int] = {}
+    for place, own in enumerate(sorted(points, reverse=True), start=1):
+        first.setdefault(own, place)
+    return [first[own] for own in points]
+
+
 def swept_angle(position: Floats, center: tuple[float, float, float]) -> float:
     """How far a path goes round a point, rad, at least 0.
 

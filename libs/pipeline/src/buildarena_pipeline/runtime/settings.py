@@ -37,11 +37,15 @@ def _simulator_name(name: str) -> str:
 SimulatorName = Annotated[str, AfterValidator(_simulator_name)]
 SimulatorVersion = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,40}$")]
 BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
+PAGES: Final = (
+    *("sweeps", "jobs", "transcripts", "tasks", "models", "compare", "method", "build", "machine"),
+    "challenges",
+)
+"""First parts of the addresses of the dashboard's pages."""
 OWN_PATHS: Final = frozenset(
     (
         *("v1", "docs", "openapi.json", "static-offline-docs"),
-        *("assets", "sweeps", "jobs", "tasks", "models", "compare", "build", "machine"),
-        *("challenges", "transcripts", "method", "favicon.svg", "scheme.js", "index.html"),
+        *("assets", *PAGES, "favicon.svg", "scheme.js", "index.html"),
     )
 )
 """First parts of the API's and the dashboard's own paths; none can be a base path's."""

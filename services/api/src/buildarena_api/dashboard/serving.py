@@ -11,11 +11,9 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from buildarena_api.dashboard.files import INDEX, PageFile
+from buildarena_pipeline.runtime.settings import PAGES
 
-PAGE: Final = re.compile(
-    r"/(?:(?:sweeps|jobs|transcripts|tasks|models|compare|method|build|machine|challenges)"
-    r"(?:/[^\x00-\x1f\x7f]*)?)?"
-)
+PAGE: Final = re.compile(rf"/(?:(?:{'|'.join(PAGES)})(?:/[^\x00-\x1f\x7f]*)?)?")
 """Addresses of pages: the page itself reads which, so all of them get the same file."""
 _SOURCES: Final = {
     "default-src": "'none'",

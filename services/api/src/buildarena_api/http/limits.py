@@ -9,6 +9,7 @@ from typing import Final
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.admission import (
@@ -34,6 +35,25 @@ SECURITY_HEADERS = {
 }
 
 log = structlog.get_logger(__name__)
+
+
+async def whole_body(request: Request, most: int, what: str) -> bytes:
+    """The body of a route that reads it in pieces, as long as it is of an acceptable size.
+
+    Args:
+        request: Whose path is one of `BodyLimitMiddleware`'s unlimited ones.
+        most: The most bytes that it may have.
+        what: What it is, for the message.
+
+    Raises:
+        ProblemError: 413, while it still comes.
+    """
+    data = bytearray()
+    async for chunk in request.stream():
+        data += chunk
+        if len(data) > most:
+            raise ProblemError(413, f"{what} has at most {most:,} bytes")
+    return bytes(data)
 
 
 class BodyLimitMiddleware:

@@ -12,9 +12,11 @@ from pydantic import BaseModel, Field
 from buildarena_api.dependencies import ContextDep, ExportingDep
 from buildarena_api.http.access import Caller, CallerDep, admin_only
 from buildarena_api.http.concurrency import limited
+from buildarena_api.http.limits import whole_body
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.package_checks import PackageChecks
 from buildarena_pipeline.challenges.package import MAX_BYTES
+from buildarena_pipeline.challenges.scores import ranks_of
 from buildarena_pipeline.challenges.season import Season
 from buildarena_pipeline.runtime.context import Context
 from buildarena_store import PackageState, StoredPackage, TooManyPackagesError
@@ -152,11 +154,8 @@ def season_board(
     track = track or next(iter(season.tracks))
     _require_track(season, track)
     rows = context.store.packages.board(name, track)
-    points = [row.points or 0.0 for row in rows]
-    return [
-        Ranked(rank=1 + sum(other > own for other in points), package=_view(row))
-        for row, own in zip(rows, points, strict=True)
-    ]
+    ranks = ranks_of([row.points or 0.0 for row in rows])
+    return [Ranked(rank=rank, package=_view(row)) for rank, row in zip(ranks, rows, strict=True)]
 
 
 @router.post(
@@ -172,7 +171,9 @@ async def check_package(
     rules = _season(seasons_of(request), season)
     _require_track(rules, track)
     checks: PackageChecks = request.app.state.package_checks
-    checked = await exporting.run(checks.look, await _received(request), rules, track)
+    checked = await exporting.run(
+        checks.look, await whole_body(request, MAX_BYTES, "a package"), rules, track
+    )
     return PackageReport(
         passed=checked.passed,
         reason=checked.reason,
@@ -207,7 +208,7 @@ async def submit_package(
     season = _season(seasons_of(request), entry.season)
     _require_track(season, entry.track)
     _require_open(season)
-    data = await _received(request)
+    data = await whole_body(request, MAX_BYTES, "a package")
     stored, added = await exporting.run(
         _receive, exporting.context, data, entry, season, caller.key_id or ""
     )
@@ -300,16 +301,6 @@ def withdraw_package(package: PackageId, context: ContextDep, caller: CallerDep)
         owner=None if caller.is_admin else caller.key_id,
     )
     return _detail(context, stored, caller)
-
-
-async def _received(request: Request) -> bytes:
-    """The request's body, as long as it is of an acceptable size."""
-    data = bytearray()
-    async for chunk in request.stream():
-        data += chunk
-        if len(data) > MAX_BYTES:
-            raise ProblemError(413, f"a package has at most {MAX_BYTES:,} bytes")
-    return bytes(data)
 
 
 def _receive(

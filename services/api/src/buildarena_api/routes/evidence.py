@@ -13,6 +13,7 @@ from buildarena_api.dependencies import ContextDep, ExportingDep
 from buildarena_api.evidence_uploads import shared_evidence_checker
 from buildarena_api.http.access import CallerDep, admin_only
 from buildarena_api.http.concurrency import limited
+from buildarena_api.http.limits import whole_body
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_pipeline.evidence import EvidenceTable, Verdict
 from buildarena_pipeline.evidence.archive_names import MAX_BYTES
@@ -73,7 +74,7 @@ async def add_evidence(
     No verdict in it is believed: its logs and machine files are read and judged here, and the
     sender's verdicts that they do not bear out are marked. The same file twice changes nothing.
     """
-    data = await _received(request)
+    data = await whole_body(request, MAX_BYTES, "a file of evidence")
     stored, added = await exporting.run(_add, exporting.context, data, caller.key_id)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"{PATH}/{stored.hash}"
@@ -112,16 +113,6 @@ def evidence_file(
     stored = _named(context, id_)
     headers = {"Content-Disposition": f'attachment; filename="evidence-{stored.hash[:12]}.zip"'}
     return Response(context.artifacts.get(stored.hash), media_type=ZIP, headers=headers)
-
-
-async def _received(request: Request) -> bytes:
-    """The request's body, as long as it is of an acceptable size."""
-    data = bytearray()
-    async for chunk in request.stream():
-        data += chunk
-        if len(data) > MAX_BYTES:
-            raise ProblemError(413, f"a file of evidence has at most {MAX_BYTES:,} bytes")
-    return bytes(data)
 
 
 def _add(context: Context, data: bytes, owner: str | None) -> tuple[StoredEvidence, bool]:
