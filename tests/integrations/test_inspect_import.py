@@ -59,11 +59,12 @@ def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, c
     with live_api(context) as url, httpx.Client(base_url=url) as client:
         code, first = bring(url, logs / "honest.eval", "--wait", 0)
         assert code == 1, first
+        assert first[0] == "honest.eval: 4 of 4 samples"
         assert sum("has not ended yet" in line for line in first) == 2
         work(context)
         code, second = bring(url, logs / "honest.eval")
-        assert (code, len(second)) == (0, 4), second
-        assert all("by agent/inspect-mockllm-model, brought before" in line for line in second)
+        assert (code, len(second)) == (0, 5), second
+        assert all("by agent/inspect-mockllm-model, brought before" in line for line in second[1:])
         assert [re.findall(r"job_\w+", line) for line in second] == [
             re.findall(r"job_\w+", line) for line in first
         ]
@@ -108,7 +109,7 @@ def test_what_the_service_refuses_is_told(logs, context) -> None:
         assert code == 2
         assert "1 to 80 letters" in told[-1]
     code, told = bring(url, logs / "honest.eval")
-    assert (code, told[0][:24]) == (2, "no BuildArena answers at")
+    assert (code, told[1][:24]) == (2, "no BuildArena answers at")
 
 
 def test_jobs_belong_to_the_key_and_its_name_is_nobody_elses(logs, context) -> None:
@@ -119,7 +120,7 @@ def test_jobs_belong_to_the_key_and_its_name_is_nobody_elses(logs, context) -> N
         assert code == 2, told
         code, told = bring(url, logs / "honest.eval", "--limit", 1, "--wait", 0, key=mine.secret)
         (job,) = mine.get("/v1/jobs")["jobs"]
-        assert (job["owner"], job["id"] in told[0]) == (mine.id, True)
+        assert (job["owner"], job["id"] in told[1]) == (mine.id, True)
         code, told = bring(url, logs / "honest.eval", "--limit", 1, key=theirs.secret)
         assert code == 2
         assert "inspect-mockllm-model" in told[-1]
