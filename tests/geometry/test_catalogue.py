@@ -193,7 +193,7 @@ BROKEN = [
     (edit(physics={**WOOD["physics"], "joint_type": "glue"}), "expected one of attachment, axle"),
     (edit(physics={**WOOD["physics"], "friction": -1}), "friction: expected a number of at least"),
     (edit(landmarks=[{"name": "fire", "along": 1, "heats": True}]), "radius: expected the radius"),
-    (other(BRACE, link="glue"), "link: expected one of rigid, rope, spring"),
+    (other(BRACE, link="glue"), "link: expected one of hose, rigid, rope, spring"),
     (other(WHEEL, motor={**WHEEL["motor"], "torque": 0}), "torque: expected a number above 0"),
     (other(CANNON, thrust={**CANNON["thrust"], "spheres": [{"along": 1}]}), "radius is missing"),
 ]

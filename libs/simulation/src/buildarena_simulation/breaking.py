@@ -20,7 +20,13 @@ from buildarena_simulation.structure.contacts import (
     together,
 )
 from buildarena_simulation.structure.loads import JointLoads, LoadModel
-from buildarena_simulation.structure.model import JOINT_KINDS, BoolArray, FloatArray, IntArray
+from buildarena_simulation.structure.model import (
+    JOINT_KINDS,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Structure,
+)
 from buildarena_simulation.structure.motion import Motion, rope_ends
 from buildarena_simulation.structure.supports import EdgeSupports
 from buildarena_simulation.structure.vectors import turned
@@ -61,7 +67,7 @@ class BreakingModel:
         self._field, self._gravity = world.field, world.gravity
         self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
         self.bearing = BearingMeter(structure, len(world.terrain), gravity=world.gravity)
-        self._loads = LoadModel(structure, clusters, motion, gravity=world.gravity)
+        self._loads = LoadModel(structure, clusters, motion, gravity=world.even_gravity)
         self._enter(clusters)
         self._interval_s, self._unseen_s, self._calm = interval_s, 0.0, False
         self._peaks = np.zeros((3, len(structure.members)))
@@ -79,8 +85,28 @@ class BreakingModel:
         self._cargo_mass, self._machine_mass = 0.0, float(structure.masses.sum())
 
     def blow(self, wind: FloatArray) -> None:
-        """Says what accelerates every mass from now on beside gravity, (3,), units/s²."""
+        """Says what accelerates masses from now on beside even gravity; see `LoadModel.wind`."""
         self._loads.wind = wind
+
+    @property
+    def holds(self) -> BoolArray:
+        """Which joints hold, (M,)."""
+        return self._loads.holds
+
+    def weigh(self, engine: Engine, structure: Structure) -> None:
+        """Takes the machine as it weighs now.
+
+        Args:
+            engine: The engine, which is given new bodies.
+            structure: The same machine with other masses.
+        """
+        self._structure, before = structure, self.clusters
+        after = find_clusters(structure, self._loads.holds)
+        self.motion = self.motion.after_break(before, after)
+        self._loads.weigh(structure)
+        self._enter(after)
+        engine.enter(after, self.motion)
+        self._loads.rebuild(after, self.motion)
 
     def follow(
         self,

@@ -30,6 +30,7 @@ ROOTS: Final = (
     "fuel_s",
     "gravity",
     "drive_strength",
+    "planet",
 )
 """What of a scenario may be drawn."""
 _DIGITS: Final = 3

@@ -22,8 +22,10 @@ class ForceSchedule:
     """Commands of some steps, one row each.
 
     Attributes:
-        pushing: (S, P) how far each fan is asked to push, 0 to 1.
+        pushing: (S, P) how far each block that pushes is asked to, -1 to 1.
         heights: (S, A) by how much each held height was moved, units.
+        open: (S, B) whether each brake is open.
+        turning: (S, F) how far each flywheel is asked to turn its block, -1 to 1.
         let_go: (S, D) whether each decoupler's key was pressed by then.
         rests: (S, K) length of each spring at rest, as a share of its built length.
         grab: (S, G) whether each grip is asked to.
@@ -32,6 +34,8 @@ class ForceSchedule:
 
     pushing: FloatArray
     heights: FloatArray
+    open: FloatArray
+    turning: FloatArray
     let_go: BoolArray
     rests: FloatArray
     grab: BoolArray
@@ -47,6 +51,8 @@ class ForceSchedule:
         return Commands(
             pushing=self.pushing[step],
             heights=self.heights[step],
+            open=self.open[step],
+            turning=self.turning[step],
             kicks=kicks,
             rests=self.rests[step],
         )
@@ -58,11 +64,13 @@ class ForceState:
 
     Attributes:
         moved: (A,) for how many steps each held height has risen.
+        opened: (B,) whether each brake that opens for good did by now.
         let_go: (D,) whether each decoupler was asked to by now.
         rests: (K,) length of each spring at rest, as a share of its built length.
     """
 
     moved: FloatArray
+    opened: BoolArray
     let_go: BoolArray
     rests: FloatArray
 
@@ -71,6 +79,7 @@ class ForceState:
         """Before anything was asked for."""
         return cls(
             moved=np.zeros(len(forces.altitudes)),
+            opened=np.zeros(len(forces.brakes), dtype=bool),
             let_go=np.zeros(len(forces.decouplers), dtype=bool),
             rests=np.ones(len(structure.ropes.spring_of)),
         )
@@ -106,6 +115,8 @@ def plan_forces(
         push = structure.parts[block].module.push
         if push is not None:
             pushing[:, k] = levels(int(block), push.action)
+            if push.reverse is not None:
+                pushing[:, k] -= levels(int(block), push.reverse)
     if control.mode == "held":
         pushing[times >= control.from_s - 1e-9] = 1.0
     heights = np.zeros((len(times), len(forces.altitudes)))
@@ -113,6 +124,9 @@ def plan_forces(
         moved = levels(int(block), of.rise) - levels(int(block), of.sink)
         steps = state.moved[k] + np.cumsum(moved)
         heights[:, k], state.moved[k] = steps * of.rate * time_step_s, steps[-1]
+    turning = np.zeros((len(times), len(forces.flywheels)))
+    for k, (block, wheel) in enumerate(zip(forces.flywheels, forces.flywheel_of, strict=True)):
+        turning[:, k] = levels(int(block), wheel.left) - levels(int(block), wheel.right)
     let_go = np.zeros((len(times), len(forces.decouplers)), dtype=bool)
     for k, block in enumerate(forces.decouplers):
         decoupling = structure.parts[block].module.decouple
@@ -124,11 +138,27 @@ def plan_forces(
     return ForceSchedule(
         pushing=pushing,
         heights=heights,
+        open=_opened(forces, levels, state, len(times)),
+        turning=turning,
         let_go=let_go,
         rests=_rests(structure, levels, state, len(times), time_step_s),
         grab=grab,
         release=release,
     )
+
+
+def _opened(forces: OwnForces, levels: Levels, state: ForceState, step_count: int) -> FloatArray:
+    """Whether each brake is open, (S, B)."""
+    opened = np.zeros((step_count, len(forces.brakes)))
+    for k, (block, brake) in enumerate(zip(forces.brakes, forces.brake_of, strict=True)):
+        asked = np.zeros(step_count, dtype=bool)
+        for action in brake.actions:
+            asked |= levels(int(block), action) > _ON
+        if brake.opens == "once":
+            asked = np.logical_or.accumulate(asked) | state.opened[k]
+            state.opened[k] = asked[-1]
+        opened[:, k] = asked if brake.opens == "once" else ~asked
+    return opened
 
 
 def _grabbing(

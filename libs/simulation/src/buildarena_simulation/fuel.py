@@ -43,7 +43,7 @@ class Tank:
             return
         burnt = drives.firing @ self._cannons
         if forces is not None:
-            burnt = burnt + forces.pushing @ self._fans
+            burnt = burnt + np.abs(forces.pushing) @ self._fans
         left = self.left_s - time_step_s * np.cumsum(burnt)
         empty = left < 0.0
         drives.firing[empty] = 0.0

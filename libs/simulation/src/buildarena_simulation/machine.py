@@ -90,7 +90,12 @@ def structure_of(machine: "Machine") -> Structure:
                 spring=connector.module.spring,
             )
         )
-    return build_structure(parts, links, ropes)
+    hoses = [
+        Rope(**_span(connector, index), mass=connector.module.mass)
+        for connector in connectors
+        if connector.module.link == "hose"
+    ]
+    return build_structure(parts, links, ropes, hoses)
 
 
 class _Span(TypedDict):

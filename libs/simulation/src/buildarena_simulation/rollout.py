@@ -33,6 +33,7 @@ from buildarena_simulation.processor import warn_if_late
 from buildarena_simulation.scenario import Control, Scenario
 from buildarena_simulation.structure.force_field import field_of
 from buildarena_simulation.structure.model import Structure
+from buildarena_simulation.structure.planet import Surroundings
 from buildarena_simulation.threads import single_threaded
 from buildarena_simulation.trajectory import Trajectory
 from buildarena_simulation.trial import Decision, Trial
@@ -211,7 +212,12 @@ class Rollout:
             gravity=scenario.gravity,
             drive_strength=scenario.drive_strength,
             substeps=substeps,
-            field=field_of(structure, drive_strength=scenario.drive_strength),
+            field=field_of(
+                structure,
+                drive_strength=scenario.drive_strength,
+                around=surroundings_of(scenario),
+            ),
+            planet=None if scenario.planet is None else scenario.planet.radius,
         )
         if control is not None:
             scenario = scenario.model_copy(update={"control": control})
@@ -286,6 +292,19 @@ def world_of(scenario: Scenario, trajectory: Trajectory) -> Scenario:
     """What a trial in a scenario was put through, with what its seed drew."""
     seed = trajectory.settings.get(SEED)
     return scenario.world(None if seed is None else int(seed))
+
+
+def surroundings_of(scenario: Scenario) -> Surroundings:
+    """The gravity and the air of a scenario."""
+    planet = scenario.planet
+    if planet is None:
+        return Surroundings(gravity=scenario.gravity)
+    return Surroundings(
+        gravity=scenario.gravity,
+        radius=planet.radius,
+        air=planet.air,
+        air_height=planet.air_height,
+    )
 
 
 def _unusual(scenario: Scenario) -> dict[str, float]:

@@ -6,7 +6,7 @@ may come from strangers, so every number has bounds within which the engines sta
 """
 
 import math
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
@@ -19,32 +19,29 @@ from pydantic import (
 
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.draws import Draws, at_end, drawn
+from buildarena_simulation.fields import (
+    MAX_DURATION_S,
+    BlockId,
+    CargoExtent,
+    Coordinate,
+    Distance,
+    Gravity,
+    Heading,
+    Instant,
+    Label,
+    Mass,
+    Period,
+    PushSpeed,
+    Speed,
+    Strength,
+    Swing,
+    TerrainExtent,
+    is_default,
+)
 from buildarena_simulation.line import Line
 from buildarena_simulation.offered import Senses
+from buildarena_simulation.planet import Planet
 from buildarena_simulation.rounded_terrain import with_boxes
-
-MAX_DURATION_S: Final = 600.0
-
-Coordinate = Annotated[float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
-Distance = Annotated[float, Field(gt=0, le=1000)]
-TerrainExtent = Annotated[float, Field(ge=0.1, le=1000)]
-CargoExtent = Annotated[float, Field(ge=0.1, le=100)]
-Mass = Annotated[float, Field(ge=0.01, le=100_000)]
-Instant = Annotated[float, Field(ge=0, le=MAX_DURATION_S)]
-Speed = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
-Swing = Annotated[float, Field(allow_inf_nan=False, ge=-100, le=100)]
-Period = Annotated[float, Field(ge=1, le=600)]
-PushSpeed = Annotated[float, Field(allow_inf_nan=False, ge=-20, le=20)]
-Heading = Annotated[float, Field(ge=-180, le=180, exclude_if=lambda value: value == 0)]
-Label = Annotated[str, Field(pattern=r"^[\w -]+$", min_length=1, max_length=40)]
-Gravity = Annotated[float, Field(ge=5, le=100)]
-Strength = Annotated[float, Field(ge=0.1, le=10)]
-BlockId = Annotated[str, Field(min_length=1, max_length=40)]
-
-
-def _is_default(value: Any) -> bool:
-    """Whether an addition to the format is unused: older texts and hashes stay as they were."""
-    return value is None or value is False or value in ((), {})
 
 
 class _Document(BaseModel):
@@ -93,7 +90,7 @@ class Cargo(_Document):
     ramp_s: Annotated[float, Field(gt=0, le=MAX_DURATION_S)]
     at: Annotated[
         tuple[Coordinate, Coordinate, Annotated[float, Field(ge=0, le=1000)]] | None,
-        Field(exclude_if=_is_default),
+        Field(exclude_if=is_default),
     ] = None
     heading_deg: Heading = 0.0
 
@@ -192,7 +189,7 @@ class Mark(_Document):
     name: Label
     center: tuple[Coordinate, Coordinate, Coordinate]
     radius: Distance
-    drift: Annotated[Drift | None, Field(exclude_if=_is_default)] = None
+    drift: Annotated[Drift | None, Field(exclude_if=is_default)] = None
 
     def at(self, time_s: float) -> tuple[float, float, float]:
         """Where it is at a time, (3,), world frame, units."""
@@ -218,7 +215,7 @@ class Control(_Document):
 
     mode: Literal["agent", "held", "none"] = "none"
     from_s: Instant = 0.0
-    until_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
+    until_s: Annotated[Instant | None, Field(exclude_if=is_default)] = None
 
 
 class Gusts(_Document):
@@ -248,7 +245,7 @@ class Push(_Document):
 class Scenario(_Document):
     """Everything about a trial but the machine and the engine.
 
-    The world frame is x east, y north, z up; the ground is the plane z = 0.
+    The world frame is x east, y north, z up; the ground is the plane z = 0, or a planet's.
 
     Attributes:
         duration_s: Length of the trial, seconds.
@@ -272,6 +269,8 @@ class Scenario(_Document):
         fuel_s: For how many seconds fans and cannons can hold the machine's weight: what all of
             them are asked to push is added up, and once it is more than that they push no longer.
             None forever.
+        planet: What it stands on in place of flat ground; None for flat ground. It has neither
+            terrain, cargo nor anything else that lies on a plane.
         draws: What the seed of a trial draws, see `buildarena_simulation.draws`; a trial without a
             seed has the figures that stand here.
     """
@@ -286,17 +285,18 @@ class Scenario(_Document):
     tracked_blocks: (
         Literal["all"] | Annotated[tuple[BlockId, ...], Field(min_length=1, max_length=1000)]
     ) = "all"
-    gates: Annotated[tuple[Gate, ...], Field(max_length=64, exclude_if=_is_default)] = ()
-    marks: Annotated[tuple[Mark, ...], Field(max_length=64, exclude_if=_is_default)] = ()
-    line: Annotated[Line | None, Field(exclude_if=_is_default)] = None
-    clear_start: Annotated[bool, Field(exclude_if=_is_default)] = False
+    gates: Annotated[tuple[Gate, ...], Field(max_length=64, exclude_if=is_default)] = ()
+    marks: Annotated[tuple[Mark, ...], Field(max_length=64, exclude_if=is_default)] = ()
+    line: Annotated[Line | None, Field(exclude_if=is_default)] = None
+    clear_start: Annotated[bool, Field(exclude_if=is_default)] = False
     gravity: Annotated[Gravity, Field(exclude_if=lambda value: value == GRAVITY)] = GRAVITY
     drive_strength: Annotated[Strength, Field(exclude_if=lambda value: value == 1)] = 1.0
-    senses: Annotated[Senses | None, Field(exclude_if=_is_default)] = None
-    gusts: Annotated[Gusts | None, Field(exclude_if=_is_default)] = None
-    pushes: Annotated[tuple[Push, ...], Field(max_length=64, exclude_if=_is_default)] = ()
-    fuel_s: Annotated[Instant | None, Field(exclude_if=_is_default)] = None
-    draws: Annotated[Draws, Field(exclude_if=_is_default)] = {}
+    senses: Annotated[Senses | None, Field(exclude_if=is_default)] = None
+    gusts: Annotated[Gusts | None, Field(exclude_if=is_default)] = None
+    pushes: Annotated[tuple[Push, ...], Field(max_length=64, exclude_if=is_default)] = ()
+    fuel_s: Annotated[Instant | None, Field(exclude_if=is_default)] = None
+    planet: Annotated[Planet | None, Field(exclude_if=is_default)] = None
+    draws: Annotated[Draws, Field(exclude_if=is_default)] = {}
 
     @model_validator(mode="after")
     def _names_are_unique(self) -> Self:
@@ -305,6 +305,16 @@ class Scenario(_Document):
             twice = next((name for name in names if names.count(name) > 1), None)
             if twice is not None:
                 raise ValueError(f"the name {twice!r} stands for two places")
+        return self
+
+    @model_validator(mode="after")
+    def _planets_are_bare(self) -> Self:
+        flat = ("terrain", "cargo", "gates", "line", "gusts", "pushes", "fuel_s")
+        beside = [name for name in flat if getattr(self, name)]
+        if self.placement.kind == "span":
+            beside.append("placement.kind span")
+        if self.planet is not None and beside:
+            raise ValueError(f"a planet has no flat ground, so it goes without {beside[0]}")
         return self
 
     @model_validator(mode="after")

@@ -1,6 +1,7 @@
 """One trial as it runs: commands, steps, loads, samples."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from buildarena_simulation.planning import Keys, Planner
 from buildarena_simulation.recording import Recorder
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
+from buildarena_simulation.structure.force_field import Commands
 from buildarena_simulation.structure.motion import Motion
+from buildarena_simulation.structure.tanks import Tanks, tanks_of
 
 _PROGRESS_EVERY = 10
 _FINER = 2
@@ -56,6 +59,7 @@ class Trial:
         structure = world.structure
         self._structure, self._scenario, self._engine = structure, scenario, engine
         self._field, self._wind = world.field, wind
+        self._tanks = tanks_of(structure, None if world.field is None else world.field.table)
         self._let_go = np.zeros(0 if world.field is None else len(world.field.table.seats), bool)
         holds = np.ones(len(structure.members), dtype=bool)
         clusters = find_clusters(structure, holds)
@@ -152,6 +156,8 @@ class Trial:
             # The push lasts one interval, so that the loads that it makes are seen.
             kicks[asked] = held * table.impulse[asked] / self._interval_s
         field.commands = schedule.at(row, kicks)
+        if self._tanks is not None:
+            field.commands = self._burn(self._tanks, field.commands)
         holding, breaking = self.breaking.holding, self.breaking
         if holding is not None and not self.has_blown_up:
             cargo = self._engine.cargo() if self._scenario.cargo else None
@@ -165,6 +171,15 @@ class Trial:
             ):
                 self._hold(holding)
 
+    def _burn(self, tanks: Tanks, commands: Commands) -> Commands:
+        """What the fuel allows of what is asked for; the machine is weighed again without it."""
+        tanks.join(self.breaking.holds)
+        pushing = tanks.supply(commands.pushing, self._interval_s)
+        lighter = tanks.lighter(self.breaking.clusters.cluster_of)
+        if lighter is not None and not self.has_blown_up:
+            self.breaking.weigh(self._engine, lighter)
+        return replace(commands, pushing=pushing)
+
     def _hold(self, holding: Holding) -> None:
         self._engine.hold(holding.holds)
         self._engine.enter(self.breaking.clusters, self.breaking.motion)
@@ -174,15 +189,13 @@ class Trial:
             return
         engine, cargo = self._engine, self._scenario.cargo
         time_s = step * engine.time_step_s
-        if self._wind is not None:
-            wind = self._wind.at(time_s + self._interval_s / 2)
-            engine.blow(wind)
-            self.breaking.blow(wind)
+        self._blow(time_s)
         mass = cargo.mass_at(time_s) if cargo else None
         if mass is not None:
             engine.set_cargo_mass(mass)
         thrusts = recoil(self._structure, firing, self.recorder.heated_now)
         before, place = self.breaking.motion, engine.cargo() if cargo else None
+        spun = None if self._field is None else self._field.spun
         engine.advance(targets, thrusts)
         motion = engine.motion()
         if not (np.isfinite(motion.position).all() and np.isfinite(motion.rotation).all()):
@@ -197,6 +210,8 @@ class Trial:
 
         def repeat_finer() -> Motion:
             finer = np.repeat(targets, _FINER, axis=0)
+            if self._field is not None and spun is not None:
+                self._field.spun = spun
             engine.enter(self.breaking.clusters, before, cargo=place, finer=_FINER)
             engine.advance(finer, thrusts)
             if holding is not None:
@@ -217,6 +232,17 @@ class Trial:
         landing = self.breaking.landing
         if landing is not None and landing.counts and landing.over:
             engine.push_cargo(landing.bounced)
+
+    def _blow(self, time_s: float) -> None:
+        """Says what accelerates masses beside even gravity in the next interval."""
+        field, breaking = self._field, self.breaking
+        if field is not None and field.around.radius is not None:
+            centers = breaking.motion.points(breaking.clusters, self._structure.centers_of_mass)
+            breaking.blow(field.around.pull(centers))
+        if self._wind is not None:
+            wind = self._wind.at(time_s + self._interval_s / 2)
+            self._engine.blow(wind)
+            breaking.blow(wind)
 
     def _sample(self, time_s: float) -> None:
         cargo = self._scenario.cargo

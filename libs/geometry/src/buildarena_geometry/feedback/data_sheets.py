@@ -14,7 +14,7 @@ from buildarena_geometry.feedback.words import number, plain, point
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from buildarena_geometry.modules.forces import Altitude, Spring, Wing
+    from buildarena_geometry.modules.forces import Altitude, Push, Spring, Wing
     from buildarena_geometry.modules.joints import Drive, MovingJoint
     from buildarena_geometry.modules.module import Module, Motor, Physics
 
@@ -124,7 +124,7 @@ def _forces(module: Module) -> Iterator[str]:
     """What it pushes, pulls, holds and lets go."""
     push, thrust, grip = module.push, module.thrust, module.grip
     if push is not None:
-        yield f"{push.action} pushes it along {point(push.direction)} with {plain(push.force)}"
+        yield from _push(push)
     if thrust is not None:
         yield (
             f"pushes with {plain(thrust.cold)} cold and {plain(thrust.heated)} heated, against the "
@@ -140,10 +140,47 @@ def _forces(module: Module) -> Iterator[str]:
         yield _spring(module.spring)
     if module.decouple is not None:
         yield f"lets go with an impulse of {plain(module.decouple.impulse)} mass·units/s each way"
+    yield from _in_space(module)
     if grip is not None:
         yield (
             f"holds what comes within {plain(grip.reach)} of its far end, ready from the start; "
             f"slips at a force of {plain(grip.force)} or a moment of {plain(grip.moment)}"
+        )
+
+
+def _push(push: Push) -> Iterator[str]:
+    back = f", {push.reverse} the other way," if push.reverse else ""
+    yield f"{push.action} pushes it along {point(push.direction)}{back} with {plain(push.force)}"
+    if not push.needs_air:
+        yield "needs no air"
+    if push.fuel:
+        yield f"burns {plain(push.fuel)} of fuel a second at full push"
+    if push.steady_speed is not None:
+        yield (
+            f"steadies: pushes by asked - u / {plain(push.steady_speed)} within -1 and 1, u the "
+            "speed along that way at which it turns about the centre of mass"
+        )
+
+
+def _in_space(module: Module) -> Iterator[str]:
+    """Its fuel, flywheel and brake."""
+    tank, wheel, brake = module.tank, module.flywheel, module.brake
+    if tank is not None:
+        if tank.fuel:
+            yield f"holds {plain(tank.fuel)} of fuel of mass {plain(tank.mass)}"
+        yield "shares fuel with what it is joined to and takes fuel as well"
+    if wheel is not None:
+        yield (
+            f"flywheel: torque up to {plain(wheel.torque)} about {point(wheel.axis)}, {wheel.left} "
+            f"counterclockwise seen from outside, until it has spun up by {plain(wheel.momentum)} "
+            "mass·units²/s; without a key it brakes, fully from "
+            f"{plain(wheel.steady_rate)} rad/s on"
+        )
+    if brake is not None:
+        opens = "once opened" if brake.opens == "once" else "while no key is held"
+        yield (
+            f"air brakes it by {plain(brake.coefficient)}·v·min(|v|, {plain(brake.cap_speed)}), in "
+            f"mass·units/s², {opens}"
         )
 
 

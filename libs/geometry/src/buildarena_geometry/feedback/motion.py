@@ -33,6 +33,9 @@ def motions(block: Block) -> list[str]:
     if push is not None:
         towards = caption(block.world_from_block.direction(push.direction))
         facts.append(f"{push.action} pushes it {towards}")
+    if module.flywheel is not None:
+        about = caption(block.world_from_block.direction(module.flywheel.axis))
+        facts.append(f"{module.flywheel.left} turns it counterclockwise about {about}")
     return facts
 
 

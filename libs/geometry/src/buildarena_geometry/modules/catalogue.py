@@ -51,11 +51,12 @@ CATALOGUE_VERSION = 1
 CONFIDENCES = ("known", "community", "chosen", "unknown")
 _WITHOUT_PHYSICS = ("connector", "cargo")
 _TOLERANCE = 1e-6  # what six written digits may miss of a unit length or a right angle
-_DIRECTIONS = ("pointing", "joint.axis", "push.direction", "wing.normal")
+_DIRECTIONS = ("pointing", "joint.axis", "push.direction", "wing.normal", "flywheel.axis")
 _ACTIONS = (
     *("motor.forward", "motor.backward", "thrust.action", "push.action"),
     *("joint.drive.forward", "joint.drive.backward", "altitude.rise", "altitude.sink"),
-    *("spring.contract", "decouple.action", "grip.grab", "grip.release"),
+    *("spring.contract", "decouple.action", "grip.grab", "grip.release", "push.reverse"),
+    *("flywheel.left", "flywheel.right"),
 )
 _OLD_FIELDS = {"seat": "joint_type", "idle": "default_mode", "tether": "rope_mount"}
 

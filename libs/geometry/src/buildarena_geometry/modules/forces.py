@@ -1,4 +1,4 @@
-"""The forces that modules exert by themselves: fans, wings, balloons, springs and what lets go."""
+"""The forces that modules exert by themselves: of nozzles, wings, balloons, springs and others."""
 
 from __future__ import annotations
 
@@ -21,14 +21,23 @@ class Push(Form, frozen=True, kw_only=True):
 
     Attributes:
         action: the action that switches it on.
+        reverse: the action that pushes the other way; None if none does.
         direction: (3,) where it pushes the block, block frame, unit length.
         force: mass·g.
+        needs_air: whether it pushes the less the thinner the air is.
+        fuel: what it burns in a second at full push; 0 for what needs none.
+        steady_speed: it brakes its own motion about the centre of mass, at this speed by all it
+            can push, which is taken off from what its keys ask, units/s; None if it does not.
         origin: where the figures come from.
     """
 
     action: str
+    reverse: str | None = None
     direction: Point
     force: Amount
+    needs_air: bool = True
+    fuel: Amount = 0.0
+    steady_speed: Positive | None = None
     origin: str = ""
 
 
@@ -170,6 +179,65 @@ class Grip(Form, frozen=True, kw_only=True):
     origin: str = ""
 
 
+class Tank(Form, frozen=True, kw_only=True):
+    """Fuel that a block holds, and shares with those that it touches and that take fuel as well.
+
+    Attributes:
+        fuel: how much, when it is full; 0 for what passes fuel on and holds none.
+        mass: of that fuel, part of the block's mass, mass units.
+        origin: where the figures come from.
+    """
+
+    fuel: Amount
+    mass: Amount = 0.0
+    origin: str = ""
+
+
+class Flywheel(Form, frozen=True, kw_only=True):
+    """A wheel inside a block, whose spinning up turns the block the other way.
+
+    While no key asks, it brakes the block's turning about its axis.
+
+    Attributes:
+        left: the action that turns the block against the clock, seen against its axis.
+        right: the action that turns it clockwise.
+        axis: (3,) block frame, unit length.
+        torque: the greatest, mass·g·unit.
+        momentum: at which the wheel spins as fast as it can, mass·unit²/s.
+        steady_rate: the block's turning at which it brakes with all its torque, rad/s.
+        origin: where the figures come from.
+    """
+
+    left: str
+    right: str
+    axis: Point
+    torque: Positive
+    momentum: Positive
+    steady_rate: Positive
+    origin: str = ""
+
+
+class Brake(Form, frozen=True, kw_only=True):
+    """What air brakes a block with while it is open, whichever way it moves.
+
+    The force is -coefficient · min(|v|, cap_speed) · v, less in thinner air.
+
+    Attributes:
+        actions: those that move it.
+        opens: "once": the first of them opens it for good; "unless": it stands open and folds
+            while one of them is held.
+        coefficient: mass/unit.
+        cap_speed: the speed from which on it grows no faster than the speed, units/s.
+        origin: where the figures come from.
+    """
+
+    actions: tuple[str, ...]
+    opens: Literal["once", "unless"]
+    coefficient: Amount
+    cap_speed: Positive
+    origin: str = ""
+
+
 class Forces(Form, frozen=True, kw_only=True):
     """The forces that a module exerts by itself; None where it has none of a kind.
 
@@ -182,6 +250,9 @@ class Forces(Form, frozen=True, kw_only=True):
         spring: a connector's.
         decouple: what lets go.
         grip: what holds.
+        tank: its fuel.
+        flywheel: what turns it.
+        brake: what opens in the air.
     """
 
     push: Push | None = None
@@ -192,6 +263,9 @@ class Forces(Form, frozen=True, kw_only=True):
     spring: Spring | None = None
     decouple: Decoupling | None = None
     grip: Grip | None = None
+    tank: Tank | None = None
+    flywheel: Flywheel | None = None
+    brake: Brake | None = None
 
     @property
     def greatest_push(self) -> float:
@@ -227,7 +301,12 @@ def check_forces(forces: Forces, *, kind: str, mass: float, link: str | None) ->
     if (forces.spring is not None) != (link == "spring"):
         expected = "a spring with the link spring, and none with another link"
         refuse("spring", expected, forces.spring)
-    wing, altitude = forces.wing, forces.altitude
+    wing, altitude, brake = forces.wing, forces.altitude, forces.brake
+    if forces.tank is not None and forces.tank.mass >= mass:
+        refuse("tank.mass", f"less than the block's mass of {mass:g}", forces.tank.mass)
+    if brake is not None:
+        most = _FASTEST_LOSS * mass / brake.cap_speed
+        _check_most("brake.coefficient", brake.coefficient, most)
     if wing is not None:
         most = _FASTEST_LOSS * mass / math.pow(wing.cap_speed, wing.power)
         _check_most("wing.coefficient", wing.coefficient, most)

@@ -34,7 +34,7 @@ ATTACHABLE_KINDS = ("block", "joint", "wheel", "flight", "cannon", "torch", "dev
 JointType = Literal[
     "attachment", "axle", "mount", "hinge", "slider", "ball", "constant_velocity", "loose"
 ]
-Link = Literal["rigid", "rope", "spring"]
+Link = Literal["rigid", "rope", "spring", "hose"]
 FLUSH_TOLERANCE = 1e-6  # units; faces nearer than this are the same place
 _FACING = -0.9  # cosine; a face that looks this way looks at the block it sits on
 
@@ -248,7 +248,8 @@ class Module(ModuleFields, frozen=True, kw_only=True):
         cost: Besiege's price.
         faces: the places where others attach, in the order of their labels.
         flames: spheres of fire, which heat what they touch.
-        link: what a connector is: a rigid strut, a rope that pulls and never pushes, or a spring.
+        link: what a connector is: a rigid strut, a rope that pulls and never pushes, a spring, or a
+            hose, which holds nothing and levels the fuel of both ends.
         besiege_id: its number in Besiege's machine files.
         besiege_data: further entries of its block in Besiege's machine files: type, key, value.
         besiege_keys: the entry there that holds the keys of an action, by the action.

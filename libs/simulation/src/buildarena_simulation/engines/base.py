@@ -49,7 +49,9 @@ class World:
         gravity: Downward acceleration, units/s².
         drive_strength: As in `Scenario`; `field` has it already.
         substeps: Into how many each usual step of the engine is divided.
-        field: What the blocks exert by themselves; None where none does.
+        field: What the blocks exert by themselves; None where none does. On a planet it has
+            gravity and drag as well, and the engine has neither.
+        planet: Radius of the ball that is the ground, below the origin, units; None for a plane.
     """
 
     structure: Structure
@@ -60,6 +62,12 @@ class World:
     drive_strength: float = 1.0
     substeps: int = 1
     field: ForceField | None = None
+    planet: float | None = None
+
+    @property
+    def even_gravity(self) -> float:
+        """What the engine accelerates everything by, downwards, units/s²."""
+        return self.gravity if self.planet is None else 0.0
 
     @property
     def force_unit(self) -> float:

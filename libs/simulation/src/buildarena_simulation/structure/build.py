@@ -86,7 +86,10 @@ class Rope:
 
 
 def build_structure(
-    parts: Sequence[Part], links: Sequence[Link], ropes: Sequence[Rope]
+    parts: Sequence[Part],
+    links: Sequence[Link],
+    ropes: Sequence[Rope],
+    hoses: Sequence[Rope] = (),
 ) -> Structure:
     """The structure of a machine; far joints are found here.
 
@@ -94,6 +97,7 @@ def build_structure(
         parts: The blocks, in creation order.
         links: Attachments, axles and braces.
         ropes: Winches.
+        hoses: Hoses, which only weigh something.
 
     Returns:
         The structure, in the frame the parts are given in.
@@ -103,7 +107,7 @@ def build_structure(
         if link.kind is JointKind.BRACE:
             lumps[link.first].append((link.mass / 2, link.start))
             lumps[link.second].append((link.mass / 2, link.end))
-    for rope in ropes:
+    for rope in (*ropes, *hoses):
         lumps[rope.first].append((rope.mass / 2, rope.start))
         lumps[rope.second].append((rope.mass / 2, rope.end))
     lumped = [_lump(part, extra) for part, extra in zip(parts, lumps, strict=True)]
@@ -143,6 +147,7 @@ def build_structure(
             ]
         ),
         angular_drag=np.array([part.physics.angular_drag for part in parts]),
+        hoses=tuple((hose.first, hose.second) for hose in hoses),
     )
 
 

@@ -1,16 +1,21 @@
 """What the blocks of a running trial exert by themselves, from their motion and the keys."""
 
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
-from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.constants import FORCES_EVERY_S, GRAVITY
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import PointForces
 from buildarena_simulation.structure.model import FloatArray, Ropes, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.own_forces import OwnForces, own_forces_of
+from buildarena_simulation.structure.planet import Surroundings
 from buildarena_simulation.structure.vectors import cross, summed_by, turned
+
+_AHEAD_S: Final = (FORCES_EVERY_S - 0.002) / 2
+"""From an evaluation to the middle of the engines' steps until the next one, seconds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -18,14 +23,18 @@ class Commands:
     """What the keys ask of the blocks for some time.
 
     Attributes:
-        pushing: (P,) how far each fan is asked to push, 0 to 1.
+        pushing: (P,) how far each block that pushes is asked to, -1 to 1.
         heights: (A,) by how much each held height was moved from where it began, units.
+        open: (B,) whether each brake is open.
+        turning: (F,) how far each flywheel is asked to turn its block, -1 to 1.
         kicks: (D,) force with which each block that let go pushes off, mass·unit/s².
         rests: (K,) length of each spring at rest, as a share of its built length.
     """
 
     pushing: FloatArray
     heights: FloatArray
+    open: FloatArray
+    turning: FloatArray
     kicks: FloatArray
     rests: FloatArray
 
@@ -34,19 +43,25 @@ class Commands:
 class ForceField:
     """Works out a trial's own forces; engines ask it, the load model takes their mean.
 
+    On a planet it works out gravity and drag as well, which the load model has for itself.
+
     Attributes:
         table: Who exerts what.
         ropes: The ropes and springs.
+        around: Gravity and air.
         commands: What the keys ask for now.
+        spun: (F,) momentum of each flywheel about its axis, mass·unit²/s.
     """
 
     table: OwnForces
     ropes: Ropes
+    around: Surroundings
     commands: Commands = field(init=False)
     _targets: FloatArray | None = field(init=False, default=None)
     _sum: FloatArray = field(init=False)
     _count: int = field(init=False, default=0)
     _arms: tuple[Clusters | None, FloatArray] = field(init=False)
+    spun: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         """Starts without any key held."""
@@ -54,11 +69,14 @@ class ForceField:
         self.commands = Commands(
             pushing=np.zeros(len(table.pushes)),
             heights=np.zeros(len(table.altitudes)),
+            open=np.array([float(of.opens == "unless") for of in table.brake_of]),
+            turning=np.zeros(len(table.flywheels)),
             kicks=np.zeros(len(table.decouplers)),
             rests=np.ones(len(self.ropes.springs)),
         )
         self._sum = np.zeros((len(table), 3))
         self._arms = (None, table.point)
+        self.spun = np.zeros(len(table.flywheels))
 
     def rest_lengths(self) -> FloatArray:
         """Length at rest of every rope and spring, (R,), units."""
@@ -73,13 +91,16 @@ class ForceField:
             clusters: The clusters.
             motion: Their motion now.
         """
-        if not len(self.table):
-            return np.zeros((len(clusters), 6))
-        forces = self._forces(clusters, motion)
-        self._sum += forces
-        self._count += 1
-        both = np.concatenate([forces, cross(self._arm(clusters), forces)], axis=1)
-        return summed_by(clusters.cluster_of[self.table.block], both, len(clusters))
+        total = np.zeros((len(clusters), 6))
+        if len(self.table):
+            forces = self._forces(clusters, motion)
+            self._sum += forces
+            self._count += 1
+            both = np.concatenate([forces, cross(self._arm(clusters), forces)], axis=1)
+            total = summed_by(clusters.cluster_of[self.table.block], both, len(clusters))
+        if self.around.radius is not None:
+            total += _falling(self.around, clusters, motion)
+        return total
 
     def taken(self, clusters: Clusters, motion: Motion) -> PointForces:
         """The mean of the forces since the last call, at the blocks' present places."""
@@ -106,38 +127,91 @@ class ForceField:
         c = clusters.cluster_of[table.block]
         back = motion.rotation[c].transpose(0, 2, 1)
         arm = self._arm(clusters)
-        velocity = turned(back, motion.velocity[c]) + cross(turned(back, motion.spin[c]), arm)
+        swept = cross(turned(back, motion.spin[c]), arm)
+        velocity = turned(back, motion.velocity[c]) + swept
         w, p = len(table.wings), len(table.pushes)
-        up = back[w + p :, :, 2]
-        lifts = np.concatenate([table.lift, self._lifts(motion, back, velocity, c)])
-        size = np.concatenate([table.push * commands.pushing, np.zeros(len(lifts))])
-        kicks = np.tile(commands.kicks, 2)
-        forces = np.concatenate([np.zeros(w), size, kicks])[:, None] * table.direction
+        places = motion.position[c] + turned(motion.rotation[c], table.point)
+        air = self.around.thinness(places)
+        up = turned(back, self.around.up(places))
+        lifts = np.concatenate([table.lift, self._lifts(places, up, velocity)])
+        b = w + p + len(lifts)
+        brakes = slice(b, b + len(table.brakes))
+        size = np.concatenate(
+            [
+                np.zeros(w),
+                self._pushes(swept[w : w + p], air[w : w + p]),
+                np.zeros(len(lifts) + len(table.brakes)),
+                np.tile(commands.kicks, 2),
+                np.tile(self._turns(turned(back, motion.spin[c])), 2),
+            ]
+        )
+        forces = size[:, None] * table.direction
         forces[:w] = table.wings.forces(velocity[:w], clusters.parent[c[:w]] < 0)
-        forces[w + p : w + p + len(lifts)] = lifts[:, None] * up[: len(lifts)]
+        forces[:w] *= air[:w, None]
+        forces[w + p : b] = (lifts * air[w + p : b])[:, None] * up[w + p : b]
+        forces[brakes] = self._braked(velocity[brakes]) * air[brakes, None]
         return forces
 
-    def _lifts(
-        self, motion: Motion, back: FloatArray, velocity: FloatArray, c: np.ndarray
-    ) -> FloatArray:
+    def _pushes(self, swept: FloatArray, air: FloatArray) -> FloatArray:
+        """The force of each block that pushes, (P,), mass·unit/s².
+
+        Args:
+            swept: (P, 3) how it moves about the centre of mass, machine frame, units/s.
+            air: (P,) drag there as a share of the usual one.
+        """
+        table, asked = self.table, self.commands.pushing
+        first = len(table.wings)
+        along = (swept * table.direction[first : first + len(asked)]).sum(axis=1)
+        level = np.clip(asked - along / table.steady_speed, -1.0, 1.0)
+        return np.asarray(table.push * level * np.where(table.needs_air, np.minimum(air, 1.0), 1.0))
+
+    def _braked(self, velocity: FloatArray) -> FloatArray:
+        """What air exerts on each brake that is open, (B, 3), mass·unit/s²."""
+        if not len(velocity):
+            return velocity
+        coefficient, cap = np.array(
+            [(of.coefficient, of.cap_speed) for of in self.table.brake_of]
+        ).T
+        speed = np.minimum(np.sqrt((velocity * velocity).sum(axis=1)), cap)
+        return np.asarray(-(self.commands.open * coefficient * speed)[:, None] * velocity)
+
+    def _turns(self, spin: FloatArray) -> FloatArray:
+        """The torque of each flywheel on its block, (F,), mass·unit²/s²; it gains as much.
+
+        Args:
+            spin: (R, 3) of each row's cluster, machine frame, rad/s.
+        """
+        table, asked = self.table, self.commands.turning
+        if not len(asked):
+            return asked
+        torque, momentum, rate = np.array(
+            [(GRAVITY * of.torque, of.momentum, of.steady_rate) for of in table.flywheel_of]
+        ).T
+        about = (spin[-len(asked) :] * table.turn_axis).sum(axis=1)
+        level = np.where(asked == 0.0, -np.clip(about / rate, -1.0, 1.0), asked)
+        most = (self.spun + momentum) / FORCES_EVERY_S
+        least = (self.spun - momentum) / FORCES_EVERY_S
+        exerted = np.clip(torque * level, least, most)
+        self.spun = self.spun - FORCES_EVERY_S * exerted
+        return np.asarray(exerted)
+
+    def _lifts(self, places: FloatArray, up: FloatArray, velocity: FloatArray) -> FloatArray:
         """The lift of each block that holds its height, (A,), mass·unit/s².
 
         Args:
-            motion: The clusters' motion.
-            back: (R, 3, 3) machine_from_world of each row.
-            velocity: (R, 3) of each row's point, machine frame, units/s.
-            c: (R,) cluster of each row.
+            places: (R, 3) of each row's point, world frame, units.
+            up: (R, 3) which way is up there, machine frame.
+            velocity: (R, 3) of it, machine frame, units/s.
         """
         table = self.table
         if not len(table.altitudes):
             return np.zeros(0)
         first = len(table.wings) + len(table.pushes) + len(table.lift)
         rows = slice(first, first + len(table.altitudes))
-        up = back[rows, :, 2]
-        height = motion.position[c[rows], 2] + (up * table.point[rows]).sum(axis=1)
+        height = self.around.height(places[rows])
         if self._targets is None:
             self._targets = height
-        climb = (up * velocity[rows]).sum(axis=1)
+        climb = (up[rows] * velocity[rows]).sum(axis=1)
         stiffness, damping, most = np.array(
             [(of.stiffness, of.damping, of.most) for of in table.altitude_of]
         ).T
@@ -145,15 +219,34 @@ class ForceField:
         return np.asarray(GRAVITY * np.clip(stiffness * below - damping * climb, 0.0, most))
 
 
-def field_of(structure: Structure, *, drive_strength: float = 1.0) -> ForceField | None:
+def _falling(around: Surroundings, clusters: Clusters, motion: Motion) -> FloatArray:
+    """Gravity and drag of each cluster about its centre of mass, (C, 6), machine frame axes.
+
+    Gravity is that of the middle of the steps in which it stays the same, so that a path round a
+    planet neither gains nor loses energy.
+    """
+    centers, back = motion.centers_of_mass(clusters), motion.rotation.transpose(0, 2, 1)
+    air = around.thinness(centers)
+    slowed = (air * clusters.linear_drag)[:, None] * motion.velocity
+    gained = around.pull(centers + _AHEAD_S * motion.velocity) - slowed
+    # What turns on an axle is carried along by the root of its component.
+    loses = np.where(clusters.parent < 0, air * clusters.angular_drag, 0.0)
+    torque = -loses[:, None] * turned(clusters.inertia, turned(back, motion.spin))
+    return np.concatenate([clusters.mass[:, None] * turned(back, gained), torque], axis=1)
+
+
+def field_of(
+    structure: Structure, *, drive_strength: float = 1.0, around: Surroundings
+) -> ForceField | None:
     """What a structure's blocks exert by themselves; None where none does.
 
     Args:
         structure: The machine.
         drive_strength: Share of their data with which fans push.
+        around: Gravity and air.
     """
     table = own_forces_of(structure)
     table = replace(table, push=table.push * drive_strength)
     grips = any(part.module.grip for part in structure.parts)
-    exerted = len(table) or len(structure.ropes.springs) or grips
-    return ForceField(table, structure.ropes) if exerted else None
+    exerted = len(table) or len(structure.ropes.springs) or grips or around.radius
+    return ForceField(table, structure.ropes, around) if exerted else None

@@ -45,7 +45,8 @@ class LoadModel:
         gravity: Downward acceleration, units/s².
 
     Attributes:
-        wind: (3,) what accelerates every mass beside gravity, world frame, units/s².
+        wind: What accelerates every mass beside gravity, (3,), or each block, (N, 3), world frame,
+            units/s².
     """
 
     def __init__(
@@ -73,6 +74,11 @@ class LoadModel:
     def put_back(self, filters: tuple[FloatArray, ...]) -> None:
         """Forgets what was evaluated since `filters` gave them."""
         self._wrenches, self._inertial, self._root_rotation, self._velocity, self._spin = filters
+
+    def weigh(self, structure: Structure) -> None:
+        """Takes the masses of the machine from now on; `rebuild` takes those of its clusters."""
+        self._weights = structure.masses * (self._weights / self._structure.masses)
+        self._structure = structure
 
     def rebuild(self, clusters: Clusters, motion: Motion) -> None:
         """Takes over the clusters left after a break; filtered loads are carried along."""

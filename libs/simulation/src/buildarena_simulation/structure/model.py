@@ -280,6 +280,7 @@ class Structure:
         flames: The torches' flames.
         linear_drag: (N,) 1/s; connectors have none.
         angular_drag: (N,) 1/s.
+        hoses: The two blocks of each hose.
     """
 
     parts: tuple[Part, ...]
@@ -304,6 +305,7 @@ class Structure:
     flames: Spheres
     linear_drag: FloatArray
     angular_drag: FloatArray
+    hoses: tuple[tuple[int, int], ...] = ()
 
     def __len__(self) -> int:
         return len(self.parts)

@@ -1,44 +1,55 @@
-"""The forces that blocks exert by themselves: fans, wings, balloons and what pushes off.
+"""The forces that blocks exert by themselves: fans, nozzles, wings, balloons, brakes and others.
 
 Each has a row: the block it acts on and the point of it where it acts. They are worked out from
 the motion every `FORCES_EVERY_S`, and held until the next time, turning with their blocks.
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from buildarena_geometry.modules.forces import Altitude
+from buildarena_geometry.modules.forces import Altitude, Brake, Flywheel
 from buildarena_simulation.constants import GRAVITY, JointKind
 from buildarena_simulation.structure.aerodynamics import Wings, wings_of
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
+    BoolArray,
     FloatArray,
     IntArray,
     Part,
     Structure,
 )
+from buildarena_simulation.structure.vectors import axis_frame
 
 _NO_SEATS: Final = [JOINT_KINDS.index(JointKind.BRACE), JOINT_KINDS.index(JointKind.FAR_JOINT)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnForces:
-    """Who exerts what; R rows: W wings, P fans, L balloons, A that hold a height, D that let go.
+    """Who exerts what, R rows.
 
-    The rows are in this order; each block that lets go has two, its own and its base's.
+    W wings, P that push, L balloons, A that hold a height, B brakes, D that let go and F flywheels
+    are in this order; each block that lets go has two, its own and its base's, and each
+    flywheel has two, which are a couple.
 
     Attributes:
         block: (R,) the block each acts on.
         point: (R, 3) where, machine frame, units.
         direction: (R, 3) of a push in the machine frame, unit length; zero in the other rows.
         wings: What air does.
-        pushes: (P,) blocks with a fan.
+        pushes: (P,) blocks that push.
         push: (P,) mass·unit/s².
+        needs_air: (P,) whether it pushes the less the thinner the air is.
+        steady_speed: (P,) as in `Push`, units/s; infinite if it has none.
         lift: (L,) mass·unit/s².
         altitude_of: (A,) what holds each height.
         altitudes: (A,) blocks that hold a height.
+        brake_of: (B,) what each brake is.
+        brakes: (B,) blocks that air brakes while they are open.
+        flywheel_of: (F,) what each flywheel is.
+        flywheels: (F,) blocks with one.
+        turn_axis: (F, 3) machine frame, unit length.
         decouplers: (D,) blocks that let go.
         seats: (D,) the member that each lets go.
         impulse: (D,) mass·unit/s.
@@ -50,9 +61,16 @@ class OwnForces:
     wings: Wings
     pushes: IntArray
     push: FloatArray
+    needs_air: BoolArray
+    steady_speed: FloatArray
     lift: FloatArray
     altitude_of: tuple[Altitude, ...]
     altitudes: IntArray
+    brake_of: tuple[Brake, ...]
+    brakes: IntArray
+    flywheel_of: tuple[Flywheel, ...]
+    flywheels: IntArray
+    turn_axis: FloatArray
     decouplers: IntArray
     seats: IntArray
     impulse: FloatArray
@@ -69,28 +87,41 @@ def own_forces_of(structure: Structure) -> OwnForces:
     pushes = [i for i, of in enumerate(forces) if of.push]
     lifts = [i for i, of in enumerate(forces) if of.lift]
     altitudes = [i for i, of in enumerate(forces) if of.altitude]
+    brakes = [i for i, of in enumerate(forces) if of.brake]
+    flywheels = [i for i, of in enumerate(forces) if of.flywheel]
     seats = seats_of(structure)
     decouplers = [i for i, of in enumerate(forces) if of.decouple and i in seats]
     joints = [seats[i] for i in decouplers]
-    alone = [*wings, *pushes, *lifts, *altitudes]
-    direction = np.zeros((len(alone) + 2 * len(decouplers), 3))
+    alone = [*wings, *pushes, *lifts, *altitudes, *brakes]
+    direction = np.zeros((len(alone) + 2 * len(decouplers) + 2 * len(flywheels), 3))
     for row, i in enumerate(pushes, len(wings)):
         direction[row] = _pushed(parts[i])
     for row, i in enumerate(decouplers, len(alone)):
         direction[row] = parts[i].rotation[:, 2]
         direction[row + len(decouplers)] = -parts[i].rotation[:, 2]
+    couples = _couples([parts[i] for i in flywheels])
+    direction[len(direction) - 2 * len(flywheels) :] = couples.direction
     places = [structure.members.point[k] for k in joints]
     bases: IntArray = structure.members.first[joints] if joints else _ids([])
     return OwnForces(
-        block=np.array([*alone, *decouplers, *bases], dtype=np.int64),
-        point=np.array([*(parts[i].center for i in alone), *places, *places]).reshape(-1, 3),
+        block=np.array([*alone, *decouplers, *bases, *flywheels, *flywheels], dtype=np.int64),
+        point=np.array(
+            [*(parts[i].center for i in alone), *places, *places, *couples.point]
+        ).reshape(-1, 3),
         direction=direction,
         wings=wings_of([of.wing for of in forces if of.wing], structure.rotations[_ids(wings)]),
         pushes=_ids(pushes),
         push=GRAVITY * np.array([of.push.force for of in forces if of.push]),
+        needs_air=np.array([of.push.needs_air for of in forces if of.push], dtype=bool),
+        steady_speed=np.array([of.push.steady_speed or np.inf for of in forces if of.push]),
         lift=GRAVITY * np.array([of.lift.force for of in forces if of.lift]),
         altitudes=_ids(altitudes),
         altitude_of=tuple(of.altitude for of in forces if of.altitude),
+        brakes=_ids(brakes),
+        brake_of=tuple(of.brake for of in forces if of.brake),
+        flywheels=_ids(flywheels),
+        flywheel_of=tuple(of.flywheel for of in forces if of.flywheel),
+        turn_axis=couples.axis,
         decouplers=_ids(decouplers),
         seats=_ids(joints),
         impulse=np.array([_impulse(parts[i]) for i in decouplers]),
@@ -105,6 +136,32 @@ def seats_of(structure: Structure) -> dict[int, int]:
         for k in reversed(range(len(members)))
         if members.kind[k] not in _NO_SEATS
     }
+
+
+class _Couples(NamedTuple):
+    """Axes (F, 3), points and directions (2F, 3) of forces that turn blocks by a unit torque."""
+
+    axis: FloatArray
+    point: FloatArray
+    direction: FloatArray
+
+
+def _couples(parts: list[Part]) -> _Couples:
+    axis = np.array([_turned(part) for part in parts]).reshape(-1, 3)
+    # The frames' other columns are across the axis, to which they are at right angles.
+    across = np.array([axis_frame(own)[:, 1] for own in axis]).reshape(-1, 3)
+    center = np.array([part.center for part in parts]).reshape(-1, 3)
+    along = np.cross(axis, across)
+    return _Couples(
+        axis=axis,
+        point=np.concatenate([center + across / 2, center - across / 2]),
+        direction=np.concatenate([along, -along]),
+    )
+
+
+def _turned(part: Part) -> FloatArray:
+    flywheel = part.module.flywheel
+    return np.zeros(3) if flywheel is None else part.rotation @ np.array(flywheel.axis)
 
 
 def _ids(blocks: list[int]) -> IntArray:

@@ -130,7 +130,7 @@ def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int,
     ties = [
         (link.start[0], link.end[0], f"{link.module.name} {key}")
         for key, link in machine.connectors.items()
-        if link.module.link != "rigid"
+        if link.module.link in {"rope", "spring"}
     ]
     if any(block.module.rope_mount for block in machine.blocks.values()):
         ties += [

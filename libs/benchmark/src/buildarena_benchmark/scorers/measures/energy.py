@@ -6,7 +6,7 @@ import numpy as np
 
 from buildarena_benchmark.scorers.measures.commands import keys_of, presses_of
 from buildarena_benchmark.scorers.measures.components import masses_of_blocks
-from buildarena_benchmark.scorers.measures.series import Series, release_speed
+from buildarena_benchmark.scorers.measures.series import Series, lifted, release_speed
 
 if TYPE_CHECKING:
     from buildarena_geometry import Block, Machine
@@ -44,15 +44,15 @@ def gains_energy(
     masses = masses_of_blocks(machine, trajectory)
     positions = trajectory.positions[:samples].astype(np.float64)
     whole = float(masses.sum())
-    energy = _energies(time_s, positions, gravity) @ masses
-    released = whole * release_speed(scenario) ** 2 / 2 + gravity * float(
-        positions[0, :, 2] @ masses
+    energy = _energies(scenario, time_s, positions) @ masses
+    released = whole * release_speed(scenario) ** 2 / 2 + float(
+        lifted(scenario, positions[0]) @ masses
     )
     brought = np.zeros(samples - 1)
     if trajectory.cargo_position is not None and trajectory.cargo_mass is not None:
         cargo = trajectory.cargo_mass[:samples]
         path = trajectory.cargo_position[:samples].astype(np.float64)
-        each = _energies(time_s, path[:, None], gravity)[:, 0]
+        each = _energies(scenario, time_s, path[:, None])[:, 0]
         energy = energy + cargo[1:] * each
         released += gravity * float(path[0, 2]) * float(cargo[0])
         brought = np.cumsum(np.diff(cargo) * each)
@@ -63,11 +63,11 @@ def gains_energy(
     return bool((runs >= LASTING).any())
 
 
-def _energies(time_s: Series, positions: Series, gravity: float) -> Series:
+def _energies(scenario: "Scenario", time_s: Series, positions: Series) -> Series:
     """Energy per mass of points in each step, (T - 1, N), units²/s²."""
     speed = np.diff(positions, axis=0) / np.diff(time_s)[:, None, None]
-    middle = (positions[1:, :, 2] + positions[:-1, :, 2]) / 2
-    return np.asarray((speed**2).sum(axis=2) / 2 + gravity * middle)
+    middle = (positions[1:] + positions[:-1]) / 2
+    return np.asarray((speed**2).sum(axis=2) / 2 + lifted(scenario, middle))
 
 
 def _is_driven(scenario: "Scenario", machine: "Machine", trajectory: "Trajectory") -> bool:

@@ -31,6 +31,20 @@ def release_speed(scenario: "Scenario") -> float:
     return float(np.linalg.norm(placement.velocity))
 
 
+def lifted(scenario: "Scenario", points: Series) -> Series:
+    """Work against gravity that it takes to bring masses from (0, 0, 0) to points, units²/s².
+
+    Args:
+        scenario: Gives gravity, and the planet if there is one.
+        points: (..., 3) world frame, units.
+    """
+    planet, gravity = scenario.planet, scenario.gravity
+    if planet is None:
+        return np.asarray(gravity * points[..., 2])
+    away = np.linalg.norm(points + np.array([0.0, 0.0, planet.radius]), axis=-1)
+    return np.asarray(gravity * planet.radius * (1.0 - planet.radius / np.maximum(away, 1.0)))
+
+
 def gravity_of(trajectory: "Trajectory") -> float:
     """Downward acceleration in a trial, units/s²; the usual one where no simulator of ours ran."""
     return float(trajectory.settings.get("gravity", GRAVITY))

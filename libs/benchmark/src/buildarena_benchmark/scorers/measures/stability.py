@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.energy import gains_energy
-from buildarena_benchmark.scorers.measures.series import Series, release_speed
+from buildarena_benchmark.scorers.measures.series import Series, lifted, release_speed
 from buildarena_benchmark.scorers.scorer import Deciding
 from buildarena_simulation.constants import GRAVITY
 
@@ -62,20 +62,20 @@ def is_unstable(
     bound = _bound(scenario, machine, trajectory, masses * members)
     steps = np.diff(trajectory.time_s[:samples])
     weights = (masses * members)[1:] * members[:-1]
-    g = scenario.gravity
-    energies = [_energies(np.where(members[:, :, None], positions, 0.0), steps, weights, g)]
+    inside = np.where(members[:, :, None], positions, 0.0)
+    energies = [_energies(scenario, inside, steps, weights)]
     if cargo is not None:
         path = cargo[:samples].astype(np.float64)[:, None]
-        energies.append(_energies(path, steps, np.ones((samples - 1, 1)), g))
+        energies.append(_energies(scenario, path, steps, np.ones((samples - 1, 1))))
     return any(_lasts(energy > bound) for energy in energies) or gains_energy(
         scenario, machine, trajectory, samples
     )
 
 
-def _energies(positions: Series, steps: Series, weights: Series, gravity: float) -> Series:
+def _energies(scenario: "Scenario", positions: Series, steps: Series, weights: Series) -> Series:
     """Mean energy per mass in each step, (T - 1,), units²/s²; of K points weighed (T - 1, K)."""
     speed = np.diff(positions, axis=0) / steps[:, None, None]
-    each = 0.5 * (speed**2).sum(axis=2) + gravity * positions[1:, :, 2]
+    each = 0.5 * (speed**2).sum(axis=2) + lifted(scenario, positions[1:])
     return np.asarray((each * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9))
 
 

@@ -147,7 +147,9 @@ class MujocoEngine:
         hold_as_they_are(self._model, self._data, self._holds)
         mujoco.mj_forward(self._model, self._data)
         wheels = len(self._structure.wheels)
-        self._wheels = wheel_contacts(self._model, self._data, wheels, _FRICTION_S)
+        self._wheels = wheel_contacts(
+            self._model, self._data, wheels, friction_s=_FRICTION_S, gravity=self._world.gravity
+        )
         self._wheels.bear(self._model, self._mass + self._cargo_mass)
 
     def set_cargo_mass(self, mass: float) -> None:
@@ -307,6 +309,8 @@ class MujocoEngine:
         model, clusters = self._model, self._clusters
         self._apart: list[tuple[int, ...]] = []
         for component in clusters.components:
+            if self._world.planet is not None:
+                break  # the field has drag and gravity
             if not is_simple_component(self._structure, clusters, component):
                 self._apart.append(component)
                 continue

@@ -105,7 +105,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
         opened(
             "option",
             timestep=settings.time_step_s,
-            gravity=(0.0, 0.0, -world.gravity),
+            gravity=(0.0, 0.0, -world.even_gravity),
             integrator="implicitfast",
             cone="elliptic",
             impratio=settings.impratio,
@@ -152,7 +152,10 @@ def _static(world: World) -> Iterator[str]:
         "friction": _friction(FRICTION_TERRAIN),
         "priority": _TERRAIN_PRIORITY,
     }
-    if world.ground:
+    if world.planet is not None:
+        ball: dict[str, object] = {"size": (world.planet,), "pos": (0.0, 0.0, -world.planet)}
+        yield tag("geom", name="ground", type="sphere", **ball, **surface)
+    elif world.ground:
         yield tag("geom", name="ground", type="plane", size=(0.0, 0.0, 1.0), **surface)
     for i, box in enumerate(world.terrain):
         yield tag(

@@ -40,12 +40,14 @@ class WheelContacts:
         largest: (P,) velocity that each wheel gains per unit impulse, where it gives way most,
             1/mass unit.
         wheels: How many wheels there are.
+        gravity: Units/s².
     """
 
     pairs: IntArray
     compliance: FloatArray
     largest: FloatArray
     wheels: int
+    gravity: float
 
     def bear(self, model: "mujoco.MjModel", mass: float) -> None:
         """Makes the contacts as stiff as a mass on the wheels needs.
@@ -58,14 +60,19 @@ class WheelContacts:
             return
         share = mass / (_POINTS * self.wheels)
         scale = (1.0 - _IMPEDANCE) * self.compliance
-        stiffness = np.minimum(share * -model.opt.gravity[2] / _SAG, _STIFFEST / self.largest)
+        stiffness = np.minimum(share * self.gravity / _SAG, _STIFFEST / self.largest)
         damping = np.minimum(2.0 * np.sqrt(stiffness * share), _MOST_DAMPED / self.largest)
         model.pair_solref[self.pairs, 0] = -scale * stiffness
         model.pair_solref[self.pairs, 1] = -scale * damping
 
 
 def wheel_contacts(
-    model: "mujoco.MjModel", data: "mujoco.MjData", wheels: int, friction_s: float
+    model: "mujoco.MjModel",
+    data: "mujoco.MjData",
+    wheels: int,
+    *,
+    friction_s: float,
+    gravity: float,
 ) -> WheelContacts:
     """Finds the contacts of wheels in a compiled model, named "wheel …", and softens them.
 
@@ -74,6 +81,7 @@ def wheel_contacts(
         data: Its state, after `mj_forward`.
         wheels: How many wheels the machine has.
         friction_s: Time constant with which friction stops a slip, seconds.
+        gravity: Units/s².
     """
     pairs = [p for p in range(model.npair) if model.pair(p).name.startswith("wheel ")]
     bodies = model.geom_bodyid[model.pair_geom2[pairs]]
@@ -84,6 +92,7 @@ def wheel_contacts(
         compliance=model.body_invweight0[bodies, 0],
         largest=np.array([_largest_compliance(model, data, body) for body in bodies.tolist()]),
         wheels=wheels,
+        gravity=gravity,
     )
 
 

@@ -42,6 +42,17 @@ def add_box(
         turn: World_from_box as a quaternion (x, y, z, w).
     """
     shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **client)
+    return _add_body(client, shape, center, mass=mass, turn=turn)
+
+
+def _add_body(
+    client: Mapping[str, int],
+    shape: int,
+    center: Sequence[float] | FloatArray,
+    *,
+    mass: float = 0.0,
+    turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+) -> int:
     body = pybullet.createMultiBody(
         mass,
         shape,
@@ -125,7 +136,7 @@ def start_world(
     Returns:
         What `ContactForces.surface` calls each fixed body, and the cargo's body.
     """
-    pybullet.setGravity(0, 0, -world.gravity, **client)
+    pybullet.setGravity(0, 0, -world.even_gravity, **client)
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=time_step_s,
         numSubSteps=0,
@@ -137,7 +148,10 @@ def start_world(
         **client,
     )
     surfaces = {}
-    if world.ground:
+    if world.planet is not None:
+        ball = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=world.planet, **client)
+        surfaces[_add_body(client, ball, (0.0, 0.0, -world.planet))] = 0
+    elif world.ground:
         half = (_GROUND_REACH, _GROUND_REACH, 1.0)
         surfaces[add_box(client, half, (0.0, 0.0, -1.0), mass=0.0)] = 0
     for k, box in enumerate(world.terrain, 1):

@@ -196,9 +196,7 @@ class PyBulletEngine:
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
         external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
-        drags = drag_forces(
-            self._structure, self._clusters, self._motion, self._axes, self._moments
-        )
+        drags = [] if self._world.planet is not None else self._drags()
         impacts = ImpactWatch(
             len(targets),
             gravity=self._world.gravity,
@@ -333,6 +331,9 @@ class PyBulletEngine:
             pybullet.applyExternalTorque(*address[c], torque, frame, **client)
         if self._rope_alive.any():
             self._pull_ropes()
+
+    def _drags(self) -> list[tuple[int, Force]]:
+        return drag_forces(self._structure, self._clusters, self._motion, self._axes, self._moments)
 
     def _own_forces(self, step: int) -> list[tuple[int, Force]]:
         field = self._world.field

@@ -16,6 +16,7 @@ from buildarena_worker.builtin.designs import (
     risers,
     rockets,
     rovers,
+    spacecraft,
     throwers,
     vehicles,
     walkers,
@@ -63,6 +64,8 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "throw-1": throwers.catapult,
     "throw-2": throwers.catapult,
     "throw-3": throwers.aiming_catapult,
+    "orbit-1": spacecraft.orbiter,
+    "orbit-2": spacecraft.returner,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 
