@@ -19,6 +19,7 @@ from support.challenge import (
 )
 from support.machines.families import car as family_car
 
+from buildarena_benchmark.scorers.measures.orbits import swept
 from buildarena_geometry.machine_files import machine_of
 from buildarena_pipeline.challenges.checking import Report, check_package
 from buildarena_pipeline.challenges.judging import fingerprints, judge_folder
@@ -28,7 +29,6 @@ from buildarena_pipeline.challenges.package import (
     packed_package,
     read_package,
 )
-from buildarena_pipeline.challenges.scores import swept_angle
 from buildarena_pipeline.challenges.season import SeasonError, read_season, season_named
 
 S01 = season_named("s01-stable-orbit")
@@ -269,11 +269,11 @@ def test_swinging_to_and_fro_goes_round_nothing() -> None:
     times = np.linspace(0.0, 60.0, 4001)
     swings = math.pi / 2 * np.sin(times)
     path = 500.0 * np.column_stack([np.cos(swings), np.sin(swings), np.zeros(len(times))])
-    assert swept_angle(path, (0.0, 0.0, 0.0)) < math.pi
+    assert abs(swept(path, np.zeros(3))[-1]) < math.pi
     beside = path + np.array([2000.0, 0.0, 0.0])
-    assert swept_angle(beside, (0.0, 0.0, 0.0)) < 0.6
+    assert abs(swept(beside, np.zeros(3))[-1]) < 0.6
     tilted = 500.0 * np.column_stack([np.cos(times), 0.6 * np.sin(times), 0.8 * np.sin(times)])
-    assert swept_angle(tilted, (0.0, 0.0, 0.0)) == pytest.approx(60.0, rel=1e-6)
+    assert abs(swept(tilted, np.zeros(3))[-1]) == pytest.approx(60.0, rel=1e-6)
 
 
 def test_folders_and_zip_files_are_packages(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from buildarena_besiege.logs.tracker_file import Floats, TrackerFile
+from buildarena_benchmark.scorers.measures.orbits import swept
+from buildarena_besiege.logs.tracker_file import TrackerFile
 from buildarena_pipeline.challenges.season import OrbitScore, Track, TrialsScore
 
 FULL: Final = 100.0
@@ -74,7 +75,11 @@ def score_flight(
         cost: Of the machine.
         track_name: What messages call the track.
     """
-    angle = None if rule.center is None else swept_angle(flight.position, rule.center)
+    angle = (
+        None
+        if rule.center is None
+        else float(abs(swept(flight.position, np.array(rule.center))[-1]))
+    )
     lasted = float(flight.time_s[-1] - flight.time_s[0])
     terms = (
         _progress(rule, angle),
@@ -116,29 +121,6 @@ def ranks_of(points: Sequence[float]) -> list[int]:
     for place, own in enumerate(sorted(points, reverse=True), start=1):
         first.setdefault(own, place)
     return [first[own] for own in points]
-
-
-def swept_angle(position: Floats, center: tuple[float, float, float]) -> float:
-    """How far a path goes round a point, rad, at least 0.
-
-    The angle about the axis about which the path turns most: what goes back is taken off again, so
-    that swinging to and fro is worth nothing.
-
-    Args:
-        position: (N, 3) places, units.
-        center: The point.
-    """
-    arms = position - np.asarray(center)
-    crossed = np.cross(arms[:-1], arms[1:])
-    axis = crossed.sum(axis=0)
-    length = float(np.linalg.norm(axis))
-    if length == 0.0:
-        return 0.0
-    axis = axis / length
-    level = arms - (arms @ axis)[:, None] * axis
-    sine = np.cross(level[:-1], level[1:]) @ axis
-    cosine = (level[:-1] * level[1:]).sum(axis=1)
-    return abs(float(np.arctan2(sine, cosine).sum()))
 
 
 def _progress(rule: OrbitScore, angle: float | None) -> Term:
