@@ -46,12 +46,19 @@ CONTROL = [
 
 
 THROWING = ["throw-1", "throw-2", "throw-3"]
-GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL, "throwing": THROWING}
+SPACE = ["orbit-1", "orbit-2"]
+GROUPS = {
+    "headroom": HEADROOM,
+    "families": FAMILIES,
+    "control": CONTROL,
+    "throwing": THROWING,
+    "space": SPACE,
+}
 
 
 def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
-    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL, *THROWING]
+    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL, *THROWING, *SPACE]
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         kind, _, level = name.rpartition("-")

@@ -9,9 +9,12 @@ import csv
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.optimize import least_squares
 
+from buildarena_besiege import read_any_machine
 from buildarena_pipeline.challenges.season import season_named
+from buildarena_simulation import ENGINES, Scenario, simulate
 
 HEAD = Path(__file__).parents[1] / "data" / "challenge" / "tracker_head.csv"
 STEP_S = 0.1
@@ -86,3 +89,55 @@ def test_the_season_has_the_centre_that_the_head_tells() -> None:
     assert rule.center is not None
     assert rule.center[0] == rule.center[2] == 0.0
     assert abs(rule.center[1] - center) < 3 * errors[2]
+
+
+PILOT = """
+local HEAD = {{ {table} }}
+
+local function wanted(t)
+  for k = 2, #HEAD do
+    local before, after = HEAD[k - 1], HEAD[k]
+    if t <= after[1] then
+      local share = (t - before[1]) / (after[1] - before[1])
+      return before[2] + share * (after[2] - before[2])
+    end
+  end
+  return HEAD[#HEAD][2]
+end
+
+function control(t, sense)
+  if t < 0.08 then return {{}} end
+  local turn = 3 * (wanted(t + 0.1) - math.atan(sense.up.x, sense.up.z))
+  return {{
+    ["2.thrust_left"] = 1, ["2.thrust_right"] = math.max(0, math.min(1, turn)),
+    ["3.thrust_left"] = 1, ["3.thrust_right"] = math.max(0, math.min(1, -turn)),
+  }}
+end
+"""
+"""Holds the thrust, as the file's player did, and turns the machine as it was turned."""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_simulated_machine_flies_beside_the_head(engine) -> None:
+    head = rows()[rows()[:, 0] <= 32]
+    file = HEAD.parent / "three_blocks" / "machine_tuned.bsg"
+    machine = read_any_machine(file.read_bytes(), where=file.name).machine
+    table = ", ".join(f"{{ {sample * STEP_S:g}, {-turn:g} }}" for sample, _, _, turn in head)
+    world = Scenario.model_validate(
+        {
+            "duration_s": 3.2,
+            "gravity": 23,
+            "control": {"mode": "agent"},
+            "senses": {"offers": ["pose"]},
+            "planet": {"radius": 600, "air": 0.86, "air_height": 342},
+            "placement": {"kind": "released", "height": 4.5},
+        }
+    )
+    trial = simulate(machine.with_controller(PILOT.format(table=table)), world, engine)
+    path = trial.positions[:, 0].astype(float)
+    for sample, x, y, _ in head:
+        now = np.array([np.interp(sample * STEP_S, trial.time_s, path[:, k]) for k in (0, 2)])
+        # The nozzles give less while they turn it, so it lags behind by a twentieth of its way.
+        assert abs(now[0] - x) < 2.0 + 0.05 * x
+        assert abs(now[1] - y) < 0.6
+    assert not trial.breaks

@@ -22,6 +22,7 @@ from buildarena_besiege.logs.stored import logged_trajectory
 from buildarena_besiege.logs.telemetry import read_telemetry, telemetry_log, telemetry_trajectory
 from buildarena_besiege.logs.trajectories import trajectory_of
 from buildarena_besiege.open_loop import TimedMachine, machine_with_timeline, timeline_of
+from buildarena_besiege.own_keys import lines_of_keys, with_own_keys
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start
 
@@ -39,6 +40,7 @@ __all__ = [
     "game_start",
     "level_file",
     "level_finding",
+    "lines_of_keys",
     "logged_trajectory",
     "looks_published",
     "machine_with_timeline",
@@ -54,4 +56,5 @@ __all__ = [
     "telemetry_trajectory",
     "timeline_of",
     "trajectory_of",
+    "with_own_keys",
 ]

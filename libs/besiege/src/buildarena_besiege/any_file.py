@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+from msgspec import structs
 
 from buildarena_besiege.importing.file_data import file_data_lines
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
@@ -12,6 +14,9 @@ from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_of
 from buildarena_geometry.reading import read, shown
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 _LEADING: Final = b" \t\r\n\x00"
 _PUBLISHED_FIELDS: Final = {"time": "time_s", "hold_for": "hold_for_s"}
@@ -37,13 +42,16 @@ def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> 
     return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
 
 
-def read_presses(data: bytes, *, where: str) -> tuple[KeyPress, ...]:
+def read_presses(
+    data: bytes, *, where: str, keys: Mapping[str, str] | None = None
+) -> tuple[KeyPress, ...]:
     """A control sequence from a JSON list.
 
     Args:
         data: Objects with time_s, key and hold_for_s; or with time, key and hold_for, as the
             published files call them.
         where: What messages call the file.
+        keys: Other names of keys, and which they are, as in `with_own_keys`.
 
     Raises:
         DocumentError: It is none; the message names the entry.
@@ -57,8 +65,12 @@ def read_presses(data: bytes, *, where: str) -> tuple[KeyPress, ...]:
             press = read(renamed, KeyPress, where=place, error=DocumentError)
         else:
             press = read(entry, KeyPress, where=place, error=DocumentError)
+        named = keys or {}
+        press = structs.replace(press, key=named.get(press.key, press.key))
         if press.key not in KEYS:
-            expected = f"one of {', '.join(KEYS)}, found {shown(press.key)}"
+            expected = (
+                f"one of {', '.join(dict.fromkeys([*named, *KEYS]))}, found {shown(press.key)}"
+            )
             raise DocumentError(f"{place}.key: expected {expected}")
         presses.append(press)
     return tuple(presses)

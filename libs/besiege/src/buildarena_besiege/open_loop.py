@@ -26,9 +26,9 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.controllers.answers import Channels, near_names
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.errors import ControllerFailed
+from buildarena_simulation.fields import MAX_DURATION_S
 from buildarena_simulation.machine import bindings_of as actions_of
 from buildarena_simulation.machine import part_ids, structure_of
-from buildarena_simulation.scenario import MAX_DURATION_S
 
 if TYPE_CHECKING:
     from buildarena_geometry import Machine

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from buildarena_benchmark import Score, Task
-    from buildarena_geometry import Machine
+    from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation import Piloting, Trajectory
 
 TaskName = Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")]
@@ -73,6 +74,13 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
         Path | None,
         typer.Option(help="A program (.lua) that acts in place of its keys: docs/control.md."),
     ] = None,
+    keys: Annotated[
+        Path | None,
+        typer.Option(
+            help="Key presses in place of its own (JSON: time, key, hold_for); of a .bsg its own "
+            "keys, whichever the game has."
+        ),
+    ] = None,
     dialect: DialectOption = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the score as JSON.")] = False,
 ) -> None:
@@ -104,13 +112,18 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
         if controller is not None:
             machine = controlled(machine, controller)
         _require_program(machine, trace)
+        machine, presses = _with_presses(machine, keys)
         broken = broken_constraint(chosen, machine)
         if broken is not None:
             warn(f"not simulated: {broken[0]}: {broken[1]}")
         if seeds is not None:
             show_robustness(chosen, machine, engine, seeds, as_json=as_json)
             return
-        rollout = None if broken is not None else _simulated(machine, chosen, engine, seed)
+        rollout = (
+            None
+            if broken is not None
+            else _simulated(machine, chosen, engine, seed=seed, presses=presses)
+        )
         if rollout is None:
             result = failed_score(chosen, machine)
         else:
@@ -175,7 +188,31 @@ def _write_trace(time_s: NDArray[np.float64], piloting: Piloting, file: Path) ->
             rows.writerow([f"{value:.6g}" for value in (float(time_s[tick]), *values)])
 
 
-def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> Trajectory | None:
+def _with_presses(machine: Machine, keys: Path | None) -> tuple[Machine, Sequence[KeyPress] | None]:
+    """The machine with its file's own keys, and what is pressed in place of its own sequence."""
+    from buildarena_besiege import file_data_lines, lines_of_keys, read_presses, with_own_keys
+
+    if keys is None:
+        return machine, None
+    settings = [line for line in file_data_lines(machine) if "simulated as" in line]
+    for line in (*lines_of_keys(machine), *settings):
+        warn(line)
+    machine, own = with_own_keys(machine)
+    try:
+        data = keys.read_bytes()
+    except OSError as error:
+        raise CommandError(f"{keys}: {error.strerror or error}") from error
+    return machine, read_presses(data, where=str(keys), keys=own)
+
+
+def _simulated(
+    machine: Machine,
+    task: Task,
+    engine: str,
+    *,
+    seed: int | None,
+    presses: Sequence[KeyPress] | None,
+) -> Trajectory | None:
     from buildarena_simulation import MachineNotSimulable
     from buildarena_simulation import simulate as simulate_here
 
@@ -187,6 +224,7 @@ def _simulated(machine: Machine, task: Task, engine: str, seed: int | None) -> T
                 task.scenario,
                 engine,
                 seed=seed,
+                controls=presses,
                 on_progress=lambda done: bar.update(row, completed=done),
             )
         except MachineNotSimulable as failure:

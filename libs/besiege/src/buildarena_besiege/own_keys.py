@@ -1,0 +1,78 @@
+"""Own keys of files, which may be any of the game, and keys of ours in their place."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_besiege.importing.blocks import keys_of
+from buildarena_besiege.importing.file_data import part_data
+from buildarena_besiege.names import key_entries
+from buildarena_geometry.feedback.words import caption
+from buildarena_geometry.keys import KEYS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from buildarena_geometry import Machine
+    from buildarena_geometry.blocks import Block
+
+
+def with_own_keys(machine: Machine) -> tuple[Machine, Mapping[str, str]]:
+    """A copy whose actions have keys of ours in place of the file's own that ours lack.
+
+    Args:
+        machine: As it was read from a machine file.
+
+    Returns:
+        The machine, and the key of ours for each of the file's own; keys of ours stay.
+
+    Raises:
+        MachineNotPlayableError: It has more keys than there are.
+        MachineFileError: Its file data is wrong.
+    """
+    bound = list(_bound(machine))
+    used = [key for _, _, key in bound if key in KEYS]
+    others = [key for key in dict.fromkeys(key for _, _, key in bound) if key not in KEYS]
+    free = [key for key in KEYS if key not in used]
+    if len(others) > len(free):
+        raise MachineNotPlayableError(
+            f"the machine has {len(others)} keys that machines here lack; {len(free)} are free"
+        )
+    ours = dict(zip(others, free, strict=False))
+    keyed = machine.copy()
+    for block, action, key in bound:
+        if key in ours:
+            keyed.act(
+                "add_control_key", {"block_id": block.id, "action": action, "new_key": ours[key]}
+            )
+    return keyed, {**{key: key for key in dict.fromkeys(used)}, **ours}
+
+
+def lines_of_keys(machine: Machine) -> tuple[str, ...]:
+    """What each of the file's own keys does, a line each: which blocks it pushes which way."""
+    does: dict[str, list[str]] = {}
+    for block, action, key in _bound(machine):
+        does.setdefault(key, []).append(f"{block.id} {action}{_pushed(block, action)}")
+    return tuple(f"{key}: {', '.join(actions)}" for key, actions in does.items())
+
+
+def _bound(machine: Machine) -> Iterator[tuple[Block, str, str]]:
+    """Each block, action and key of the file."""
+    for block in machine.blocks.values():
+        own = part_data(block)
+        entries = {} if own is None else {entry.key: entry for entry in own.block.entries}
+        for action, name in key_entries(block.module).items():
+            entry = entries.get(name)
+            keys = block.bindings.get(action, ()) if entry is None else keys_of(entry)
+            for key in dict.fromkeys(keys):
+                yield block, action, key
+
+
+def _pushed(block: Block, action: str) -> str:
+    push = block.module.push
+    if push is None or action not in {push.action, push.reverse}:
+        return ""
+    x, y, z = block.world_from_block.direction(push.direction)
+    sign = 1.0 if action == push.action else -1.0
+    return f" (pushes it {caption((sign * x, sign * y, sign * z))})"
