@@ -17,6 +17,8 @@ _GROUND: Final[Color] = (205, 211, 200)
 _GRID: Final[Color] = (176, 184, 172)
 _INK: Final[Color] = (30, 34, 40)
 _GRID_STEP: Final = 2.0
+_GRID_HEIGHT: Final = 16.0
+"""A camera that is higher sees a wider grid, units."""
 _GRID_REACH: Final = 30
 _NEAR: Final = 0.5
 
@@ -84,10 +86,12 @@ def _draw_ground(canvas: "ImageDraw", camera: Camera) -> None:
         horizon = camera.center[1] - camera.focal * np.tan(np.arcsin(down[2]))
         canvas.rectangle([0, max(0.0, horizon), width, height], fill=_GROUND)
     target = camera.position - down * (camera.position[2] / max(down[2], 0.05))
-    middle = np.round(target[:2] / _GRID_STEP) * _GRID_STEP
-    reach = _GRID_REACH * _GRID_STEP
+    wider = max(0, round(np.log2(max(camera.position[2], 1.0) / _GRID_HEIGHT)))
+    step = _GRID_STEP * 2.0**wider
+    middle = np.round(target[:2] / step) * step
+    reach = _GRID_REACH * step
     for k in range(-_GRID_REACH, _GRID_REACH + 1):
-        offset = k * _GRID_STEP
+        offset = k * step
         for start, end in (
             ([middle[0] + offset, middle[1] - reach], [middle[0] + offset, middle[1] + reach]),
             ([middle[0] - reach, middle[1] + offset], [middle[0] + reach, middle[1] + offset]),

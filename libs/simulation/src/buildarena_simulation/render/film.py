@@ -10,6 +10,7 @@ import numpy as np
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.render.camera import Camera
 from buildarena_simulation.render.drawing import draw
+from buildarena_simulation.render.planet import Flight
 from buildarena_simulation.render.scene import Scene
 from buildarena_simulation.rollout import world_of
 
@@ -54,33 +55,46 @@ def write_film(
     kind = path.suffix.lstrip(".").lower()
     if kind not in FORMATS:
         raise ValueError(f"{path.name}: a film ends in {', '.join(FORMATS)}")
-    scene = Scene(machine, world_of(scenario, trajectory), trajectory)
+    world = world_of(scenario, trajectory)
+    flight = None
+    if world.planet is not None and len(trajectory.block_ids):
+        flight = Flight(trajectory, world.planet.radius)
+    seen = Scene(machine, world, trajectory), flight
     count = len(trajectory.time_s)
     if kind == "png":
         samples = np.linspace(0, count - 1, _SHEET[0] * _SHEET[1]).round().astype(int)
-        _write_sheet(list(_frames(scene, trajectory, samples, _SHEET_FRAME, on_progress)), path)
+        _write_sheet(list(_frames(seen, trajectory, samples, _SHEET_FRAME, on_progress)), path)
     elif kind == "gif":
         samples = np.arange(0, count, _GIF_EVERY)
-        _write_gif(list(_frames(scene, trajectory, samples, _GIF_SIZE, on_progress)), path)
+        _write_gif(list(_frames(seen, trajectory, samples, _GIF_SIZE, on_progress)), path)
     else:
-        _write_mp4(_frames(scene, trajectory, np.arange(count), _SIZE, on_progress), path)
+        _write_mp4(_frames(seen, trajectory, np.arange(count), _SIZE, on_progress), path)
 
 
 def _frames(
-    scene: Scene,
+    seen: tuple[Scene, Flight | None],
     trajectory: "Trajectory",
     samples: Sequence[int] | np.ndarray,
     size: tuple[int, int],
     on_progress: Callable[[float], None] | None,
 ) -> Iterator["Image"]:
+    from PIL import ImageDraw
+
+    scene, flight = seen
     distance = 2.6 * scene.reach()
-    for done, sample in enumerate(samples, 1):
-        focus = scene.focus(int(sample))
+    for done, sample in enumerate(map(int, samples), 1):
+        focus = scene.focus(sample) if flight is None else flight.focus(sample)
         camera = Camera.looking_at(
             focus, distance=distance, size=size, azimuth_deg=scene.azimuth_deg
         )
-        caption = _caption(trajectory, int(sample))
-        yield draw(scene.at(int(sample)), camera, size=size, caption=caption)
+        picture, caption = scene.at(sample), _caption(trajectory, sample)
+        if flight is None:
+            image = draw(picture, camera, size=size, caption=caption)
+        else:
+            caption += f"\nheight {flight.height[sample]:.1f}"
+            image = draw(flight.unrolled(picture, sample), camera, size=size, caption=caption)
+            flight.draw_map(ImageDraw.Draw(image), size, sample)
+        yield image
         if on_progress:
             on_progress(done / len(samples))
 

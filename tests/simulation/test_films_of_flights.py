@@ -1,0 +1,66 @@
+"""Films of flights round a planet: level ground that rolls by, and a map of the path."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from PIL import Image
+from support.machines.building import built
+
+from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation.render.film import write_film
+from buildarena_simulation.render.planet import Flight
+from buildarena_simulation.render.scene import Scene
+
+RADIUS, HEIGHT = 600.0, 40.0
+SCENARIO = Scenario.model_validate({"duration_s": 4, "planet": {"radius": RADIUS}})
+
+
+@pytest.fixture(scope="module")
+def around() -> Trajectory:
+    """A block that is carried once round the planet towards the north, its own top upwards."""
+    trial = simulate(built(), SCENARIO, "mujoco")
+    angle = np.linspace(0, 2 * math.pi, len(trial.time_s))
+    away = RADIUS + HEIGHT
+    place = np.stack([0 * angle, away * np.sin(angle), away * np.cos(angle) - RADIUS], axis=1)
+    turn = np.stack([np.cos(angle / 2), -np.sin(angle / 2), 0 * angle, 0 * angle], axis=1)
+    return replace(
+        trial,
+        positions=place[:, None].astype(np.float32),
+        quaternions=turn[:, None].astype(np.float32),
+    )
+
+
+def test_the_ground_rolls_by_as_far_as_it_is_round(around) -> None:
+    flight = Flight(around, RADIUS)
+    assert flight.height == pytest.approx(HEIGHT, abs=1e-3)
+    last = len(around.time_s) - 1
+    places = np.array([flight.focus(k) for k in range(last + 1)])
+    assert places[:, 2] == pytest.approx(HEIGHT, abs=1e-3)
+    assert places[-1, 1] == pytest.approx(2 * math.pi * RADIUS, rel=1e-3)
+    assert places[:, 0] == pytest.approx(0, abs=1e-2)
+
+
+def test_what_is_upright_there_is_upright_in_the_picture(around) -> None:
+    flight, scene = Flight(around, RADIUS), Scene(built(), SCENARIO, around)
+    for sample in range(0, len(around.time_s), 7):
+        corners = np.concatenate(
+            [face for face, _ in flight.unrolled(scene.at(sample), sample).faces]
+        )
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        assert high - low == pytest.approx([1, 1, 1], abs=0.01)
+        assert (low + high) / 2 == pytest.approx(flight.focus(sample), abs=0.01)
+
+
+def test_a_film_has_the_map(around, tmp_path) -> None:
+    write_film(built(), SCENARIO, around, tmp_path / "flight.png")
+    with Image.open(tmp_path / "flight.png") as sheet:
+        frames = [sheet.crop((x, y, x + 640, y + 420)) for y in (0, 420) for x in (0, 640, 1280)]
+    path = (194, 65, 12)
+    drawn = [sum(count for count, color in f.getcolors(1 << 20) if color == path) for f in frames]
+    assert drawn[0] == 0
+    assert all(b > a for a, b in pairwise(drawn))
