@@ -18,7 +18,9 @@ from support.challenge import (
     zipped,
 )
 from support.machines.families import car as family_car
+from support.machines.piloted import experts_machine
 
+from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.scorers.measures.orbits import swept
 from buildarena_geometry.machine_files import machine_of
 from buildarena_pipeline.challenges.checking import Report, check_package
@@ -342,6 +344,18 @@ def test_bridges_are_tried_and_scored() -> None:
     assert report.score.unknown == ()
 
 
+@pytest.mark.slow
+def test_flights_are_flown_and_scored() -> None:
+    files = {
+        f"{name}.json": json.dumps(experts_machine(builtin_tasks()[name]).to_document()).encode()
+        for name in ("orbit-1", "orbit-2")
+    }
+    report = checked(files, season_named("first-orbits"), "human")
+    assert report.passed, report.findings
+    assert report.score is not None
+    assert all(0.6 < term.share < 1.0 for term in report.score.terms)
+
+
 def test_what_is_no_bridge_bears_nothing() -> None:
     car = json.dumps(family_car().to_document()).encode()
     score = checked({**bridge_files(), "support-2.json": car}, BRIDGES, "agent").score
@@ -399,7 +413,7 @@ def test_a_wrong_season_is_told_where(tmp_path: Path) -> None:
         assert words in str(refusal.value)
     with pytest.raises(SeasonError, match="is no parameter of"):
         S01.with_parameters({"formula": 1})
-    with pytest.raises(SeasonError, match="there is first-bridges, s01-stable-orbit"):
+    with pytest.raises(SeasonError, match="there is first-bridges, first-orbits, s01-stable-orbit"):
         season_named("s02")
     with pytest.raises(SeasonError, match="No such file"):
         season_named(str(tmp_path / "own.yaml"))

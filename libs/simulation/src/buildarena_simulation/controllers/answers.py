@@ -110,6 +110,8 @@ def _switches(structure: "Structure") -> set[tuple[int, str]]:
         if spring.contract is not None
     }
     for index, part in enumerate(structure.parts):
+        if part.module.brake is not None:
+            switches |= {(index, action) for action in part.module.brake.actions}
         if part.module.decouple is not None:
             switches.add((index, part.module.decouple.action))
         if part.module.grip is not None:
@@ -127,6 +129,8 @@ def _opposites(structure: "Structure") -> dict[tuple[int, str], str]:
             (module.motor.forward, module.motor.backward) if module.motor else None,
             (drive.forward, drive.backward) if drive else None,
             (module.altitude.rise, module.altitude.sink) if module.altitude else None,
+            (module.push.action, module.push.reverse) if module.push else None,
+            (module.flywheel.left, module.flywheel.right) if module.flywheel else None,
         ]
         for forward, backward in filter(None, pairs):
             if forward is not None and backward is not None:
