@@ -83,5 +83,7 @@ export function described(scenario: Scenario): string {
       : scenario.cargo.at == null
         ? `A cargo of ${scenario.cargo.size.join(" x ")} units is dropped onto it and grows to ${scenario.cargo.final_mass} mass units.`
         : `A cargo of ${scenario.cargo.size.join(" x ")} units and ${scenario.cargo.final_mass} mass units stands at (${scenario.cargo.at.join(", ")}).`;
-  return `${place} ${cargo} ${signs(scenario)}The trial lasts ${scenario.duration_s} seconds; the red cube marks the machine's place.`;
+  const ground =
+    scenario.planet == null ? "" : `The ground is a planet of radius ${scenario.planet.radius} straight below it. `;
+  return `${place} ${ground}${cargo} ${signs(scenario)}The trial lasts ${scenario.duration_s} seconds; the red cube marks the machine's place.`;
 }

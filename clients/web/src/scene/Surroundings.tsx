@@ -12,6 +12,8 @@ export interface Scenario {
   gates?: Gate[];
   marks?: Mark[];
   line?: GroundLine | null;
+  /** A ball in place of flat ground, straight below. */
+  planet?: { radius: number } | null;
 }
 
 const GROUND = 160;

@@ -4,6 +4,8 @@ import { useClock, type Clock } from "./clock";
 import { Curves } from "./Curves";
 import { curvesOf } from "./curves";
 import { Film } from "./Film";
+import { seenAlong } from "./flight";
+import { FlightMap } from "./FlightMap";
 import { Legend } from "./Legend";
 import { loadsAt, mostLoaded } from "./loads";
 import { CameraLock } from "./lock";
@@ -30,7 +32,9 @@ interface TrialProps {
 }
 
 /** A trial, played: scrubbed, slowed, joints coloured by what they bear, breaks marked. */
-export default function TrialView(props: TrialProps) {
+export default function TrialView({ trial: recorded, ...others }: TrialProps) {
+  const props = { ...others, trial: seenAlong(recorded, others.scenario) };
+  const planet = others.scenario.planet;
   const end = props.trial.times.at(-1) ?? 0;
   const { moment, addressOf } = props;
   const clock = useClock(end, props.begun, moment?.time);
@@ -43,6 +47,7 @@ export default function TrialView(props: TrialProps) {
       <div ref={stage}>
         <TrialScene {...props} clock={clock} loads={loads} follow={follow} lock={lock} />
       </div>
+      {planet != null && <FlightMap trial={recorded} radius={planet.radius} now={clock.shown} />}
       <TimeLine clock={clock} end={end} breaks={props.trial.breaks} />
       <Group gap="md">
         <Switch

@@ -8,6 +8,7 @@ import { Legend } from "../../scene/Legend";
 import { CameraLock } from "../../scene/lock";
 import { TimeLine } from "../../scene/TimeLine";
 import type { Trial } from "../../scene/trial";
+import { seenAlong } from "../../scene/flight";
 import { TrialCurves, TrialScene } from "../../scene/TrialView";
 import { rolloutsOf, scene as sceneQuery, trial as trialQuery, type Scene } from "../job/queries";
 
@@ -30,7 +31,11 @@ export default function Trials({ jobs }: { jobs: readonly [JobDetail, JobDetail]
     second.data === undefined
   )
     return <Loading rows={10} />;
-  return <InStep scenes={[firstScene.data, secondScene.data]} trials={[first.data, second.data]} />;
+  const trials = [
+    seenAlong(first.data, firstScene.data.scenario),
+    seenAlong(second.data, secondScene.data.scenario),
+  ] as const;
+  return <InStep scenes={[firstScene.data, secondScene.data]} trials={trials} />;
 }
 
 function InStep({ scenes, trials }: { scenes: readonly [Scene, Scene]; trials: readonly [Trial, Trial] }) {
