@@ -20,7 +20,7 @@ function control(t, sense)
   if near then
     local away = math.sqrt(dot(drift, drift))
     wanted = scaled(drift, math.min(1, 25 / math.max(away, 1)) * 0.5)
-    if away < 6 then height = at.height - clip(0.4 + 0.4 * (at.height - RESTS_AT), 12) end
+    if away < 6 then height = at.height - clip(0.8 + 0.4 * (at.height - RESTS_AT), 12) end
   elseif axis then
     local way = unit(cross(axis, at.up))
     local across = -dot(at.up, axis) * at.radius
@@ -35,7 +35,7 @@ function control(t, sense)
   aside = scaled(aside, math.min(1.5, 40 / math.max(1, math.sqrt(dot(aside, aside)))))
   local push = risen(at, height)
   if near and height < HEIGHT then
-    push = GRAVITY * (RADIUS / at.radius) ^ 2 + 2.5 * (height - at.height - at.climb)
+    push = GRAVITY * (RADIUS / at.radius) ^ 2 + learned + 2.5 * (height - at.height - at.climb)
   end
   return pushed(sense, sum(scaled(at.up, push), aside))
 end
