@@ -7,6 +7,7 @@ import random
 import signal
 import threading
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Self
@@ -42,6 +43,7 @@ class Fire:
     rng: random.Random
     every_s: float
     most: float = math.inf
+    victims: Sequence[str] = VICTIMS
     strikes: list[Strike] = field(default_factory=list)
     duplicates: int = 0
     _stop: threading.Event = field(default_factory=threading.Event)
@@ -69,7 +71,7 @@ class Fire:
                 return
             self._duplicate()
             if not turn:
-                turn = self.rng.sample(VICTIMS, len(VICTIMS))
+                turn = self.rng.sample(self.victims, len(self.victims))
             self._strike(turn.pop())
 
     def _strike(self, name: str) -> None:

@@ -28,7 +28,7 @@ scenario:
   control: {mode: agent}
   planet: {radius: 600, air: 0.86, air_height: 342}
 scoring: {name: orbit}
-indicator: {name: cycles a minute, unit: 1/min}
+indicator: {name: pace, unit: cycles/min}
 constraints: {modules: [Steering Thruster]}
 """
 
