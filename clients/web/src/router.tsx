@@ -8,6 +8,7 @@ import {
 import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
 import { readBuildSearch } from "./pages/workbench/search";
+import { readDriveSearch } from "./pages/drive/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch, readTranscriptsSearch } from "./api/jobs-search";
 import { Missing, RootError, Shell } from "./parts/Shell";
@@ -107,6 +108,13 @@ const machine = createRoute({
   component: lazyRouteComponent(() => import("./pages/machine/MachinePage")),
 });
 
+const drive = createRoute({
+  getParentRoute: () => root,
+  path: "/drive",
+  validateSearch: readDriveSearch,
+  component: lazyRouteComponent(() => import("./pages/drive/DrivePage")),
+});
+
 const challenges = createRoute({
   getParentRoute: () => root,
   path: "/challenges",
@@ -135,6 +143,7 @@ export const router = createRouter({
     method,
     build,
     machine,
+    drive,
     challenges,
     challenge,
   ]),
