@@ -67,6 +67,12 @@ const job = createRoute({
   validateSearch: readJobSearch,
   component: lazyRouteComponent(() => import("./pages/job/JobPage")),
 });
+const embed = createRoute({
+  getParentRoute: () => root,
+  path: "/embed/job/$id",
+  validateSearch: readJobSearch,
+  component: lazyRouteComponent(() => import("./pages/job/EmbedPage")),
+});
 const compare = createRoute({
   getParentRoute: () => root,
   path: "/compare",
@@ -136,6 +142,7 @@ export const router = createRouter({
     jobs,
     transcripts,
     job,
+    embed,
     compare,
     tasks,
     task,
