@@ -1,4 +1,4 @@
-"""Drives over a real socket: keys move a machine at once, and the job has them for ever."""
+"""Drives over a real socket: keys move a machine at once, and the job has them forever."""
 
 import json
 import struct

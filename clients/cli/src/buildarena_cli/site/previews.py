@@ -25,16 +25,16 @@ def head(title: str, sentence: str, picture: str | None, *, above: str = "") -> 
         picture: Path of a picture within the site, if there is one.
         above: The way from the page up to the site's folder.
     """
-    told = {"og:type": "website", "og:title": title, "og:description": sentence}
+    properties = {"og:type": "website", "og:title": title, "og:description": sentence}
     if picture is not None:
-        told["og:image"] = above + picture
-        told["twitter:card"] = "summary_large_image"
+        properties["og:image"] = above + picture
+        properties["twitter:card"] = "summary_large_image"
     return "".join(
         [
             f'<meta name="description" content="{escape(sentence)}" />',
             *(
                 f'<meta property="{name}" content="{escape(text)}" />'
-                for name, text in told.items()
+                for name, text in properties.items()
             ),
         ]
     )
