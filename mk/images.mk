@@ -19,7 +19,7 @@ UNUSED := --no-emit-package cython --no-emit-package click-repl --no-emit-packag
 # What each image needs and no more: the versions are those of requirements.lock.
 lock-images:
 	@$(LOCK_IMAGE) $(UNUSED) $(NO_ENGINE) --extra tracing -o $(LOCKS)/shared.lock libs/pipeline/pyproject.toml
-	@$(LOCK_IMAGE) $(UNUSED) $(NO_ENGINE) --extra tracing -o $(LOCKS)/api.lock services/api/pyproject.toml libs/pipeline/pyproject.toml
+	@$(LOCK_IMAGE) $(UNUSED) $(MUJOCO) --extra tracing -o $(LOCKS)/api.lock services/api/pyproject.toml libs/pipeline/pyproject.toml
 	@$(LOCK_IMAGE) $(UNUSED) $(MUJOCO) --extra tracing -o $(LOCKS)/construct.lock services/worker/pyproject.toml libs/pipeline/pyproject.toml
 	@$(LOCK_IMAGE) $(UNUSED) $(NO_MUJOCO) --extra tracing -o $(LOCKS)/simulate-pybullet.lock services/simworker/pyproject.toml libs/pipeline/pyproject.toml
 	@$(LOCK_IMAGE) $(UNUSED) $(MUJOCO) $(VIEWER) $(PYBULLET) --extra tracing \

@@ -40,7 +40,7 @@ export default defineConfig({
   },
   server: {
     fs: { allow: [here("../..")] },
-    proxy: { "/v1": process.env.BUILDARENA_URL ?? "http://127.0.0.1:8000" },
+    proxy: { "/v1": { target: process.env.BUILDARENA_URL ?? "http://127.0.0.1:8000", ws: true } },
   },
   test: { include: ["src/**/*.test.ts"] },
 });

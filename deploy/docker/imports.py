@@ -26,6 +26,7 @@ BY_NAME = (
     "uvicorn.lifespan.on",
     "uvicorn.loops.uvloop",
     "uvicorn.protocols.http.httptools_impl",
+    "uvicorn.protocols.websockets.auto",
 )
 """Modules that libraries load by name."""
 SITE = Path(sys.prefix, "lib", f"python3.{sys.version_info[1]}", "site-packages")

@@ -146,6 +146,13 @@ def test_pages_run_no_script_but_their_own(pages) -> None:
     assert policy["frame-ancestors"] == "'none'"
 
 
+def test_other_sites_frame_a_trial_and_no_other_page(pages) -> None:
+    embedded = pages.get("/embed/job/job_1").headers["content-security-policy"]
+    assert embedded.endswith("frame-ancestors *")
+    for path in ("/", "/jobs/embed/", "/embed", "/keys?next=/embed/"):
+        assert "frame-ancestors *" not in pages.get(path).headers.get("content-security-policy", "")
+
+
 def test_without_a_build_the_start_says_how_to_make_one(tmp_path) -> None:
     with served(tmp_path / "none") as client:
         answer = client.get("/")

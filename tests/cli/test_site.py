@@ -87,7 +87,11 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     wanted |= {"scheme.js", "assets/index-1.js"}
     rows = read(site, whole["jobs"])
     indexes = [read(site, f"jobs/{job}.json")["answers"] for job in rows["kept"]]
-    wanted |= {f"jobs/{job}.json" for job in rows["kept"]}
+    wanted |= {f"jobs/{job}.{ending}" for job in rows["kept"] for ending in ("json", "html")}
+    page = (site / "index.html").read_text()
+    picture = re.search(r'og:image" content="(data/[^"]*\.png)"', page)
+    assert picture is not None
+    assert picture[1] in files_of(site)
     trials = 0
     for answers in (whole["answers"], *indexes):
         for question, name in answers.items():

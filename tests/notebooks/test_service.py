@@ -1,5 +1,7 @@
 """What notebooks read of a service is what it keeps; the notebook about it runs."""
 
+from html import unescape
+
 import httpx
 import pytest
 from support.servers.live_api import live_api
@@ -53,7 +55,11 @@ def test_a_job_s_machine_and_trial_are_those_that_are_kept(url):
     again = ba.simulate(machine, trial.task)
     assert again.score == trial.score
     assert "success, load" in trial._repr_mimebundle_()["text/html"]
-    for read in (ba.job_machine, ba.job_trial):
+    from buildarena.service import job_page
+
+    page = job_page(good["id"], url)
+    assert f"support-1 by builtin/expert, seed 0. {trial!r}".splitlines()[0] in unescape(page)
+    for read in (ba.job_machine, ba.job_trial, job_page):
         with pytest.raises(ClientError, match=f"{empty['id']} has no .*: plan_unreadable"):
             read(empty["id"])
         with pytest.raises(NotFoundError):

@@ -206,6 +206,11 @@ describe.skipIf(sessions.length === 0)("a moment of a trial", () => {
     await again.locator(".stage-3d canvas").waitFor();
     expect(await again.getByRole("slider", { name: /Time of the trial/ }).getAttribute("aria-valuenow")).toBe("2");
     await expect.poll(() => eye(again), { timeout: 20_000 }).toEqual(seen);
+    await again.goto(page.url().replace("/jobs/", "/embed/job/"));
+    await again.locator(".stage-3d canvas").waitFor();
+    await expect.poll(() => eye(again), { timeout: 20_000 }).toEqual(seen);
+    expect(await again.getByRole("navigation").count()).toBe(0);
+    await expectNoSeriousFault(again);
     await again.close();
     const saved = async (button: string): Promise<Buffer> => {
       const [download] = await Promise.all([

@@ -8,6 +8,7 @@ import {
 import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
 import { readBuildSearch } from "./pages/workbench/search";
+import { readDriveSearch } from "./pages/drive/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch, readTranscriptsSearch } from "./api/jobs-search";
 import { Missing, RootError, Shell } from "./parts/Shell";
@@ -66,6 +67,12 @@ const job = createRoute({
   validateSearch: readJobSearch,
   component: lazyRouteComponent(() => import("./pages/job/JobPage")),
 });
+const embed = createRoute({
+  getParentRoute: () => root,
+  path: "/embed/job/$id",
+  validateSearch: readJobSearch,
+  component: lazyRouteComponent(() => import("./pages/job/EmbedPage")),
+});
 const compare = createRoute({
   getParentRoute: () => root,
   path: "/compare",
@@ -107,6 +114,13 @@ const machine = createRoute({
   component: lazyRouteComponent(() => import("./pages/machine/MachinePage")),
 });
 
+const drive = createRoute({
+  getParentRoute: () => root,
+  path: "/drive",
+  validateSearch: readDriveSearch,
+  component: lazyRouteComponent(() => import("./pages/drive/DrivePage")),
+});
+
 const challenges = createRoute({
   getParentRoute: () => root,
   path: "/challenges",
@@ -128,6 +142,7 @@ export const router = createRouter({
     jobs,
     transcripts,
     job,
+    embed,
     compare,
     tasks,
     task,
@@ -135,6 +150,7 @@ export const router = createRouter({
     method,
     build,
     machine,
+    drive,
     challenges,
     challenge,
   ]),

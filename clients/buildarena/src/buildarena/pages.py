@@ -56,6 +56,7 @@ class Shown:
         task: The task of the trial.
         trajectory: How the trial went; None to show the machine as it was built.
         height: Of the frame, pixels.
+        heading: What stands above it, as text; "" for nothing.
     """
 
     title: str
@@ -63,6 +64,7 @@ class Shown:
     height: int
     task: Task | None = None
     trajectory: Trajectory | None = None
+    heading: str = ""
 
     def frame(self) -> str:
         """HTML for a notebook: the page in a frame that reaches nothing outside of itself."""
@@ -77,6 +79,8 @@ class Shown:
     def page(self) -> str:
         """A whole page."""
         title = f'<meta charset="utf-8"><title>{escape(self.title)}</title>'
+        if self.heading:
+            title += f'<meta name="description" content="{escape(self.heading)}">'
         if not SCRIPT.is_file():
             return f"<!doctype html><html><head>{title}</head><body>{self._drawn()}</body></html>"
         return (
@@ -110,6 +114,7 @@ class Shown:
             world = world_of(world, self.trajectory)
         return {
             "title": self.title,
+            "heading": self.heading,
             "machine": machine_scene(self.machine).model_dump(mode="json"),
             "scenario": None if world is None else world.model_dump(mode="json"),
             "trial": None if self.trajectory is None else _trial(self.trajectory),

@@ -22,6 +22,8 @@ export function Film({
   follow,
   loads,
   begins = 0,
+  chosen,
+  onChoose,
 }: {
   machine: Machine;
   trial: Trial;
@@ -29,6 +31,9 @@ export function Film({
   follow: boolean;
   /** At which time the machine is where the camera first looks for it. */
   begins?: number;
+  /** The part that is pointed out. */
+  chosen?: string;
+  onChoose?: (part: string | undefined) => void;
   /** What each joint bears; null to draw the parts in their own colours. */
   loads: Float32Array | null;
 }) {
@@ -80,10 +85,19 @@ export function Film({
     (rod: Rod) => (loads === null ? null : loadColour(loads[joints.get(rod.joint) ?? -1] ?? 0)),
     [loads, joints],
   );
+  const pointed = useMemo(() => new Set(chosen === undefined ? [] : [chosen]), [chosen]);
   const pose = useMemo<PoseNow>(() => (part, into) => into.copy(poses.current.get(part.id) ?? part.pose), []);
   return (
     <>
-      <Parts machine={machine} pose={pose} moving colour={colour} rodColour={rodColour} />
+      <Parts
+        machine={machine}
+        pose={pose}
+        moving
+        colour={colour}
+        rodColour={rodColour}
+        chosen={pointed}
+        onChoose={onChoose}
+      />
       {loads !== null && <LoadedJoints machine={machine} trial={trial} pose={pose} loads={loads} />}
       <Breaks machine={machine} trial={trial} pose={pose} now={shown} />
       {trial.cargo !== null && (

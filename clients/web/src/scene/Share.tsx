@@ -1,9 +1,9 @@
 import { Button, Group, Text, TextInput } from "@mantine/core";
-import { IconCamera, IconLink, IconMovie } from "@tabler/icons-react";
+import { IconCamera, IconFrame, IconLink, IconMovie } from "@tabler/icons-react";
 import { useState, type RefObject } from "react";
 import { save } from "../api/client";
 import type { Clock } from "./clock";
-import { filmOf, pictureOf } from "./pictures";
+import { embedding, filmOf, pictureOf } from "./pictures";
 
 interface ShareProps {
   /** What holds the drawing. */
@@ -19,12 +19,12 @@ export function Share({ stage, clock, address }: ShareProps) {
   const [link, setLink] = useState<string | null>(null);
   const [recording, setRecording] = useState<(() => void) | null>(null);
   const canvas = (): HTMLCanvasElement | null => stage.current?.querySelector("canvas") ?? null;
-  const copy = async (): Promise<void> => {
+  const copy = async (made: (address: string) => string, done: string): Promise<void> => {
     if (address === undefined) return;
-    const text = await address();
+    const text = made(await address());
     try {
       await navigator.clipboard.writeText(text);
-      setTold("The link is copied.");
+      setTold(done);
       setLink(null);
     } catch {
       // Without a secure address a page may not write there: it can be copied by hand.
@@ -58,9 +58,19 @@ export function Share({ stage, clock, address }: ShareProps) {
           size="compact-xs"
           variant="default"
           leftSection={<IconLink size={14} aria-hidden />}
-          onClick={() => void copy()}
+          onClick={() => void copy((link) => link, "The link is copied.")}
         >
           Copy link to this moment
+        </Button>
+      )}
+      {address !== undefined && (
+        <Button
+          size="compact-xs"
+          variant="default"
+          leftSection={<IconFrame size={14} aria-hidden />}
+          onClick={() => void copy(embedding, "The frame is copied: paste it into a page.")}
+        >
+          Copy frame for a page
         </Button>
       )}
       <Button
@@ -82,7 +92,7 @@ export function Share({ stage, clock, address }: ShareProps) {
       >
         {recording === null ? "Record film" : "Stop and save the film"}
       </Button>
-      {link !== null && <TextInput size="xs" readOnly value={link} aria-label="Link to this moment" />}
+      {link !== null && <TextInput size="xs" readOnly value={link} aria-label="To be copied" />}
       <Text size="xs" role="status">
         {told}
       </Text>

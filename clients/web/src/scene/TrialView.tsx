@@ -7,7 +7,7 @@ import { Film } from "./Film";
 import { seenAlong } from "./flight";
 import { FlightMap } from "./FlightMap";
 import { Legend } from "./Legend";
-import { loadsAt, mostLoaded } from "./loads";
+import { loadsAt, mostLoaded, mostOf } from "./loads";
 import { CameraLock } from "./lock";
 import { readScene, type MachineScene } from "./machine";
 import type { Moment } from "./moment";
@@ -27,6 +27,9 @@ interface TrialProps {
   begun?: boolean;
   /** When and from where it is seen at first. */
   moment?: Moment;
+  /** The part that is pointed out. */
+  part?: string;
+  onPart?: (part: string | undefined) => void;
   /** The address of a moment; without, none can be copied. */
   addressOf?: (moment: Moment) => Promise<string>;
 }
@@ -75,6 +78,9 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
         clock={clock}
         address={addressOf === undefined ? undefined : () => addressOf({ time: clock.time.current, look: lock.look })}
       />
+      {props.part !== undefined && (
+        <Chosen trial={props.trial} machine={props.scene} part={props.part} clear={() => props.onPart?.(undefined)} />
+      )}
       {loads && <Legend whole={props.trial.loads === null} />}
       <Broken breaks={props.trial.breaks} seek={clock.seek} />
       <TrialCurves trial={props.trial} clock={clock} />
@@ -114,6 +120,8 @@ export function TrialScene({
   height = 420,
   lock,
   moment,
+  part,
+  onPart,
 }: TrialProps & { clock: Clock; loads: boolean; follow: boolean; height?: number; lock?: CameraLock }) {
   const machine = useMemo(() => readScene(scene), [scene]);
   const bounds = useMemo(() => startBounds(machine, trial), [machine, trial]);
@@ -128,8 +136,10 @@ export function TrialScene({
           trial={trial}
           clock={clock}
           follow={follow}
-          loads={loads ? borne : null}
+          loads={loads && most !== null ? borne : null}
           begins={moment?.look ? moment.time : 0}
+          chosen={part}
+          onChoose={onPart}
         />
       </Stage>
       {loads && (
@@ -140,6 +150,34 @@ export function TrialScene({
         </Text>
       )}
     </>
+  );
+}
+
+/** What part was clicked, and what its joints bear at most in the whole trial. */
+function Chosen({
+  trial,
+  machine,
+  part,
+  clear,
+}: {
+  trial: Trial;
+  machine: MachineScene;
+  part: string;
+  clear: () => void;
+}) {
+  const [block, rod] = [machine.blocks, machine.connectors].map((all) => all.find(({ id }) => id === part));
+  const module = (block ?? rod)?.module;
+  const most = mostOf(trial, part, machine.connectors.find(({ id }) => id === part)?.joint);
+  if (module === undefined) return null;
+  return (
+    <Group gap="xs">
+      <Text size="sm" className="figures">
+        Part {part}, {module}: its joints bear up to {(100 * most).toFixed(0)} % of their strength.
+      </Text>
+      <Button size="compact-xs" variant="default" onClick={clear}>
+        Let it go
+      </Button>
+    </Group>
   );
 }
 

@@ -50,6 +50,12 @@ export function mostLoaded(trial: Trial, loads: Float32Array): { joint: string; 
   return peak === undefined ? null : { joint: peak.joint, kind: peak.kind, ratio: loads[found] ?? 0 };
 }
 
+/** The most that the joints of a part bear in a trial, as a share of their strength. */
+export function mostOf(trial: Trial, part: string, rod: string | undefined): number {
+  const own = trial.peaks.filter(({ joint }) => joint === rod || joint.split("-").includes(part));
+  return Math.max(0, ...own.map(({ ratio }) => ratio));
+}
+
 const STOPS = [
   [0, [120, 140, 165]],
   [0.5, [236, 190, 60]],

@@ -45,3 +45,9 @@ export async function filmOf(canvas: Drawn, begun: (stop: () => void) => void): 
     });
   });
 }
+
+/** HTML that shows a moment of a job's trial in a frame of another page. */
+export function embedding(address: string): string {
+  const source = address.replace("/jobs/", "/embed/job/").replaceAll("&", "&amp;").replaceAll('"', "%22");
+  return `<iframe src="${source}" title="A trial of BuildArena" width="760" height="720" style="border: 0" loading="lazy"></iframe>`;
+}

@@ -11,9 +11,20 @@ import type { Trial } from "../scene/trial";
 import { trialOf, type Given } from "./given";
 
 const CONTROLS = 84;
+const HEADING = 42;
 
 /** What a notebook shows of a machine or a trial, in a page of its own without a server. */
 export function Viewer({ given, height }: { given: Given; height: number }) {
+  if (!given.heading) return <Shown given={given} height={height} />;
+  return (
+    <>
+      <h1>{given.heading}</h1>
+      <Shown given={given} height={height - HEADING} />
+    </>
+  );
+}
+
+function Shown({ given, height }: { given: Given; height: number }) {
   const machine = useMemo(() => readScene(given.machine), [given]);
   const trial = useMemo(() => (given.trial === null ? null : trialOf(given.trial)), [given]);
   if (trial === null) return <Standing machine={machine} title={given.title} height={height} />;
@@ -51,7 +62,7 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
     <>
       <Stage bounds={bounds} height={height} label={`${title}, at ${clock.shown.toFixed(1)} seconds`}>
         <Surroundings scenario={scenario} time={clock.shown} />
-        <Film machine={machine} trial={trial} clock={clock} follow loads={coloured ? borne : null} />
+        <Film machine={machine} trial={trial} clock={clock} follow loads={coloured && most !== null ? borne : null} />
       </Stage>
       <div className="controls">
         <button type="button" onClick={clock.toggle}>

@@ -19,6 +19,8 @@ export interface GivenTrial {
 /** What is to be shown: a machine, or a machine in its trial. */
 export interface Given {
   title: string;
+  /** What stands above it. */
+  heading?: string;
   machine: MachineScene;
   scenario: Scenario | null;
   trial: GivenTrial | null;

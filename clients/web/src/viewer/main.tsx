@@ -5,6 +5,7 @@ import { Viewer } from "./Viewer";
 const STYLE = `
   :root { color-scheme: light dark; font: 13px/1.4 system-ui, sans-serif; }
   body { margin: 0; overflow: hidden; }
+  h1 { margin: 0; padding: 0 10px; font-size: 14px; line-height: 42px; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }
   .controls { display: flex; gap: 10px; align-items: center; height: 42px; padding: 0 10px; white-space: nowrap; }
   .controls input[type="range"] { flex: 1; min-width: 60px; }
   .controls label { display: inline-flex; gap: 4px; align-items: center; }

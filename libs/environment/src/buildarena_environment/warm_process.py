@@ -152,7 +152,7 @@ def _serve(
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answer = make()
     if spare_bytes is not None:
-        _limit_memory(spare_bytes)
+        limit_memory(spare_bytes)
     while True:
         try:
             question = pipe.recv()
@@ -161,7 +161,8 @@ def _serve(
         pipe.send(answer(question))
 
 
-def _limit_memory(spare_bytes: int) -> None:
+def limit_memory(spare_bytes: int) -> None:
+    """Lets this process take no more memory than it has now and so many bytes."""
     if sys.platform == "win32":
         return  # it has no such limit
     import resource

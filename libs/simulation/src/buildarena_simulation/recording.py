@@ -94,15 +94,29 @@ class Recorder:
             return None
         return rounded_positions(self._cargo_position[self._row - 1])
 
+    @property
+    def poses_now(self) -> NDArray[np.float32]:
+        """(N, 7) positions and quaternions (w, x, y, z) of the tracked blocks at the last sample.
+
+        World frame, units; a cargo's pose is one more row.
+        """
+        positions, quaternions = self._poses(self._row - 1)
+        rows = np.concatenate([positions[0], quaternions[0]], axis=1)
+        if self._cargo_size is not None:
+            last = self._row - 1
+            cargo = np.concatenate([self._cargo_position[last], self._cargo_quaternion[last]])
+            rows = np.concatenate([rows, cargo[None]])
+        return rows.astype(np.float32)
+
     def _heated_in(self, clusters: Clusters, motion: Motion) -> BoolArray:
         structure = self._structure
         shown = motion.points(clusters, structure.shown)
         directions = turned(motion.rotation[clusters.cluster_of], structure.directions)
         return heated_cannons(structure, shown, directions)
 
-    def _runs(self) -> Iterator[tuple[Clusters, list[Motion]]]:
-        """The samples, together as long as no cluster broke."""
-        for _, run in itertools.groupby(self._seen, key=lambda seen: id(seen[0])):
+    def _runs(self, first: int = 0) -> Iterator[tuple[Clusters, list[Motion]]]:
+        """The samples from one on, together as long as no cluster broke."""
+        for _, run in itertools.groupby(self._seen[first:], key=lambda seen: id(seen[0])):
             samples = list(run)
             yield samples[0][0], [motion for _, motion in samples]
 
@@ -117,12 +131,16 @@ class Recorder:
             rows.append(np.tile(component.astype(np.int16), (len(motions), 1)))
         return np.concatenate(rows)
 
-    def _poses(self) -> tuple[FloatArray, FloatArray]:
-        """Positions (T, N, 3) and quaternions (T, N, 4) of the tracked blocks, world frame."""
+    def _poses(self, first: int = 0) -> tuple[FloatArray, FloatArray]:
+        """Positions (T, N, 3) and quaternions (T, N, 4) of the tracked blocks, world frame.
+
+        Args:
+            first: The sample that they begin with.
+        """
         structure, tracked = self._structure, self._tracked
         shown, turns = structure.shown[tracked], structure.rotations[tracked]
         positions, quaternions = [], []
-        for clusters, motions in self._runs():
+        for clusters, motions in self._runs(first):
             of = clusters.cluster_of[tracked]
             rotation = np.array([motion.rotation for motion in motions])[:, of]
             origin = np.array([motion.position for motion in motions])[:, of]

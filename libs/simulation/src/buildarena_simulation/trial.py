@@ -7,7 +7,7 @@ import numpy as np
 
 from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.control import recoil
+from buildarena_simulation.control import Levels, recoil
 from buildarena_simulation.controllers.answers import constant
 from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.senses import Seen
@@ -112,8 +112,15 @@ class Trial:
 
     def ask(self, levels: Mapping[tuple[int, str], float]) -> None:
         """Says what is asked for in the next tick; see `Channels.levels`."""
-        count = self._per_sample
-        self._planner.plan(constant(levels, count), self._tick * count, count)
+        self._plan(constant(levels, self._per_sample))
+
+    def press(self, keys: Keys) -> None:
+        """Says which keys are held in the next tick."""
+        first = self._tick * self._per_sample
+        self._plan(keys.levels(self._planner.times(first, self._per_sample)))
+
+    def _plan(self, levels: Levels) -> None:
+        self._planner.plan(levels, self._tick * self._per_sample, self._per_sample)
 
     def pass_tick(self) -> None:
         """Lets a tick pass with what was asked for."""

@@ -46,6 +46,7 @@ from buildarena_api.routes import (
     catalogue,
     challenges,
     comparisons,
+    drives,
     events,
     evidence,
     exports,
@@ -207,6 +208,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
 def _add_routes(app: FastAPI) -> None:
     app.include_router(health.router)
+    app.include_router(drives.router)  # its first message says who asks
     for route in (*LIMITED_THEMSELVES, *ORDINARY):
         own = [] if route in LIMITED_THEMSELVES else [limited()]
         app.include_router(

@@ -32,6 +32,7 @@ from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import (
     EXTERNAL_WORKFLOW,
     FILE_WORKFLOW,
+    PILOTED_WORKFLOW,
     has_data_sheets,
     worlds_of,
 )
@@ -164,7 +165,7 @@ class Verifier:
     def _checks(self, job: Job) -> list[Check]:
         if job.state != JobState.DONE or job.success is None:
             return [compare("scored", kept=True, found=False)]
-        if job.track_config["workflow"] in {EXTERNAL_WORKFLOW, FILE_WORKFLOW}:
+        if job.track_config["workflow"] in {EXTERNAL_WORKFLOW, FILE_WORKFLOW, PILOTED_WORKFLOW}:
             return self._external_checks(job)
         try:
             session, host, result = self._replay(job)
@@ -201,11 +202,12 @@ class Verifier:
 
     def _external_checks(self, job: Job) -> list[Check]:
         """What came about elsewhere: the calls are made again, or the machine is read again."""
-        if job.track_config["workflow"] == FILE_WORKFLOW:
-            digest = str(job.model_config.get("model"))
-            machine = Machine.from_document(json.loads(self._artifacts.get(digest)))
-            checks = [compare("machine", self._artifact(job, "machine"), digest)]
-            return checks + self._trial_checks(job, machine)
+        workflow, stored = job.track_config["workflow"], self._artifact(job, "machine")
+        if workflow in {FILE_WORKFLOW, PILOTED_WORKFLOW}:
+            # A file's job is named after the machine; the keys that a person held are part of it.
+            named = str(job.model_config.get("model") if workflow == FILE_WORKFLOW else stored)
+            machine = Machine.from_document(json.loads(self._artifacts.get(named)))
+            return [compare("machine", stored, named), *self._trial_checks(job, machine)]
         with self._store.database.transaction() as connection:
             calls = self._store.external_calls.read(job.id, connection=connection)
         bench = bench_of(task_of(job, self._tasks), data_sheets=has_data_sheets(job.track_config))

@@ -10,6 +10,7 @@ import typer
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_files import job_files
 from buildarena_cli.commands.job_lists import list_jobs
+from buildarena_cli.commands.job_page import page
 from buildarena_cli.commands.job_replay import replay
 from buildarena_cli.errors import DONE, FAILED
 from buildarena_cli.ids import whole_id
@@ -109,6 +110,7 @@ def verify_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
 
 
 app.command("replay")(replay)
+app.command("page")(page)
 
 
 def _change(url: str, job_id: str, verb: str, *, as_json: bool) -> None:

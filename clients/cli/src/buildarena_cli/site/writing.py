@@ -17,6 +17,13 @@ from buildarena_cli.site.boards import Collected, questions, rows_of
 from buildarena_cli.site.folder import MARKER, Folder, as_json, job_file, name_of
 from buildarena_cli.site.jobs import job_answers
 from buildarena_cli.site.pages import INDEX, SITE, first_page, page_files
+from buildarena_cli.site.previews import (
+    best_picture,
+    head,
+    job_preview,
+    job_preview_file,
+    thumbnail_of,
+)
 from buildarena_cli.site.scope import Job, Scope, digest_of
 from buildarena_cli.terminal.counting import counted
 
@@ -137,11 +144,16 @@ def write_site(client: Client, plan: Plan, folder: Folder) -> int:
         stored_rows = folder.keep(rows.content, rows.ending)
         job_names = _keep_jobs(client, plan, folder)
         wanted.update(job_file(job_id) for job_id in job_names)
+        for job in plan.chosen:
+            picture = thumbnail_of(job["id"], job_names[job["id"]])
+            folder.write(job_preview_file(job["id"]), job_preview(job, picture).encode())
+            wanted.add(job_preview_file(job["id"]))
         for names in (answers, *job_names.values()):
             wanted.update(name for name in names.values() if name is not None)
         wanted.add(stored_rows)
         folder.write(SITE, as_json(_site(plan, answers, stored_rows)))
-        folder.write(INDEX, first_page(plan.pages).encode())
+        preview = head("BuildArena", plan.holds, best_picture(list(plan.chosen), job_names))
+        folder.write(INDEX, first_page(plan.pages, preview).encode())
         folder.remove_others(wanted)
         return sum((folder.path / name).stat().st_size for name in wanted)
 

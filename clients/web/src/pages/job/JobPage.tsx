@@ -8,6 +8,7 @@ import type { StreamState } from "../../api/events";
 import type { JobSearch } from "../../api/jobs-search";
 import { job as jobQuery, type JobDetail } from "../../api/queries";
 import { ProblemNote } from "../../parts/Problem";
+import { isSite } from "../../api/site";
 import { Section } from "../../parts/Section";
 import { Answered, Empty } from "../../parts/States";
 import { BuildPart } from "./BuildPart";
@@ -149,6 +150,11 @@ function GlbButton({ job }: { job: JobDetail }) {
       <Link to="/compare" search={{ a: job.id }}>
         Compare
       </Link>
+      {!isSite && (
+        <Link to="/drive" search={{ job: job.id }}>
+          Drive it
+        </Link>
+      )}
       <Button
         size="compact-sm"
         variant="default"

@@ -33,6 +33,10 @@ export function TrialPart({
     await change?.({ view: "trial", t: Number(time.toFixed(2)), rollout: number, camera: writtenLook(look) });
     return window.location.href;
   };
+  const choose = (part: string | undefined): void => {
+    if (change === undefined) setOwn((before) => ({ ...before, part }));
+    else void change({ part });
+  };
   const [scene, trial] = useQueries({
     queries: [sceneQuery(job.id, number), trialQuery(job.id, number, job.artifacts[`trajectory-${number}`])],
   });
@@ -73,6 +77,8 @@ export function TrialPart({
               trial={trial.data}
               scenario={scene.data.scenario}
               begun={begun}
+              part={search.part}
+              onPart={choose}
               moment={{ time: search.t ?? 0, look: readLook(search.camera) }}
               addressOf={change === undefined ? undefined : addressOf}
             />

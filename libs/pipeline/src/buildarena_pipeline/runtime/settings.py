@@ -39,7 +39,7 @@ SimulatorVersion = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,40}$")]
 BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
 PAGES: Final = (
     *("sweeps", "jobs", "transcripts", "tasks", "models", "compare", "method", "build", "machine"),
-    "challenges",
+    *("challenges", "drive", "embed"),
 )
 """First parts of the addresses of the dashboard's pages."""
 OWN_PATHS: Final = frozenset(

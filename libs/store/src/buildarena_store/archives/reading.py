@@ -37,7 +37,14 @@ from buildarena_store.database import SCHEMA, Database
 from buildarena_store.errors import NameTakenError
 from buildarena_store.ids import content_hash
 from buildarena_store.jobs.audits import require_audits
-from buildarena_store.states import EXTERNAL_QUEUE, Audit, JobState, Outcome, SweepState
+from buildarena_store.states import (
+    EXTERNAL_PROVIDER,
+    EXTERNAL_QUEUE,
+    Audit,
+    JobState,
+    Outcome,
+    SweepState,
+)
 from buildarena_store.tables import (
     artifacts,
     attempts,
@@ -246,7 +253,7 @@ class _Archive:
         players = {
             (str(row.model_config_.get("model")), row.model.startswith("human/"))
             for row in self._jobs.values()
-            if row.track_config.get("workflow") == EXTERNAL_QUEUE
+            if row.model_config_.get("provider") == EXTERNAL_PROVIDER
         }
         for name, person in sorted(players):
             # One that is of the other kind here stays so: results keep the names they came with.

@@ -29,6 +29,9 @@ _SOURCES: Final = {
 }
 POLICY: Final = "; ".join(f"{what} {where}" for what, where in _SOURCES.items())
 """What a page may load and run: its own files only, and no script that stands in a page."""
+EMBED: Final = "/embed/"
+"""Pages that other sites may show in a frame: nothing can be changed on them."""
+EMBED_POLICY: Final = POLICY.replace("frame-ancestors 'none'", "frame-ancestors *")
 NOT_BUILT: Final = """<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>BuildArena</title>
 <h1>BuildArena</h1>
@@ -77,10 +80,11 @@ class Dashboard:
             return None
         if INDEX not in self._files:
             return HTMLResponse(self._not_built, headers={"Content-Security-Policy": POLICY})
-        return _answer(self._files[INDEX], headers)
+        policy = EMBED_POLICY if path.startswith(EMBED) else POLICY
+        return _answer(self._files[INDEX], headers, policy)
 
 
-def _answer(file: PageFile, headers: Headers) -> Response:
+def _answer(file: PageFile, headers: Headers, policy: str = POLICY) -> Response:
     encoding = _accepted(headers.get("accept-encoding", ""), file.encoded)
     # Each encoding is another body, so it has another tag.
     etag = file.etag if encoding is None else f'{file.etag[:-1]}-{encoding}"'
@@ -88,7 +92,7 @@ def _answer(file: PageFile, headers: Headers) -> Response:
         "ETag": etag,
         "Cache-Control": "public, max-age=31536000, immutable" if file.immutable else "no-cache",
         "Vary": "Accept-Encoding",
-        "Content-Security-Policy": POLICY,
+        "Content-Security-Policy": policy,
     }
     if etag in [tag.strip() for tag in headers.get("if-none-match", "").split(",")]:
         return Response(status_code=304, headers=answer)

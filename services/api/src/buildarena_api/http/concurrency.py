@@ -159,6 +159,7 @@ class ConcurrencyLimits:
     trajectories: ConcurrencyLimit
     runner_waits: ConcurrencyLimit
     runner_outcomes: ConcurrencyLimit
+    drives: ConcurrencyLimit
 
 
 def usual_limits() -> ConcurrencyLimits:
@@ -182,6 +183,8 @@ def usual_limits() -> ConcurrencyLimits:
         runner_waits=ConcurrencyLimit("waits for a trial", per_caller=64, total=1000),
         # One may have a hundred megabytes in memory until it is scored.
         runner_outcomes=ConcurrencyLimit("outcomes", per_caller=2, total=4, wait_s=30.0),
+        # Each has a process, of which two cores bear some twenty.
+        drives=ConcurrencyLimit("drives", per_caller=4, total=24, retry_s=10),
     )
 
 
