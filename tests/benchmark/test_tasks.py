@@ -46,12 +46,15 @@ CONTROL = [
 
 
 THROWING = ["throw-1", "throw-2", "throw-3"]
-GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL, "throwing": THROWING}
+COURSES = ["deliver-1", "deliver-2", "deliver-3"]
+GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL, "throwing": THROWING} | {
+    "courses": COURSES
+}
 
 
 def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
-    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL, *THROWING]
+    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL, *THROWING, *COURSES]
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         kind, _, level = name.rpartition("-")
@@ -96,7 +99,7 @@ def test_a_statement_tells_what_the_scorer_measures(tasks) -> None:
             assert "four powered wheels" in text
 
 
-@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM, *FAMILIES, *THROWING])
+@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM, *FAMILIES, *THROWING, *COURSES])
 def test_a_statement_tells_every_threshold(tasks, name) -> None:
     task = tasks[name]
     text = " ".join(task.statement.split())

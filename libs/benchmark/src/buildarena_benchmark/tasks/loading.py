@@ -36,6 +36,7 @@ _CONTROL: Final = (
     "line-1",
 )
 _THROWING: Final = ("throw-1", "throw-2", "throw-3")
+_COURSES: Final = ("deliver-1", "deliver-2", "deliver-3")
 
 
 @cache
@@ -43,7 +44,7 @@ def builtin_tasks() -> Mapping[str, Task]:
     """The built-in tasks by name: the paper's nine in its order, the workshop's, then the rest."""
     folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
     tasks = {}
-    for name in (*_PAPER, *_WORKSHOP, *_HEADROOM, *_FAMILIES, *_CONTROL, *_THROWING):
+    for name in (*_PAPER, *_WORKSHOP, *_HEADROOM, *_FAMILIES, *_CONTROL, *_THROWING, *_COURSES):
         text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
         tasks[name] = parse_task(text, origin=f"{name}.yaml")
     return MappingProxyType(tasks)

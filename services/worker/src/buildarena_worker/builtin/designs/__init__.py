@@ -10,6 +10,7 @@ from collections.abc import Callable
 from buildarena_worker.builtin.designs import (
     arms,
     bridges,
+    couriers,
     flyers,
     piloted,
     repairs,
@@ -63,6 +64,9 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "throw-1": throwers.catapult,
     "throw-2": throwers.catapult,
     "throw-3": throwers.aiming_catapult,
+    "deliver-1": couriers.courier,
+    "deliver-2": couriers.courier,
+    "deliver-3": couriers.courier,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 
