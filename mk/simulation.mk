@@ -1,4 +1,4 @@
-.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-processors bench-game bench-control bench-worlds bench-repeats \
+.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-agreement-throwing bench-processors bench-game bench-control bench-worlds bench-repeats \
 	game-evidence evidence-machines
 
 bench-simulation: $(STAMP) ## Measures the simulation and the engines' agreement; JSON in .buildarena/
@@ -10,6 +10,10 @@ bench-agreement: $(STAMP) ## Compares the engines on 300 machines that nobody ch
 bench-agreement-workshop: $(STAMP) ## The same for 120 machines of the workshop's modules
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_agreement --set workshop \
 		--json .buildarena/bench-agreement-workshop.json
+
+bench-agreement-throwing: $(STAMP) ## The same for 120 catapults
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_agreement --set throwing \
+		--json .buildarena/bench-agreement-throwing.json
 
 bench-processors: $(STAMP) ## Compares 200 trials' bytes over kinds of processors; an hour
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_processors --json .buildarena/bench-processors.json

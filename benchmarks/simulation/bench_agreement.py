@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from benchmarks.figures import keep
-from support.machines import random_machines, random_workshop
+from support.machines import random_machines, random_throwers, random_workshop
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_simulation import ENGINES, simulate
@@ -21,8 +21,9 @@ from buildarena_simulation import ENGINES, simulate
 DRAWS = {
     "basic": (random_machines.TASKS, random_machines.random_machine, 300, 0.95),
     "workshop": (random_workshop.TASKS, random_workshop.random_workshop_machine, 120, 0.90),
+    "throwing": (random_throwers.TASKS, random_throwers.random_thrower, 120, 0.95),
 }
-"""By module set: its tasks, how a machine is drawn, how many, and the bar of equal verdicts."""
+"""By set: its tasks, how a machine is drawn, how many, and the bar of equal verdicts."""
 CLOSE = 0.90
 TOLERANCE = 0.25
 FINER = 4
@@ -98,7 +99,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path, help="where the figures go")
     parser.add_argument("--set", choices=list(DRAWS), default="basic", dest="modules")
-    parser.add_argument("--machines", type=int, help="300 basic ones or 120 of the workshop")
+    parser.add_argument("--machines", type=int, help="300 basic ones, 120 of other sets")
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()

@@ -11,9 +11,10 @@ CONTROL = {
     *("balance-1", "balance-2", "walk-1", "walk-2", "place-2", "line-1"),
 }
 THROWING = {"throw-1", "throw-2", "throw-3"}
+COURSES = {"deliver-1", "deliver-2", "deliver-3"}
 WORKSHOP = {*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"}
 SPACE = {"orbit-1", "orbit-2"}
-OTHERS = WORKSHOP | FAMILIES | CONTROL | THROWING | SPACE
+OTHERS = WORKSHOP | FAMILIES | CONTROL | THROWING | SPACE | COURSES
 
 
 def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
@@ -34,6 +35,7 @@ def test_an_unknown_category_is_refused_with_those_that_there_are(api) -> None:
         (None, ["control"], CONTROL),
         (None, ["throwing"], THROWING),
         (None, ["space"], SPACE),
+        (None, ["courses"], COURSES),
         (None, ["support"], {"support-1", "support-2", "support-3"}),
         (["support-1"], ["flight"], None),
     ],

@@ -47,18 +47,21 @@ CONTROL = [
 
 THROWING = ["throw-1", "throw-2", "throw-3"]
 SPACE = ["orbit-1", "orbit-2"]
+COURSES = ["deliver-1", "deliver-2", "deliver-3"]
 GROUPS = {
     "headroom": HEADROOM,
     "families": FAMILIES,
     "control": CONTROL,
     "throwing": THROWING,
     "space": SPACE,
+    "courses": COURSES,
 }
 
 
 def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None:
     paper = [f"{c}-{n}" for c in ("transport", "support", "lift") for n in (1, 2, 3)]
-    assert list(tasks) == [*paper, *WORKSHOP, *HEADROOM, *FAMILIES, *CONTROL, *THROWING, *SPACE]
+    further = [*HEADROOM, *FAMILIES, *CONTROL, *THROWING, *SPACE, *COURSES]
+    assert list(tasks) == [*paper, *WORKSHOP, *further]
     assert list(paper_tasks()) == paper
     for name, task in tasks.items():
         kind, _, level = name.rpartition("-")
@@ -103,7 +106,7 @@ def test_a_statement_tells_what_the_scorer_measures(tasks) -> None:
             assert "four powered wheels" in text
 
 
-@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM, *FAMILIES, *THROWING])
+@pytest.mark.parametrize("name", [*WORKSHOP, *HEADROOM, *FAMILIES, *THROWING, *COURSES])
 def test_a_statement_tells_every_threshold(tasks, name) -> None:
     task = tasks[name]
     text = " ".join(task.statement.split())

@@ -229,7 +229,7 @@ def after(time_s: float, shift: tuple[float, float, float]) -> Callable[[np.ndar
     ("part", "change", "flag"),
     [
         (5, after(2.4, (0, 9, 0)), "crossed_line"),
-        (0, after(1.0, (0, -1.05, 0)), "base_moved"),
+        (0, after(1.0, (0, -3.05, 0)), "base_moved"),
         ("Boulder", after(2.6, (0, 3, 0)), "not_free"),
         ("Boulder", lambda t: np.outer((t > 1.2) & (t < 1.3), (0, -2.0, 2.0)), "not_borne"),
     ],
@@ -241,6 +241,14 @@ def test_a_trial_that_breaks_one_rule(part, change, flag) -> None:
     result = score(TASK, machine, later(trial, block, change))
     fails(result)
     assert result.flags == (flag,)
+
+
+def test_recoil_after_the_throw_does_not_count() -> None:
+    """Engines part in what the machine does once the boulder is away: so it decides nothing."""
+    machine, trial = honest("mujoco")
+    release_s = score(TASK, machine, trial).metrics["release_s"]
+    hops = later(trial, 0, after(release_s + 0.08, (0, -5, 0)))
+    assert score(TASK, machine, hops).success
 
 
 def test_what_is_thrown_by_parts_that_fly_along() -> None:

@@ -61,11 +61,11 @@ def random_workshop_machine(task: str, seed: int) -> Machine:
     draw = np.random.default_rng([seed, TASKS.index(task)])
     while True:
         machine = _drawn(task, draw)
-        if _starts_clear(task, machine):
+        if starts_clear(task, machine):
             return machine
 
 
-def _starts_clear(task: str, machine: Machine) -> bool:
+def starts_clear(task: str, machine: Machine) -> bool:
     """Whether nothing of it is where the trial puts the cargo or has its terrain."""
     scenario, structure = builtin_tasks()[task].scenario, structure_of(machine)
     try:
@@ -81,14 +81,14 @@ def _drawn(task: str, draw: Draw) -> Machine:
     (part,) = design.parts.values()
     for name, arguments in part.actions:
         # Where another part has no room the design's own stands: later actions count on its number.
-        if not machine.act(name, _varied(name, arguments, draw)).ok:
+        if not machine.act(name, varied(name, arguments, draw)).ok:
             machine.act(name, arguments)
-    _add_parts(machine, draw)
-    _bind(machine, design.control or {}, draw)
+    add_parts(machine, draw)
+    bind(machine, design.control or {}, draw)
     return machine
 
 
-def _varied(name: str, arguments: Mapping[str, Any], draw: Draw) -> dict[str, Any]:
+def varied(name: str, arguments: Mapping[str, Any], draw: Draw) -> dict[str, Any]:
     varied = dict(arguments)
     if name == "attach_block_to" and draw.random() < _SWAPPED:
         varied["new_block"] = str(draw.choice(_STAND_INS.get(varied["new_block"], ("Hinge",))))
@@ -97,7 +97,7 @@ def _varied(name: str, arguments: Mapping[str, Any], draw: Draw) -> dict[str, An
     return varied
 
 
-def _add_parts(machine: Machine, draw: Draw) -> None:
+def add_parts(machine: Machine, draw: Draw) -> None:
     offered = [name for name in _FURTHER if name in machine.catalogue]
     for _ in range(int(draw.integers(0, 5))):
         blocks = [block for block in machine.blocks.values() if block.module.faces]
@@ -107,7 +107,7 @@ def _add_parts(machine: Machine, draw: Draw) -> None:
         attach(machine, base.id, face, module)
 
 
-def _bind(machine: Machine, control: Mapping[str, Any], draw: Draw) -> None:
+def bind(machine: Machine, control: Mapping[str, Any], draw: Draw) -> None:
     for bound in control.get("control_config", ()):
         for key in bound["keys"]:
             told = {"block_id": bound["block"], "action": bound["action"], "new_key": key}

@@ -172,6 +172,7 @@ def _cargo(trajectory: Trajectory) -> dict[str, Any] | None:
         return None
     return {
         "size": list(trajectory.cargo_size),
+        "shape": trajectory.cargo_shape,
         "positions": _bytes(places, "<f4"),
         "quaternions": _bytes(turns, "<f4"),
         "mass": _bytes(masses, "<f8"),

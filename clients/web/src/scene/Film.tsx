@@ -1,6 +1,7 @@
 import { useFrame, useThree } from "@react-three/fiber";
 import { useCallback, useEffect, useMemo, useRef } from "react";
 import { Matrix4, Vector3, type Mesh } from "three";
+import { CargoSolid } from "./CargoSolid";
 import type { Clock } from "./clock";
 import { Breaks, LoadedJoints } from "./Joints";
 import { loadColour, loadsOfBlocks } from "./loads";
@@ -102,8 +103,7 @@ export function Film({
       <Breaks machine={machine} trial={trial} pose={pose} now={shown} />
       {trial.cargo !== null && (
         <mesh ref={cargo} matrixAutoUpdate={false} frustumCulled={false}>
-          <boxGeometry args={[...trial.cargo.size]} />
-          <meshLambertMaterial color="#859966" transparent opacity={0.85} />
+          <CargoSolid size={trial.cargo.size} shape={trial.cargo.shape} />
         </mesh>
       )}
     </>

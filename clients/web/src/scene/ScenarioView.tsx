@@ -1,6 +1,7 @@
 import { Stack, Text } from "@mantine/core";
 import { useMemo } from "react";
 import { Box3, Vector3 } from "three";
+import { CargoSolid } from "./CargoSolid";
 import { Stage } from "./Stage";
 import { posts } from "./signs";
 import { Surroundings, type Scenario } from "./Surroundings";
@@ -31,8 +32,7 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
             position={cargoPlace(scenario.cargo, height)}
             rotation={[0, 0, (-(scenario.cargo.heading_deg ?? 0) * Math.PI) / 180]}
           >
-            <boxGeometry args={[...scenario.cargo.size]} />
-            <meshLambertMaterial color="#859966" transparent opacity={0.85} />
+            <CargoSolid size={scenario.cargo.size} shape={scenario.cargo.shape ?? "box"} />
           </mesh>
         )}
         <mesh position={[0, 0, scenario.placement.lowest_center ?? 0.5 + (scenario.placement.height ?? 0)]}>
@@ -53,6 +53,9 @@ function cargoHeight(scenario: Scenario): number {
 function cargoPlace({ at, size }: NonNullable<Scenario["cargo"]>, height: number): [number, number, number] {
   return at == null ? [0, 0, height] : [at[0], at[1], at[2] + size[2] / 2];
 }
+
+const cargoOf = ({ size, shape }: NonNullable<Scenario["cargo"]>): string =>
+  shape === "ball" ? `A ball of ${size[0]}` : `A cargo of ${size.join(" x ")}`;
 
 const counted = (count: number, thing: string): string => `${count} ${thing}${count === 1 ? "" : "s"}`;
 
@@ -81,8 +84,8 @@ export function described(scenario: Scenario): string {
     scenario.cargo === null
       ? "There is no cargo."
       : scenario.cargo.at == null
-        ? `A cargo of ${scenario.cargo.size.join(" x ")} units is dropped onto it and grows to ${scenario.cargo.final_mass} mass units.`
-        : `A cargo of ${scenario.cargo.size.join(" x ")} units and ${scenario.cargo.final_mass} mass units stands at (${scenario.cargo.at.join(", ")}).`;
+        ? `${cargoOf(scenario.cargo)} units is dropped onto it and grows to ${scenario.cargo.final_mass} mass units.`
+        : `${cargoOf(scenario.cargo)} units and ${scenario.cargo.final_mass} mass units stands at (${scenario.cargo.at.join(", ")}).`;
   const ground =
     scenario.planet == null ? "" : `The ground is a planet of radius ${scenario.planet.radius} straight below it. `;
   return `${place} ${ground}${cargo} ${signs(scenario)}The trial lasts ${scenario.duration_s} seconds; the red cube marks the machine's place.`;

@@ -2,12 +2,20 @@ import { useFrame } from "@react-three/fiber";
 import { useMemo, useRef } from "react";
 import { DoubleSide, type Group } from "three";
 import type { Vector } from "./modules";
+import type { CargoShape } from "./trial";
 import { lineStrip, markAt, posts, type Gate, type GroundLine, type Mark, turnOf } from "./signs";
 
 export interface Scenario {
   duration_s: number;
   terrain: { center: Vector; size: Vector; slope_deg?: number; heading_deg?: number }[];
-  cargo: { size: Vector; drop_height: number; final_mass: number; at?: Vector | null; heading_deg?: number } | null;
+  cargo: {
+    size: Vector;
+    shape?: CargoShape;
+    drop_height: number;
+    final_mass: number;
+    at?: Vector | null;
+    heading_deg?: number;
+  } | null;
   placement: { kind: string; gap?: number; lowest_center?: number; height?: number; velocity?: Vector };
   gates?: Gate[];
   marks?: Mark[];

@@ -25,6 +25,9 @@ export interface Piloting {
   answers: Float32Array;
 }
 
+/** A ball's size is its diameter three times. */
+export type CargoShape = "box" | "ball";
+
 /** A rollout: T instants, N tracked blocks, J joints. */
 export interface Trial {
   times: Float64Array;
@@ -35,6 +38,7 @@ export interface Trial {
   quaternions: Float32Array;
   cargo: {
     size: readonly [number, number, number];
+    shape: CargoShape;
     positions: Float32Array;
     quaternions: Float32Array;
     mass: Float64Array;
@@ -52,6 +56,7 @@ export interface Trial {
 interface Facts {
   block_ids: string[];
   cargo_size: [number, number, number] | null;
+  cargo_shape?: CargoShape;
   joint_peaks: JointPeak[];
   breaks: Break[];
   sense_names?: string[];
@@ -102,6 +107,7 @@ export function readTrial(file: ArrayBuffer): Trial {
         ? null
         : {
             size,
+            shape: facts.cargo_shape ?? "box",
             positions: flat(table, "cargo_position") ?? NONE,
             quaternions: flat(table, "cargo_quaternion") ?? NONE,
             mass: series(table, "cargo_mass") ?? new Float64Array(times.length),

@@ -1,6 +1,6 @@
 import type { MachineScene } from "../scene/machine";
 import type { Scenario } from "../scene/Surroundings";
-import type { Break, JointPeak, Trial } from "../scene/trial";
+import type { Break, CargoShape, JointPeak, Trial } from "../scene/trial";
 
 /** A trial as notebooks give it: arrays are little-endian bytes in base64. */
 export interface GivenTrial {
@@ -8,7 +8,13 @@ export interface GivenTrial {
   block_ids: string[];
   positions: string;
   quaternions: string;
-  cargo: { size: [number, number, number]; positions: string; quaternions: string; mass: string } | null;
+  cargo: {
+    size: [number, number, number];
+    shape?: CargoShape;
+    positions: string;
+    quaternions: string;
+    mass: string;
+  } | null;
   joint_peaks: (Omit<JointPeak, "ratio"> & { ratio: number | null })[];
   joint_loads: string | null;
   breaks: Break[];
@@ -44,6 +50,7 @@ export function trialOf(given: GivenTrial): Trial {
         ? null
         : {
             size: given.cargo.size,
+            shape: given.cargo.shape ?? "box",
             positions: floats(given.cargo.positions),
             quaternions: floats(given.cargo.quaternions),
             mass: doubles(given.cargo.mass),

@@ -350,6 +350,7 @@ def _require_sayable(machine: Machine, scenario: Scenario) -> None:
     asked: dict[str, object] = {
         "the game lets no machine go in the air": isinstance(place, ReleasedPlacement),
         "the game's cargo falls onto the machine": cargo is not None and cargo.at is not None,
+        "the game's cargo is a box": cargo is not None and cargo.shape != "box",
         "the game's cargo is not turned": cargo is not None and cargo.heading_deg,
         "the game has no gusts": scenario.gusts,
         "the game pushes nothing": scenario.pushes,

@@ -1,6 +1,7 @@
 """Whether a machine's place is clear at the start: nothing of it inside terrain or cargo."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,14 +50,10 @@ def _obstacles(scenario: Scenario, start: Start) -> Iterator[tuple[str, Shape]]:
     for number, terrain in enumerate(scenario.terrain, start=1):
         yield f"terrain {number}", shape_of(terrain)
     if start.cargo is not None:
+        # What is beside a ball in the box around it is beside the ball.
         yield (
             "the cargo",
-            Shape(
-                kind=ShapeKind.BOX,
-                center=start.cargo.position,
-                rotation=start.cargo.rotation,
-                half_extents=start.cargo.size / 2,
-            ),
+            replace(start.cargo, is_ball=False).shape(start.cargo.position, start.cargo.rotation),
         )
 
 

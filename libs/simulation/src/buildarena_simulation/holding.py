@@ -11,7 +11,7 @@ from buildarena_simulation.engines.base import CargoPose, Engine, World, rotatio
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, PointForces
 from buildarena_simulation.structure.grips import Hold, distances, grips_of
-from buildarena_simulation.structure.model import BoolArray, FloatArray, Shape, ShapeKind
+from buildarena_simulation.structure.model import BoolArray, FloatArray, Shape
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.terrain import shape_of
 from buildarena_simulation.trajectory import Event
@@ -173,16 +173,8 @@ class Holding:
         for number, box in enumerate(self._world.terrain, start=1):
             yield f"terrain {number}", WORLD, shape_of(box)
         if cargo is not None and self._world.cargo is not None:
-            yield (
-                "cargo",
-                CARGO,
-                Shape(
-                    kind=ShapeKind.BOX,
-                    center=cargo.position,
-                    rotation=rotation_of(cargo.quaternion),
-                    half_extents=self._world.cargo.size / 2,
-                ),
-            )
+            turn = rotation_of(cargo.quaternion)
+            yield "cargo", CARGO, self._world.cargo.shape(cargo.position, turn)
 
     def _near_blocks(
         self, points: FloatArray, c: int, clusters: Clusters, motion: Motion, reach: float

@@ -132,6 +132,8 @@ def _facts(trajectory: Trajectory, schema: int) -> dict[str, Any]:
         "simulation_version": trajectory.simulation_version,
         "settings": dict(trajectory.settings),
     }
+    if trajectory.cargo_shape != "box":
+        facts["cargo_shape"] = trajectory.cargo_shape
     if trajectory.events:
         facts["events"] = [asdict(event) for event in trajectory.events]
     if piloting is not None and schema >= PILOTED_SCHEMA:

@@ -156,4 +156,5 @@ def _cargo_at_start(
         position=middle + shift,
         mass=cargo.mass_at(0.0),
         rotation=turn_about(np.array([0.0, 0.0, 1.0]), -math.radians(cargo.heading_deg)),
+        is_ball=cargo.shape == "ball",
     )

@@ -55,6 +55,7 @@ class Recorder:
         self._loads: list[FloatArray] = []
         self._heated = np.zeros((count, cannons), dtype=bool)
         self._cargo_size = scenario.cargo.size if scenario.cargo else None
+        self._cargo_shape = scenario.cargo.shape if scenario.cargo else "box"
         self._cargo_position = np.zeros((count, 3))
         self._cargo_quaternion = np.zeros((count, 4))
         self._cargo_mass = np.zeros(count)
@@ -175,6 +176,7 @@ class Recorder:
             cargo_quaternion=rounded_quaternions(quaternion) if has_cargo else None,
             cargo_mass=self._cargo_mass[recorded] if has_cargo else None,
             cargo_size=self._cargo_size,
+            cargo_shape=self._cargo_shape,
             cannon_ids=tuple(structure.block_ids[i] for i in structure.cannons),
             heated=self._heated[recorded],
             pieces=self._pieces(),

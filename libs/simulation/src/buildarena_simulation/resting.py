@@ -131,7 +131,8 @@ class FaceFinder:
         ]
         if world.ground:
             self._tops.insert(0, (0, np.zeros(3), np.array([1e6, 1e6, 0.0])))
-        self._cargo_half = None if world.cargo is None else world.cargo.size / 2
+        flat = world.cargo is not None and not world.cargo.is_ball
+        self._cargo_half = world.cargo.size / 2 if world.cargo is not None and flat else None
 
     def find(self, clusters: Clusters, motion: Motion, cargo: CargoPose | None) -> RestingFaces:
         """The faces that rest now.

@@ -67,7 +67,7 @@ class TerrainBox(_Document):
 
 
 class Cargo(_Document):
-    """A loose box that is dropped onto the machine, or stands at a place, and may grow heavier.
+    """A loose box or ball, dropped onto the machine or put at a place, that may grow heavier.
 
     Attributes:
         size: (3,) full extents along east, north and up, units.
@@ -80,6 +80,7 @@ class Cargo(_Document):
         at: (3,) the middle of its underside at the start, world frame, units; None above the
             machine, over (0, 0).
         heading_deg: By how much it is turned about the vertical, from north towards east, degrees.
+        shape: "ball" for one whose diameter the size gives three times.
     """
 
     size: tuple[CargoExtent, CargoExtent, CargoExtent]
@@ -93,6 +94,13 @@ class Cargo(_Document):
         Field(exclude_if=is_default),
     ] = None
     heading_deg: Heading = 0.0
+    shape: Annotated[Literal["box", "ball"], Field(exclude_if=lambda value: value == "box")] = "box"
+
+    @model_validator(mode="after")
+    def _balls_are_round(self) -> Self:
+        if self.shape == "ball" and len(set(self.size)) > 1:
+            raise ValueError(f"a ball's size is its diameter three times, not {list(self.size)}")
+        return self
 
     def mass_at(self, time_s: float) -> float:
         """Mass of the cargo at a time, mass units.

@@ -150,6 +150,7 @@ class Trajectory:
         cargo_quaternion: (T, 4) float32; None without cargo.
         cargo_mass: (T,) float64, mass units; None without cargo.
         cargo_size: (3,) full extents, units; None without cargo.
+        cargo_shape: "ball" for one whose diameter the extents are, else "box".
         cannon_ids: (C,) ids of all cannons.
         heated: (T, C) bool, which cannons a flame touches.
         pieces: (T, N) int16, which piece each tracked block belongs to: the index of the first of
@@ -190,6 +191,7 @@ class Trajectory:
     joint_loads: NDArray[np.float32] | None = None
     events: tuple[Event, ...] = ()
     piloting: Piloting | None = None
+    cargo_shape: str = "box"
 
     def __post_init__(self) -> None:
         """Checks that the arrays fit together, and closes them."""

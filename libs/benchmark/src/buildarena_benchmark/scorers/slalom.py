@@ -7,6 +7,7 @@ import numpy as np
 
 from buildarena_benchmark.fields import Count, Document
 from buildarena_benchmark.scorers.measures.components import Mask, center_of, joined_to_start
+from buildarena_benchmark.scorers.measures.gates import crossings
 from buildarena_benchmark.scorers.measures.rolling import driven_distances, moved_upright
 from buildarena_benchmark.scorers.measures.series import Series
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
@@ -26,7 +27,6 @@ from buildarena_simulation import Scenario
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Trajectory
-    from buildarena_simulation.scenario import Gate
 
 
 class SlalomScoring(Document):
@@ -106,34 +106,21 @@ def _passed(scenario: Scenario, paths: Sequence[Series], counts: Sequence[Mask])
     """
     passed = []
     for path, counting in zip(paths, counts, strict=True):
-        crossings = sorted(
+        crossed = sorted(
             (sample, number)
             for number, gate in enumerate(scenario.gates)
-            for sample in _crossings(path, gate)
+            for sample in crossings(path, gate)
             if counting[sample]
         )
-        passed.append(_in_order(crossings))
+        passed.append(_in_order(crossed))
     common = set.intersection(*(set(samples) for samples in passed))
     return sorted(max(samples[gate] for samples in passed) for gate in common)
 
 
-def _crossings(path: Series, gate: "Gate") -> list[int]:
-    """Samples after which a gate's line has been crossed in its direction."""
-    heading = np.radians(gate.heading_deg)
-    ahead = np.array([np.sin(heading), np.cos(heading)])
-    right = np.array([ahead[1], -ahead[0]])
-    apart = path[:, :2] - np.array(gate.center)
-    along, aside = apart @ ahead, apart @ right
-    steps = np.flatnonzero((along[:-1] < 0.0) & (along[1:] >= 0.0))
-    share = -along[steps] / (along[steps + 1] - along[steps])
-    at = aside[steps] + share * (aside[steps + 1] - aside[steps])
-    return [int(step) + 1 for step in steps[np.abs(at) <= gate.half_width]]
-
-
-def _in_order(crossings: list[tuple[int, int]]) -> dict[int, int]:
+def _in_order(crossed: list[tuple[int, int]]) -> dict[int, int]:
     """The sample of each gate that counts, of crossings (sample, gate) in order of time."""
     samples: dict[int, int] = {}
-    for sample, gate in crossings:
+    for sample, gate in crossed:
         if gate > max(samples, default=-1):
             samples[gate] = sample
     return samples

@@ -90,8 +90,9 @@ class ThrowScoring(Document):
         min_distance: Least distance beyond the line at which the boulder may come down, units.
         target: Name of the mark that it is to hit; None where the farthest throw is the best.
         borne_s: How long the machine must bear it before it flies, seconds.
-        max_base_shift: The starting block must stay nearer to where it was, units.
-        max_tilt_deg: The starting block must lean by less, degrees.
+        max_base_shift: Until the boulder flies the starting block must stay nearer to where it was,
+            units. What the recoil does to the machine afterwards throws nothing.
+        max_tilt_deg: Until then the starting block must lean by less, degrees.
         max_start_height: The boulder's centre must start lower, units: its own fall is no throw.
         max_error: Largest share of its way by which its flight may stray from a free one.
         max_unexplained: Largest share by which its energy may exceed the work done.
@@ -102,7 +103,7 @@ class ThrowScoring(Document):
     min_distance: Threshold = 10.0
     target: MarkName | None = None
     borne_s: Annotated[float, Field(gt=0, le=60)] = 1.0
-    max_base_shift: Threshold = 1.0
+    max_base_shift: Threshold = 3.0
     max_tilt_deg: Annotated[float, Field(gt=0, le=180)] = 30.0
     max_start_height: Threshold = 5.0
     max_error: Annotated[float, Field(gt=0, le=1)] = 0.03
@@ -151,7 +152,7 @@ def judge(
         `not_borne`: no machine that is joined to the starting block bore it before it flew.
         `crossed_line`: a part was beyond the line. `thrust_used`: a part pushes or lifts.
         `not_free`: it touched something on its way, or flew as no free ball does. `base_moved`:
-        the starting block did not stay. `came_apart`: a joint broke before it flew.
+        the starting block did not stay before. `came_apart`: a joint broke before it flew.
         `unexplained`: it has more energy than springs, drives and falling parts can have given.
         `start_too_high`: it started high up. `forces_not_measured`: cannot be judged.
     """
@@ -278,8 +279,8 @@ class _Throw:
         return float(others.max() - middle @ ahead)
 
     def _base(self) -> tuple[float, float]:
-        """How far the starting block shifts, units, and leans, degrees, until then."""
-        start, until = starting_block(self.machine, self.trajectory), self.flight.landed + 1
+        """How far the starting block shifts, units, and leans, degrees, until the boulder flies."""
+        start, until = starting_block(self.machine, self.trajectory), self.flight.released + 2
         path = self.trajectory.positions[:until, start].astype(np.float64)
         lean = tilt_deg(self.trajectory, start)[:until]
         return float(np.linalg.norm(path - path[0], axis=1).max()), float(lean.max())

@@ -37,6 +37,7 @@ _CONTROL: Final = (
 )
 _THROWING: Final = ("throw-1", "throw-2", "throw-3")
 _SPACE: Final = ("orbit-1", "orbit-2")
+_COURSES: Final = ("deliver-1", "deliver-2", "deliver-3")
 
 
 @cache
@@ -44,8 +45,8 @@ def builtin_tasks() -> Mapping[str, Task]:
     """The built-in tasks by name: the paper's nine in its order, the workshop's, then the rest."""
     folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
     tasks = {}
-    chosen = (*_PAPER, *_WORKSHOP, *_HEADROOM, *_FAMILIES, *_CONTROL, *_THROWING, *_SPACE)
-    for name in chosen:
+    further = (*_HEADROOM, *_FAMILIES, *_CONTROL, *_THROWING, *_SPACE, *_COURSES)
+    for name in (*_PAPER, *_WORKSHOP, *further):
         text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
         tasks[name] = parse_task(text, origin=f"{name}.yaml")
     return MappingProxyType(tasks)

@@ -16,7 +16,7 @@ from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.force_field import ForceField
 from buildarena_simulation.structure.grips import Hold
-from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind, Structure
 from buildarena_simulation.structure.motion import Motion
 
 
@@ -29,12 +29,28 @@ class CargoBox:
         position: (3,) its centre, world frame, units.
         mass: Mass units.
         rotation: (3, 3) world_from_cargo.
+        is_ball: Whether it is a ball, whose diameter the extents are.
     """
 
     size: FloatArray
     position: FloatArray
     mass: float
     rotation: FloatArray = field(default_factory=lambda: np.eye(3))
+    is_ball: bool = False
+
+    def shape(self, center: FloatArray, rotation: FloatArray) -> Shape:
+        """Its solid where it is now.
+
+        Args:
+            center: (3,) world frame, units.
+            rotation: (3, 3) world_from_cargo.
+        """
+        return Shape(
+            kind=ShapeKind.SPHERE if self.is_ball else ShapeKind.BOX,
+            center=center,
+            rotation=rotation,
+            half_extents=self.size / 2,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -151,8 +151,9 @@ class Scene:
                 picture.lines.append((line, color))
         if trajectory.cargo_position is not None and trajectory.cargo_quaternion is not None:
             turn = rotation_of(trajectory.cargo_quaternion[sample].astype(np.float64))
+            is_ball = trajectory.cargo_shape == "ball"
             cargo = Shape(
-                kind=ShapeKind.BOX,
+                kind=ShapeKind.SPHERE if is_ball else ShapeKind.BOX,
                 center=trajectory.cargo_position[sample].astype(np.float64),
                 rotation=turn,
                 half_extents=np.array(trajectory.cargo_size) / 2,

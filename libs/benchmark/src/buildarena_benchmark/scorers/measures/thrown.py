@@ -62,17 +62,22 @@ def radius_of(machine: "Machine", trajectory: "Trajectory", ball: int) -> float:
 def gaps_to_parts(machine: "Machine", trajectory: "Trajectory", ball: int) -> Series:
     """From a ball's surface to each tracked block's body, (T, N), units; infinite to itself."""
     center = trajectory.positions[:, ball].astype(np.float64)
+    gaps = distances_to_parts(machine, trajectory, center) - radius_of(machine, trajectory, ball)
+    gaps[:, ball] = np.inf
+    return gaps
+
+
+def distances_to_parts(machine: "Machine", trajectory: "Trajectory", center: Series) -> Series:
+    """From a point that moves, (T, 3), to each tracked block's body, (T, N), units; 0 inside."""
     gaps = np.full(trajectory.positions.shape[:2], np.inf)
     for column, name in enumerate(trajectory.block_ids):
-        if column == ball:
-            continue
         block = machine.blocks[name]
         turns = rotations(trajectory.quaternions[:, column])
         apart = center - trajectory.positions[:, column].astype(np.float64)
         local = np.einsum("tji,tj->ti", turns, apart) + np.array(block.module.center)
         for solid in block.module.body:
             gaps[:, column] = np.minimum(gaps[:, column], _distances(solid, local))
-    return gaps - radius_of(machine, trajectory, ball)
+    return gaps
 
 
 def gap_to_world(scenario: "Scenario", center: Series, radius: float) -> Series:

@@ -181,6 +181,8 @@ def _cargo(world: World, mass: float) -> Iterator[str]:
         return
     a, b, c = cargo.size
     moments = mass / 12 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2])
+    if cargo.is_ball:
+        moments = np.full(3, mass * a**2 / 10)
     turn = quaternion_of(cargo.rotation)
     yield opened("body", name="cargo", pos=cargo.position, quat=turn)
     yield tag("inertial", pos=(0.0, 0.0, 0.0), mass=mass, diaginertia=moments)
@@ -188,8 +190,8 @@ def _cargo(world: World, mass: float) -> Iterator[str]:
     yield tag(
         "geom",
         name="cargo",
-        type="box",
-        size=cargo.size / 2,
+        type="sphere" if cargo.is_ball else "box",
+        size=cargo.size[:1] / 2 if cargo.is_ball else cargo.size / 2,
         friction=_friction(FRICTION_TERRAIN),
         priority=_CARGO_PRIORITY,
     )

@@ -31,8 +31,9 @@ def add_box(
     *,
     mass: float,
     turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
+    is_ball: bool = False,
 ) -> int:
-    """Adds a box of neutral friction; its id.
+    """Adds a box, or a ball, of neutral friction; its id.
 
     Args:
         client: The engine's world.
@@ -40,19 +41,13 @@ def add_box(
         center: (3,) world frame, units.
         mass: 0 for one that never moves.
         turn: World_from_box as a quaternion (x, y, z, w).
+        is_ball: Whether it is a ball, whose radius the half-extents are.
     """
-    shape = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **client)
-    return _add_body(client, shape, center, mass=mass, turn=turn)
-
-
-def _add_body(
-    client: Mapping[str, int],
-    shape: int,
-    center: Sequence[float] | FloatArray,
-    *,
-    mass: float = 0.0,
-    turn: Sequence[float] = (0.0, 0.0, 0.0, 1.0),
-) -> int:
+    shape = (
+        pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=half[0], **client)
+        if is_ball
+        else pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half, **client)
+    )
     body = pybullet.createMultiBody(
         mass,
         shape,
@@ -149,8 +144,8 @@ def start_world(
     )
     surfaces = {}
     if world.planet is not None:
-        ball = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=world.planet, **client)
-        surfaces[_add_body(client, ball, (0.0, 0.0, -world.planet))] = 0
+        ball, below = (world.planet,) * 3, (0.0, 0.0, -world.planet)
+        surfaces[add_box(client, ball, below, mass=0.0, is_ball=True)] = 0
     elif world.ground:
         half = (_GROUND_REACH, _GROUND_REACH, 1.0)
         surfaces[add_box(client, half, (0.0, 0.0, -1.0), mass=0.0)] = 0
@@ -164,7 +159,10 @@ def start_world(
     if cargo is None:
         return surfaces, None
     turn = quaternion_of(cargo.rotation)[[1, 2, 3, 0]].tolist()
-    return surfaces, add_box(client, cargo.size / 2, cargo.position, mass=cargo.mass, turn=turn)
+    body = add_box(
+        client, cargo.size / 2, cargo.position, mass=cargo.mass, turn=turn, is_ball=cargo.is_ball
+    )
+    return surfaces, body
 
 
 def friction_of(structure: Structure, blocks: IntArray) -> float:

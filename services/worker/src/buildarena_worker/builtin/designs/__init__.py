@@ -10,6 +10,7 @@ from collections.abc import Callable
 from buildarena_worker.builtin.designs import (
     arms,
     bridges,
+    couriers,
     flyers,
     piloted,
     repairs,
@@ -66,6 +67,9 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "throw-3": throwers.aiming_catapult,
     "orbit-1": spacecraft.orbiter,
     "orbit-2": spacecraft.returner,
+    "deliver-1": couriers.courier,
+    "deliver-2": couriers.courier,
+    "deliver-3": couriers.courier,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from buildarena_worker.builtin.designs.design import Design, PartDesign
 from buildarena_worker.builtin.designs.drafting import (
@@ -20,13 +21,35 @@ from buildarena_worker.builtin.designs.drafting import (
 )
 from buildarena_worker.builtin.designs.programs import listed, program_text
 
-_ARM, _TAIL, _POST, _FRONT, _BACK = 6, 4, 4, 4, 8
-_LEAN_DEG = 38.7
-"""How far the arm hangs down behind: so its tip rests on the ground."""
-_CUP_DEG = 10.0
-"""How far the cup leans outwards on the arm: the boulder rolls out of it in time."""
+_FRONT = 4
+"""Blocks of the foot in front of the post."""
 _BEGINS_S = (1.52, 1.6, 1.68, 1.76, 1.84)
 """When the springs draw, by seed, seconds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """What a catapult's throw depends on.
+
+    Attributes:
+        arm: Length of the arm behind the swivel, blocks.
+        tail: Length of the arm in front of it, which the springs pull down, blocks.
+        post: Height of the post, blocks.
+        back: Length of the foot behind the post, blocks.
+        lean_deg: How far the arm hangs down behind: so its tip rests on the ground.
+        cup_deg: How far the cup leans outwards on the arm: the boulder rolls out of it in time.
+        springs: How many springs pull, of seven.
+        aside: How far the starting block lies to the east of the foot.
+    """
+
+    arm: int = 6
+    tail: int = 4
+    post: int = 4
+    back: int = 8
+    lean_deg: float = 38.7
+    cup_deg: float = 10.0
+    springs: int = 7
+    aside: int = 0
 
 
 def catapult(seed: int) -> Design:
@@ -54,7 +77,7 @@ def catapult(seed: int) -> Design:
 
 def aiming_catapult(seed: int) -> Design:
     """The same catapult in the middle, whose program draws as many springs as the ring asks for."""
-    draft, springs, _ = catapult_draft(aside=3)
+    draft, springs, _ = catapult_draft(Shape(aside=3))
     return Design(
         overall="A catapult whose arm swings above x = 0; fewer springs throw less far.",
         parts={
@@ -69,32 +92,28 @@ def aiming_catapult(seed: int) -> Design:
     )
 
 
-def catapult_draft(*, aside: int = 0) -> tuple[Draft, list[str], str]:
-    """The machine, the ids of its springs, and that of its boulder.
-
-    Args:
-        aside: How far the starting block lies to the east of the foot.
-    """
-    draft = Draft(modules="all")
-    front = [draft.start("the front of the foot"), *draft.row("1", WEST, aside)][-1]
-    beam = [front, *draft.row(front, SOUTH, _FRONT + _BACK)]
+def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
+    """The machine, the ids of its springs, and that of its boulder."""
+    draft, lean = Draft(modules="all"), shape.lean_deg
+    front = [draft.start("the front of the foot"), *draft.row("1", WEST, shape.aside)][-1]
+    beam = [front, *draft.row(front, SOUTH, _FRONT + shape.back)]
     near, anchor, west = _feet(draft, beam)
-    post = draft.row(beam[_FRONT], UP, _POST)
+    post = draft.row(beam[_FRONT], UP, shape.post)
     _stays(draft, beam, post, west)
     swivel = draft.attach(post[-1], EAST, "Swivel")
-    draft.do("twist_block", block_id=swivel, angle=-_LEAN_DEG)
-    back, ahead, above, below = (_leaning(way, _LEAN_DEG) for way in (SOUTH, NORTH, UP, DOWN))
+    draft.do("twist_block", block_id=swivel, angle=-lean)
+    back, ahead, above, below = (_leaning(way, lean) for way in (SOUTH, NORTH, UP, DOWN))
     hub = draft.attach(swivel, EAST)
-    arm, tail = draft.row(hub, back, _ARM), draft.row(hub, ahead, _TAIL)
+    arm, tail = draft.row(hub, back, shape.arm), draft.row(hub, ahead, shape.tail)
     tip = draft.attach(arm[-1], EAST)
-    draft.do("twist_block", block_id=tip, angle=-_CUP_DEG)
-    out = _leaning(UP, _LEAN_DEG + _CUP_DEG)
+    draft.do("twist_block", block_id=tip, angle=-shape.cup_deg)
+    out = _leaning(UP, lean + shape.cup_deg)
     boulder = draft.attach(draft.attach(tip, out, "Bomb Holder"), out, "Boulder")
     mast = draft.row(hub, above, 2)[-1]
     for end, way in ((arm[3], back), (tail[-1], ahead)):
         draft.connect(mast, end, way, above)
         draft.connect(mast, end, EAST)
-    for end, way, base, side in (
+    pulls = (
         (tail[-1], below, anchor, UP),
         (tail[-1], EAST, anchor, EAST),
         (tail[-1], ahead, anchor, NORTH),
@@ -102,7 +121,8 @@ def catapult_draft(*, aside: int = 0) -> tuple[Draft, list[str], str]:
         (tail[-2], EAST, near, NORTH),
         (tail[-2], below, anchor, SOUTH),
         (tail[-2], WEST, beam[1], DOWN),
-    ):
+    )
+    for end, way, base, side in pulls[: shape.springs]:
         draft.connect(end, base, way, side, connector="Spring")
     links = draft.machine.connectors.values()
     return draft, [link.id for link in links if link.module.name == "Spring"], boulder
