@@ -32,6 +32,7 @@ export function liveOf(scene: { scenario: Scenario; machine: MachineScene | null
           ? null
           : {
               size: cargo.size,
+              shape: cargo.shape ?? "box",
               positions: new Float32Array(6),
               quaternions: new Float32Array(8),
               mass: new Float64Array(2),
