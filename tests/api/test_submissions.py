@@ -250,3 +250,48 @@ def test_packages_are_no_garbage(people, context) -> None:
     assert done is not None
     assert done.kept == 1
     assert context.artifacts.get(made["hash"]) == packed()
+
+
+def test_what_passed_is_shown_to_whom_it_concerns(people, checks) -> None:
+    client, ann, bob = people
+    made = ann.ask("POST", PATH, params=as_entry(), content=packed()).json()
+    place = f"{PATH}/{made['id']}/picture"
+    early = ann.ask("GET", place)
+    assert early.status_code == 409
+    assert "only what passed is shown" in early.json()["detail"]
+    checks.check_waiting()
+    picture = ann.get(place)
+    (machine,) = picture["machines"].values()
+    assert [block["module"] for block in machine["blocks"]] == [
+        *("Starting Block", "Steering Thruster", "Steering Thruster")
+    ]
+    flight = picture["flight"]
+    assert len(flight["time_s"]) == len(flight["places"]) > 100
+    x, y, z = CENTER
+    assert flight["center"] == [x, z, y]  # in the game y points up
+    away = [sum((a - b) ** 2 for a, b in zip(p, flight["center"], strict=True)) ** 0.5
+            for p in flight["places"]]  # fmt: skip
+    assert min(away) > 100
+    assert bob.ask("GET", place).status_code == 403
+    assert operator(client).get(place) == picture
+
+
+def test_admins_see_who_decided_what_in_a_season(people, checks) -> None:
+    client, ann, _ = people
+    ids = [
+        ann.ask("POST", PATH, params=as_entry(name), content=packed(note=name)).json()["id"]
+        for name in ("one", "two")
+    ]
+    checks.check_waiting()
+    boss = operator(client)
+    decided = {"state": "refused", "reason": "flown by a program"}
+    assert boss.ask("POST", f"{PATH}/{ids[0]}/decision", json=decided).status_code == 200
+    assert ann.ask("POST", f"{PATH}/{ids[1]}/withdraw").status_code == 200
+    changes = boss.get(f"/v1/seasons/{KNOWN.name}/changes")
+    seen = [(c["package"], c["name"], c["state"], c["reason"]) for c in changes[:2]]
+    assert seen == [
+        (ids[1], "two", "withdrawn", "withdrawn by its owner"),
+        (ids[0], "one", "refused", "flown by a program"),
+    ]
+    assert ann.ask("GET", f"/v1/seasons/{KNOWN.name}/changes").status_code == 403
+    assert boss.ask("GET", "/v1/seasons/none/changes").status_code == 404

@@ -5,7 +5,7 @@ import subprocess
 import httpx
 import pytest
 from pydantic import SecretStr
-from support.challenge import bridge_files, zipped
+from support.challenge import bridge_files, packed, zipped
 from support.documents.pages import BUILDARENA, in_browser, needs_pages
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from support.servers.stacks import finished, running_stack
@@ -48,6 +48,7 @@ def test_packages_are_looked_at_handed_in_and_ranked(tmp_path) -> None:
     (tmp_path / "sound.zip").write_bytes(zipped(files))
     del files["support-2.json"]
     (tmp_path / "broken.zip").write_bytes(zipped(files))
+    (tmp_path / "flight.zip").write_bytes(packed())
     with running_stack(tmp_path) as stack:
         in_browser(stack.url, ["e2e/challenges"], BUILDARENA_WEB_PACKAGES=str(tmp_path))
 

@@ -44,6 +44,28 @@ describe("challenges", () => {
     await expectNoSeriousFault(page);
     expect(faults).toEqual([]);
     if (PICTURES !== undefined) await page.screenshot({ path: `${PICTURES}/season-${scheme}.png`, fullPage: true });
+    await board.getByRole("link", { name: "Three bridges" }).first().click();
+    await page.getByRole("heading", { name: "support-3.json" }).waitFor();
+    await page.getByRole("rowheader", { name: "machines" }).waitFor();
+    await expectNoSeriousFault(page);
+    expect(faults).toEqual([]);
+    if (PICTURES !== undefined) await page.screenshot({ path: `${PICTURES}/entry-${scheme}.png`, fullPage: true });
+    await context.close();
+  });
+
+  it.each(["light", "dark"] as const)("show a flight round a planet, %s", async (scheme) => {
+    const { page, context, faults } = await visit(browser, "/challenges/s01-stable-orbit", { scheme });
+    await page.getByLabel("Package", { exact: true }).setInputFiles(`${PACKAGES}/flight.zip`);
+    await page.getByText("every rule is kept", { exact: false }).waitFor({ timeout: 60_000 });
+    await page.getByLabel("Name of the entry").fill("Thrustcraft");
+    await page.getByRole("button", { name: "Hand in" }).click();
+    const board = page.getByRole("table", { name: "Board of the season" });
+    await board.getByRole("link", { name: "Thrustcraft" }).click({ timeout: 60_000 });
+    await page.getByRole("img", { name: "The planet from the side", exact: false }).waitFor();
+    await page.getByText("Height over the start").waitFor();
+    await expectNoSeriousFault(page);
+    expect(faults).toEqual([]);
+    if (PICTURES !== undefined) await page.screenshot({ path: `${PICTURES}/flight-${scheme}.png`, fullPage: true });
     await context.close();
   });
 

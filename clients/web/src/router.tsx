@@ -131,6 +131,11 @@ const challenge = createRoute({
   path: "/challenges/$name",
   component: lazyRouteComponent(() => import("./pages/challenges/SeasonPage")),
 });
+const entry = createRoute({
+  getParentRoute: () => root,
+  path: "/challenges/$name/$entry",
+  component: lazyRouteComponent(() => import("./pages/challenges/EntryPage")),
+});
 
 export const router = createRouter({
   routeTree: root.addChildren([
@@ -153,6 +158,7 @@ export const router = createRouter({
     drive,
     challenges,
     challenge,
+    entry,
   ]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,

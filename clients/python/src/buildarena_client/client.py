@@ -225,5 +225,7 @@ class Client:
     packages = _call(Api.packages)
     package = _call(Api.package)
     package_file = _call(Api.package_file)
+    package_picture = _call(Api.package_picture)
+    season_changes = _call(Api.season_changes)
     decide_package = _call(Api.decide_package)
     withdraw_package = _call(Api.withdraw_package)

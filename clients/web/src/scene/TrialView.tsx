@@ -4,7 +4,7 @@ import { useClock, type Clock } from "./clock";
 import { Curves } from "./Curves";
 import { curvesOf } from "./curves";
 import { Film } from "./Film";
-import { seenAlong } from "./flight";
+import { pathOf, seenAlong } from "./flight";
 import { FlightMap } from "./FlightMap";
 import { Legend } from "./Legend";
 import { loadsAt, mostLoaded, mostOf } from "./loads";
@@ -50,7 +50,14 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
       <div ref={stage}>
         <TrialScene {...props} clock={clock} loads={loads} follow={follow} lock={lock} />
       </div>
-      {planet != null && <FlightMap trial={recorded} radius={planet.radius} now={clock.shown} />}
+      {planet != null && (
+        <FlightMap
+          path={pathOf(recorded, planet.radius)}
+          times={recorded.times}
+          radius={planet.radius}
+          now={clock.shown}
+        />
+      )}
       <TimeLine clock={clock} end={end} breaks={props.trial.breaks} />
       <Group gap="md">
         <Switch

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { seenAlong, sidePath } from "./flight";
+import { flightOf, pathOf, seenAlong } from "./flight";
 import type { Scenario } from "./Surroundings";
 import type { Trial } from "./trial";
 
@@ -50,9 +50,23 @@ it("leaves a trial on flat ground as it is", () => {
 });
 
 it("sees the path from the side, its beginning on top", () => {
-  const path = sidePath(around(), RADIUS);
+  const path = pathOf(around(), RADIUS);
   expect(path[0]?.map(Math.round)).toEqual([0, RADIUS + HEIGHT]);
   for (const [x, y] of path) expect(Math.hypot(x, y)).toBeCloseTo(RADIUS + HEIGHT, 1);
   expect(path[50]?.[1]).toBeCloseTo(-RADIUS - HEIGHT, 1);
-  expect(sidePath({ ...around(), times: new Float64Array(), positions: new Float32Array() }, RADIUS)).toEqual([]);
+  expect(pathOf({ ...around(), times: new Float64Array(), positions: new Float32Array() }, RADIUS)).toEqual([]);
+});
+
+it("counts a recorded flight from the planet's centre, or along z where that is not known", () => {
+  const places = [
+    [0, 0, 10],
+    [610, 0, -600],
+  ];
+  const known = flightOf([0, 1], places, [0, 0, -600]);
+  expect([...known.distances]).toEqual([610, 610]);
+  expect(known.path.map((point) => point.map(Math.round))).toEqual([
+    [0, 610],
+    [610, 0],
+  ]);
+  expect([...flightOf([0, 1], places, null).distances]).toEqual([10, -600]);
 });

@@ -49,12 +49,8 @@ export function seenAlong(trial: Trial, scenario: Scenario): Trial {
   return shown;
 }
 
-/** A path round a planet from its side: the plane in which it turns most, its beginning upwards, in units. */
-export function sidePath(trial: Trial, radius: number): [number, number][] {
-  const stride = 3 * trial.blockIds.length;
-  const arms = Array.from(trial.times, (_, instant) =>
-    from(trial.positions, instant * stride).add(new Vector3(0, 0, radius)),
-  );
+/** Places seen from a planet's centre, from its side: the plane in which they turn most, the first one upwards. */
+export function sidePath(arms: readonly Vector3[]): [number, number][] {
   const [first] = arms;
   if (first === undefined) return [];
   const top = first.clone().normalize();
@@ -64,4 +60,34 @@ export function sidePath(trial: Trial, radius: number): [number, number][] {
   if (axis.length() < 1e-9) axis.set(0, 1, 0);
   const aside = new Vector3().crossVectors(axis.normalize(), top);
   return arms.map((arm) => [arm.dot(aside), arm.dot(top)]);
+}
+
+/** The path of a trial's first block round a planet that is straight below, as it was recorded. */
+export function pathOf(trial: Trial, radius: number): [number, number][] {
+  const stride = 3 * trial.blockIds.length;
+  const center = new Vector3(0, 0, -radius);
+  return sidePath(Array.from(trial.times, (_, instant) => from(trial.positions, instant * stride).sub(center)));
+}
+
+export interface RecordedFlight {
+  times: Float64Array;
+  path: [number, number][];
+  /** From the planet's centre; heights along z where it is not known. */
+  distances: Float64Array;
+}
+
+/** A flight that somebody recorded, place by place. */
+export function flightOf(
+  times: readonly number[],
+  places: readonly (readonly number[])[],
+  center: readonly number[] | null,
+): RecordedFlight {
+  const vectors = places.map(([x, y, z]) => new Vector3(x, y, z));
+  const [x, y, z] = center ?? [0, 0, 0];
+  const arms = vectors.map((place) => place.clone().sub(new Vector3(x, y, z)));
+  return {
+    times: Float64Array.from(times),
+    path: sidePath(arms),
+    distances: Float64Array.from(arms, (arm) => (center === null ? arm.z : arm.length())),
+  };
 }

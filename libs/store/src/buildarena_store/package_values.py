@@ -108,3 +108,16 @@ class Checked:
     points: float | None
     cost: int | None
     fingerprints: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SeasonChange(PackageChange):
+    """Who changed a package of a season.
+
+    Attributes:
+        package: Its id.
+        name: Of the entry.
+    """
+
+    package: str
+    name: str

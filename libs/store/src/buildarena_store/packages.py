@@ -19,6 +19,7 @@ from buildarena_store.package_values import (
     Checked,
     PackageChange,
     PackageState,
+    SeasonChange,
     StoredPackage,
 )
 from buildarena_store.rows import columns_of, value_of
@@ -249,6 +250,19 @@ class Packages:
         )
         with self._database.transaction() as connection:
             return [value_of(PackageChange, row) for row in connection.execute(query)]
+
+    def season_changes(self, season: str) -> list[SeasonChange]:
+        """Who changed packages of a season, the last change first, `MAX_LISTED` at most."""
+        own = columns_of(PackageChange, package_changes)
+        query = (
+            select(*own, package_changes.c.package, packages.c.name)
+            .join_from(package_changes, packages, packages.c.id == package_changes.c.package)
+            .where(packages.c.season == season)
+            .order_by(package_changes.c.id.desc())
+            .limit(MAX_LISTED)
+        )
+        with self._database.transaction() as connection:
+            return [value_of(SeasonChange, row) for row in connection.execute(query)]
 
     def listed(
         self, *, season: str | None = None, state: str | None = None, owner: str | None = None

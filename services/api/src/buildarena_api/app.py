@@ -56,6 +56,7 @@ from buildarena_api.routes import (
     leaderboard,
     machines,
     metrics,
+    package_pictures,
     pictures,
     replays,
     runner,
@@ -107,7 +108,10 @@ ORDINARY = (
     versions,
     workers,
 )
-LIMITED_THEMSELVES = (events, exports, archives, evidence, challenges, comparisons, metrics)
+LIMITED_THEMSELVES = (
+    *(events, exports, archives, evidence, challenges, package_pictures),
+    *(comparisons, metrics),
+)
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
 thread."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,

@@ -245,6 +245,24 @@ def withdraw(package: PackageId, *, url: UrlOption = DEFAULT_URL) -> None:
     say(f"{done['id']}: {done['state']}")
 
 
+@app.command("audit")
+def audit(season: SeasonName, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+    """Show who decided what of a season's packages, and why; for admins."""
+    changes = Client(url).season_changes(season)
+    if as_json:
+        print_json(changes)
+        return
+    cells = [
+        [
+            *(minute_of(change["at"]), change["changed_by"] or "operator", change["name"]),
+            f"{change['state_before']} -> {change['state']}",
+            *(change["reason"], change["package"]),
+        ]
+        for change in changes
+    ]
+    print_table(columns("at", "by", "entry", "change", "reason", "package"), cells)
+
+
 def _season(name: str, settings: list[str] | None) -> Season:
     from buildarena_pipeline.challenges.season import season_named
 

@@ -11,10 +11,12 @@ from buildarena_client.paths import at
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
         PackageDetail,
+        PackagePicture,
         PackageReport,
         PackageView,
         Ranked,
         ReceivedPackage,
+        SeasonChangeView,
         SeasonView,
     )
 
@@ -45,6 +47,14 @@ class Challenges(Sender):
             track: The track's name.
         """
         return cast("list[Ranked]", await self.get(at("seasons", name, "board"), track=track))
+
+    async def season_changes(self, name: str) -> list[SeasonChangeView]:
+        """Who decided what of a season's packages, the last change first; for admins.
+
+        Args:
+            name: The season's name.
+        """
+        return cast("list[SeasonChangeView]", await self.get(at("seasons", name, "changes")))
 
     async def check_package(
         self, source: Path | bytes, *, season: str, track: str
@@ -104,6 +114,15 @@ class Challenges(Sender):
             package_id: Its id.
         """
         return cast("PackageDetail", await self.get(at("submissions", package_id)))
+
+    async def package_picture(self, package_id: str) -> PackagePicture:
+        """Machines and flight of a package that passed its checks.
+
+        Args:
+            package_id: Its id.
+        """
+        answer = await self.get(at("submissions", package_id, "picture"))
+        return cast("PackagePicture", answer)
 
     async def package_file(self, package_id: str) -> bytes:
         """The file as it was handed in.

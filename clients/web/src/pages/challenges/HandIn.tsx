@@ -1,10 +1,10 @@
-import { Alert, Button, Group, Stack, Table, Text, TextInput } from "@mantine/core";
+import { Alert, Button, Group, Stack, Text, TextInput } from "@mantine/core";
 import { IconFileZip } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
-import { number } from "../../format";
 import { DropZone } from "../../parts/DropZone";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
+import { Findings } from "./Findings";
 import { useHandIn, useLook, type Report, type Season } from "./queries";
 
 /** A package: dropped, checked, and only then handed in. */
@@ -72,39 +72,5 @@ export function HandIn({ season, track, isOpen }: { season: Season; track: strin
         )}
       </Stack>
     </Section>
-  );
-}
-
-function Findings({ report }: { report: Report }) {
-  const terms = report.score?.terms ?? [];
-  return (
-    <Table.ScrollContainer
-      minWidth={420}
-      type="native"
-      tabIndex={0}
-      role="region"
-      aria-label="What the checks say, scrolls sideways"
-    >
-      <Table fz="sm" aria-label="What the checks say" verticalSpacing={4}>
-        <Table.Tbody>
-          {report.findings.map(({ check, passed, sentence }) => (
-            <Table.Tr key={check}>
-              <Table.Th>{check}</Table.Th>
-              <Table.Td>{passed ? "✓" : "✗"}</Table.Td>
-              <Table.Td>{sentence}</Table.Td>
-            </Table.Tr>
-          ))}
-          {terms.map(({ name, points, share, sentence }) => (
-            <Table.Tr key={name}>
-              <Table.Th>{name}</Table.Th>
-              <Table.Td className="figures">
-                {share === null ? "?" : number(points * share, 2)} of {number(points, 2)}
-              </Table.Td>
-              <Table.Td>{sentence}</Table.Td>
-            </Table.Tr>
-          ))}
-        </Table.Tbody>
-      </Table>
-    </Table.ScrollContainer>
   );
 }

@@ -1,6 +1,6 @@
 import { Alert, List, SegmentedControl, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { getRouteApi } from "@tanstack/react-router";
+import { getRouteApi, Link } from "@tanstack/react-router";
 import { useState } from "react";
 import { number } from "../../format";
 import { Ago } from "../../parts/Ago";
@@ -67,7 +67,9 @@ function Shown({ view }: { view: SeasonView }) {
 
 function wordsOf({ score }: SeasonView["season"]): string {
   if (score.formula === "trials") {
-    const full = Object.entries(score.tasks).map(([task, indicator]) => `${task} at ${number(indicator, 0)}`);
+    const full = Object.entries(score.tasks).map(
+      ([task, indicator]) => `${task} at ${number(indicator, indicator < 10 ? 1 : 0)}`,
+    );
     return `100 times the mean over the tasks of indicator / full, at most 1; full are ${full.join(", ")}.`;
   }
   const { progress, speed, integrity, cycles } = score;
@@ -83,7 +85,9 @@ function Board({ rows }: { rows: readonly Ranked[] }) {
         {rows.map(({ rank, package: entry }) => (
           <Table.Tr key={entry.id}>
             <Table.Td className="figures">{rank}</Table.Td>
-            <Table.Td>{entry.name}</Table.Td>
+            <Table.Td>
+              <EntryLink entry={entry} />
+            </Table.Td>
             <Table.Td className="figures">{number(entry.points, 2)}</Table.Td>
             <Table.Td className="figures">{number(entry.cost, 0)}</Table.Td>
             <Table.Td>
@@ -104,7 +108,9 @@ function Own({ listed }: { listed: readonly PackageView[] }) {
       <Table.Tbody>
         {listed.map((entry) => (
           <Table.Tr key={entry.id}>
-            <Table.Td>{entry.name}</Table.Td>
+            <Table.Td>
+              <EntryLink entry={entry} />
+            </Table.Td>
             <Table.Td>{entry.track}</Table.Td>
             <Table.Td>{entry.state}</Table.Td>
             <Table.Td className="figures">{number(entry.points, 2)}</Table.Td>
@@ -115,6 +121,14 @@ function Own({ listed }: { listed: readonly PackageView[] }) {
         ))}
       </Table.Tbody>
     </Scrolling>
+  );
+}
+
+function EntryLink({ entry }: { entry: PackageView }) {
+  return (
+    <Link className="quiet" to="/challenges/$name/$entry" params={{ name: entry.season, entry: entry.id }}>
+      {entry.name}
+    </Link>
   );
 }
 

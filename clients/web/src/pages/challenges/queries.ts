@@ -1,10 +1,11 @@
 import { queryOptions, useMutation, useQueryClient } from "@tanstack/react-query";
-import { client, sentFile, taken, type Schema } from "../../api/client";
+import { client, jsonOf, sentFile, taken, type Schema } from "../../api/client";
 
 export type SeasonView = Awaited<ReturnType<typeof askedFor>>;
 export type Season = SeasonView["season"];
 export type Ranked = Schema<"Ranked">;
 export type PackageView = Schema<"PackageView">;
+export type PackageDetail = Schema<"PackageDetail">;
 
 export interface Finding {
   check: string;
@@ -44,6 +45,22 @@ export const ownPackages = (name: string) =>
     queryKey: ["seasons", name, "own"],
     queryFn: () => taken(client.GET("/v1/submissions", { params: { query: { season: name, own: true } } })),
     refetchInterval: EVERY_MS,
+  });
+
+const ofPackage = (id: string) => ({ params: { path: { package: id } } });
+
+export const entry = (id: string) =>
+  queryOptions({
+    queryKey: ["packages", id],
+    queryFn: () => taken(client.GET("/v1/submissions/{package}", ofPackage(id))),
+  });
+
+/** What a package looks like; it never changes once it was checked. */
+export const entryPicture = (id: string) =>
+  queryOptions({
+    queryKey: ["packages", id, "picture"],
+    queryFn: () => jsonOf<Schema<"PackagePicture">>(`/v1/submissions/${encodeURIComponent(id)}/picture`),
+    staleTime: Infinity,
   });
 
 interface Entry {

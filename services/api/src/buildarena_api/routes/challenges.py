@@ -136,9 +136,9 @@ def list_seasons(seasons: SeasonsDep) -> list[SeasonView]:
 
 
 @router.get("/seasons/{name}", dependencies=_ORDINARY, responses=problem_responses(404))
-def show_season(name: str, seasons: SeasonsDep) -> SeasonView:
+def showseason_of(name: str, seasons: SeasonsDep) -> SeasonView:
     """Shows a season."""
-    return _season_view(_season(seasons, name))
+    return _season_view(season_of(seasons, name))
 
 
 @router.get("/seasons/{name}/board", dependencies=_ORDINARY, responses=problem_responses(404, 503))
@@ -150,7 +150,7 @@ def season_board(
     Of packages of one owner and name the newest stands for all. Without a track it is the season's
     first.
     """
-    season = _season(seasons, name)
+    season = season_of(seasons, name)
     track = track or next(iter(season.tracks))
     _require_track(season, track)
     rows = context.store.packages.board(name, track)
@@ -168,7 +168,7 @@ async def check_package(
     season: str, track: str, request: Request, exporting: ExportingDep
 ) -> PackageReport:
     """Says what a season's checks find of a ZIP file, and keeps nothing of it."""
-    rules = _season(seasons_of(request), season)
+    rules = season_of(seasons_of(request), season)
     _require_track(rules, track)
     checks: PackageChecks = request.app.state.package_checks
     checked = await exporting.run(
@@ -205,7 +205,7 @@ async def submit_package(
     The same file twice is one package. A package with the name of an earlier one replaces it on the
     board once it is scored.
     """
-    season = _season(seasons_of(request), entry.season)
+    season = season_of(seasons_of(request), entry.season)
     _require_track(season, entry.track)
     _require_open(season)
     data = await whole_body(request, MAX_BYTES, "a package")
@@ -245,7 +245,7 @@ def show_package(
 ) -> PackageDetail:
     """Shows a package with every check; before its season is closed only to its owner."""
     stored = context.store.packages.show(package)
-    _require_sight(stored, seasons, caller)
+    require_sight(stored, seasons, caller)
     return _detail(context, stored, caller)
 
 
@@ -263,7 +263,7 @@ def package_file(
 ) -> Response:
     """The file as it was handed in, so that anybody who may see it can check it again."""
     stored = context.store.packages.show(package)
-    _require_sight(stored, seasons, caller)
+    require_sight(stored, seasons, caller)
     headers = {"Content-Disposition": f'attachment; filename="{stored.id}.zip"'}
     return Response(context.artifacts.get(stored.hash), media_type=ZIP, headers=headers)
 
@@ -320,7 +320,12 @@ def _receive(
         raise ProblemError(429, str(error), headers={"Retry-After": "3600"}) from error
 
 
-def _season(seasons: Mapping[str, Season], name: str) -> Season:
+def season_of(seasons: Mapping[str, Season], name: str) -> Season:
+    """A season that the service knows.
+
+    Raises:
+        ProblemError: There is none of this name.
+    """
     if name not in seasons:
         raise ProblemError(404, f"there is no season {name[:60]!r}; there is {_listed(seasons)}")
     return seasons[name]
@@ -348,8 +353,12 @@ def _is_over(season: Season | None) -> bool:
     return season is not None and season.closes is not None and datetime.now(UTC) >= season.closes
 
 
-def _require_sight(package: StoredPackage, seasons: Mapping[str, Season], caller: Caller) -> None:
-    """Before a season is closed nobody learns from another's package."""
+def require_sight(package: StoredPackage, seasons: Mapping[str, Season], caller: Caller) -> None:
+    """Before a season is closed nobody learns from another's package.
+
+    Raises:
+        ProblemError: The caller may not see it.
+    """
     is_own = package.owner == (caller.key_id or "")
     if not (is_own or caller.is_admin or _is_over(seasons.get(package.season))):
         raise ProblemError(
