@@ -17,6 +17,7 @@ from scenarios.attack.outages import (
     killed_supervisor,
     stopped_broker,
 )
+from scenarios.attack.packages import hostile_packages
 from scenarios.attack.runners import (
     forged_trials,
     harmful_runner,
@@ -302,6 +303,7 @@ SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     "lying provider": lying_provider,
     "truncated bodies": truncated_bodies,
     "forged archives": forged_archives,
+    "hostile packages": hostile_packages,
     "forged trials": forged_trials,
     "noisy runner": noisy_runner,
     "harmful runner": harmful_runner,
