@@ -7,6 +7,8 @@ import { loadColour, loadsOfBlocks } from "./loads";
 import type { Machine, Part, Rod } from "./machine";
 import { Parts, type PoseNow } from "./Parts";
 import { cargoAt, poseAt } from "./playing";
+import { Shadows } from "./Shadows";
+import type { Scenario } from "./Surroundings";
 import type { Trial } from "./trial";
 
 interface Orbit {
@@ -24,6 +26,7 @@ export function Film({
   begins = 0,
   chosen,
   onChoose,
+  terrain,
 }: {
   machine: Machine;
   trial: Trial;
@@ -31,6 +34,8 @@ export function Film({
   follow: boolean;
   /** At which time the machine is where the camera first looks for it. */
   begins?: number;
+  /** What shadows fall on. */
+  terrain?: Scenario["terrain"];
   /** The part that is pointed out. */
   chosen?: string;
   onChoose?: (part: string | undefined) => void;
@@ -89,6 +94,7 @@ export function Film({
   const pose = useMemo<PoseNow>(() => (part, into) => into.copy(poses.current.get(part.id) ?? part.pose), []);
   return (
     <>
+      <Shadows machine={machine} pose={pose} moving terrain={terrain} />
       <Parts
         machine={machine}
         pose={pose}

@@ -5,8 +5,9 @@ import { Box3, Quaternion, Vector3 } from "three";
 import { faceAt, type PlacedFace } from "./faces";
 import { boundsOf, machineOf, type PartView } from "./machine";
 import { asPlaced, Parts } from "./Parts";
+import { Shadows } from "./Shadows";
 import { Stage } from "./Stage";
-import { Surroundings } from "./Surroundings";
+import { Surroundings, type Scenario } from "./Surroundings";
 
 export interface HandFace extends PlacedFace {
   taken_by: string | null;
@@ -25,6 +26,8 @@ interface HandSceneProps {
   onPick: (part: string, face: string | undefined) => void;
   subject: string;
   label: string;
+  /** What the machine will be put through, to be seen around it; null for bare ground. */
+  course: Scenario | null;
 }
 
 const FREE = "#2b8a3e";
@@ -34,7 +37,7 @@ const ROOM = 0.6;
 const Z = new Vector3(0, 0, 1);
 
 /** A machine under construction: a click on a part chooses it and the face that was clicked. */
-export default function HandScene({ parts, part, face, from, onPick, subject, label }: HandSceneProps) {
+export default function HandScene({ parts, part, face, from, onPick, subject, label, course }: HandSceneProps) {
   const machine = useMemo(() => machineOf(parts), [parts]);
   const bounds = useMemo(() => {
     const own = boundsOf(machine);
@@ -43,7 +46,10 @@ export default function HandScene({ parts, part, face, from, onPick, subject, la
   const chosen = useMemo(() => new Set(part === undefined ? [] : [part.id]), [part]);
   return (
     <Stage bounds={bounds} height={460} label={label} subject={subject}>
-      <Surroundings scenario={null} floor={bounds.min.z} />
+      <group position={[0, 0, bounds.min.z - startHeight(course)]}>
+        <Surroundings scenario={course} />
+      </group>
+      <Shadows machine={machine} pose={asPlaced} ground={bounds.min.z} />
       <Parts
         machine={machine}
         pose={asPlaced}
@@ -56,6 +62,13 @@ export default function HandScene({ parts, part, face, from, onPick, subject, la
       <Marks part={part} face={face} from={from} />
     </Stage>
   );
+}
+
+/** How high the machine's lowest point is at the start of its trial, units. */
+function startHeight(course: Scenario | null): number {
+  if (course === null) return 0;
+  const { lowest_center, height } = course.placement;
+  return lowest_center === undefined ? (height ?? 0) : lowest_center - 0.5;
 }
 
 function Marks({ part, face, from }: Pick<HandSceneProps, "part" | "face" | "from">) {

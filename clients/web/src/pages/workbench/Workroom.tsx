@@ -8,6 +8,7 @@ import {
   Select,
   Spoiler,
   Stack,
+  Switch,
   Tabs,
   Text,
   TextInput,
@@ -40,6 +41,7 @@ import {
   type Hand,
   type SessionView,
 } from "./session";
+import type { Scenario } from "../../scene/Surroundings";
 import { TestTrials } from "./TestTrials";
 import { ToolsPanel } from "./ToolsPanel";
 
@@ -49,7 +51,7 @@ const HEADING = /^\s*#[^\n]*\n+/;
 
 interface TaskDocument {
   constraints?: { modules?: string[] | null; max_sub_structures?: number };
-  scenario?: { duration_s?: number };
+  scenario?: { duration_s?: number } & Partial<Scenario>;
 }
 
 /** The open session: the machine, what is in hand, the tools. */
@@ -58,6 +60,7 @@ export function Workroom({ view }: { view: SessionView }) {
   const hand = useHand(view);
   const task = useQuery(taskQuery(job.task, job.task_version));
   const document = (task.data?.document ?? {}) as TaskDocument;
+  const [course, setCourse] = useState(true);
   useEffect(() => {
     rememberSession(job.id);
   }, [job.id]);
@@ -99,9 +102,18 @@ export function Workroom({ view }: { view: SessionView }) {
               from={hand.fromFace}
               onPick={hand.choose}
               subject={hand.machine}
+              course={course ? ((document.scenario as Scenario | undefined) ?? null) : null}
               label={`The machine under construction: ${hand.bench.parts.length} parts`}
             />
           </Suspense>
+          <Switch
+            size="sm"
+            label="Show the course around it"
+            checked={course}
+            onChange={(event) => {
+              setCourse(event.currentTarget.checked);
+            }}
+          />
           <Text size="xs" className="dimmed">
             Click a face to choose it; drag to turn, scroll to come closer. Green: free, orange: taken, blue: where a
             connector begins. The red block is the starting block; north is away from you at first.
