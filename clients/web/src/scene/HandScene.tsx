@@ -3,6 +3,7 @@ import { useThree } from "@react-three/fiber";
 import { useEffect, useMemo } from "react";
 import { Box3, Quaternion, Vector3 } from "three";
 import { faceAt, type PlacedFace } from "./faces";
+import { moduleGeometry } from "./geometry";
 import { boundsOf, machineOf, type PartView } from "./machine";
 import { asPlaced, Parts } from "./Parts";
 import { Shadows } from "./Shadows";
@@ -26,6 +27,8 @@ interface HandSceneProps {
   onPick: (part: string, face: string | undefined) => void;
   subject: string;
   label: string;
+  /** The module that would be attached to the chosen face. */
+  ghost: string | undefined;
   /** What the machine will be put through, to be seen around it; null for bare ground. */
   course: Scenario | null;
 }
@@ -37,7 +40,7 @@ const ROOM = 0.6;
 const Z = new Vector3(0, 0, 1);
 
 /** A machine under construction: a click on a part chooses it and the face that was clicked. */
-export default function HandScene({ parts, part, face, from, onPick, subject, label, course }: HandSceneProps) {
+export default function HandScene({ parts, part, face, from, onPick, subject, label, course, ghost }: HandSceneProps) {
   const machine = useMemo(() => machineOf(parts), [parts]);
   const bounds = useMemo(() => {
     const own = boundsOf(machine);
@@ -46,7 +49,7 @@ export default function HandScene({ parts, part, face, from, onPick, subject, la
   const chosen = useMemo(() => new Set(part === undefined ? [] : [part.id]), [part]);
   return (
     <Stage bounds={bounds} height={460} label={label} subject={subject}>
-      <group position={[0, 0, bounds.min.z - startHeight(course)]}>
+      <group position={[0, 0, bounds.min.z + (parts.length > 0 ? ROOM : 0) - startHeight(course)]}>
         <Surroundings scenario={course} />
       </group>
       <Shadows machine={machine} pose={asPlaced} ground={bounds.min.z} />
@@ -60,6 +63,7 @@ export default function HandScene({ parts, part, face, from, onPick, subject, la
         }}
       />
       <Marks part={part} face={face} from={from} />
+      {ghost !== undefined && face !== undefined && face.taken_by === null && <Ghost module={ghost} face={face} />}
     </Stage>
   );
 }
@@ -96,6 +100,21 @@ function Marks({ part, face, from }: Pick<HandSceneProps, "part" | "face" | "fro
           </Html>
         ))}
     </>
+  );
+}
+
+/** Where a block would sit, as it sits on a face without a twist. */
+function Ghost({ module, face }: { module: string; face: PlacedFace }) {
+  const invalidate = useThree((state) => state.invalidate);
+  useEffect(() => {
+    invalidate();
+    return invalidate;
+  }, [module, face, invalidate]);
+  const turn = new Quaternion().setFromUnitVectors(Z, new Vector3(...face.normal));
+  return (
+    <mesh geometry={moduleGeometry(module)} position={[...face.center]} quaternion={turn} raycast={() => undefined}>
+      <meshLambertMaterial color="#2b8a3e" transparent opacity={0.45} depthWrite={false} />
+    </mesh>
   );
 }
 

@@ -15,7 +15,7 @@ import {
   Title,
 } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
-import { IconRocket } from "@tabler/icons-react";
+import { IconArrowBackUp, IconArrowForwardUp, IconRocket } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { lazy, Suspense, useEffect, useState } from "react";
@@ -31,6 +31,7 @@ import { AttachPanel } from "./AttachPanel";
 import { FeedbackLog } from "./FeedbackLog";
 import { KeysPanel } from "./KeysPanel";
 import { PartPanel } from "./PartPanel";
+import { Practice } from "./Practice";
 import { ProgramPanel, takesPrograms } from "./ProgramPanel";
 import {
   ASSEMBLY,
@@ -101,11 +102,32 @@ export function Workroom({ view }: { view: SessionView }) {
               face={hand.face}
               from={hand.fromFace}
               onPick={hand.choose}
+              ghost={hand.ghost}
               subject={hand.machine}
               course={course ? ((document.scenario as Scenario | undefined) ?? null) : null}
               label={`The machine under construction: ${hand.bench.parts.length} parts`}
             />
           </Suspense>
+          <Group gap="xs">
+            <Button
+              size="compact-xs"
+              variant="default"
+              leftSection={<IconArrowBackUp size={14} aria-hidden />}
+              disabled={hand.undo === null || hand.busy}
+              onClick={() => hand.undo?.()}
+            >
+              Undo
+            </Button>
+            <Button
+              size="compact-xs"
+              variant="default"
+              leftSection={<IconArrowForwardUp size={14} aria-hidden />}
+              disabled={hand.redo === null || hand.busy}
+              onClick={() => hand.redo?.()}
+            >
+              Redo
+            </Button>
+          </Group>
           <Switch
             size="sm"
             label="Show the course around it"
@@ -148,6 +170,7 @@ export function Workroom({ view }: { view: SessionView }) {
           </Tabs>
         </Stack>
         <FeedbackLog id={job.id} />
+        <Practice view={view} />
       </div>
     </Stack>
   );

@@ -88,7 +88,6 @@ class Dashboard:
         policy = EMBED_POLICY if path.startswith(EMBED) else POLICY
         return _answer(self._files[INDEX], headers, policy)
 
-
     def _missing(self, path: str, headers: Headers) -> Response | None:
         """The page that says so, for people: somebody's browser opened the address itself."""
         is_visit = headers.get("sec-fetch-dest") == "document"
