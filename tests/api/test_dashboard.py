@@ -146,6 +146,17 @@ def test_pages_run_no_script_but_their_own(pages) -> None:
     assert policy["frame-ancestors"] == "'none'"
 
 
+def test_somebody_who_visits_no_page_gets_one_that_leads_on(pages) -> None:
+    visit = {"sec-fetch-dest": "document", "accept": "text/html"}
+    answer = pages.get("/nonsense/here", headers=visit)
+    assert (answer.status_code, answer.content) == (404, INDEX)
+    assert "frame-ancestors 'none'" in answer.headers["content-security-policy"]
+    assert pages.get("/nonsense/here").content != INDEX
+    for path in ("/v1", "/v1/jobz", "/docs/x", "/assets/gone.js", "/openapi.json"):
+        assert pages.get(path, headers=visit).content != INDEX, path
+    assert pages.post("/nonsense", headers=visit).content != INDEX
+
+
 def test_other_sites_frame_a_trial_and_no_other_page(pages) -> None:
     embedded = pages.get("/embed/job/job_1").headers["content-security-policy"]
     assert embedded.endswith("frame-ancestors *")

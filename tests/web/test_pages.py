@@ -39,7 +39,10 @@ def test_pages_work_in_a_browser(tmp_path, files) -> None:
 @pytest.mark.slow
 def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
-        in_browser(stack.url, ["e2e/build", "e2e/program", "e2e/strangers", "e2e/drive"])
+        in_browser(
+            stack.url,
+            ["e2e/build", "e2e/program", "e2e/strangers", "e2e/drive", "e2e/robust", "e2e/toy"],
+        )
 
 
 @pytest.mark.slow

@@ -14,6 +14,25 @@ beforeAll(async () => {
 afterAll(() => browser.close());
 
 describe.skipIf(GUARDED === "")("with keys required", () => {
+  it("a key stays for other tabs where its holder says so, and goes everywhere when it is forgotten", async () => {
+    const secret = await made("read");
+    const context = await browser.newContext();
+    const page = await context.newPage();
+    await page.goto(`${GUARDED}/sweeps`);
+    const alert = page.getByRole("alert");
+    await alert.getByRole("checkbox", { name: /stay in this browser/ }).check();
+    await alert.getByLabel("API key").fill(secret);
+    await page.getByRole("button", { name: "Use", exact: true }).click();
+    await page.getByText("Nobody has submitted a sweep").waitFor();
+    const other = await context.newPage();
+    await other.goto(`${GUARDED}/sweeps`);
+    await other.getByText("Nobody has submitted a sweep").waitFor();
+    await other.getByRole("button", { name: "API key is set" }).click();
+    await other.getByRole("button", { name: "Forget" }).click();
+    await page.getByRole("button", { name: "Give an API key" }).waitFor();
+    await context.close();
+  });
+
   async function made(scope: string): Promise<string> {
     const answer = await fetch(`${GUARDED}/v1/keys`, {
       method: "POST",

@@ -8,7 +8,8 @@ import { RouterProvider } from "@tanstack/react-router";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { ApiError } from "./api/problem";
-import { router } from "./router";
+import { wakeWithService } from "./api/waking";
+import { fetchWhenIdle, router } from "./router";
 import { theme } from "./theme";
 
 const TRIES = 2;
@@ -21,6 +22,9 @@ const queries = new QueryClient({
     },
   },
 });
+
+wakeWithService(queries);
+fetchWhenIdle();
 
 const root = document.getElementById("root");
 if (root !== null) {

@@ -11,7 +11,7 @@ import { readBuildSearch } from "./pages/workbench/search";
 import { readDriveSearch } from "./pages/drive/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch, readTranscriptsSearch } from "./api/jobs-search";
-import { Missing, RootError, Shell } from "./parts/Shell";
+import { Missing, NeedsService, RootError, Shell } from "./parts/Shell";
 
 function readTrack(raw: Record<string, unknown>): { track?: string } {
   return { track: typeof raw.track === "string" && raw.track !== "" ? raw.track : undefined };
@@ -38,7 +38,7 @@ const sweep = createRoute({
 const newSweep = createRoute({
   getParentRoute: () => root,
   path: "/sweeps/new",
-  component: lazyRouteComponent(() => import("./pages/sweeps/NewSweepPage")),
+  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/sweeps/NewSweepPage")),
 });
 const twoSweeps = createRoute({
   getParentRoute: () => root,
@@ -106,25 +106,25 @@ const build = createRoute({
   getParentRoute: () => root,
   path: "/build",
   validateSearch: readBuildSearch,
-  component: lazyRouteComponent(() => import("./pages/workbench/BuildPage")),
+  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/workbench/BuildPage")),
 });
 const machine = createRoute({
   getParentRoute: () => root,
   path: "/machine",
-  component: lazyRouteComponent(() => import("./pages/machine/MachinePage")),
+  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/machine/MachinePage")),
 });
 
 const drive = createRoute({
   getParentRoute: () => root,
   path: "/drive",
   validateSearch: readDriveSearch,
-  component: lazyRouteComponent(() => import("./pages/drive/DrivePage")),
+  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/drive/DrivePage")),
 });
 
 const challenges = createRoute({
   getParentRoute: () => root,
   path: "/challenges",
-  component: lazyRouteComponent(() => import("./pages/challenges/ChallengesPage")),
+  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/challenges/ChallengesPage")),
 });
 const challenge = createRoute({
   getParentRoute: () => root,
@@ -166,6 +166,27 @@ export const router = createRouter({
   defaultPreload: "intent",
   scrollRestoration: true,
 });
+
+/** A page's script that is not there yet. */
+interface Loaded {
+  preload?: () => Promise<unknown>;
+}
+
+/** Fetches the scripts of all pages when there is nothing else to do: no click waits for the service then. */
+export function fetchWhenIdle(): void {
+  const pages = Object.values(router.routesById).map(({ options }) => options.component as Loaded | undefined);
+  const next = (): void => {
+    const page = pages.shift();
+    if (page === undefined) return;
+    const after = (): void => {
+      if ("requestIdleCallback" in window) requestIdleCallback(next);
+      else setTimeout(next, 50);
+    };
+    // One that fails is asked for again by whoever goes there.
+    (page.preload?.() ?? Promise.resolve()).then(after, after);
+  };
+  window.addEventListener("load", () => setTimeout(next, 1_500), { once: true });
+}
 
 declare module "@tanstack/react-router" {
   interface Register {

@@ -1,5 +1,5 @@
 import { useEffect, useState } from "react";
-import { duration } from "../format";
+import { duration, moment } from "../format";
 
 const EVERY_MS = 10_000;
 
@@ -17,7 +17,7 @@ export function Ago({ time }: { time: string | null }) {
   if (time === null) return <>–</>;
   const seconds = Math.max(0, (now - Date.parse(time)) / 1000);
   return (
-    <time dateTime={time} title={new Date(time).toLocaleString()}>
+    <time dateTime={time} title={moment(time)}>
       {seconds < 10 ? "just now" : `${duration(seconds)} ago`}
     </time>
   );

@@ -1,19 +1,20 @@
-import { Button, Group, PasswordInput } from "@mantine/core";
+import { Button, Checkbox, Group, PasswordInput, Stack } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState, useSyncExternalStore } from "react";
-import { key, onKey, setKey } from "../api/key";
+import { key, keyStays, onKey, setKey } from "../api/key";
 
 export function useKey(): string | null {
   return useSyncExternalStore(onKey, key);
 }
 
-/** Where a key is given; it stays in this tab and ends with it. */
+/** Where a key is given; it ends with this tab, unless the reader has it stay. */
 export function KeyField() {
   const known = useKey();
   const [text, setText] = useState("");
+  const [stays, setStays] = useState(keyStays);
   const queries = useQueryClient();
   const give = (value: string | null): void => {
-    setKey(value);
+    setKey(value, stays);
     setText("");
     void queries.resetQueries();
   };
@@ -24,32 +25,46 @@ export function KeyField() {
         give(text);
       }}
     >
-      <Group align="end" gap="xs">
-        <PasswordInput
-          label="API key"
-          description="Kept in this tab only"
-          value={text}
-          autoComplete="off"
-          placeholder={known === null ? "" : "one is set"}
-          onChange={(event) => {
-            setText(event.currentTarget.value);
-          }}
-          w={260}
-        />
-        <Button type="submit" disabled={text.trim() === ""}>
-          Use
-        </Button>
-        {known !== null && (
-          <Button
-            variant="default"
-            onClick={() => {
-              give(null);
+      <Stack gap="xs">
+        <Group align="end" gap="xs">
+          <PasswordInput
+            label="API key"
+            description={
+              known === null ? "None is set" : keyStays() ? "One stays in this browser" : "One is in this tab"
+            }
+            value={text}
+            autoComplete="off"
+            placeholder={known === null ? "" : "one is set"}
+            onChange={(event) => {
+              setText(event.currentTarget.value);
             }}
-          >
-            Forget
+            w={260}
+          />
+          <Button type="submit" disabled={text.trim() === ""}>
+            Use
           </Button>
-        )}
-      </Group>
+          {known !== null && (
+            <Button
+              variant="default"
+              onClick={() => {
+                give(null);
+              }}
+            >
+              Forget
+            </Button>
+          )}
+        </Group>
+        <Checkbox
+          size="xs"
+          label="Let it stay in this browser, for all tabs and later visits: on a device of your own only"
+          checked={stays}
+          onChange={(event) => {
+            setStays(event.currentTarget.checked);
+            if (known !== null) setKey(known, event.currentTarget.checked);
+          }}
+          maw={340}
+        />
+      </Stack>
     </form>
   );
 }

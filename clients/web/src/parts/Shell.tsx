@@ -184,6 +184,19 @@ export function Missing() {
   );
 }
 
+/** What a published site says in place of a page that needs a running service. */
+export function NeedsService() {
+  return (
+    <>
+      <Title order={1}>This needs a running service</Title>
+      <Text mt="sm">
+        A published site shows what was done; it builds, drives and tries nothing. Go on with{" "}
+        <Link to="/">the leaderboard</Link>, <Link to="/jobs">all jobs</Link> or <Link to="/tasks">all tasks</Link>.
+      </Text>
+    </>
+  );
+}
+
 export function RootError({ error, reset }: { error: unknown; reset: () => void }) {
   return <ProblemNote error={error} retry={reset} />;
 }

@@ -21,7 +21,14 @@ export function Loading({ rows = 6 }: { rows?: number }) {
 /** A note that what is shown is older than it should be. */
 export function Stale({ since }: { since: number }) {
   return (
-    <Badge color="yellow" variant="light" leftSection={<IconCloudOff size={14} aria-hidden />} tt="none" role="status">
+    <Badge
+      color="yellow"
+      variant="outline"
+      styles={{ root: { color: "inherit" } }}
+      leftSection={<IconCloudOff size={14} aria-hidden />}
+      tt="none"
+      role="status"
+    >
       not refreshed since <Ago time={new Date(since).toISOString()} />
     </Badge>
   );

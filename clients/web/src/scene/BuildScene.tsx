@@ -4,6 +4,7 @@ import { Ghosts } from "./Ghosts";
 import type { CameraLock } from "./lock";
 import { boundsOf, machineOf, type PartView, type PlacedView } from "./machine";
 import { asPlaced, Parts } from "./Parts";
+import { Shadows } from "./Shadows";
 import { Stage } from "./Stage";
 import { Surroundings } from "./Surroundings";
 
@@ -45,6 +46,7 @@ export default function BuildScene({
   return (
     <Stage bounds={bounds} height={height} label={label} subject={subject} lock={lock}>
       <Surroundings scenario={null} floor={bounds.isEmpty() ? 0 : bounds.min.z} />
+      <Shadows machine={machine} pose={asPlaced} ground={bounds.isEmpty() ? 0 : bounds.min.z} />
       <Parts machine={machine} pose={asPlaced} chosen={chosen} onChoose={onChoose} />
       <Ghosts blocks={ghosts} />
     </Stage>

@@ -46,7 +46,7 @@ export default function DriveScene({ scene, scenario, live, playing }: DriveScen
   return (
     <Stage bounds={bounds} height={440} label="The machine that is driven">
       <Surroundings scenario={scenario} time={seconds} />
-      <Film machine={machine} trial={live.trial} clock={clock} follow loads={null} />
+      <Film machine={machine} trial={live.trial} clock={clock} follow loads={null} terrain={scenario.terrain} />
     </Stage>
   );
 }

@@ -2,6 +2,7 @@ import { useMemo, useState } from "react";
 import { Text } from "@mantine/core";
 import { boundsOf, readScene, type MachineScene } from "./machine";
 import { asPlaced, Parts } from "./Parts";
+import { Shadows } from "./Shadows";
 import { Stage } from "./Stage";
 import { Surroundings } from "./Surroundings";
 
@@ -16,6 +17,7 @@ export default function FileScene({ scene, label }: { scene: MachineScene; label
     <>
       <Stage bounds={bounds} height={420} label={label} subject={label}>
         <Surroundings scenario={null} floor={bounds.isEmpty() ? 0 : bounds.min.z} />
+        <Shadows machine={machine} pose={asPlaced} ground={bounds.isEmpty() ? 0 : bounds.min.z} />
         <Parts machine={machine} pose={asPlaced} chosen={marked} onChoose={setChosen} />
       </Stage>
       <Text size="xs" className="dimmed" role="status">

@@ -8,6 +8,8 @@ import { loadColour, loadsOfBlocks } from "./loads";
 import type { Machine, Part, Rod } from "./machine";
 import { Parts, type PoseNow } from "./Parts";
 import { cargoAt, poseAt } from "./playing";
+import { Shadows } from "./Shadows";
+import type { Scenario } from "./Surroundings";
 import type { Trial } from "./trial";
 
 interface Orbit {
@@ -25,6 +27,7 @@ export function Film({
   begins = 0,
   chosen,
   onChoose,
+  terrain,
 }: {
   machine: Machine;
   trial: Trial;
@@ -32,6 +35,8 @@ export function Film({
   follow: boolean;
   /** At which time the machine is where the camera first looks for it. */
   begins?: number;
+  /** What shadows fall on. */
+  terrain?: Scenario["terrain"];
   /** The part that is pointed out. */
   chosen?: string;
   onChoose?: (part: string | undefined) => void;
@@ -90,6 +95,7 @@ export function Film({
   const pose = useMemo<PoseNow>(() => (part, into) => into.copy(poses.current.get(part.id) ?? part.pose), []);
   return (
     <>
+      <Shadows machine={machine} pose={pose} moving terrain={terrain} />
       <Parts
         machine={machine}
         pose={pose}

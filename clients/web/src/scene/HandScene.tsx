@@ -3,10 +3,12 @@ import { useThree } from "@react-three/fiber";
 import { useEffect, useMemo } from "react";
 import { Box3, Quaternion, Vector3 } from "three";
 import { faceAt, type PlacedFace } from "./faces";
+import { moduleGeometry } from "./geometry";
 import { boundsOf, machineOf, type PartView } from "./machine";
 import { asPlaced, Parts } from "./Parts";
+import { Shadows } from "./Shadows";
 import { Stage } from "./Stage";
-import { Surroundings } from "./Surroundings";
+import { Surroundings, type Scenario } from "./Surroundings";
 
 export interface HandFace extends PlacedFace {
   taken_by: string | null;
@@ -25,6 +27,10 @@ interface HandSceneProps {
   onPick: (part: string, face: string | undefined) => void;
   subject: string;
   label: string;
+  /** The module that would be attached to the chosen face. */
+  ghost: string | undefined;
+  /** What the machine will be put through, to be seen around it; null for bare ground. */
+  course: Scenario | null;
 }
 
 const FREE = "#2b8a3e";
@@ -34,7 +40,7 @@ const ROOM = 0.6;
 const Z = new Vector3(0, 0, 1);
 
 /** A machine under construction: a click on a part chooses it and the face that was clicked. */
-export default function HandScene({ parts, part, face, from, onPick, subject, label }: HandSceneProps) {
+export default function HandScene({ parts, part, face, from, onPick, subject, label, course, ghost }: HandSceneProps) {
   const machine = useMemo(() => machineOf(parts), [parts]);
   const bounds = useMemo(() => {
     const own = boundsOf(machine);
@@ -43,7 +49,10 @@ export default function HandScene({ parts, part, face, from, onPick, subject, la
   const chosen = useMemo(() => new Set(part === undefined ? [] : [part.id]), [part]);
   return (
     <Stage bounds={bounds} height={460} label={label} subject={subject}>
-      <Surroundings scenario={null} floor={bounds.min.z} />
+      <group position={[0, 0, bounds.min.z + (parts.length > 0 ? ROOM : 0) - startHeight(course)]}>
+        <Surroundings scenario={course} />
+      </group>
+      <Shadows machine={machine} pose={asPlaced} ground={bounds.min.z} />
       <Parts
         machine={machine}
         pose={asPlaced}
@@ -54,8 +63,16 @@ export default function HandScene({ parts, part, face, from, onPick, subject, la
         }}
       />
       <Marks part={part} face={face} from={from} />
+      {ghost !== undefined && face !== undefined && face.taken_by === null && <Ghost module={ghost} face={face} />}
     </Stage>
   );
+}
+
+/** How high the machine's lowest point is at the start of its trial, units. */
+function startHeight(course: Scenario | null): number {
+  if (course === null) return 0;
+  const { lowest_center, height } = course.placement;
+  return lowest_center === undefined ? (height ?? 0) : lowest_center - 0.5;
 }
 
 function Marks({ part, face, from }: Pick<HandSceneProps, "part" | "face" | "from">) {
@@ -83,6 +100,21 @@ function Marks({ part, face, from }: Pick<HandSceneProps, "part" | "face" | "fro
           </Html>
         ))}
     </>
+  );
+}
+
+/** Where a block would sit, as it sits on a face without a twist. */
+function Ghost({ module, face }: { module: string; face: PlacedFace }) {
+  const invalidate = useThree((state) => state.invalidate);
+  useEffect(() => {
+    invalidate();
+    return invalidate;
+  }, [module, face, invalidate]);
+  const turn = new Quaternion().setFromUnitVectors(Z, new Vector3(...face.normal));
+  return (
+    <mesh geometry={moduleGeometry(module)} position={[...face.center]} quaternion={turn} raycast={() => undefined}>
+      <meshLambertMaterial color="#2b8a3e" transparent opacity={0.45} depthWrite={false} />
+    </mesh>
   );
 }
 

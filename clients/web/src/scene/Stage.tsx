@@ -1,7 +1,8 @@
 import { Canvas } from "@react-three/fiber";
-import type { ReactNode } from "react";
+import { useRef, type ReactNode } from "react";
 import { Object3D, type Box3 } from "three";
 import { Camera, FIELD_DEG } from "./Camera";
+import { Gauge, GaugeMarks } from "./Gauge";
 import type { CameraLock } from "./lock";
 
 // The world's z points up.
@@ -37,6 +38,8 @@ interface StageProps {
 
 /** A view of something of this size: light, and a camera that mouse, touch and keys turn. */
 export function Stage({ bounds, height, label, subject = "", lock, children }: StageProps) {
+  const needle = useRef<SVGGElement>(null);
+  const bar = useRef<HTMLDivElement>(null);
   drawing ??= whoDraws();
   if (drawing === "none") {
     return <p>This browser draws no 3D (WebGL 2 is off).</p>;
@@ -57,7 +60,9 @@ export function Stage({ bounds, height, label, subject = "", lock, children }: S
         <directionalLight position={[30, -40, 60]} intensity={2} />
         {children}
         <Camera bounds={bounds} subject={subject} lock={lock} />
+        <Gauge needleRef={needle} barRef={bar} />
       </Canvas>
+      <GaugeMarks needleRef={needle} barRef={bar} />
     </div>
   );
 }

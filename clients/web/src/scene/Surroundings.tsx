@@ -1,6 +1,6 @@
-import { useFrame } from "@react-three/fiber";
-import { useMemo, useRef } from "react";
-import { DoubleSide, type Group } from "three";
+import { useMemo } from "react";
+import { DoubleSide } from "three";
+import { Ground } from "./Ground";
 import type { Vector } from "./modules";
 import type { CargoShape } from "./trial";
 import { lineStrip, markAt, posts, type Gate, type GroundLine, type Mark, turnOf } from "./signs";
@@ -22,27 +22,6 @@ export interface Scenario {
   line?: GroundLine | null;
   /** A ball in place of flat ground, straight below. */
   planet?: { radius: number } | null;
-}
-
-const GROUND = 160;
-const CELL = 4;
-
-/** The ground around the camera: it has no end, and its lines stay where they are. */
-function Ground({ height }: { height: number }) {
-  const drawn = useRef<Group>(null);
-  useFrame(({ camera }) => {
-    const [x, y] = [camera.position.x, camera.position.y].map((at) => CELL * Math.round(at / CELL));
-    drawn.current?.position.set(x ?? 0, y ?? 0, height);
-  });
-  return (
-    <group ref={drawn} position={[0, 0, height]}>
-      <mesh position={[0, 0, -0.02]}>
-        <planeGeometry args={[GROUND, GROUND]} />
-        <meshLambertMaterial color="#b9b5a8" transparent opacity={0.55} />
-      </mesh>
-      <gridHelper args={[GROUND, GROUND / CELL, "#8f8b80", "#8f8b80"]} rotation={[Math.PI / 2, 0, 0]} />
-    </group>
-  );
 }
 
 const POST = 2;

@@ -145,6 +145,7 @@ export function TrialScene({
           follow={follow}
           loads={loads && most !== null ? borne : null}
           begins={moment?.look ? moment.time : 0}
+          terrain={scenario.terrain}
           chosen={part}
           onChoose={onPart}
         />

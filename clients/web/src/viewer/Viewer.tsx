@@ -62,7 +62,14 @@ function Played({ machine, trial, scenario, title, height }: PlayedProps) {
     <>
       <Stage bounds={bounds} height={height} label={`${title}, at ${clock.shown.toFixed(1)} seconds`}>
         <Surroundings scenario={scenario} time={clock.shown} />
-        <Film machine={machine} trial={trial} clock={clock} follow loads={coloured && most !== null ? borne : null} />
+        <Film
+          machine={machine}
+          trial={trial}
+          clock={clock}
+          follow
+          loads={coloured && most !== null ? borne : null}
+          terrain={scenario?.terrain}
+        />
       </Stage>
       <div className="controls">
         <button type="button" onClick={clock.toggle}>

@@ -151,9 +151,14 @@ function GlbButton({ job }: { job: JobDetail }) {
         Compare
       </Link>
       {!isSite && (
-        <Link to="/drive" search={{ job: job.id }}>
-          Drive it
-        </Link>
+        <>
+          <Link to="/drive" search={{ job: job.id }}>
+            Drive it
+          </Link>
+          <Link to="/build" search={{ task: job.task, remix: job.id }}>
+            Remix it
+          </Link>
+        </>
       )}
       <Button
         size="compact-sm"

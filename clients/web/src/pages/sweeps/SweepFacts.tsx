@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import type { ReactNode } from "react";
 import { sweepForecast, type Forecast, type SweepView } from "../../api/queries";
 import { isSite } from "../../api/site";
-import { compact, count, dollars, duration, number, percent, stateWords } from "../../format";
+import { compact, count, dollars, duration, moment, number, percent, stateWords } from "../../format";
 import { Fact } from "../../parts/Fact";
 
 /** How much of a budget is used; nothing where there is none. */
@@ -27,7 +27,7 @@ function rateOf(forecast: Forecast | undefined): Shown {
     value: `${number(rate)} a minute`,
     notes: [
       end !== null && (
-        <time dateTime={end} title={`about ${new Date(end).toLocaleString()}`}>
+        <time dateTime={end} title={`about ${moment(end)}`}>
           {forecast.jobs_left < rate
             ? "less than a minute left"
             : `about ${duration((60 * forecast.jobs_left) / rate)} left`}

@@ -1,9 +1,9 @@
-import { Badge, Group, Stack, Table, Text, Title } from "@mantine/core";
+import { Badge, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { board, task as taskQuery, type TaskDetail } from "../../api/queries";
-import { measured, words } from "../../format";
+import { measured, ruleLines } from "../../format";
 import { JobsSummary } from "../../parts/JobsSummary";
 import { Markdown } from "../../parts/Markdown";
 import { Section } from "../../parts/Section";
@@ -11,7 +11,6 @@ import { Answered, Empty, Loading } from "../../parts/States";
 import { TaskTable } from "../../parts/TaskTable";
 import { TrackSelect } from "../../parts/TrackSelect";
 import type { Scenario } from "../../scene/Surroundings";
-import { flattened } from "../job/JobRecords";
 import { Machines } from "./Machines";
 
 const Distribution = lazy(() => import("./Distribution"));
@@ -113,19 +112,22 @@ function Tracks({ known, chosen }: { known: readonly string[]; chosen: string | 
 }
 
 function Rules({ task }: { task: TaskDetail }) {
-  const parts = { constraints: task.document.constraints, scoring: task.document.scoring, difficulty: task.difficulty };
+  const { constraints, scoring } = task.document as Record<string, unknown>;
+  const parts = { "What may be built": constraints, "What counts": scoring, Difficulty: task.difficulty };
   return (
-    <Table fz="sm">
-      <Table.Tbody>
-        {flattened(parts).map(([name, value]) => (
-          <Table.Tr key={name}>
-            <Table.Th scope="row" fw={500}>
-              {words(name)}
-            </Table.Th>
-            <Table.Td className="figures">{value === "null" ? "any" : value}</Table.Td>
-          </Table.Tr>
-        ))}
-      </Table.Tbody>
-    </Table>
+    <Stack gap="sm">
+      {Object.entries(parts).map(([title, part]) => (
+        <div key={title}>
+          <Text size="sm" fw={600}>
+            {title}
+          </Text>
+          <ul className="rules">
+            {ruleLines(part).map((line) => (
+              <li key={line}>{line}</li>
+            ))}
+          </ul>
+        </div>
+      ))}
+    </Stack>
   );
 }

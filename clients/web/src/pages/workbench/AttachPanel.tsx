@@ -1,8 +1,9 @@
-import { Button, Group, Select, Stack, Text, TextInput } from "@mantine/core";
+import { Button, Checkbox, Group, Select, Stack, Text, TextInput } from "@mantine/core";
 import { IconLink, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { Answered } from "../../parts/States";
+import { mirrored } from "./mirror";
 import { modules as modulesQuery, type Hand, type ModuleView } from "./session";
 
 const UNPLACED = new Set(["start", "cargo", "connector"]);
@@ -76,6 +77,7 @@ function Begin({ hand }: { hand: Hand }) {
 
 function Blocks({ hand, modules }: { hand: Hand; modules: readonly ModuleView[] }) {
   const [text, setText] = useState("");
+  const [both, setBoth] = useState(false);
   const { part, face } = hand;
   const where =
     part === undefined
@@ -98,6 +100,14 @@ function Blocks({ hand, modules }: { hand: Hand; modules: readonly ModuleView[] 
       <Text size="sm" fw={600} role="status">
         {where}
       </Text>
+      <Checkbox
+        size="xs"
+        label="On the other side too, mirrored between east and west"
+        checked={both}
+        onChange={(event) => {
+          setBoth(event.currentTarget.checked);
+        }}
+      />
       {shown.map((one) => (
         <Group key={one.name} wrap="nowrap" align="start" gap="sm">
           <Button
@@ -106,11 +116,28 @@ function Blocks({ hand, modules }: { hand: Hand; modules: readonly ModuleView[] 
             style={{ flexShrink: 0 }}
             aria-label={`Attach ${one.name}`}
             disabled={part === undefined || face === undefined || hand.busy}
+            onPointerEnter={() => {
+              hand.setGhost(one.name);
+            }}
+            onPointerLeave={() => {
+              hand.setGhost(undefined);
+            }}
+            onFocus={() => {
+              hand.setGhost(one.name);
+            }}
+            onBlur={() => {
+              hand.setGhost(undefined);
+            }}
             onClick={() => {
-              hand.act({
-                tool: "attach_block_to",
-                arguments: { base_block: part?.id, face: face?.label, new_block: one.name },
-              });
+              if (part === undefined || face === undefined) return;
+              const here = { part: part.id, face: face.label };
+              const there = both ? mirrored(hand.bench.parts, here) : undefined;
+              hand.act(
+                ...[here, ...(there === undefined ? [] : [there])].map((place) => ({
+                  tool: "attach_block_to",
+                  arguments: { base_block: place.part, face: place.face, new_block: one.name },
+                })),
+              );
             }}
           >
             Attach

@@ -12,6 +12,8 @@ export function Result({ job }: { job: JobDetail }) {
   const figures = Object.entries(job.metrics ?? {}).filter(
     ([, value]) => typeof value === "number" || typeof value === "boolean",
   );
+  const wanted =
+    job.success === true ? null : missing(task.data?.document.scoring, task.data?.indicator, job.indicator);
   const trials = rolloutsOf(job.artifacts);
   return (
     <Stack gap="sm" data-outcome={job.outcome ?? ""}>
@@ -20,6 +22,11 @@ export function Result({ job }: { job: JobDetail }) {
         {job.indicator !== null &&
           `: ${words(task.data?.indicator ?? "indicator")} ${job.censored ? "≥ " : ""}${number(job.indicator)} ${unit}`}
       </Text>
+      {wanted !== null && (
+        <Text size="sm">
+          {number(job.indicator)} of {number(wanted)} {unit} that the task asks for.
+        </Text>
+      )}
       {job.reason !== null && (
         <Text size="sm">
           {words(job.reason)}
@@ -37,4 +44,10 @@ export function Result({ job }: { job: JobDetail }) {
       {trials.length > 0 && <TrialPart job={job} numbers={trials} />}
     </Stack>
   );
+}
+
+/** How much of what is measured a task asks for, where more was asked for than there is; null where it names none. */
+export function missing(scoring: unknown, indicator: string | undefined, reached: number | null): number | null {
+  const asked = (scoring as Record<string, unknown> | undefined)?.[`min_${indicator ?? ""}`];
+  return typeof asked === "number" && reached !== null && reached < asked ? asked : null;
 }

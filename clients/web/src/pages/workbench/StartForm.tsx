@@ -9,6 +9,7 @@ import { tasks as tasksQuery } from "../../api/queries";
 import { Markdown } from "../../parts/Markdown";
 import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
+import { remix } from "./remix";
 import { rememberSession, useLastSession } from "./session";
 
 const route = getRouteApi("/build");
@@ -26,8 +27,8 @@ export function StartForm() {
   const simulator = useSimulator();
   const [seed, setSeed] = useState<number | string>(0);
   const opening = useMutation({
-    mutationFn: () =>
-      taken(
+    mutationFn: async () => {
+      const opened = await taken(
         client.POST("/v1/sessions", {
           body: {
             task,
@@ -38,7 +39,11 @@ export function StartForm() {
             kind: "human",
           },
         }),
-      ),
+      );
+      // One that was open already has something on its workbench.
+      if (search.remix !== undefined && opened.calls === 0) await remix(search.remix, opened.id);
+      return opened;
+    },
     onSuccess: ({ id }) => {
       localStorage.setItem(NAME, name.trim());
       rememberSession(id);
@@ -59,6 +64,15 @@ export function StartForm() {
           stands on the leaderboard of the external track as human/your-name.
         </Text>
       </div>
+      {search.remix !== undefined && (
+        <Alert color="teal" title="A remix">
+          The session begins with the machine of{" "}
+          <Link to="/jobs/$id" params={{ id: search.remix }}>
+            this job
+          </Link>
+          , built again step by step. Change what you like.
+        </Alert>
+      )}
       {last !== undefined && (
         <Alert color="blue" title="You have a session under way">
           <Link to="/build" search={{ session: last.job.id }}>

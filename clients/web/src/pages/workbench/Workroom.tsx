@@ -8,13 +8,14 @@ import {
   Select,
   Spoiler,
   Stack,
+  Switch,
   Tabs,
   Text,
   TextInput,
   Title,
 } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
-import { IconRocket } from "@tabler/icons-react";
+import { IconArrowBackUp, IconArrowForwardUp, IconRocket } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { lazy, Suspense, useEffect, useState } from "react";
@@ -30,6 +31,7 @@ import { AttachPanel } from "./AttachPanel";
 import { FeedbackLog } from "./FeedbackLog";
 import { KeysPanel } from "./KeysPanel";
 import { PartPanel } from "./PartPanel";
+import { Practice } from "./Practice";
 import { ProgramPanel, takesPrograms } from "./ProgramPanel";
 import {
   ASSEMBLY,
@@ -40,6 +42,7 @@ import {
   type Hand,
   type SessionView,
 } from "./session";
+import type { Scenario } from "../../scene/Surroundings";
 import { TestTrials } from "./TestTrials";
 import { ToolsPanel } from "./ToolsPanel";
 
@@ -49,7 +52,7 @@ const HEADING = /^\s*#[^\n]*\n+/;
 
 interface TaskDocument {
   constraints?: { modules?: string[] | null; max_sub_structures?: number };
-  scenario?: { duration_s?: number };
+  scenario?: { duration_s?: number } & Partial<Scenario>;
 }
 
 /** The open session: the machine, what is in hand, the tools. */
@@ -58,6 +61,7 @@ export function Workroom({ view }: { view: SessionView }) {
   const hand = useHand(view);
   const task = useQuery(taskQuery(job.task, job.task_version));
   const document = (task.data?.document ?? {}) as TaskDocument;
+  const [course, setCourse] = useState(true);
   useEffect(() => {
     rememberSession(job.id);
   }, [job.id]);
@@ -98,10 +102,40 @@ export function Workroom({ view }: { view: SessionView }) {
               face={hand.face}
               from={hand.fromFace}
               onPick={hand.choose}
+              ghost={hand.ghost}
               subject={hand.machine}
+              course={course ? ((document.scenario as Scenario | undefined) ?? null) : null}
               label={`The machine under construction: ${hand.bench.parts.length} parts`}
             />
           </Suspense>
+          <Group gap="xs">
+            <Button
+              size="compact-xs"
+              variant="default"
+              leftSection={<IconArrowBackUp size={14} aria-hidden />}
+              disabled={hand.undo === null || hand.busy}
+              onClick={() => hand.undo?.()}
+            >
+              Undo
+            </Button>
+            <Button
+              size="compact-xs"
+              variant="default"
+              leftSection={<IconArrowForwardUp size={14} aria-hidden />}
+              disabled={hand.redo === null || hand.busy}
+              onClick={() => hand.redo?.()}
+            >
+              Redo
+            </Button>
+          </Group>
+          <Switch
+            size="sm"
+            label="Show the course around it"
+            checked={course}
+            onChange={(event) => {
+              setCourse(event.currentTarget.checked);
+            }}
+          />
           <Text size="xs" className="dimmed">
             Click a face to choose it; drag to turn, scroll to come closer. Green: free, orange: taken, blue: where a
             connector begins. The red block is the starting block; north is away from you at first.
@@ -136,6 +170,7 @@ export function Workroom({ view }: { view: SessionView }) {
           </Tabs>
         </Stack>
         <FeedbackLog id={job.id} />
+        <Practice view={view} />
       </div>
     </Stack>
   );

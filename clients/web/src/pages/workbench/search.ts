@@ -2,6 +2,8 @@
 export interface BuildSearch {
   session?: string;
   task?: string;
+  /** The job whose machine a new session begins with. */
+  remix?: string;
 }
 
 const ID = /^job_[0-9a-f]{1,40}$/;
@@ -10,5 +12,5 @@ const NAME = /^[a-z0-9-]{1,60}$/;
 export function readBuildSearch(raw: Record<string, unknown>): BuildSearch {
   const taken = (value: unknown, form: RegExp): string | undefined =>
     typeof value === "string" && form.test(value) ? value : undefined;
-  return { session: taken(raw.session, ID), task: taken(raw.task, NAME) };
+  return { session: taken(raw.session, ID), task: taken(raw.task, NAME), remix: taken(raw.remix, ID) };
 }

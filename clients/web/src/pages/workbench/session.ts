@@ -1,5 +1,6 @@
 import { queryOptions, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useMemo, useState } from "react";
+import { after, inverseOf, NO_HISTORY, redone, undone, type Done, type History } from "./history";
 import { client, jsonOf, taken, type Schema } from "../../api/client";
 
 export type SessionView = Schema<"SessionView">;
@@ -58,10 +59,10 @@ export interface Told extends Call {
   outcome: Outcome;
 }
 
-/** The first part that was not there before: what an action has made. */
-export function newPart(before: readonly BenchPart[], after: readonly BenchPart[]): string | undefined {
+/** The parts that were not there before: what actions have made, in their order. */
+export function newParts(before: readonly BenchPart[], after: readonly BenchPart[]): string[] {
   const known = new Set(before.map((part) => part.id));
-  return after.find((part) => !known.has(part.id))?.id;
+  return after.map((part) => part.id).filter((id) => !known.has(id));
 }
 
 export interface Place {
@@ -80,9 +81,21 @@ export interface Hand {
   setFrom: (place: Place | undefined) => void;
   choose: (part: string | undefined, face?: string) => void;
   act: (...calls: Call[]) => void;
+  /** Takes the last thing back, or does what was taken back again; null where there is nothing. */
+  undo: (() => void) | null;
+  redo: (() => void) | null;
+  /** The module that would be attached next, while somebody points at it. */
+  ghost: string | undefined;
+  setGhost: (module: string | undefined) => void;
   busy: boolean;
   told: Told | undefined;
   error: Error | null;
+}
+
+/** Calls that are made, and what the history is once they were. */
+interface Doing {
+  calls: Call[];
+  then: (before: History, done: Done) => History;
 }
 
 /** What a person has in hand: the machine, the chosen part and face, and what came of the last action. */
@@ -94,9 +107,11 @@ export function useHand(view: SessionView): Hand {
   );
   const [chosen, setChosen] = useState<{ part?: string; face?: string }>({});
   const [from, setFrom] = useState<Place>();
+  const [ghost, setGhost] = useState<string>();
+  const [history, setHistory] = useState(NO_HISTORY);
   const bench = useMemo(() => benchOf(view, machine), [view, machine]);
   const doing = useMutation({
-    mutationFn: async (calls: Call[]): Promise<Told | undefined> => {
+    mutationFn: async ({ calls }: Doing): Promise<Told | undefined> => {
       let told: Told | undefined;
       for (const call of calls) {
         const body = { tool: call.tool, arguments: call.arguments, machine };
@@ -109,19 +124,26 @@ export function useHand(view: SessionView): Hand {
       return told;
     },
     // Whatever came of it, also where no answer came: the service knows what stands there.
-    onSettled: async () => {
-      const after = await queries.query({ ...session(id), staleTime: 0 });
+    onSettled: async (told, _, { calls, then }) => {
+      const now = await queries.query({ ...session(id), staleTime: 0 });
       await queries.invalidateQueries({ queryKey: ["job", id, "transcript"] });
-      const made = newPart(bench.parts, benchOf(after, machine).parts);
-      if (made !== undefined) setChosen({ part: made });
+      const made = newParts(bench.parts, benchOf(now, machine).parts);
+      const last = made.at(-1);
+      if (last !== undefined) setChosen({ part: last });
+      if (told?.outcome.ok === true) setHistory((before) => then(before, { calls, made }));
+      // Of several some may have been done: none of them can be taken back by itself.
+      else if (calls.length > 1 || told === undefined) setHistory(NO_HISTORY);
     },
   });
   const part = bench.parts.find((one) => one.id === chosen.part);
+  const [back, forth] = [history.past.at(-1), history.next.at(-1)];
+  const inverse = back === undefined ? null : inverseOf(back);
   return {
     bench,
     machine,
     setMachine: (name) => {
       setMachine(name);
+      setHistory(NO_HISTORY);
       setChosen({});
       setFrom(undefined);
     },
@@ -134,8 +156,22 @@ export function useHand(view: SessionView): Hand {
       setChosen({ part: next, face });
     },
     act: (...calls) => {
-      if (!doing.isPending) doing.mutate(calls);
+      if (!doing.isPending) doing.mutate({ calls, then: after });
     },
+    undo:
+      back === undefined || inverse === null
+        ? null
+        : () => {
+            if (!doing.isPending) doing.mutate({ calls: inverse, then: undone });
+          },
+    redo:
+      forth === undefined
+        ? null
+        : () => {
+            if (!doing.isPending) doing.mutate({ calls: [...forth.calls], then: redone });
+          },
+    ghost,
+    setGhost,
     busy: doing.isPending,
     told: doing.data,
     error: doing.error,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from http import HTTPStatus
 from typing import Final
 
 from starlette.datastructures import Headers
@@ -43,6 +44,10 @@ service shows it here after its next start.</p>
 """
 
 
+API: Final = re.compile(r"/(?:v1|docs|openapi\.json|static-offline-docs|assets)(?:/|$)")
+"""Paths whose answers are for programs, whoever asks."""
+
+
 def is_page(path: str) -> bool:
     """Whether a path is a page's; no route of the API has such a path."""
     return PAGE.fullmatch(path) is not None
@@ -77,11 +82,20 @@ class Dashboard:
         if path != INDEX and path in self._files:
             return _answer(self._files[path], headers)
         if not is_page(path):
-            return None
+            return self._missing(path, headers)
         if INDEX not in self._files:
             return HTMLResponse(self._not_built, headers={"Content-Security-Policy": POLICY})
         policy = EMBED_POLICY if path.startswith(EMBED) else POLICY
         return _answer(self._files[INDEX], headers, policy)
+
+    def _missing(self, path: str, headers: Headers) -> Response | None:
+        """The page that says so, for people: somebody's browser opened the address itself."""
+        is_visit = headers.get("sec-fetch-dest") == "document"
+        if INDEX not in self._files or not is_visit or API.match(path):
+            return None
+        answer = _answer(self._files[INDEX], headers)
+        answer.status_code = 404 if answer.status_code == HTTPStatus.OK else answer.status_code
+        return answer
 
 
 def _answer(file: PageFile, headers: Headers, policy: str = POLICY) -> Response:

@@ -1,0 +1,40 @@
+import type { Browser } from "playwright-core";
+import { afterAll, beforeAll, expect, it } from "vitest";
+import { expectNoSeriousFault, launched, settled, URL_OF_SERVICE, visit } from "./browser";
+
+let browser: Browser;
+beforeAll(async () => {
+  browser = await launched();
+});
+afterAll(() => browser.close());
+
+it("leads on from an address that there is not", async () => {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  const answer = await page.goto(`${URL_OF_SERVICE}/nonsense/here`);
+  expect(answer?.status()).toBe(404);
+  await page.getByRole("heading", { name: "There is no such page" }).waitFor();
+  await expectNoSeriousFault(page);
+  await page.getByRole("main").getByRole("link", { name: "all tasks" }).click();
+  await page.getByRole("heading", { name: "Tasks" }).waitFor();
+  await context.close();
+});
+
+it("stays while the service is away, and comes back by itself", async () => {
+  const { page, context } = await visit(browser, "/");
+  // The scripts of all pages, when there is nothing else to do.
+  const last = (): Promise<boolean> =>
+    page.evaluate(() => performance.getEntriesByType("resource").some(({ name }) => name.includes("SeasonPage-")));
+  await expect.poll(last, { timeout: 25_000 }).toBe(true);
+  await context.route("**/*", (route) => route.abort());
+  await page.getByRole("navigation").getByRole("link", { name: "Challenges", exact: true }).click();
+  await page
+    .getByText(/no answer came/)
+    .first()
+    .waitFor();
+  expect(new URL(page.url()).pathname).toBe("/challenges");
+  await context.unroute("**/*");
+  await expect.poll(() => page.getByText(/no answer came/).count(), { timeout: 15_000 }).toBe(0);
+  await settled(page);
+  await context.close();
+});

@@ -1,0 +1,42 @@
+import { Button, Stack, Text } from "@mantine/core";
+import { IconPlayerPlay } from "@tabler/icons-react";
+import { useMutation } from "@tanstack/react-query";
+import { jsonOf, sentFile } from "../../api/client";
+import type { JobView } from "../../api/queries";
+import { ProblemNote } from "../../parts/Problem";
+import type { SessionView } from "./session";
+import { Tried } from "./Tried";
+
+/** A trial of the machine as it stands, which counts for nothing; the session goes on. */
+export function Practice({ view }: { view: SessionView }) {
+  const { job } = view;
+  const trying = useMutation({
+    mutationFn: async () => {
+      const document = await jsonOf(`/v1/sessions/${job.id}/machine`);
+      const simulator = String(job.track.split("/")[1]?.replace(/-[^-]*$/, ""));
+      const file = new File([JSON.stringify(document)], "machine.json");
+      return sentFile<JobView>("/v1/machines/trials", { task: job.task, simulator }, file);
+    },
+  });
+  return (
+    <Stack gap="xs" align="start">
+      <Text size="sm">
+        Try the machine as it stands, in the exact world. It counts for nothing and stands on no board; you build on.
+      </Text>
+      <Button
+        size="xs"
+        variant="light"
+        leftSection={<IconPlayerPlay size={14} aria-hidden />}
+        loading={trying.isPending}
+        disabled={view.machines.length === 0}
+        onClick={() => {
+          trying.mutate();
+        }}
+      >
+        Practice trial
+      </Button>
+      {trying.isError && <ProblemNote error={trying.error} />}
+      {trying.data !== undefined && <Tried key={trying.data.id} id={trying.data.id} />}
+    </Stack>
+  );
+}
