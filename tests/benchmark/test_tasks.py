@@ -46,7 +46,11 @@ CONTROL = [
 
 
 THROWING = ["throw-1", "throw-2", "throw-3"]
-COURSES = ["deliver-1", "deliver-2", "deliver-3"]
+COURSES = [
+    *(f"deliver-{level}" for level in (1, 2, 3)),
+    *(f"drive-{level}" for level in (1, 2, 3, 4)),
+    "fetch-1",
+]
 GROUPS = {"headroom": HEADROOM, "families": FAMILIES, "control": CONTROL, "throwing": THROWING} | {
     "courses": COURSES
 }

@@ -36,7 +36,16 @@ _CONTROL: Final = (
     "line-1",
 )
 _THROWING: Final = ("throw-1", "throw-2", "throw-3")
-_COURSES: Final = ("deliver-1", "deliver-2", "deliver-3")
+_COURSES: Final = (
+    "deliver-1",
+    "deliver-2",
+    "deliver-3",
+    "drive-1",
+    "drive-2",
+    "drive-3",
+    "drive-4",
+    "fetch-1",
+)
 
 
 @cache
