@@ -64,6 +64,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "throw-1": throwers.catapult,
     "throw-2": throwers.catapult,
     "throw-3": throwers.aiming_catapult,
+    "throw-4": throwers.ring_shooter,
     "deliver-1": couriers.courier,
     "deliver-2": couriers.courier,
     "deliver-3": couriers.courier,
