@@ -10,8 +10,12 @@ CONTROL = {
     *("landing-1", "landing-2", "slalom-2", "hover-3", "hover-4"),
     *("balance-1", "balance-2", "walk-1", "walk-2", "place-2", "line-1"),
 }
-THROWING = {"throw-1", "throw-2", "throw-3"}
-COURSES = {"deliver-1", "deliver-2", "deliver-3"}
+THROWING = {"throw-1", "throw-2", "throw-3", "throw-4"}
+COURSES = {
+    *(f"deliver-{level}" for level in (1, 2, 3)),
+    *(f"drive-{level}" for level in (1, 2, 3, 4)),
+    "fetch-1",
+}
 WORKSHOP = {*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"}
 SPACE = {"orbit-1", "orbit-2"}
 OTHERS = WORKSHOP | FAMILIES | CONTROL | THROWING | SPACE | COURSES

@@ -45,9 +45,13 @@ CONTROL = [
 ]
 
 
-THROWING = ["throw-1", "throw-2", "throw-3"]
+THROWING = ["throw-1", "throw-2", "throw-3", "throw-4"]
+COURSES = [
+    *(f"deliver-{level}" for level in (1, 2, 3)),
+    *(f"drive-{level}" for level in (1, 2, 3, 4)),
+    "fetch-1",
+]
 SPACE = ["orbit-1", "orbit-2"]
-COURSES = ["deliver-1", "deliver-2", "deliver-3"]
 GROUPS = {
     "headroom": HEADROOM,
     "families": FAMILIES,

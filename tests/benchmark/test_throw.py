@@ -177,6 +177,40 @@ def test_who_throws_as_in_the_exact_world_misses_where_the_ring_is_elsewhere(eng
     assert elsewhere.indicator < 0.12
 
 
+STANDING: Final = builtin_tasks()["throw-4"]
+
+
+@pytest.mark.samples(2)
+@pytest.mark.parametrize("seed", [None, 8, 11])
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_the_expert_throws_through_the_ring_however_high_it_stands(engine, seed) -> None:
+    """Seeds whose rings stand at 16.4 and 11.3."""
+    result = scored(STANDING, experts_machine(STANDING), engine, seed)
+    assert result.success
+    assert result.metrics["rings"] == 1
+    assert 1.0 < result.indicator < 2.0
+
+
+def test_a_ring_is_passed_in_the_air_and_with_all_of_the_boulder() -> None:
+    """The same flight by rings beside it, so small that it would touch them, and behind its end."""
+    machine = experts_machine(STANDING)
+    trial = simulate(machine, STANDING.scenario, "mujoco")
+    assert score(STANDING, machine, trial).success
+    (ring,) = STANDING.scenario.marks
+    for changed in ({"center": (4, 24, 12)}, {"radius": 0.9}, {"center": (0, 60, 12)}):
+        marks = (ring.model_copy(update=changed),)
+        task = replace(STANDING, scenario=STANDING.scenario.model_copy(update={"marks": marks}))
+        result = score(task, machine, trial)
+        assert (result.success, result.indicator, result.metrics["rings"]) == (False, 0.0, 0)
+
+
+def test_who_throws_as_in_the_exact_world_misses_a_higher_ring() -> None:
+    machine = experts_machine(STANDING)
+    exact, answers = listened(STANDING, machine, "mujoco")
+    assert exact.success
+    assert not repeated(answers, STANDING, machine, "mujoco", 8).success
+
+
 def test_rings_lie_where_the_statement_tells() -> None:
     places = [RING.scenario.world(seed).marks[0].center for seed in range(200)]
     assert {(x, z) for x, _, z in places} == {(0, 0)}
@@ -296,6 +330,7 @@ def test_each_threshold_decides(stricter) -> None:
     [
         ("scenario", {"gates": []}, "there is no gate 'line': there are none"),
         ("scoring", {"target": "ring"}, "there is no mark 'ring'"),
+        ("scoring", {"rings": ["hoop"]}, "there is no mark 'hoop'"),
         ("scenario", {"placement": {"kind": "released", "height": 5}}, "is not ground"),
         ("scenario", {"gusts": {"strength": 2}}, "would throw as well"),
         ("scenario", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),

@@ -75,6 +75,44 @@ def test_a_cylinder_is_solid_and_round() -> None:
     assert outside.max() < 1.0 + 1e-6
 
 
+def test_a_cone_is_solid_and_narrows() -> None:
+    """At each height its radius is that of a cone, within half a step."""
+    cone = {
+        "shape": "cone",
+        "center": [3, 5, 1],
+        "radius": 3,
+        "height": 2,
+        "layers": 8,
+        "sides": 16,
+    }
+    angles = np.linspace(-180, 180, 60)
+    for height in (0.1, 0.9, 1.6):
+        radius, step = 3 * (1 - height / 2), 3 / 8 / 2
+        around = circle((0, 0, 0), 1, angles, 0)[:, [1, 2]]
+        for factor, is_solid in ((radius - step, True), (radius + step + 0.1, False)):
+            points = np.column_stack([factor * around, np.full(len(angles), height)])
+            inside = distances(cone, points=np.add(points, (3, 5, 1))) < 1e-6
+            assert set(inside.tolist()) == {is_solid}, (height, factor)
+
+
+def test_a_bend_is_a_wall_without_gaps() -> None:
+    bend = {
+        "shape": "bend",
+        "center": [7, 15, 0],
+        "radius": 10,
+        "height": 1.5,
+        "from_deg": -90,
+        "to_deg": 0,
+    }
+    turn = np.radians(np.linspace(-90, 0, 60))
+    for radius, least, most in ((10.25, 0, 0.01), (9.5, 0.49, 0.5 + 0.06), (11.0, 0.3, 0.51)):
+        ring = [7 + radius * np.sin(turn), 15 + radius * np.cos(turn), np.full(60, 0.7)]
+        gaps = distances(bend, points=np.array(ring).T)
+        assert least <= gaps.min() <= gaps.max() <= most, radius
+    with pytest.raises(ValidationError, match="is no arc"):
+        scenario(bend | {"to_deg": -90})
+
+
 def test_what_is_round_is_boxes_from_then_on_and_boxes_stay_as_they_were() -> None:
     wall = {"center": [0, 9, 1], "size": [2, 1, 2]}
     world = scenario(wall, RING)
@@ -125,7 +163,7 @@ def test_what_falls_beside_the_middle_of_a_half_pipe_slides_there(engine, headin
         ({**RING, "segments": 1}, "1 segments are too few for 360 degrees"),
         ({**QUARTER, "to_deg": -10}, "not beyond from_deg"),
         ({**HUMP, "sides": 5}, "multiple of 2"),
-        ({**HUMP, "shape": "cone"}, "0: Input tag 'cone'.*'pipe', 'cylinder'"),
+        ({**HUMP, "shape": "wedge"}, "0: Input tag 'wedge'.*'pipe', 'cylinder'"),
         ({**HUMP, "bend": 5}, "0.cylinder.bend"),
         ({**RING, "segments": 64, "radius": -1}, "0.pipe.radius"),
     ],

@@ -65,7 +65,7 @@ def answered(*answers: str, task: str = TASK):
     "task",
     [
         *("landing-1", "slalom-2", "hover-3", "hover-4", "balance-2", "landing-2"),
-        *("walk-2", "place-2", "line-1", "throw-3"),
+        *("walk-2", "place-2", "line-1", "throw-3", "throw-4"),
     ],
 )
 def test_the_expert_writes_programs_in_every_workflow(play, task, workflow) -> None:

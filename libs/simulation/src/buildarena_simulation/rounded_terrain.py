@@ -1,4 +1,4 @@
-"""Round terrain as task files write it: pipes and cylinders, which become fixed boxes.
+"""Round terrain as task files write it: pipes, cylinders, cones, bends, which become fixed boxes.
 
 What a scenario holds, what engines collide with and what films and pages draw are the boxes.
 """
@@ -13,6 +13,8 @@ _DIGITS: Final = 6
 """A box's figures have so many digits behind the point, alike on all processors."""
 
 _UPRIGHT: Final = 90.0
+_THINNEST: Final = 0.1
+"""No box of a scenario is thinner, units."""
 
 Place = Annotated[float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
 Extent = Annotated[float, Field(ge=0.1, le=1000)]
@@ -120,9 +122,107 @@ class Cylinder(_Round):
             yield self._box(number * 360.0 / self.sides, 0.0, width, 2 * self.radius)
 
 
-_SHAPES: Final[TypeAdapter[Pipe | Cylinder]] = TypeAdapter(
-    Annotated[Pipe | Cylinder, Field(discriminator="shape")]
-)
+class _Upright(BaseModel):
+    """What cones and bends have in common: they lie about an axis that stands.
+
+    Attributes:
+        center: (3,) where their axis meets the level on which they stand, world frame, units.
+        radius: Units.
+        height: Of the top above that level, units.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    center: tuple[Place, Place, Place]
+    radius: Extent
+    height: Extent
+
+    def _box(
+        self, heading: float, apart: float, size: tuple[float, float, float], low: float = 0.0
+    ) -> dict[str, Any]:
+        """A box that stands beside the axis.
+
+        Args:
+            heading: In which direction from it, from north towards east, degrees.
+            apart: From the axis to its middle, units.
+            size: (3,) across, away from the axis and up, units.
+            low: Height of its underside above the level, units.
+        """
+        turn, (x, y, z) = math.radians(heading), self.center
+        center = (
+            x + apart * math.sin(turn),
+            y + apart * math.cos(turn),
+            z + low + size[2] / 2,
+        )
+        return {
+            "center": [round(value, _DIGITS) + 0.0 for value in center],
+            "size": [round(value, _DIGITS) for value in size],
+            "heading_deg": round((heading + 180) % 360 - 180, _DIGITS) + 0.0,
+        }
+
+
+class Cone(_Upright):
+    """A cone that stands on its base, in steps.
+
+    Attributes:
+        layers: Of how many steps it is made.
+        sides: How many each has; even.
+    """
+
+    shape: Literal["cone"]
+    layers: Annotated[int, Field(ge=1, le=16)] = 6
+    sides: Annotated[int, Field(ge=4, le=64, multiple_of=2)] = 8
+
+    def boxes(self) -> Iterator[dict[str, Any]]:
+        """One box for every two opposite sides of each step, as a scenario has boxes."""
+        rise = self.height / self.layers
+        for layer in range(self.layers):
+            radius = self.radius * (1 - (layer + 0.5) / self.layers)
+            across = 2 * radius * math.tan(math.pi / self.sides)
+            size = (max(across, _THINNEST), max(2 * radius, _THINNEST), rise)
+            for number in range(self.sides // 2):
+                yield self._box(number * 360.0 / self.sides, 0.0, size, layer * rise)
+
+
+class Bend(_Upright):
+    """A wall along an arc: the side of a road that bends.
+
+    The radius is that of its side towards the axis, which its boxes touch in their middles.
+
+    Attributes:
+        from_deg: Where it begins, seen from the axis, from north towards east, degrees.
+        to_deg: Where it ends.
+        thickness: Away from the axis, units.
+        segments: Of how many boxes it is made.
+    """
+
+    shape: Literal["bend"]
+    from_deg: Annotated[float, Field(allow_inf_nan=False, ge=-360, le=360)]
+    to_deg: Annotated[float, Field(allow_inf_nan=False, ge=-360, le=360)]
+    thickness: Annotated[float, Field(ge=0.1, le=100)] = 0.5
+    segments: Annotated[int, Field(ge=1, le=64)] = 8
+
+    @model_validator(mode="after")
+    def _is_an_arc(self) -> Self:
+        arc = self.to_deg - self.from_deg
+        if not 0 < arc <= 360:  # noqa: PLR2004 - a whole turn
+            raise ValueError(f"from_deg {self.from_deg:g} to to_deg {self.to_deg:g} is no arc")
+        if arc / self.segments > _UPRIGHT:
+            raise ValueError(f"{self.segments} segments are too few for {arc:g} degrees")
+        return self
+
+    def boxes(self) -> Iterator[dict[str, Any]]:
+        """Its segments, as a scenario has boxes."""
+        each, outer = (self.to_deg - self.from_deg) / self.segments, self.radius + self.thickness
+        width = 2 * outer * math.tan(math.radians(each / 2))
+        for number in range(self.segments):
+            heading = self.from_deg + (number + 0.5) * each
+            size = (width, self.thickness, self.height)
+            yield self._box(heading, self.radius + self.thickness / 2, size)
+
+
+_Shape = Pipe | Cylinder | Cone | Bend
+_SHAPES: Final[TypeAdapter[_Shape]] = TypeAdapter(Annotated[_Shape, Field(discriminator="shape")])
 
 
 def with_boxes(terrain: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Throwing: how far beyond a line, or how near to a mark, a boulder comes down."""
+"""Throwing: how far, how near to a mark, or how well through rings a boulder flies."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Final, Literal
@@ -83,12 +83,14 @@ UNEXPLAINED: Final = Flag(
 
 
 class ThrowScoring(Document):
-    """How far beyond a line, or how near to a mark, a boulder comes down.
+    """How far, how near to a mark, or how well through rings a boulder flies.
 
     Attributes:
         line: Name of the gate that is the line.
         min_distance: Least distance beyond the line at which the boulder may come down, units.
         target: Name of the mark that it is to hit; None where the farthest throw is the best.
+        rings: Names of the marks that are rings, in order: they face the line and stand; what flies
+            through one passes nearer to its middle than its radius less the boulder's.
         borne_s: How long the machine must bear it before it flies, seconds.
         max_base_shift: Until the boulder flies the starting block must stay nearer to where it was,
             units. What the recoil does to the machine afterwards throws nothing.
@@ -102,6 +104,7 @@ class ThrowScoring(Document):
     line: MarkName = "line"
     min_distance: Threshold = 10.0
     target: MarkName | None = None
+    rings: Annotated[tuple[MarkName, ...], Field(max_length=8, exclude_if=lambda v: not v)] = ()
     borne_s: Annotated[float, Field(gt=0, le=60)] = 1.0
     max_base_shift: Threshold = 3.0
     max_tilt_deg: Annotated[float, Field(gt=0, le=180)] = 30.0
@@ -115,10 +118,13 @@ def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
     gates = [gate.name for gate in scenario.gates]
     if scoring.line not in gates:
         return f"there is no gate {scoring.line!r}: there are {', '.join(gates) or 'none'}"
-    if scoring.target is not None:
-        lacking = lacking_mark(scoring.target, scenario) or moving_mark(scenario)
+    named = scoring.rings if scoring.target is None else (scoring.target, *scoring.rings)
+    for name in named:
+        lacking = lacking_mark(name, scenario) or moving_mark(scenario)
         if lacking is not None:
             return lacking
+    if scoring.target is not None and scoring.rings:
+        return "a throw is at a target or through rings: scoring names both"
     on_ground = isinstance(scenario.placement, GroundPlacement)
     reasons = {
         "a throw is from the ground, but scenario.placement.kind is not ground": not on_ground,
@@ -137,7 +143,9 @@ def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: ThrowScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is how far beyond the line a boulder comes down, or 1 / (1 + miss) of a target.
+    """The indicator is how far a boulder flies, 1 / (1 + miss) of a target, or the rings it passes.
+
+    A ring that it passes untouched is worth 1, and up to 1 more the nearer to its middle.
 
     The boulder is the first loose ball of the machine. What counts is where it first touches
     ground or terrain, if the machine bore and threw it: 0 otherwise.
@@ -181,9 +189,12 @@ def judge(
     hit = scoring.target is None or (
         miss is not None and miss <= radius_of_mark(scoring.target, scenario)
     )
-    far = distance >= scoring.min_distance and hit
+    rings = [throw.nearness(name) for name in scoring.rings]
+    far = distance >= scoring.min_distance and hit and all(near > 0.0 for near in rings)
     counts = not any(faults.values())
     worth = max(distance, 0.0) if miss is None else 1.0 / (1.0 + miss)
+    if rings:
+        worth = sum(1.0 + near for near in rings if near > 0.0)
     members = throw.joined.copy()
     members[:, ball] = True
     return Verdict(
@@ -244,6 +255,7 @@ class _Throw:
             "flew": True,
             "distance": rounded(self.distance()),
             "miss": None if miss is None else rounded(miss),
+            "rings": self._passed(),
             "release_s": rounded(self.trajectory.time_s[self.flight.released]),
             "release_speed": rounded(float(np.linalg.norm(self.flight.velocity))),
             "flight_error": rounded(self.flight.error),
@@ -264,6 +276,28 @@ class _Throw:
             return None
         middle = center_of_mark(self.scoring.target, self.scenario)
         return float(np.linalg.norm(self.flight.end[:2] - middle[:2]))
+
+    def nearness(self, ring: str) -> float:
+        """How near to a ring's middle it passes: 1 at that, 0 and less where it does not pass."""
+        middle, (_, ahead) = center_of_mark(ring, self.scenario), self._line()
+        room = radius_of_mark(ring, self.scenario) - radius_of(
+            self.machine, self.trajectory, self.ball
+        )
+        flown = slice(self.flight.released + 1, self.flight.landed)
+        path = self.trajectory.positions[flown, self.ball].astype(np.float64)
+        along = (path[:, :2] - middle[:2]) @ ahead
+        (before,) = np.nonzero((along[:-1] < 0.0) & (along[1:] >= 0.0))
+        if not len(before):
+            return 0.0
+        first = int(before[0])
+        share = -along[first] / (along[first + 1] - along[first])
+        at = path[first] + share * (path[first + 1] - path[first])
+        return 1.0 - float(np.linalg.norm(at - middle)) / room
+
+    def _passed(self) -> int | None:
+        """How many rings it passes; None without rings."""
+        rings = self.scoring.rings
+        return sum(self.nearness(name) > 0.0 for name in rings) if rings else None
 
     def _line(self) -> tuple[Series, Series]:
         """The line's middle (2,), and the direction (2,) in which it is crossed."""

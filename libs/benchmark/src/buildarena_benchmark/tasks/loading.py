@@ -35,9 +35,18 @@ _CONTROL: Final = (
     "place-2",
     "line-1",
 )
-_THROWING: Final = ("throw-1", "throw-2", "throw-3")
+_THROWING: Final = ("throw-1", "throw-2", "throw-3", "throw-4")
 _SPACE: Final = ("orbit-1", "orbit-2")
-_COURSES: Final = ("deliver-1", "deliver-2", "deliver-3")
+_COURSES: Final = (
+    "deliver-1",
+    "deliver-2",
+    "deliver-3",
+    "drive-1",
+    "drive-2",
+    "drive-3",
+    "drive-4",
+    "fetch-1",
+)
 
 
 @cache

@@ -65,11 +65,17 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "throw-1": throwers.catapult,
     "throw-2": throwers.catapult,
     "throw-3": throwers.aiming_catapult,
+    "throw-4": throwers.ring_shooter,
     "orbit-1": spacecraft.orbiter,
     "orbit-2": spacecraft.returner,
     "deliver-1": couriers.courier,
     "deliver-2": couriers.courier,
     "deliver-3": couriers.courier,
+    "drive-1": vehicles.climber,
+    "drive-2": vehicles.climber,
+    "drive-3": rovers.cone_passer,
+    "drive-4": rovers.track_follower,
+    "fetch-1": arms.well_crane,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

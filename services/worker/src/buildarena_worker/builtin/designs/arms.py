@@ -19,6 +19,10 @@ from buildarena_worker.builtin.designs.drafting import (
 _LIFTS_S = (18.5, 18.2, 17.9, 17.6)
 """When the lift begins, by seed, seconds."""
 
+_OVER_THE_TOP = (*((0.16 * k, 0.08) for k in range(12)), (1.92, 3.76))
+"""When the crane turns and for how long, seconds: at half its pace to begin with, so that the arm
+keeps up with its drive and does not catch up by a jerk."""
+
 _MOTORS = 4
 _LIGHT_S = 0.8
 """When a cargo that grows heavier is still light enough for three motors, seconds."""
@@ -58,6 +62,58 @@ def swinging_arm(seed: int) -> Design:
                 {"time": begin, "key": "LeftArrow", "hold_for": 3.96},
                 {"time": begin + 8.0, "key": "Alpha1", "hold_for": 0.2},
                 {"time": begin + 9.0, "key": "RightArrow", "hold_for": 0.5},
+            ],
+        },
+    )
+
+
+def well_crane(seed: int) -> Design:
+    """A high arm with a counterweight; its long hand goes down a well, and over the top with it."""
+    begin = 0.6 + 0.1 * (seed % 5)
+    draft = Draft(modules="workshop")
+    middle = draft.start("under the post")
+    for side in (EAST, WEST):
+        end = draft.row(middle, side, 4)[-1]
+        for way, count in ((NORTH, 4), (SOUTH, 3)):
+            draft.row(end, way, count)
+    post = draft.row(middle, UP, 7)
+    for base, side in (("5", EAST), ("16", WEST)):
+        draft.connect(post[-1], base, side, UP)
+    shoulder = draft.attach(post[-1], NORTH, "Steering Block")
+    root = draft.attach(shoulder, NORTH)
+    arm = draft.row(root, WEST, 8)
+    draft.connect(root, arm[4], UP)
+    for near in draft.row(root, EAST, 5)[2:]:
+        for way in (NORTH, SOUTH, UP, DOWN):
+            draft.attach(near, way, "Log", note="counterweight")
+    # A block further out than the arm is wide: what hangs there passes it at the top.
+    hand = draft.attach(draft.attach(arm[-1], NORTH), NORTH, "Swivel")
+    link = draft.row(hand, DOWN, 2)[-1]
+    # The hand gives way where it touches the ground of the well.
+    gripper = draft.attach(draft.attach(link, DOWN, "Suspension"), DOWN, "Grabber")
+    return Design(
+        overall="An arm on a high post that turns over the top, with a long hand that hangs.",
+        parts={
+            "crane": PartDesign(
+                description="A wide foot, a post of 7, an arm of 8 with a counterweight, a gripper",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "Down the well, half a turn over the top, let go, and lift the hand.",
+            "control_config": [
+                {"block": shoulder, "action": "turn_left", "keys": ["LeftArrow"]},
+                {"block": shoulder, "action": "turn_right", "keys": ["RightArrow"]},
+                {"block": gripper, "action": "release", "keys": ["Alpha1"]},
+            ],
+            "control_sequence": [
+                {"time": begin, "key": "RightArrow", "hold_for": 0.38},
+                *(
+                    {"time": round(begin + 2.0 + at, 2), "key": "LeftArrow", "hold_for": hold_for}
+                    for at, hold_for in _OVER_THE_TOP
+                ),
+                {"time": begin + 16.0, "key": "Alpha1", "hold_for": 0.2},
+                {"time": begin + 17.0, "key": "RightArrow", "hold_for": 0.5},
             ],
         },
     )

@@ -60,6 +60,21 @@ _TOUR = (
 )
 """When the car of the three stops presses which key and for how long, seconds; found likewise."""
 
+_PAST_THE_CONE = (
+    (0.4, _AHEAD, 19.0),
+    (1.68, _RIGHT, 0.28),
+    (2.44, _LEFT, 0.8),
+    (3.12, _RIGHT, 0.32),
+)
+_TRACK = (
+    (0.4, _AHEAD, 19.0),
+    (1.68, _RIGHT, 0.28),
+    (3.16, _LEFT, 0.2),
+    (4.04, _LEFT, 0.44),
+    (5.8, _RIGHT, 0.48),
+)
+"""When the car that bends presses which key and for how long, seconds; both found by search."""
+
 
 def rough_rider(seed: int) -> Design:
     """A tray on four large wheels, each on a spring leg of its own."""
@@ -130,6 +145,52 @@ def touring_car(seed: int) -> Design:
         _TOUR,
         begin=_SAMPLE_S * (seed % 4),
         plan="Ahead to the first point, ahead to the second, back to the third.",
+    )
+
+
+def cone_passer(seed: int) -> Design:
+    """A car that bends: through the gap, then past the cone on its right side."""
+    return _bending_car(_PAST_THE_CONE, begin=2 * _SAMPLE_S * (seed % 4), plan="Round the cone.")
+
+
+def track_follower(seed: int) -> Design:
+    """The same car, steered through two bends."""
+    return _bending_car(_TRACK, begin=2 * _SAMPLE_S * (seed % 4), plan="Right, straight on, left.")
+
+
+def _bending_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design:
+    """A car as narrow as its wheels that bends in its middle; arguments as `_steering_car`."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("behind the joint")
+    joint = draft.attach(middle, NORTH, "Steering Hinge")
+    draft.turn_axis(joint, 0, UP)
+    front, back = draft.attach(joint, NORTH), draft.row(middle, SOUTH, 2)[-1]
+    wheels = [draft.wheel(base, side) for base in (front, back) for side in (EAST, WEST)]
+    config = [
+        {"block": joint, "action": "turn_left", "keys": [_LEFT]},
+        {"block": joint, "action": "turn_right", "keys": [_RIGHT]},
+    ]
+    for wheel in wheels:
+        config += [
+            {"block": wheel, "action": "spinning_forward", "keys": [_AHEAD]},
+            {"block": wheel, "action": "spinning_backward", "keys": [_BACK]},
+        ]
+    return Design(
+        overall="A narrow car on four wheels that bends in its middle.",
+        parts={
+            "car": PartDesign(
+                description="Two axles of two wheels each, and a steering hinge between them",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": plan,
+            "control_config": config,
+            "control_sequence": [
+                {"time": round(begin + time, 2), "key": key, "hold_for": hold}
+                for time, key, hold in presses
+            ],
+        },
     )
 
 

@@ -26,6 +26,17 @@ _FRONT = 4
 _BEGINS_S = (1.52, 1.6, 1.68, 1.76, 1.84)
 """When the springs draw, by seed, seconds."""
 
+_FAR = """\
+  { 13.5, 4, 5, 3 }, { 14.0, 4, 5 }, { 17.4, 4, 6, 3 }, { 18.2, 4, 6 }, { 20.8, 4, 7, 3 },
+  { 21.9, 4, 7 }, { 22.6, 4, 8, 3 }, { 23.8, 4, 8 }, { 24.6, 5 }, { 25.0, 5, 4 }, { 28.3, 5, 5, 3 },
+  { 29.4, 5, 5 }, { 32.7, 5, 6, 3 }, { 34.0, 5, 6 }, { 36.3, 5, 7, 3 }, { 38.1, 5, 7 }, \
+{ 40.0, 5, 8 },"""
+"""How far beyond the line each shot comes down, as a table of the program's."""
+_HIGH = """\
+  { 9.1, 5, 4, 4 }, { 11.0, 5, 5, 2 }, { 11.3, 5, 5, 3 }, { 12.0, 5, 5, 1 }, { 12.6, 5, 5 },
+  { 14.9, 5, 5, 4 }, { 15.5, 5, 4, 5 }, { 15.8, 5, 6, 2 },"""
+"""How high each shot is above a place 24 north, likewise."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
@@ -76,7 +87,17 @@ def catapult(seed: int) -> Design:
 
 
 def aiming_catapult(seed: int) -> Design:
-    """The same catapult in the middle, whose program draws as many springs as the ring asks for."""
+    """The same catapult in the middle: its program draws as many springs as the ring asks for."""
+    return _aiming_catapult(seed, shots=_FAR, axis="y", level=2)
+
+
+def ring_shooter(seed: int) -> Design:
+    """The same machine, which aims at how high the ring stands."""
+    return _aiming_catapult(seed, shots=_HIGH, axis="z", level=0)
+
+
+def _aiming_catapult(seed: int, *, shots: str, axis: str, level: int) -> Design:
+    """Its program's table of shots, and which coordinate of the ring, from what on, is aimed at."""
     draft, springs, _ = catapult_draft(Shape(aside=3))
     return Design(
         overall="A catapult whose arm swings above x = 0; fewer springs throw less far.",
@@ -87,7 +108,12 @@ def aiming_catapult(seed: int) -> Design:
             )
         },
         program=program_text(
-            "throwing", springs=listed(springs), begins=f"{_BEGINS_S[seed % len(_BEGINS_S)]:g}"
+            "throwing",
+            springs=listed(springs),
+            begins=f"{_BEGINS_S[seed % len(_BEGINS_S)]:g}",
+            shots=shots,
+            axis=axis,
+            level=str(level),
         ),
     )
 

@@ -35,6 +35,12 @@ def car(seed: int) -> Design:
     return _vehicle(length=length, track=1, deck=None, presses=presses)
 
 
+def climber(seed: int) -> Design:
+    """The same car, five long, which drives straight on."""
+    presses: list[Press] = [("UpArrow", 0.4 + 0.08 * (seed % 5), 19.0)]
+    return _vehicle(length=5, track=1, deck=None, presses=presses)
+
+
 def carrier(seed: int) -> Design:
     """A carrier with a railed deck of 5 x 5 for the small cargo."""
     presses: list[Press] = [("UpArrow", 3.0 + 0.1 * (seed % 5), 6.0)]
