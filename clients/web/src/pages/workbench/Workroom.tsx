@@ -141,6 +141,7 @@ export function Workroom({ view }: { view: SessionView }) {
             connector begins. The red block is the starting block; north is away from you at first.
           </Text>
           <Latest hand={hand} />
+          <Practice view={view} />
         </Stack>
         <Stack gap="sm" className="hand-tools">
           <PartsList hand={hand} />
@@ -170,7 +171,6 @@ export function Workroom({ view }: { view: SessionView }) {
           </Tabs>
         </Stack>
         <FeedbackLog id={job.id} />
-        <Practice view={view} />
       </div>
     </Stack>
   );
