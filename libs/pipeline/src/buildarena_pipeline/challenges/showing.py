@@ -17,7 +17,7 @@ from buildarena_pipeline.challenges.package import packed_package
 from buildarena_pipeline.challenges.season import OrbitScore, Season
 from buildarena_pipeline.challenges.trials import read_machine
 
-MOST_PLACES: Final = 2000
+MAX_PLACES: Final = 2000
 """Of a flight: what is longer is shown in even steps."""
 
 
@@ -73,7 +73,7 @@ def shown_package(data: bytes, season: Season) -> Shown:
     except (BesiegeError, KeyError) as error:
         raise CheckFailed(f"it cannot be shown: {error}") from error
     count = len(tracked.time_s)
-    chosen = np.unique(np.linspace(0, count - 1, min(count, MOST_PLACES)).round().astype(int))
+    chosen = np.unique(np.linspace(0, count - 1, min(count, MAX_PLACES)).round().astype(int))
     center = None if rule.center is None else _ours(np.array([rule.center]))[0].tolist()
     return Shown(
         machines={raw: machine},

@@ -136,7 +136,7 @@ def list_seasons(seasons: SeasonsDep) -> list[SeasonView]:
 
 
 @router.get("/seasons/{name}", dependencies=_ORDINARY, responses=problem_responses(404))
-def showseason_of(name: str, seasons: SeasonsDep) -> SeasonView:
+def show_season(name: str, seasons: SeasonsDep) -> SeasonView:
     """Shows a season."""
     return _season_view(season_of(seasons, name))
 
