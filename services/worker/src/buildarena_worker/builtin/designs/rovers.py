@@ -68,10 +68,10 @@ _PAST_THE_CONE = (
 )
 _TRACK = (
     (0.4, _AHEAD, 19.0),
-    (1.68, _RIGHT, 0.28),
-    (3.16, _LEFT, 0.2),
-    (4.04, _LEFT, 0.44),
-    (5.8, _RIGHT, 0.48),
+    (1.72, _RIGHT, 0.32),
+    (3.24, _LEFT, 0.24),
+    (4.04, _LEFT, 0.48),
+    (5.76, _RIGHT, 0.48),
 )
 """When the car that bends presses which key and for how long, seconds; both found by search."""
 
