@@ -42,6 +42,15 @@ def test_the_world_is_told_from_the_constants(monkeypatch):
     assert "Gravity is 9.75 units/s²" in world()
 
 
+def test_on_a_planet_gravity_is_the_tasks_to_tell():
+    task = builtin_tasks()["orbit-1"]
+    names = modules_named(task.constraints.modules)
+    text = world_text(task.constraints.catalogue.with_data_sheets(), names, task)
+    assert "Gravity is" not in text
+    assert "Gravity and air are the planet's" in text
+    assert "pull on\nthe ground, from 21 to 25" in task.statement
+
+
 @pytest.mark.parametrize("kind", [k for k in JointKind if k not in ("far_joint", "mount")])
 def test_one_strength_is_told_because_all_joints_have_it(kind):
     attachment = JOINT_STRENGTH[JointKind.ATTACHMENT]

@@ -354,6 +354,7 @@ def _require_sayable(machine: Machine, scenario: Scenario) -> None:
         "the game's cargo is not turned": cargo is not None and cargo.heading_deg,
         "the game has no gusts": scenario.gusts,
         "the game pushes nothing": scenario.pushes,
+        "the game's levels for trials are flat": scenario.planet is not None,
         "the game's fans and cannons burn no fuel": scenario.fuel_s is not None,
         "the game has no line on the ground": scenario.line,
         "the game's machines do not lean at the start": on_ground.tilt_deg,

@@ -149,7 +149,7 @@ def modules_told(task: Task, *, data_sheets: bool) -> str:
     told = lookup_text(catalogue) if constraints.on_demand else modules_text(catalogue, names)
     if not data_sheets:
         return told
-    return f"{told}\n\n**World.** {world_text(catalogue, names, task.unknowns)}"
+    return f"{told}\n\n**World.** {world_text(catalogue, names, task)}"
 
 
 def catalogue_told(constraints: Constraints, *, data_sheets: bool) -> Catalogue:

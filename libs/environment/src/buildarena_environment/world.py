@@ -15,45 +15,50 @@ from buildarena_simulation.constants import JOINT_STRENGTH, JointKind
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator
 
-    from buildarena_benchmark.families.unknowns import Unknowns
+    from buildarena_benchmark import Task
     from buildarena_geometry import Catalogue, Module
 
 _ARM = 4.0
 """Length of the lever that the paragraph reckons through, units."""
 
 
-def world_text(
-    catalogue: Catalogue, names: Collection[str], unknowns: Unknowns | None = None
-) -> str:
+def world_text(catalogue: Catalogue, names: Collection[str], task: Task | None = None) -> str:
     """What the numbers of modules mean and what breaks, as far as these modules are concerned.
 
     Args:
         catalogue: The modules.
         names: Those that may be used, beside the starting block.
-        unknowns: What the task does not tell of the world.
+        task: What of the world its statement tells or does not tell; None for the usual world.
     """
     modules = [catalogue.start, *(catalogue[name] for name in names)]
-    return " ".join([units_text(catalogue, unknowns), *_strengths(modules), *_sharing(modules)])
+    return " ".join([units_text(catalogue, task), *_strengths(modules), *_sharing(modules)])
 
 
-def units_text(catalogue: Catalogue, unknowns: Unknowns | None = None) -> str:
+def units_text(catalogue: Catalogue, task: Task | None = None) -> str:
     """What the numbers of modules mean: gravity, units of forces, friction, drag, places."""
-    return " ".join([*_forces(unknowns), *_units(catalogue.start)])
+    return " ".join([*_forces(task), *_units(catalogue.start)])
 
 
-def _forces(unknowns: Unknowns | None) -> Iterator[str]:
+def _forces(task: Task | None) -> Iterator[str]:
     """Gravity and the unit of forces; of what is drawn no more than that it is."""
     gravity = plain(constants.GRAVITY)
-    if unknowns is None or unknowns.gravity is None:
+    unknowns = None if task is None else task.unknowns
+    if task is not None and task.scenario.planet is not None:
+        known = "Gravity and air are the planet's, which the task tells."
+    elif unknowns is not None and unknowns.gravity is not None:
+        known = "Gravity is drawn and not told."
+    else:
+        known = ""
+    if known:
+        yield (
+            f"{known} A force of 1 gives a mass of 1 {gravity} units/s² where nothing else acts; "
+            "torques and moments are such forces times units."
+        )
+    else:
         yield (
             f"Gravity is {gravity} units/s². A force of 1 holds up a mass of 1, and gives it "
             f"{gravity} units/s² where nothing else acts; torques and moments are such forces "
             "times units."
-        )
-    else:
-        yield (
-            f"Gravity is drawn and not told. A force of 1 gives a mass of 1 {gravity} units/s² "
-            "where nothing else acts; torques and moments are such forces times units."
         )
     if unknowns is not None and unknowns.drive_strength is not None:
         yield "How strong drives are against their data is drawn and not told."

@@ -145,7 +145,7 @@ def driven_modules(session: Session, machine: Machine) -> str:
     ]
     lines = [f"- {module_text(module, session.catalogue)}" for module in driven]
     if session.data_sheets and lines:
-        lines.append(f"\n{units_text(session.catalogue, session.task.unknowns)}")
+        lines.append(f"\n{units_text(session.catalogue, session.task)}")
     return "\n".join(lines) or "(none)"
 
 

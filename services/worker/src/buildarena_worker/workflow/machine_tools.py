@@ -105,7 +105,7 @@ def planned_modules(session: Session, plan: str) -> str:
         return modules_of(session)
     named = _named_in(plan, task)
     others = [module_in_short(catalogue[name]) for name in connectors_of(task) if name not in named]
-    units = [f"\n{units_text(catalogue, session.task.unknowns)}"] if session.data_sheets else []
+    units = [f"\n{units_text(catalogue, session.task)}"] if session.data_sheets else []
     return "\n".join([modules_text(catalogue, named), *others, *units])
 
 
