@@ -55,6 +55,7 @@ def path(trial: Any) -> np.ndarray:
     return trial.positions.astype(float).mean(axis=1) + np.array([0, 0, RADIUS])
 
 
+@pytest.mark.samples(1)
 def test_a_free_fall_round_the_planet_keeps_keplers_laws(engine) -> None:
     radius = RADIUS + 400.5
     speed = 1.1 * math.sqrt(PULL * RADIUS**2 / radius)
@@ -81,6 +82,7 @@ def rocket(tank: str = "Fuel Barrel Big") -> Machine:
     return bound(machine, thrust="Alpha1")
 
 
+@pytest.mark.samples(2)
 @pytest.mark.parametrize(("tank", "burn_s"), [("Fuel Barrel Big", 40.0), ("Fuel Barrel", 8.0)])
 def test_the_rocket_equation_holds_as_fuel_is_used_up(engine, tank, burn_s) -> None:
     machine = rocket(tank)
