@@ -46,7 +46,7 @@ def test_a_file_of_a_person_goes_round_without_a_loss() -> None:
     assert "a Lua script of 16 characters, which is not run" in machine
     assert thruster == (
         "block 2 (Steering Thruster): bmt-left T, UpArrow, M3; bmt-right Keypad8, G, Keypad8; "
-        "bmt-fthrust 1.50; bmt-auto-brake False; bmt-toggle-mode true; flipped True"
+        "bmt-fthrust 1.50 (simulated as 3); bmt-auto-brake False; bmt-toggle-mode true; flipped True"
     )
     assert "bmt-automatic True (simulated as False)" in wheel
     assert "Scale 2 1 1 (simulated as 1 1 1)" in wheel
@@ -104,7 +104,7 @@ def test_a_trial_has_none_of_it() -> None:
     bare = Machine.from_document(document)
     scenario = builtin_tasks()["transport-1"].scenario
     data = prepare_run(machine, scenario, name="m", run_id="r").machine_file
-    for word in (b"tracker", b"1d45bae7", b"fthrust", b"brass", b'x="2', b"Infinity", b'id="57"'):
+    for word in (b"tracker", b"1d45bae7", b"1.50", b"brass", b'x="2', b"Infinity", b'id="57"'):
         assert word not in data
     assert "file_data" not in str(read_machine_file(data).machine.to_document())
     short = scenario.model_copy(update={"duration_s": 1.0})

@@ -108,7 +108,7 @@ def test_keys_end_when_the_control_says_so() -> None:
     ("fields", "said"),
     [
         ({"placement": {"kind": "released", "height": 0}}, "greater than 0"),
-        ({"placement": {"kind": "released", "height": 5, "velocity": [0, 999, 0]}}, "100"),
+        ({"placement": {"kind": "released", "height": 5, "velocity": [0, 999, 0]}}, "200"),
         ({"placement": {"kind": "thrown"}}, "'ground', 'span', 'released'"),
         ({"cargo": BOX | {"at": [0, 0, -3]}}, "greater than or equal to 0"),
         ({"gates": [{"name": "a", "center": [0, 0], "half_width": 1}] * 2}, "two places"),

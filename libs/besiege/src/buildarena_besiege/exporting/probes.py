@@ -28,6 +28,9 @@ _EASTS: Final = (-12.0, 12.0)
 _NORTHS: Final = (-25.0, -12.0, -7.0, -3.75, 0.0, 3.75, 7.0, 12.0, 25.0)
 """Clear of machines, and on both sides of the edges of gaps of 5 to 45 units."""
 
+_COURSES: Final = tuple((east, north) for north in (9.0, 20.0) for east in (-9.0, 9.0))
+"""Where built-in courses have walls and plateaus, and flat ground none."""
+
 _CLEAR_OF_EDGES: Final = 0.6
 """Nearer to an edge a height is not judged: it may be that of either side, units."""
 
@@ -60,7 +63,8 @@ def level_probes(scenario: Scenario) -> tuple[Probe, ...]:
         scenario: Its terrain; without any, the ground is flat.
     """
     terrain = scenario.terrain
-    places = {(east, north): _CLEAR_OF_EDGES for north in _NORTHS for east in _EASTS}
+    grid = [(east, north) for north in _NORTHS for east in _EASTS]
+    places = dict.fromkeys(grid if terrain else [*grid, *_COURSES], _CLEAR_OF_EDGES)
     for box in terrain:
         half = min(box.size[:2]) / 2
         places.setdefault((box.center[0], box.center[1]), min(_CLEAR_OF_EDGES, half / 2))
