@@ -46,7 +46,8 @@ def test_a_file_of_a_person_goes_round_without_a_loss() -> None:
     assert "a Lua script of 16 characters, which is not run" in machine
     assert thruster == (
         "block 2 (Steering Thruster): bmt-left T, UpArrow, M3; bmt-right Keypad8, G, Keypad8; "
-        "bmt-fthrust 1.50 (simulated as 3); bmt-auto-brake False; bmt-toggle-mode true; flipped True"
+        "bmt-fthrust 1.50 (simulated as 3); bmt-auto-brake False; bmt-toggle-mode true; "
+        "flipped True"
     )
     assert "bmt-automatic True (simulated as False)" in wheel
     assert "Scale 2 1 1 (simulated as 1 1 1)" in wheel
