@@ -11,6 +11,9 @@ _FAMILIES: Final = {
     "repair": "transport",
     "identify": "flight",
     "throw": "throwing",
+    "deliver": "transport",
+    "drive": "transport",
+    "fetch": "mechanisms",
 }
 """What sort of machine a family asks for, where its name does not say so."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import sys
 from contextlib import suppress
@@ -34,9 +35,18 @@ class Server(uvicorn.Server):
 
 
 def serve(app: Any, **settings: Any) -> None:
-    """Serves an application until the process is asked to stop; exits when it can't listen."""
+    """Serves an application until the process is asked to stop; exits when it can't listen.
+
+    The server raises the signal that stopped it once more when it has ended: it ends this call, and
+    not the process, which still has spans to send.
+    """
+    signal.signal(signal.SIGTERM, _stop)
     server = Server(uvicorn.Config(app, **settings))
     with suppress(KeyboardInterrupt):
         server.run()
     if not server.started:
         sys.exit(3)
+
+
+def _stop(*_: object) -> None:
+    sys.exit(0)
