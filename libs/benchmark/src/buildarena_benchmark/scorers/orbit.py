@@ -13,8 +13,8 @@ from buildarena_benchmark.scorers.measures.components import (
     joined_to_start,
     masses_of_blocks,
 )
-from buildarena_benchmark.scorers.measures.orbits import Series, swept
-from buildarena_benchmark.scorers.measures.series import starting_block
+from buildarena_benchmark.scorers.measures.orbits import swept
+from buildarena_benchmark.scorers.measures.series import Series, starting_block
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     CAME_APART,

@@ -34,8 +34,8 @@ from buildarena_simulation import (
     Scenario,
     SimulationError,
 )
+from buildarena_simulation.controllers.senses import TICK_S
 
-TICK_S: Final = 0.04
 WAIT_S: Final = 120.0
 """How long a drive waits for its first key."""
 LONGEST_S: Final = 300.0

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Series = NDArray[np.float64]
+from buildarena_benchmark.scorers.measures.series import Series
 
 
 def swept(path: NDArray[np.floating], center: NDArray[np.floating]) -> Series:
