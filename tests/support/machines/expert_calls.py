@@ -41,7 +41,7 @@ def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
     ]
     calls += [call(ASSEMBLY, *action) for action in design.assembly]
     whole = ASSEMBLY if design.assembly else MAIN
-    calls += [call(whole, *action) for action in _control(answer)]
+    calls += [call(whole, *action) for action in control_of(answer)]
     if design.program:
         calls.append(call(whole, "set_controller", {"program": design.program}))
     return calls
@@ -57,7 +57,7 @@ def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -
     drawn = builtin_tasks()[task].drawn(seed)
     machine = Machine(catalogue=drawn.constraints.catalogue)
     actions = [action for part in design.parts.values() for action in part.actions]
-    bound = [a for a in _control(design.steer([])) if a[0].endswith("control_key")]
+    bound = [a for a in control_of(design.steer([])) if a[0].endswith("control_key")]
     for name, arguments in [*actions, *bound]:
         assert machine.act(name, dict(arguments)).ok
     seen: list[Seen] = []
@@ -73,7 +73,7 @@ def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -
     return design.steer(seen)
 
 
-def _control(answer: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+def control_of(answer: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     actions: list[tuple[str, dict[str, Any]]] = []
     for bound in answer.get("control_config", ()):
         for number, key in enumerate(bound["keys"]):

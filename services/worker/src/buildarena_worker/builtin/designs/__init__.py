@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from buildarena_worker.builtin.designs import (
     arms,
@@ -76,6 +77,16 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "drive-3": rovers.cone_passer,
     "drive-4": rovers.track_follower,
     "fetch-1": arms.well_crane,
+    "besiegefield-car-1": vehicles.climber,
+    "besiegefield-car-2": vehicles.climber,
+    "besiegefield-car-4": vehicles.climber,
+    "besiegefield-delivery-1": couriers.courier,
+    "besiegefield-delivery-3": couriers.courier,
+    "besiegefield-delivery-5": couriers.courier,
+    **{f"besiegefield-catapult-{level}": throwers.fenced_catapult for level in range(1, 8)},
+    "besiegefield-catapult-8": partial(throwers.fenced_catapult, last_s=0.16),
+    "besiegefield-catapult-9": partial(throwers.fenced_catapult, last_s=0.24),
+    "besiegefield-catapult-10": throwers.fenced_catapult,
 }
 """By task name: the design for a seed, which varies it within its tolerances."""
 

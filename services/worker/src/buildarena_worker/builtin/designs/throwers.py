@@ -25,6 +25,8 @@ _FRONT = 4
 """Blocks of the foot in front of the post."""
 _BEGINS_S = (1.52, 1.6, 1.68, 1.76, 1.84)
 """When the springs draw, by seed, seconds."""
+_LASTS_S = 4.0
+"""How long springs draw that are to contract all the way, seconds."""
 
 _FAR = """\
   { 13.5, 4, 5, 3 }, { 14.0, 4, 5 }, { 17.4, 4, 6, 3 }, { 18.2, 4, 6 }, { 20.8, 4, 7, 3 },
@@ -51,6 +53,7 @@ class Shape:
         cup_deg: How far the cup leans outwards on the arm: the boulder rolls out of it in time.
         springs: How many springs pull, of seven.
         aside: How far the starting block lies to the east of the foot.
+        ahead: How many blocks of the foot lie to the north of the starting block.
     """
 
     arm: int = 6
@@ -61,11 +64,31 @@ class Shape:
     cup_deg: float = 10.0
     springs: int = 7
     aside: int = 0
+    ahead: int = 0
 
 
 def catapult(seed: int) -> Design:
     """A catapult whose springs all draw at one key."""
-    draft, springs, _ = catapult_draft()
+    return _catapult(Shape(), _BEGINS_S[seed % len(_BEGINS_S)])
+
+
+def fenced_catapult(seed: int, *, last_s: float = _LASTS_S) -> Design:
+    """The same within a narrow fence, above x = 0 and for trials of five seconds.
+
+    Args:
+        seed: Varies when it throws.
+        last_s: How long the last of its springs draws, seconds.
+    """
+    return _catapult(Shape(aside=3, ahead=5), 1.0 + 0.08 * (seed % 5), last_s=last_s)
+
+
+def _catapult(shape: Shape, begins_s: float, *, last_s: float = _LASTS_S) -> Design:
+    """All springs but the last draw at one key, the last at another."""
+    draft, springs, _ = catapult_draft(shape)
+    keys = dict.fromkeys(springs[:-1], "Alpha1") | {
+        springs[-1]: "Alpha1" if last_s == _LASTS_S else "Alpha2"
+    }
+    holds_s = {"Alpha1": _LASTS_S, "Alpha2": last_s}
     return Design(
         overall="An arm on a swivel with a cup behind and springs in front, on a long foot.",
         parts={
@@ -77,10 +100,12 @@ def catapult(seed: int) -> Design:
         control={
             "control_design": "All springs draw together once the boulder lies still.",
             "control_config": [
-                {"block": spring, "action": "contract", "keys": ["Alpha1"]} for spring in springs
+                {"block": spring, "action": "contract", "keys": [key]}
+                for spring, key in keys.items()
             ],
             "control_sequence": [
-                {"time": _BEGINS_S[seed % len(_BEGINS_S)], "key": "Alpha1", "hold_for": 4.0}
+                {"time": begins_s, "key": key, "hold_for": holds_s[key]}
+                for key in dict.fromkeys(keys.values())
             ],
         },
     )
@@ -121,8 +146,9 @@ def _aiming_catapult(seed: int, *, shots: str, axis: str, level: int) -> Design:
 def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
     """The machine, the ids of its springs, and that of its boulder."""
     draft, lean = Draft(modules="all"), shape.lean_deg
-    front = [draft.start("the front of the foot"), *draft.row("1", WEST, shape.aside)][-1]
-    beam = [front, *draft.row(front, SOUTH, _FRONT + shape.back)]
+    base = [draft.start("the front of the foot"), *draft.row("1", WEST, shape.aside)][-1]
+    ahead = draft.row(base, NORTH, shape.ahead)[::-1]
+    beam = [*ahead, base, *draft.row(base, SOUTH, _FRONT + shape.back - shape.ahead)]
     near, anchor, west = _feet(draft, beam)
     post = draft.row(beam[_FRONT], UP, shape.post)
     _stays(draft, beam, post, west)
