@@ -147,8 +147,8 @@ def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
     """The machine, the ids of its springs, and that of its boulder."""
     draft, lean = Draft(modules="all"), shape.lean_deg
     base = [draft.start("the front of the foot"), *draft.row("1", WEST, shape.aside)][-1]
-    ahead = draft.row(base, NORTH, shape.ahead)[::-1]
-    beam = [*ahead, base, *draft.row(base, SOUTH, _FRONT + shape.back - shape.ahead)]
+    before = draft.row(base, NORTH, shape.ahead)[::-1]
+    beam = [*before, base, *draft.row(base, SOUTH, _FRONT + shape.back - shape.ahead)]
     near, anchor, west = _feet(draft, beam)
     post = draft.row(beam[_FRONT], UP, shape.post)
     _stays(draft, beam, post, west)
