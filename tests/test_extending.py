@@ -58,6 +58,7 @@ def car(play, tmp_path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_a_scorer_is_one_file(car, tmp_path) -> None:
     environment = installed("A scorer", tmp_path)
     task = tmp_path / "north.yaml"

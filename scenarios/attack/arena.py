@@ -80,6 +80,7 @@ class Bystander(threading.Thread):
         self._tenant, self._stopped, self._lock = tenant, threading.Event(), threading.Lock()
         self._times: list[float] = []
         self._failed = 0
+        self._asked = threading.Event()
 
     def run(self) -> None:
         while not self._stopped.wait(ASK_EVERY_S):
@@ -91,14 +92,20 @@ class Bystander(threading.Thread):
             with self._lock:
                 self._times.append(time.monotonic() - started)
                 self._failed += not good
+                self._asked.set()
 
     def take(self) -> tuple[float, int, int]:
         """99th percentile in seconds, requests, and failures since it was last asked."""
         with self._lock:
             times, failed = self._times, self._failed
             self._times, self._failed = [], 0
+            self._asked.clear()
         high = statistics.quantiles(times, n=100)[98] if len(times) > 1 else 0.0
         return high, len(times), failed
+
+    def wait_for_an_answer(self, seconds: float) -> None:
+        """Returns once it has asked since it was last taken, or when that takes too long."""
+        self._asked.wait(seconds)
 
     def stop(self) -> None:
         self._stopped.set()

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 from support.long_tests import LONG
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import wait_until
@@ -47,6 +48,7 @@ def worker(environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
+@pytest.mark.slow
 def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
     play, context, settings, tmp_path
 ) -> None:

@@ -65,6 +65,7 @@ def driver(url: str, **hello: object) -> Iterator[Driver]:
         yield one
 
 
+@pytest.mark.slow
 def test_free_ground_is_driven_by_keys_and_stored_nowhere(served) -> None:
     with driver(served) as one:
         ready = one.until("ready")
@@ -103,6 +104,7 @@ def job_of(context: Context, ended: dict) -> Job:
     return context.store.jobs.get(ended["job"])
 
 
+@pytest.mark.slow
 def test_a_drive_stands_under_a_name_with_the_keys_and_is_verified(context, served) -> None:
     ended = driven(context, served, driver="ada")
     assert ended["why"] == "time"

@@ -24,6 +24,7 @@ def boasting() -> bytes:
     return repacked(packed("probe"), damage)
 
 
+@pytest.mark.slow
 def test_what_is_sent_is_judged_stored_once_and_shown(api) -> None:
     data = packed("doctor", "probe", "expert-support-1")
     first, again = (api.post(PATH, content=data) for _ in range(2))
@@ -43,6 +44,7 @@ def test_what_is_sent_is_judged_stored_once_and_shown(api) -> None:
     assert api.get(f"{PATH}/{added['id']}/file").content == data
 
 
+@pytest.mark.slow
 def test_verdicts_that_logs_do_not_bear_out_are_marked(api) -> None:
     done = api.post(PATH, content=boasting()).json()
     assert done["differing"] == 4

@@ -6,6 +6,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import pytest
 from support.servers.live_api import live_api
 
 CONTRACT = Path(__file__).parents[1] / "data" / "openapi.json"
@@ -33,6 +34,7 @@ with AuthenticatedClient(base_url=sys.argv[2], token=sys.argv[3]) as client:
 """
 
 
+@pytest.mark.slow
 def test_a_generated_client_submits_a_job(context, tmp_path) -> None:
     target = tmp_path / "arena"
     words = ["generate", "--path", str(CONTRACT), "--meta", "none", "--output-path", str(target)]

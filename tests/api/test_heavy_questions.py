@@ -383,6 +383,7 @@ def test_nobodys_questions_push_out_anothers_answers() -> None:
     assert len(cache._values) == 8
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("board")
 def test_a_caller_with_many_questions_leaves_the_others_boards(guarded) -> None:
     mine, other = new_tenant(guarded, "mine"), new_tenant(guarded, "other")

@@ -53,6 +53,7 @@ def value(job: dict, sort: str) -> object:
     return job[{"created": "created_at", "finished": "finished_at"}.get(sort, sort)]
 
 
+@pytest.mark.slow
 def test_every_order_is_kept_over_pages_of_every_size(api, jobs) -> None:
     assert len(jobs) == 13
     for sort in SORTS:

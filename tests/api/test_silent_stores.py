@@ -90,6 +90,7 @@ def _ask_for_jobs(url: str) -> None:
     httpx.get(f"{url}/v1/jobs", headers={"Authorization": f"Bearer {ADMIN}"}, timeout=40)
 
 
+@pytest.mark.slow
 def test_a_bucket_that_was_always_silent_is_named(context, monkeypatch) -> None:
     credentials = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_REGION")
     for name, value in {**dict.fromkeys(credentials, "test"), "AWS_ALLOW_HTTP": "true"}.items():

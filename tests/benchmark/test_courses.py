@@ -22,7 +22,7 @@ def tried(name: str, machine: Machine, engine: str = "mujoco") -> Any:
     return scored(builtin_tasks()[name], machine, engine, None)
 
 
-@pytest.mark.samples(3)
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("name", COURSES)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_passes(engine, name) -> None:
@@ -37,6 +37,7 @@ def straight(*, track: int = 1, seconds: float = 19.0) -> Machine:
     return drafted(vehicles._vehicle(length=5, track=track, deck=None, presses=presses))
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("name", ["drive-3", "drive-4"])
 def test_who_never_steers_does_not_get_through(name) -> None:
     """Wider than the gap it stays before that; along the track walls turn it once, not twice."""
@@ -56,6 +57,7 @@ def test_a_tower_that_topples_over_the_gates_drives_nothing() -> None:
     assert result.indicator == 0
 
 
+@pytest.mark.slow
 def test_a_weight_that_is_let_lie_is_not_fetched() -> None:
     """The crane without keys, and one that only takes hold."""
     for presses in ([], [(0.6, "RightArrow", 0.38)]):

@@ -33,7 +33,7 @@ def honest(engine: str) -> tuple[Machine, Trajectory]:
     return machine, simulate(machine, TASK.scenario, engine)
 
 
-@pytest.mark.samples(2)
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("name", ["deliver-1", "deliver-2", "deliver-3"])
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_delivers(engine, name) -> None:
@@ -46,6 +46,7 @@ def test_the_expert_delivers(engine, name) -> None:
     assert result.indicator == pytest.approx(1 + left, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_engines_agree_about_when() -> None:
     times = [score(TASK, *honest(e)).metrics["delivered_s"] for e in FASTER_FIRST]
     assert max(times) < 1.05 * min(times)
@@ -80,6 +81,7 @@ def test_who_does_nothing_delivers_nothing(engine) -> None:
     assert (result.success, result.indicator, result.flags) == (False, 0.0, ())
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_what_is_too_high_stays_before_the_barrier(engine) -> None:
     high, base = drafted(couriers.courier(0)), "1"

@@ -183,6 +183,7 @@ def _until(task: Any, machine: Machine, trial: Trajectory, samples: int) -> int:
     return int(score(task, machine, replace(trial, positions=positions)).metrics["stretches"])
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("aside", [0.0, 0.9, 1.3])
 def test_only_what_is_near_the_line_counts(aside) -> None:
     """The expert's trial beside the line, by so much to the east: along half of it, aside."""
@@ -225,6 +226,7 @@ def test_each_threshold_decides(stricter) -> None:
     assert not score(replace(TASK, scoring=scoring), machine, trial).success
 
 
+@pytest.mark.slow
 def test_lines_are_as_the_statement_says() -> None:
     """Of every drawn world, and of the corners of what is drawn."""
     draws = TASK.scenario.draws

@@ -156,6 +156,7 @@ def test_what_comes_down_hard_or_elsewhere_has_not_come_back() -> None:
         assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.slow
 def test_what_comes_off_when_it_lands_is_told() -> None:
     def loses(trial: Trajectory, touch: int) -> Trajectory:
         assert trial.pieces is not None

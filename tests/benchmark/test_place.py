@@ -63,7 +63,7 @@ VARIANTS: Final = {
 }
 
 
-@pytest.mark.samples(2)
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("how", VARIANTS)
 def test_what_is_not_put_down_from_the_arm(engine, how) -> None:

@@ -54,6 +54,7 @@ def stdio(url):
     return stdio_client(StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url]))
 
 
+@pytest.mark.slow
 def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
     result = asyncio.run(play(stdio, lambda: work(context)))
     assert result["outcome"] == "success"

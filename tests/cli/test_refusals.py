@@ -38,6 +38,7 @@ def test_an_unwritable_data_folder(tmp_path, command) -> None:
     assert_refused(done, "can't be written", "choose another with --data")
 
 
+@pytest.mark.slow
 def test_a_data_folder_in_use(tmp_path) -> None:
     import fcntl
 

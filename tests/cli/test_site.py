@@ -210,6 +210,7 @@ def _break(patched, place: str) -> None:
     patched.setattr(Folder, "write", write)
 
 
+@pytest.mark.slow
 def test_a_site_stays_whole_while_it_is_written_again(
     url, idle, context, tmp_path, monkeypatch
 ) -> None:
@@ -235,6 +236,7 @@ def test_a_site_stays_whole_while_it_is_written_again(
     assert (site / "CNAME").exists()
 
 
+@pytest.mark.slow
 def test_a_job_that_changed_is_asked_for_again(url, idle, tmp_path) -> None:
     site = tmp_path / "site"
     printed(url, "site", idle, "--out", str(site))

@@ -70,6 +70,7 @@ def _look_with_the_command_line(url: str, sweep_id: str, job_id: str) -> None:
     assert (unknown.returncode, unknown.stderr.strip()) == (1, f"there is no job {nobodys!r}")
 
 
+@pytest.mark.slow
 def test_the_expert_succeeds_and_the_other_baselines_do_not(undisturbed) -> None:
     outcomes = [job["outcome"] for job in undisturbed]
     assert outcomes.count("success") == 2

@@ -217,6 +217,7 @@ def test_what_machines_poll_is_not_traced(context, path) -> None:
     assert one.parent is None
 
 
+@pytest.mark.slow
 def test_a_runner_s_trial_is_scored_in_its_job_s_trace(context) -> None:
     with recorded() as spans:
         submitted(context)

@@ -117,6 +117,7 @@ def test_nothing_to_submit_leaves_the_episode_open_until_it_is_ended() -> None:
     assert ended.trial.score.indicator == 0.0
 
 
+@pytest.mark.slow
 def test_several_rounds_end_with_the_first_success(bridge_calls) -> None:
     environment = Environment("support-1", rounds=3)
     assert "You may submit 3 times" in environment.reset().briefing

@@ -56,6 +56,7 @@ def test_documents_do_as_well_and_nonsense_is_refused_before_it_is_sent(short, b
         assert (broken.trial.reason, broken.error) == ("empty_machine", "")
 
 
+@pytest.mark.slow
 def test_trajectories_come_along_when_asked_for(short, bridge) -> None:
     with Evaluator(short, processes=1, trajectories=True) as evaluator:
         trajectory = evaluator.evaluate(bridge).trial.trajectory

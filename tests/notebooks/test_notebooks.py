@@ -67,6 +67,7 @@ def test_notebooks_are_kept_without_outputs(file):
     assert not [cell for cell in code if cell.outputs or cell.execution_count is not None]
 
 
+@pytest.mark.slow
 def test_a_bridge_is_built_and_tried(tmp_path):
     done = run(read("bridge"), tmp_path)
     machine, trial, braced = shown(done, "text/html")

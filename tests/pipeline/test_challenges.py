@@ -334,6 +334,7 @@ def test_organisers_see_ranks_refusals_and_copies(tmp_path: Path) -> None:
 BRIDGES = season_named("first-bridges")
 
 
+@pytest.mark.slow
 def test_bridges_are_tried_and_scored() -> None:
     report = checked(bridge_files(), BRIDGES, "agent")
     assert report.passed, report.findings
@@ -356,6 +357,7 @@ def test_flights_are_flown_and_scored() -> None:
     assert all(0.6 < term.share < 1.0 for term in report.score.terms)
 
 
+@pytest.mark.slow
 def test_what_is_no_bridge_bears_nothing() -> None:
     car = json.dumps(family_car().to_document()).encode()
     score = checked({**bridge_files(), "support-2.json": car}, BRIDGES, "agent").score

@@ -73,6 +73,7 @@ def test_requests_stay_quick_and_jobs_flow_again(context, valkey, monkeypatch) -
         wait_until(lambda: (own.queues.waiting("construct") or 0) > 20, 20, "jobs flow again")
 
 
+@pytest.mark.slow
 def test_every_stop_costs_a_message_one_short_time_out(valkey) -> None:
     url, pid = valkey
     queues, times = Queues(url), []
@@ -88,6 +89,7 @@ def test_every_stop_costs_a_message_one_short_time_out(valkey) -> None:
     assert max(times) < 4 * TIMEOUT_S, times
 
 
+@pytest.mark.slow
 def test_provider_requests_go_on_without_waiting_each(context, valkey) -> None:
     url, pid = valkey
 

@@ -60,6 +60,7 @@ def test_a_key_waits_for_what_it_missed_and_others_do_not(context, keys, how) ->
     assert offered(keys[1])
 
 
+@pytest.mark.slow
 def test_the_pause_grows(context, keys) -> None:
     waiting(context)
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import pytest
 from schemathesis import GenerationMode
 from support.clients.tenants import WITH_KEYS
 from support.servers.contract import SCHEMA, ask, ways
@@ -10,6 +11,7 @@ from support.servers.live_api import live_api
 from support.servers.runner_rig import Caller, waiting
 
 
+@pytest.mark.slow
 def test_every_answer_is_a_documented_one(context) -> None:
     own = context.settings.model_copy(update={**WITH_KEYS, "require_keys": False, "lease_s": 60.0})
     with live_api(replace(context, settings=own)) as url:

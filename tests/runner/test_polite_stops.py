@@ -87,6 +87,7 @@ def test_a_trial_under_way_is_finished(context, worker) -> None:
     assert context.store.rollouts.read(job.id)[0].finished_at is not None
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 def test_a_trial_that_takes_too_long_is_handed_back(context, worker) -> None:
     job = waiting(context, ENDLESS + FEW_BLOCKS)

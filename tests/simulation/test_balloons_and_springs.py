@@ -33,6 +33,7 @@ def _foot(draft: KeyedDraft) -> str:
     return start
 
 
+@pytest.mark.samples(1)
 def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     balloon = draft.attach(_foot(draft), UP, "Balloon")
@@ -49,6 +50,7 @@ def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     assert trajectory.joint_loads[-25:, -1].mean() * 1000 == pytest.approx(net, abs=1.96)
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine) -> None:
     draft = KeyedDraft(modules="workshop")
@@ -148,6 +150,7 @@ def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine) -> None:
     assert peaks[3] / peaks[0] == pytest.approx(math.exp(-rate * 3 * period), rel=0.1)
 
 
+@pytest.mark.samples(1)
 def test_a_spring_bears_its_load_at_rest(engine) -> None:
     machine, load = _hung(1)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)

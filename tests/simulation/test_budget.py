@@ -50,7 +50,7 @@ def test_a_bridge_that_gives_way_earns_nothing_by_its_debris(
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.samples(2)
+@pytest.mark.samples(1)
 @slow_on_pybullet
 @pytest.mark.parametrize(
     "machine",
@@ -81,7 +81,7 @@ def test_a_bridge_that_bears_the_load_for_a_moment_does_not_carry_it(engine, tas
         assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.samples(2)
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     "machine",
     [

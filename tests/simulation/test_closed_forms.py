@@ -118,6 +118,7 @@ def _bending_of_beam(engine: str, cargo_mass: float) -> dict[str, float]:
     return {peak.joint: peak.moment for peak in trajectory.joint_peaks}
 
 
+@pytest.mark.samples(1)
 def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine) -> None:
     load = 120.0
     light, half, full = (_bending_of_beam(engine, mass) for mass in (5.0, load / 2, load))

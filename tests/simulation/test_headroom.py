@@ -24,6 +24,7 @@ from buildarena_worker.builtin.designs.rovers import long_slalom_car, touring_ca
 SPANS = [("support-4", 30), long("support-5", 45)]
 
 
+@pytest.mark.samples(1)
 @slow_on_pybullet
 @pytest.mark.parametrize(("task", "gap"), SPANS)
 @pytest.mark.parametrize("below", [{"places": (0,), "foot": 2}, {"places": (-6, 6)}])
@@ -77,6 +78,7 @@ def test_only_the_tasks_that_ask_for_it_tell_the_load_over_the_mass(tasks) -> No
 # A slalom of twelve gates
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 def test_a_car_that_drives_straight_on_passes_no_more_than_one_side(engine, tasks) -> None:
     for turn_s in (0.0, 0.02):
@@ -321,6 +323,7 @@ def test_a_see_saw_hauls_no_load(engine, tasks, pivot, show) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.samples(1)
 @slow_on_pybullet
 @pytest.mark.parametrize(("begin_s", "lasts_s"), [(0.7, 0.3), (8.0, 3.0), (3.0, 1.6)])
 def test_a_lift_that_ends_low_hauls_nothing(engine, tasks, begin_s, lasts_s) -> None:

@@ -66,6 +66,7 @@ def _turning_car(*, mirrored: bool) -> Machine:
     return draft.machine
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 def test_a_mirrored_car_drives_as_far(engine, tasks) -> None:
     task = tasks["transport-1"]

@@ -35,6 +35,7 @@ def test_what_the_libraries_would_choose_does_not_matter() -> None:
     assert compared(first[1:], second[1:])["equal"] == TRIALS
 
 
+@pytest.mark.slow
 @several
 def test_a_trial_of_other_kernels_is_repeated_to_the_byte() -> None:
     machine = load_machine("wide-deck")

@@ -24,6 +24,7 @@ def test_more_bracing_carries_more(engine, tasks) -> None:
     assert all(b > 1.2 * a for a, b in itertools.pairwise(loads))
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 def test_a_braced_deck_carries_more_than_a_bare_one(engine, tasks) -> None:
     bare, _ = trial(tasks["support-1"], deck(5, 7), engine)
@@ -34,6 +35,7 @@ def test_a_braced_deck_carries_more_than_a_bare_one(engine, tasks) -> None:
     assert min(event.time_s for event in trajectory.breaks) > 5.0  # not while the cargo is light
 
 
+@pytest.mark.samples(1)
 def test_the_one_shot_bridge_stands_in_the_gap(engine, tasks) -> None:
     result, _ = trial(tasks["support-1"], load_machine("one-shot-bridge"), engine)
     assert result.metrics["load_when_decided"] >= 900.0
@@ -42,6 +44,7 @@ def test_the_one_shot_bridge_stands_in_the_gap(engine, tasks) -> None:
     assert result.metrics["floor_share"] > 0.5  # its pillars reach the gap's floor
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tasks) -> None:
     # Over a gap so deep that its pillars hang free; over the task's they stand on the floor.
@@ -55,6 +58,7 @@ def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tas
     assert first.cargo_mass == pytest.approx(1000.0, rel=0.03)
 
 
+@pytest.mark.slow
 @slow_on_pybullet
 def test_overlap_on_the_terrain_never_hurts(engine, tasks) -> None:
     loads = [
@@ -94,6 +98,7 @@ def test_connectors_stacked_on_the_same_faces_are_worth_one(engine, tasks, spans
     assert trial(task, _beam_with(spans * 5), engine)[0].indicator < 1000.0
 
 
+@pytest.mark.slow
 @slow_on_pybullet
 def test_winches_stacked_between_the_same_faces_are_one_rope(engine, tasks) -> None:
     spans = ((0, 3), (3, 6), (0, 6))
@@ -104,6 +109,7 @@ def test_winches_stacked_between_the_same_faces_are_one_rope(engine, tasks) -> N
     assert loads[1] <= 1.05 * loads[0]
 
 
+@pytest.mark.samples(1)
 def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(engine, tasks) -> None:
     result, _ = trial(tasks["support-1"], beam(5), engine)
     assert not result.success

@@ -55,6 +55,7 @@ def test_a_cargo_stays_on_a_deck(engine, tasks, rails) -> None:
     assert np.abs(apart[25:]).max() < 1.0
 
 
+@pytest.mark.samples(1)
 def test_the_large_cargo_stays_on_a_long_deck(engine, tasks) -> None:
     actions = car(9, 2, deck_half=(2, 4), drive=[("UpArrow", 3.0, 2.0), ("DownArrow", 5.5, 2.0)])
     result, trajectory = trial(tasks["transport-3"], actions, engine, duration_s=8.0)

@@ -56,6 +56,7 @@ def _driven(machine: Machine, engine: str) -> tuple[float, float]:
     return float(travelled), float(heading[-1] - heading[0])
 
 
+@pytest.mark.samples(3)
 @pytest.mark.parametrize(
     ("braked", "length", "track"),
     [((0,), 5, 1), ((1,), 5, 1), ((2,), 5, 1), ((3,), 5, 1), ((0,), 9, 1), ((3,), 7, 2)],
@@ -70,6 +71,7 @@ def test_a_car_with_a_braking_wheel_turns_and_travels_as_coulomb_says(
     assert turned == pytest.approx(expected.turned, rel=0.05)
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("braked", [0, 3])
 def test_wheels_on_hinges_that_only_steer_share_their_load_alike(engine, braked) -> None:
     """The hinges' drives give way a little: the turn may differ more than a rigid car's."""

@@ -90,6 +90,7 @@ def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
+@pytest.mark.slow
 def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
     limits = BudgetLimits(max_cost_usd=Decimal(100))
     with context.store.database.transaction() as connection:
@@ -116,6 +117,7 @@ def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
     assert context.store.budgets.get("key_a") == spent
 
 
+@pytest.mark.slow
 def test_shutdown_ends_open_requests(context, settings, tmp_path) -> None:
     with stuck("hang") as bad:
         file = models_file(tmp_path, {"bad": bad})

@@ -182,6 +182,7 @@ def _pretend(context: Context, job: Job, line: str) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_job_of_another_version_of_the_game_ends_with_what_to_do(playing, rig) -> None:
     other = open_context(playing.settings.model_copy(update={"besiege_mod": "1.5"}))
     Submissions(other, load_registry()).submit_job(

@@ -77,6 +77,7 @@ def to_the_mark() -> tuple[Machine, Scenario, Recorded, LuaGame]:
     return machine, scenario, run, game_of(run, scenario)
 
 
+@pytest.mark.slow
 def test_a_program_senses_and_answers_in_the_game_what_it_does_in_an_engine(to_the_mark) -> None:
     machine, scenario, run, game = to_the_mark
     ours, there = run.trajectory.piloting, read_back(game, machine, scenario).piloting
@@ -135,6 +136,7 @@ def test_a_log_is_of_one_program(to_the_mark) -> None:
         read_back(game, other, scenario)
 
 
+@pytest.mark.slow
 def test_all_kinds_of_joints_and_the_cargo_are_sensed_as_in_an_engine() -> None:
     text = 'sensors = { "12" }\n' + program(
         """return { spinning_forward = t > 0.5 and 0.6 or 0, turn_left = t > 1 and 0.5 or 0 }"""

@@ -42,6 +42,7 @@ def answer(words: list[str], rig: Rig, screen: dict[str, str] | None, **given: o
     )
 
 
+@pytest.mark.slow
 def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> None:
     done = answer(["calibrate", "--defaults"], rig, screen)
     assert done.returncode == 0, (done.stdout, done.stderr)
@@ -59,6 +60,7 @@ def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     assert "load the machine batry: the list of machines stayed open" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_person_points_at_each_place(rig, screen) -> None:
     with GamePlayed(rig, screen) as person:
         done = person.calibrate()

@@ -97,6 +97,7 @@ def test_a_car_is_driven_as_by_our_engine(simulator) -> None:
     assert write_trajectory(again) == sent
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("fault", ["reordered", "other_names"])
 def test_columns_are_found_by_name(simulator, faults, fault) -> None:
     faults(fault)
@@ -133,6 +134,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.samples(3)
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_once_is_got_over_and_named(simulator, faults, fault) -> None:
     faults(fault)
@@ -173,6 +175,7 @@ def started(folder: Path) -> tuple[int, int]:
     return own, other
 
 
+@pytest.mark.slow
 def test_what_hangs_is_ended_with_all_it_started(toolkit, faults, tmp_path) -> None:
     faults("hang", "orphan")
     impatient = toolkit.model_copy(update={"patience": 0.01})
@@ -185,6 +188,7 @@ def test_what_hangs_is_ended_with_all_it_started(toolkit, faults, tmp_path) -> N
     assert is_gone(started(tmp_path)[1]), "what the second run left behind was ended, too"
 
 
+@pytest.mark.slow
 def test_a_lost_lease_ends_the_run_and_all_it_started(simulator, faults, tmp_path) -> None:
     faults("hang")
     task, machine = short_trial("transport-1")

@@ -81,6 +81,7 @@ def test_the_servers_start_anywhere(case, user) -> None:
     assert printed.splitlines() == ["42", "True", "", "cluster password"]
 
 
+@pytest.mark.slow
 def test_root_in_a_container_needs_no_further_privilege() -> None:
     printed = run_elsewhere(Case(contained=True), ["-c", BOTH, "{data}"])
     assert printed.splitlines() == ["42", "True", "", "cluster password"]
@@ -108,6 +109,7 @@ print([process.wait() for process in started])
     assert run_elsewhere(both, ["-c", program, *arguments]) == "[0, 0]\n"
 
 
+@pytest.mark.slow
 def test_postgres_gets_its_own_folder_and_nothing_around_it() -> None:
     program = SERVERS + (
         "(data / 'notes').write_text('for everybody who can enter')\n"
@@ -200,6 +202,7 @@ def test_the_whole_service_runs_from_a_read_only_checkout_without_pybullet() -> 
     assert process.returncode == 0
 
 
+@pytest.mark.slow
 def test_a_read_only_checkout_without_a_data_folder_is_refused_in_words() -> None:
     run = "import os, sys; os.chdir(sys.argv.pop(1)); from buildarena_cli.main import run; run()"
     with start_elsewhere(Case(read_only=True), ["-c", run, "{clone}", "demo"]) as process:

@@ -79,6 +79,7 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
     assert not is_running(data)
 
 
+@pytest.mark.slow
 def test_a_service_that_does_not_start_says_why(data, tmp_path) -> None:
     import socket
 
@@ -115,6 +116,7 @@ def test_a_note_without_a_lock_is_of_a_run_that_is_over(tmp_path) -> None:
     assert noted_run(tmp_path) is None
 
 
+@pytest.mark.slow
 def test_logs_are_followed(tmp_path) -> None:
     (tmp_path / "logs").mkdir()
     for name in ("api", "mujoco-worker"):

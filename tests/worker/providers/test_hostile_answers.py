@@ -77,6 +77,7 @@ GARBAGE = {
 
 
 # A list is a legal answer to Google's library: an empty reply.
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     ("protocol", "name"),
     sorted({(w, n) for w in PROTOCOLS for n in GARBAGE} - {("google", "a list")}),

@@ -6,6 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 
+import pytest
 from redis import Redis
 
 from buildarena_worker.providers import throttle as throttle_module
@@ -190,6 +191,7 @@ def test_an_owner_without_an_open_request_may_send_one_whoever_hangs(context, br
     del context
 
 
+@pytest.mark.slow
 def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeypatch) -> None:
     monkeypatch.setattr(throttle_module, "SLOT_TTL_S", 1)
 
