@@ -17,7 +17,7 @@ def example_for(task: Task, pack: PromptPack) -> str:
     """
     name = f"{task.category}-1"
     if name not in DESIGNS:
-        others = [name for name in DESIGNS if name in builtin_tasks() and name != task.name]
+        others = [name for name in DESIGNS if name != task.name]
         alike = [name for name in others if builtin_tasks()[name].scorer == task.scorer]
         name = next(iter(alike or DESIGNS))
     part = next(iter(DESIGNS[name](EXAMPLE_SEED).parts.values()))

@@ -77,6 +77,10 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "drive-3": rovers.cone_passer,
     "drive-4": rovers.track_follower,
     "fetch-1": arms.well_crane,
+}
+"""By a built-in task's name: the design for a seed, which varies it within its tolerances."""
+
+LEVEL_DESIGNS: dict[str, Callable[[int], Design]] = {
     "besiegefield-car-1": vehicles.climber,
     "besiegefield-car-2": vehicles.climber,
     "besiegefield-car-4": vehicles.climber,
@@ -88,6 +92,6 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "besiegefield-catapult-9": partial(throwers.fenced_catapult, last_s=0.24),
     "besiegefield-catapult-10": throwers.fenced_catapult,
 }
-"""By task name: the design for a seed, which varies it within its tolerances."""
+"""Likewise for levels of BesiegeField, which are task files of examples/tasks."""
 
-__all__ = ["DESIGNS", "Design"]
+__all__ = ["DESIGNS", "LEVEL_DESIGNS", "Design"]
