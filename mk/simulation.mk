@@ -1,4 +1,4 @@
-.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-agreement-throwing bench-processors bench-game bench-control bench-worlds bench-repeats \
+.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-agreement-throwing bench-processors bench-game bench-control bench-worlds bench-ceilings bench-repeats \
 	game-evidence evidence-machines
 
 bench-simulation: $(STAMP) ## Measures the simulation and the engines' agreement; JSON in .buildarena/
@@ -26,6 +26,9 @@ bench-control: $(STAMP) ## What a controller costs: a tick, and a trial beside o
 
 bench-worlds: $(STAMP) ## Who passes in fifty drawn worlds of each task for programs; half an hour
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_worlds --json .buildarena/bench-worlds.json
+
+bench-ceilings: $(STAMP) ## How much room indicators leave above the expert and three first tries
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_ceilings --json .buildarena/bench-ceilings.json
 
 bench-repeats: $(STAMP) ## Whether 200 trials with programs repeat to the byte, and how far engines' senses are apart
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_repeats --json .buildarena/bench-repeats.json

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from scenarios.hunt.genome import Genome, grown
 from scenarios.hunt.kinds import kind_of
+from support.machines.expert_calls import control_of
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
@@ -56,21 +57,25 @@ def exploits(folder: Path = EXPLOITS) -> list[Exploit]:
 
 
 def seeds_of(task_name: str) -> list[Genome]:
-    """Genomes to start from: all that suit the task's kind and number of sub-structures."""
+    """Genomes to start from: all that suit the task's kind and number of sub-structures.
+
+    Those of the expert are among them for kinds of which no machine is stored.
+    """
     whole = builtin_tasks()[task_name].constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
-    if kind_of(task_name) == "control":
-        found += map(expert_genome, filter(lambda name: kind_of(name) == "control", DESIGNS))
-    for other, genome in _stored():
-        if kind_of(other) == kind_of(task_name) and bool(genome.sub_structures) != whole:
+    kind, stored = kind_of(task_name), list(_stored())
+    if kind not in {kind_of(other) for other, _ in stored}:
+        found += map(expert_genome, filter(lambda name: kind_of(name) == kind, DESIGNS))
+    for other, genome in stored:
+        if kind_of(other) == kind and bool(genome.sub_structures) != whole:
             found.append(genome)
     return found
 
 
 def expert_genome(task_name: str) -> Genome:
-    """The expert's machine, with its program."""
+    """The expert's machine, with its keys or its program."""
     design = DESIGNS[task_name](0)
-    log = next(iter(design.parts.values())).actions
+    log = [*next(iter(design.parts.values())).actions, *control_of(design.control or {})]
     actions = [{"op": op, "params": dict(params)} for op, params in log]
     return grown(Genome(actions=actions, program=design.program), most=sys.maxsize)[1]
 

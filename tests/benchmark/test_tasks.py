@@ -36,7 +36,7 @@ DIMENSIONS = {
 WORKSHOP = [*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2"]
 HEADROOM = [
     *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
-    *("flight-3", "lift-4", "mechanisms-7"),
+    *("flight-3", "lift-4", "mechanisms-7", "support-6", "support-7"),
 ]
 FAMILIES = ["budget-1", "repair-1", "identify-1"]
 CONTROL = [

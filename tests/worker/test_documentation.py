@@ -101,6 +101,15 @@ def test_every_design_is_explained() -> None:
         assert f"| {task} |" in text
 
 
+def test_the_greatest_indicators_are_told_as_they_are() -> None:
+    _, _, table = (DOCS / "expert.md").read_text().partition("## Room above the expert")
+    rows = re.findall(r"^\| ([a-z]+-\d) \| ([^|]+) \|", table, re.MULTILINE)
+    greatest = {name: builtin_tasks()[name].ceiling for name, _ in rows}
+    assert dict(rows) == {
+        name: "none" if most is None else f"{most:,g}" for name, most in greatest.items()
+    }
+
+
 def test_the_guides_task_is_a_task() -> None:
     (text,) = re.findall(r"```yaml\n(name: narrow-gap.*?)```", GUIDE, re.DOTALL)
     task = parse_custom_task(text, origin="extending.md")

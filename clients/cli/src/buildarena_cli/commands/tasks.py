@@ -73,7 +73,9 @@ def show_task(
         print_json(task)
         return
     source = "added by a user" if task["custom"] else "built-in"
-    say(f"{task['name']}, version {task['version']}, {source}\n")
+    most = "" if task.get("ceiling") is None else f", at most {task['ceiling']:,g}"
+    ranked = f"ranked by {in_words(task['indicator'], task['unit'])}{most}"
+    say(f"{task['name']}, version {task['version']}, {source}, {ranked}\n")
     say(task["statement"])
 
 

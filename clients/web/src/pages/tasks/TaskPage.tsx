@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { board, task as taskQuery, type TaskDetail } from "../../api/queries";
-import { measured, ruleLines } from "../../format";
+import { measured, number, ruleLines } from "../../format";
 import { JobsSummary } from "../../parts/JobsSummary";
 import { Markdown } from "../../parts/Markdown";
 import { Section } from "../../parts/Section";
@@ -37,7 +37,8 @@ export default function TaskPage() {
                 </Badge>
               )}
               <Text size="sm" className="dimmed">
-                {task.name} · version {task.version} · ranked by {measured(task.indicator, task.unit)} ·{" "}
+                {task.name} · version {task.version} · ranked by {measured(task.indicator, task.unit)}
+                {task.ceiling == null ? "" : `, at most ${number(task.ceiling)}`} ·{" "}
                 <Link to="/jobs" search={{ task: task.name }}>
                   jobs
                 </Link>

@@ -106,4 +106,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_AIRBORNE, CAME_APART, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -143,4 +143,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_ON_TWO_WHEELS, CAME_APART, PROPPED, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, scenario: scenario.duration_s + 1.0,
 )

@@ -150,4 +150,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(LET_GO, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 2.0,
 )

@@ -21,6 +21,7 @@ from buildarena_benchmark.scorers.scorer import (
     Metric,
     Scorer,
     Verdict,
+    final_mass,
     rounded,
     undriven,
 )
@@ -167,4 +168,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_CARRIED, CAME_APART, NOT_STANDING, NOT_GEARED, NOT_AIRBORNE, FORCES_NOT_MEASURED),
+    ceiling=final_mass,
 )

@@ -145,4 +145,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_AIRBORNE, NOT_CARRIED, NOT_RISEN, FORCES_NOT_MEASURED),
+    ceiling=lambda scoring, _scenario: len(scoring.heights) * scoring.most_s,
 )

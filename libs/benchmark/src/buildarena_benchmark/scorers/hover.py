@@ -119,4 +119,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_AIRBORNE, NOT_CARRIED, NOT_RISEN, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, scenario: scenario.duration_s,
 )

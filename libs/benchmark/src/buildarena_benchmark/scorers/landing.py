@@ -138,4 +138,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(CAME_APART, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -206,4 +206,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_CARRIED, BASE_MOVED, CAME_APART, FORCES_NOT_MEASURED),
+    ceiling=lambda scoring, _scenario: 1.0 / scoring.nearest,
 )

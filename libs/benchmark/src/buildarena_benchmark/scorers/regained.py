@@ -110,4 +110,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_DRIVEN, DRIVE_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 1.0,
 )

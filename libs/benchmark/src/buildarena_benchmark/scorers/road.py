@@ -167,4 +167,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_DRIVEN, NOT_CARRIED, FORCES_NOT_MEASURED),
+    ceiling=lambda scoring, _scenario: scoring.length,
 )

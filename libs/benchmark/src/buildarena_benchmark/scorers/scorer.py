@@ -106,6 +106,10 @@ class Verdict:
     deciding: Deciding | None = None
 
 
+def _unbounded(scoring: Any, scenario: Scenario) -> None:
+    del scoring, scenario
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scorer:
     """One way to judge a trial, under the name that task files give.
@@ -119,6 +123,8 @@ class Scorer:
         flags: All that `judge` may raise, in the order in which they are documented.
         decision: Tells, given parameters and scenario, when a running trial is decided; None
             where the whole trial decides.
+        ceiling: The greatest indicator that there is, given parameters and scenario, or what none
+            reaches; None where only what can be built bounds it.
     """
 
     parameters: type[Document]
@@ -126,6 +132,7 @@ class Scorer:
     infeasible: Callable[[Any, Scenario], str | None]
     flags: tuple[Flag, ...] = ()
     decision: "Callable[[Any, Scenario], Decision] | None" = None
+    ceiling: Callable[[Any, Scenario], float | None] = _unbounded
 
     @property
     def name(self) -> str:
@@ -137,6 +144,12 @@ class Scorer:
     def description(self) -> str:
         """What its indicator is, in one sentence."""
         return (self.judge.__doc__ or "").partition("\n")[0]
+
+
+def final_mass(scoring: Any, scenario: Scenario) -> float | None:
+    """The ceiling of what is ranked by the mass of a cargo that grows."""
+    del scoring
+    return None if scenario.cargo is None else scenario.cargo.final_mass
 
 
 def undriven(scenario: Scenario) -> str | None:

@@ -103,4 +103,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_AIRBORNE, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -24,6 +24,7 @@ from buildarena_benchmark.scorers.scorer import (
     Metric,
     Scorer,
     Verdict,
+    final_mass,
     raised,
     rounded,
 )
@@ -210,4 +211,5 @@ SCORER: Final = Scorer(
     infeasible=infeasible,
     flags=(DOES_NOT_SPAN, START_TOO_HIGH, NEVER_FELL, SPAN_NOT_MEASURED),
     decision=decision,
+    ceiling=final_mass,
 )

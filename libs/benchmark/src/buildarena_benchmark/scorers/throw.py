@@ -140,6 +140,14 @@ def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
     return next((reason for reason, holds in reasons.items() if holds), undriven(scenario))
 
 
+def ceiling(scoring: ThrowScoring, scenario: Scenario) -> float | None:
+    """See `Scorer`: a throw may go any distance, but not nearer than to the middle."""
+    del scenario
+    if scoring.target is not None:
+        return 1.0
+    return 2.0 * len(scoring.rings) or None
+
+
 def judge(
     scoring: ThrowScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
@@ -368,4 +376,5 @@ SCORER: Final = Scorer(
         START_TOO_HIGH,
         FORCES_NOT_MEASURED,
     ),
+    ceiling=ceiling,
 )

@@ -159,4 +159,5 @@ SCORER: Final = Scorer(
     judge=judge,
     infeasible=infeasible,
     flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, scenario: len(scenario.marks) + 1.0,
 )

@@ -19,7 +19,7 @@ _PAPER: Final = tuple(
 _WORKSHOP: Final = (*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2")
 _HEADROOM: Final = (
     *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
-    *("flight-3", "lift-4", "mechanisms-7"),
+    *("flight-3", "lift-4", "mechanisms-7", "support-6", "support-7"),
 )
 _FAMILIES: Final = ("budget-1", "repair-1", "identify-1")
 _CONTROL: Final = (

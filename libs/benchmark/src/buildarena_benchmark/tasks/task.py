@@ -9,6 +9,7 @@ from typing import Any, Final, Literal, Self
 
 from buildarena_benchmark.families.given import Beginning, given_machine
 from buildarena_benchmark.families.unknowns import Unknowns, drawn_scenario
+from buildarena_benchmark.scorers.registry import known_scorers
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Scenario
@@ -59,6 +60,11 @@ class Task:
     def scorer(self) -> str:
         """Name of the scorer."""
         return self.scoring.name
+
+    @property
+    def ceiling(self) -> float | None:
+        """The greatest indicator that there is; None where only what can be built bounds it."""
+        return known_scorers()[self.scorer].ceiling(self.scoring, self.scenario)
 
     @property
     def control(self) -> Literal["agent", "held", "none"]:

@@ -50,6 +50,9 @@ class TaskView(BaseModel):
     statement: str = Field(description="What the model reads")
     indicator: str = Field(description="Name of the figure it is ranked by", examples=["load"])
     unit: str = Field(description='The figure\'s unit; "1" for a ratio', examples=["mass units"])
+    ceiling: float | None = Field(
+        description="The greatest indicator there is; null where only what can be built bounds it"
+    )
     difficulty: dict[str, int] = Field(description="Weight of each difficulty dimension, if any")
     custom: bool = Field(description="Whether somebody uploaded it")
     created_at: datetime | None = Field(description="When this version was; null for built-in ones")
@@ -153,6 +156,7 @@ def _fields(entry: CatalogueEntry) -> dict[str, Any]:
         "statement": task.statement,
         "indicator": task.indicator.name,
         "unit": task.indicator.unit,
+        "ceiling": task.ceiling,
         "difficulty": dict(task.difficulty),
         "custom": entry.custom,
         "created_at": entry.created_at,

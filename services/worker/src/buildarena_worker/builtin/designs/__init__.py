@@ -43,6 +43,8 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "flight-2": flyers.glider,
     "support-4": lambda seed: bridges.braced_beam(seed, gap=30, overlap=6),
     "support-5": lambda seed: bridges.braced_beam(seed, gap=45, overlap=6),
+    "support-6": lambda seed: bridges.braced_beam(seed, gap=5),
+    "support-7": lambda seed: bridges.braced_deck(seed, gap=10),
     "mechanisms-5": rovers.long_slalom_car,
     "mechanisms-6": arms.swinging_arm,
     "transport-4": rovers.touring_car,

@@ -69,7 +69,7 @@ class Shape:
 
 def catapult(seed: int) -> Design:
     """A catapult whose springs all draw at one key."""
-    return _catapult(Shape(), _BEGINS_S[seed % len(_BEGINS_S)])
+    return plain_catapult(Shape(), _BEGINS_S[seed % len(_BEGINS_S)])
 
 
 def fenced_catapult(seed: int, *, last_s: float = _LASTS_S) -> Design:
@@ -79,11 +79,19 @@ def fenced_catapult(seed: int, *, last_s: float = _LASTS_S) -> Design:
         seed: Varies when it throws.
         last_s: How long the last of its springs draws, seconds.
     """
-    return _catapult(Shape(aside=3, ahead=5), 1.0 + 0.08 * (seed % 5), last_s=last_s)
+    return plain_catapult(Shape(aside=3, ahead=5), 1.0 + 0.08 * (seed % 5), last_s=last_s)
 
 
-def _catapult(shape: Shape, begins_s: float, *, last_s: float = _LASTS_S) -> Design:
-    """All springs but the last draw at one key, the last at another."""
+def plain_catapult(
+    shape: Shape, begins_s: float = _BEGINS_S[0], *, last_s: float = _LASTS_S
+) -> Design:
+    """A catapult of a shape that is thrown by keys.
+
+    Args:
+        shape: Its measures.
+        begins_s: When its springs draw, seconds.
+        last_s: How long the last of them does, which then has a key of its own, seconds.
+    """
     draft, springs, _ = catapult_draft(shape)
     keys = dict.fromkeys(springs[:-1], "Alpha1") | {
         springs[-1]: "Alpha1" if last_s == _LASTS_S else "Alpha2"
