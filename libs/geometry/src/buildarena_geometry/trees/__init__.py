@@ -1,7 +1,7 @@
 """Construction trees, BesiegeField's format of machines: read, checked and built by actions."""
 
 from buildarena_geometry.trees.building import TreeAction, tree_actions
-from buildarena_geometry.trees.points import POINTING, point_text, points_of
+from buildarena_geometry.trees.points import POINTING, point_text, points_of, points_text
 from buildarena_geometry.trees.reading import (
     MAX_ENTRIES,
     TreeEntry,
@@ -18,6 +18,7 @@ __all__ = [
     "looks_like_tree",
     "point_text",
     "points_of",
+    "points_text",
     "read_tree",
     "tree_actions",
     "tree_in",

@@ -16,6 +16,8 @@ from buildarena_geometry.besiege_components import besiege_offset, besiege_point
 from buildarena_geometry.feedback.words import point
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from buildarena_geometry.modules.module import Face, Module
     from buildarena_geometry.rotations import Vector
 
@@ -52,6 +54,26 @@ def point_text(module: Module, number: int) -> str:
     face = points_of(module)[number]
     side = SIDES[_side(_seen(module, face.normal))]
     return f"{number} {side} {point(_seen(module, face.center))}"
+
+
+def points_text(modules: Iterable[Module]) -> str:
+    """What writers of trees read: the building points of modules, and where their sides are."""
+    holders: dict[str, list[str]] = {}
+    for module in modules:
+        numbers = range(len(points_of(module)))
+        points = ", ".join(point_text(module, number) for number in numbers) or "none"
+        if module.kind == "connector":
+            points = "joins two points"
+        holders.setdefault(points, []).append(f"{module.name} ({module.besiege_id})")
+    rows = [f"- {', '.join(names)}: {points}" for points, names in holders.items()]
+    pointing = [f"- {where}: {', '.join(sides)}" for where, sides in POINTING.items()]
+    head = (
+        "Modules with their numbers, and each point with its number, its side and its place "
+        "[right, up, ahead], from where the block sits; the starting block's from its centre. In "
+        "data lines x of a block is its left, y up and z ahead; letters of faces are not used here."
+    )
+    sides = "\nWhere left, right, up and down are of a block that points"
+    return "\n".join([head, *rows, sides, *pointing])
 
 
 def turned_x_axis(normal: Vector) -> Vector:

@@ -29,6 +29,9 @@ ROLES = (
     "controller",
     "solo",
     "analyst",
+    "tree_designer",
+    "tree_inspector",
+    "tree_planner",
 )
 MESSAGES = (
     "plan",
@@ -58,6 +61,14 @@ MESSAGES = (
     "round_failed",
     "advice",
     "example",
+    "tree_design",
+    "tree_again",
+    "tree_inspect",
+    "tree_edit",
+    "tree_part",
+    "tree_join",
+    "tree_untried",
+    "tree_tried",
 )
 PUBLISHED_ROLES = {
     "planner": "planner",

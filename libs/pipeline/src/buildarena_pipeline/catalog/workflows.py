@@ -49,6 +49,24 @@ BUILTIN: Final = (
         class_name="Builder",
         one_structure=True,
     ),
+    WorkflowSource(
+        name="tree-single",
+        place="buildarena_worker.workflow.tree_single",
+        class_name="TreeSingle",
+        one_structure=True,
+    ),
+    WorkflowSource(
+        name="tree-iterative",
+        place="buildarena_worker.workflow.tree_iterative",
+        class_name="TreeIterative",
+        one_structure=True,
+    ),
+    WorkflowSource(
+        name="tree-hierarchical",
+        place="buildarena_worker.workflow.tree_hierarchical",
+        class_name="TreeHierarchical",
+        one_structure=True,
+    ),
 )
 DEFAULT_WORKFLOW: Final = BUILTIN[0].name
 
