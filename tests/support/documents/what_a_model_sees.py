@@ -53,8 +53,8 @@ beginning stands here. `make what-a-model-sees` writes this page.
 TREES_HEAD = """## Construction trees
 
 A session of each tree workflow, played by a stand-in that takes the form of a tree, the numbers of
-modules and points, and what the task asks for from these words alone; its machines succeed. The
-statement and the list of modules are those above.
+modules and points, and what the task asks for from these words alone; its machines succeed, and
+are left out as above.
 
 Tokens are characters / 4. Texts of the prompt pack, without what is filled in:
 
@@ -141,13 +141,16 @@ def _tree_sessions() -> Iterator[str]:
     above: set[str] = set()
     for workflow, task, requests, turns in played:
         yield f"### {workflow}, {task}\n"
+        solution = {line.strip() for turn in turns for line in turn.text.splitlines()}
         for turn, request in zip(turns, requests, strict=True):
             yield f"#### {turn.stage}: {turn.role}\n"
             for message in request.messages:
-                text = _without_above(message.text, above)
+                lines = _without_above(message.text, above).splitlines()
+                text = "\n".join(_left_out(lines, solution - {""}))
                 # A prompt holds a block of code of its own.
                 yield f"*{message.role}*\n\n````text\n{text}\n````\n"
-            yield "\n".join(f"    {line}" for line in turn.text.splitlines()) + "\n"
+            said = _left_out(turn.text.splitlines(), solution)
+            yield "\n".join(f"    {line}" for line in said) + "\n"
 
 
 def _counted(workflow: str, task: str, requests: Sequence[Request], turns: Sequence[Turn]) -> str:
