@@ -4,7 +4,7 @@ BesiegeField names the sides of a block as somebody sees them who looks the way 
 back, left, right, up, down. How a block is turned depends on nothing but where it points: upright
 where that is level, and otherwise with its right to the east.
 
-Source: the block tables and the placing of blocks of BesiegeField's public release. Its 52 types
+Source: the block tables and the placing of blocks of BesiegeField's public release. Its 43 types
 number their points by the order that `points_of` has; types that it lacks get the same order.
 """
 
