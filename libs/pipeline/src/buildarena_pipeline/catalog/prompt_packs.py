@@ -3,7 +3,7 @@
 A pack of our layout is a folder of Markdown files: ``planner.md`` … are the roles' system
 messages, files under ``messages/`` are the frames of what the roles read, with ``$name``
 places. A pack of the published layout has ``prompt.yaml`` and maybe ``levels.yaml``; what it does
-not say is taken from the default pack.
+not say is taken from the default pack, as are texts of the tree workflows that a pack lacks.
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ ROLES = (
     "controller",
     "solo",
     "analyst",
+    "tree_designer",
+    "tree_inspector",
+    "tree_planner",
 )
 MESSAGES = (
     "plan",
@@ -58,6 +61,14 @@ MESSAGES = (
     "round_failed",
     "advice",
     "example",
+    "tree_design",
+    "tree_again",
+    "tree_inspect",
+    "tree_edit",
+    "tree_part",
+    "tree_join",
+    "tree_untried",
+    "tree_tried",
 )
 PUBLISHED_ROLES = {
     "planner": "planner",
@@ -66,6 +77,8 @@ PUBLISHED_ROLES = {
     "builder": "builder",
     "guidance": "guidance",
 }
+_OF_TREES = "tree_"
+"""How the names of texts begin that packs of before the tree workflows lack."""
 PUBLISHED_LEVELS = {"soft": 1, "medium": 2, "hard": 3}
 
 
@@ -143,12 +156,15 @@ def read_pack(folder: Path, *, name: str) -> PromptPack:
     """
     if (folder / "prompt.yaml").exists():
         return _read_published(folder, name)
-    roles = {role: _text(folder / f"{role}.md", name) for role in ROLES}
-    messages = {frame: _text(folder / "messages" / f"{frame}.md", name) for frame in MESSAGES}
+    roles = {role: _text(folder, f"{role}.md", name) for role in ROLES}
+    messages = {frame: _text(folder, f"messages/{frame}.md", name) for frame in MESSAGES}
     return _pack(name, roles, messages, {})
 
 
-def _text(path: Path, name: str) -> str:
+def _text(folder: Path, file: str, name: str) -> str:
+    path = folder / file
+    if path.name.startswith(_OF_TREES) and not path.exists():
+        path = builtin_folder() / "default" / file
     try:
         return path.read_text(encoding="utf-8").strip()
     except OSError as error:

@@ -26,8 +26,8 @@ PLAN: Final = "plan"
 BUILD: Final = "build"
 REFINE: Final = "refine"
 ASSEMBLE: Final = "assemble"
-NO_BUILDING: Final = frozenset({PLAN, "draft", "control", "analyse"})
-"""Phases in which no machine is built; an analyst only looks at one."""
+NO_BUILDING: Final = frozenset({PLAN, "draft", "control", "analyse", "inspect"})
+"""Phases in which no machine is built; an analyst and an inspector only look at one."""
 BEFORE_THE_MACHINE: Final = frozenset({"parallel_calls", "unknown_action"})
 """Refusals of the session, which the machine never heard of."""
 

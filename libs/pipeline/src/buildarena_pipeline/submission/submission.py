@@ -263,20 +263,23 @@ class Submissions:
     def _infeasible(
         self, workflow: str, tasks: Mapping[str, str], found: Mapping[str, Task]
     ) -> list[ValidationIssue]:
-        """An issue for each task that asks for more sub-structures than the workflow builds."""
-        if not self._workflows[workflow].one_structure:
-            return []
-        able = sorted(name for name, kind in self._workflows.items() if not kind.one_structure)
-        return [
-            ValidationIssue(
-                path=path,
-                message=f"{name} asks for several sub-structures, and the workflow "
-                f"{workflow!r} builds one",
-                choices=tuple(able),
+        """An issue for each task that asks for something that the workflow never builds."""
+        kind = self._workflows[workflow]
+        issues = []
+        for path, name in tasks.items():
+            task = found[name]
+            if kind.one_structure and task.constraints.min_sub_structures > 1:
+                why = f"asks for several sub-structures, and the workflow {workflow!r} builds one"
+                able = [other for other, one in self._workflows.items() if not one.one_structure]
+            elif kind.from_nothing and task.beginning is not None:
+                why = f"gives a machine, and the workflow {workflow!r} writes whole ones"
+                able = [other for other, one in self._workflows.items() if not one.from_nothing]
+            else:
+                continue
+            issues.append(
+                ValidationIssue(path=path, message=f"{name} {why}", choices=tuple(sorted(able)))
             )
-            for path, name in tasks.items()
-            if found[name].constraints.min_sub_structures > 1
-        ]
+        return issues
 
     def _require_size(self, jobs: int) -> None:
         largest = self._context.settings.max_sweep_jobs

@@ -45,7 +45,8 @@ class Session:
     Attributes:
         additions: What follows the task's statement: varied worlds, an example, results of rounds.
         machine: What is being built.
-        tested: Whether a test trial of the task is used up.
+        tested: Whether a trial of a task with test trials was asked for.
+        tests_used: The test trials that were.
         plan: What the plan says of the whole machine, "" without one.
     """
 
@@ -71,6 +72,7 @@ class Session:
         self.machine: Machine | None = None
         self.plan = ""
         self.tested = False
+        self.tests_used = 0
         self._model_config = model_config
         self._on_turn = on_turn
 

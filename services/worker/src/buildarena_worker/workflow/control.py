@@ -67,6 +67,57 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
         ConstructionFailedError: No attempt had a usable program.
         SessionEnded: A simulation must be done first.
     """
+    task = session.task
+    dialogue, controller = _dialogue(session, machine)
+    records: list[RolloutRecord] = []
+    attempts = task.tests + 1 if task.tests else ATTEMPTS
+    final = final or task.tests > 0
+    for attempt in range(session.tests_used + 1, attempts + 1):
+        try:
+            program = _program(
+                dialogue, controller, machine, session, keeps=not task.tests and _succeeded(records)
+            )
+        except _ProgramError as error:
+            if not records or task.tests:
+                raise ConstructionFailedError("control_invalid", str(error)) from error
+            break
+        if program is None:
+            break
+        session.machine = program.machine
+        session.tested = task.tests > 0
+        last = attempt == attempts
+        if task.tests and not last:
+            session.tests_used += 1
+        record = session.host.simulate(program.machine, program.presses, final=final and last)
+        records.append(record)
+        if not last:
+            dialogue.remark(controller, _outcome(session, record, attempt))
+    return best_rollout(records, task)
+
+
+def try_out(session: Session, machine: Machine) -> str:
+    """How a machine does in one of the task's test trials, driven by its controller.
+
+    Returns:
+        The result in words; "" where the controller had no usable program.
+
+    Raises:
+        SessionEnded: A simulation must be done first.
+    """
+    dialogue, controller = _dialogue(session, machine)
+    try:
+        program = _program(dialogue, controller, machine, session, keeps=False)
+    except _ProgramError:
+        return ""
+    assert program is not None, "nothing is kept before a trial"  # noqa: S101 - ours
+    session.tested = True
+    session.tests_used += 1
+    record = session.host.simulate(program.machine, program.presses, final=False)
+    return session.told(record, session.host.trajectory(record))
+
+
+def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
+    """The controller, and the dialogue in which it reads of a machine."""
     pack, task = session.pack, session.task
     opening = pack.say(
         "control",
@@ -85,31 +136,10 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
             center=point(tuple(machine.center_of_mass.tolist())),
         )
     if task.tests:
-        opening += "\n\n" + pack.say("control_tests", tests=str(task.tests))
+        left = task.tests - session.tests_used
+        opening += "\n\n" + pack.say("control_tests", tests=str(left))
     dialogue = Dialogue(session, phase="control", opening=opening)
-    controller = Role(name="controller", system=pack.roles["controller"])
-    records: list[RolloutRecord] = []
-    attempts = task.tests + 1 if task.tests else ATTEMPTS
-    final = final or task.tests > 0
-    for attempt in range(1, attempts + 1):
-        try:
-            program = _program(
-                dialogue, controller, machine, session, keeps=not task.tests and _succeeded(records)
-            )
-        except _ProgramError as error:
-            if not records or task.tests:
-                raise ConstructionFailedError("control_invalid", str(error)) from error
-            break
-        if program is None:
-            break
-        session.machine = program.machine
-        session.tested = task.tests > 0
-        last = attempt == attempts
-        record = session.host.simulate(program.machine, program.presses, final=final and last)
-        records.append(record)
-        if not last:
-            dialogue.remark(controller, _outcome(session, record, attempt))
-    return best_rollout(records, task)
+    return dialogue, Role(name="controller", system=pack.roles["controller"])
 
 
 def _succeeded(records: Sequence[RolloutRecord]) -> bool:

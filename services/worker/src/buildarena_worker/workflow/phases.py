@@ -41,7 +41,22 @@ SHOWN = 200
 
 
 def plan_phase(session: Session) -> Plan:
-    """Lets the planner write a plan, again while it can't be read or the task does not allow it.
+    """Lets the planner write a plan, with as many sub-structures as the task allows.
+
+    Raises:
+        ConstructionFailedError: No usable plan within the turns.
+    """
+    limits = session.task.constraints
+    return plan_by(session, "planner", parts=(limits.min_sub_structures, limits.max_sub_structures))
+
+
+def plan_by(session: Session, system: str, *, parts: tuple[int, int]) -> Plan:
+    """Lets a planner write a plan, again while it can't be read or is not allowed.
+
+    Args:
+        session: The session.
+        system: The planner's system message, by its name in the prompt pack.
+        parts: The fewest and the most sub-structures that the plan may have.
 
     Raises:
         ConstructionFailedError: No usable plan within the turns.
@@ -54,13 +69,13 @@ def plan_phase(session: Session) -> Plan:
         modules=modules_of(session),
     )
     dialogue = Dialogue(session, phase="plan", opening=opening)
-    planner = _looking_up(session, Role(name="planner", system=pack.roles["planner"]))
+    planner = looking_up(session, Role(name="planner", system=pack.roles[system]))
     error = PlanError("nothing was said")
     for _ in range(PLAN_TURNS):
-        text = _speak(dialogue, planner).text
+        text = speak(dialogue, planner).text
         try:
             plan = read_plan(text)
-            _check_plan(session, plan)
+            _check_plan(plan, *parts)
         except PlanError as unusable:
             error = unusable
             dialogue.remark(planner, pack.say("plan_again", error=str(error)))
@@ -75,10 +90,8 @@ class _PlanNotAllowedError(PlanError):
     """A plan that can be read and that the task does not allow."""
 
 
-def _check_plan(session: Session, plan: Plan) -> None:
-    limits = session.task.constraints
+def _check_plan(plan: Plan, fewest: int, most: int) -> None:
     count = len(plan.sub_structures)
-    fewest, most = limits.min_sub_structures, limits.max_sub_structures
     if not fewest <= count <= most:
         allowed = str(most) if fewest == most else f"{fewest} to {most}"
         raise _PlanNotAllowedError(
@@ -103,16 +116,16 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         sub_structure=part.text,
     )
     dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
-    drafter = _looking_up(session, Role(name="drafter", system=pack.roles["drafter"]))
-    reviewer = _looking_up(
+    drafter = looking_up(session, Role(name="drafter", system=pack.roles["drafter"]))
+    reviewer = looking_up(
         session, Role(name="reviewer", system=pack.roles["reviewer"], tools=[OBJECTION])
     )
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
-            _speak(dialogue, drafter)
-        elif terminates(_speak(dialogue, reviewer)):
+            speak(dialogue, drafter)
+        elif terminates(speak(dialogue, reviewer)):
             dialogue.remark(drafter, pack.say("blueprint", name=part.name))
-            return _speak(dialogue, drafter).text
+            return speak(dialogue, drafter).text
     raise ConstructionFailedError(
         "turn_limit", f"no agreed drawing of {part.name} within {DRAFT_TURNS} turns"
     )
@@ -246,10 +259,10 @@ def _builder(session: Session, machine: Machine, names: Sequence[str]) -> Role:
 def _guidance(session: Session, brief: str) -> Role:
     system = session.pack.roles["guidance"]
     guidance = Role(name="guidance", system=system, tools=[OBJECTION], brief=brief)
-    return _looking_up(session, guidance)
+    return looking_up(session, guidance)
 
 
-def _looking_up(session: Session, role: Role) -> Role:
+def looking_up(session: Session, role: Role) -> Role:
     """A role that speaks, with the tools to look modules up where the task has it so."""
     tools = lookups(session.task)
     if not tools:
@@ -258,7 +271,7 @@ def _looking_up(session: Session, role: Role) -> Role:
     return replace(role, tools=[*role.tools, *tools], act=offered.act)
 
 
-def _speak(dialogue: Dialogue, role: Role) -> Completion:
+def speak(dialogue: Dialogue, role: Role) -> Completion:
     """A role's turn, and further ones while it looks modules up instead of speaking."""
     reply = dialogue.turn(role)
     may_look = any(tool.name in LOOKUPS for tool in role.tools)
@@ -278,7 +291,7 @@ def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: s
     place, steps = 0, 0
     for _ in range(BUILD_TURNS):
         role = roles[place]
-        reply = _speak(dialogue, role)
+        reply = speak(dialogue, role)
         if role is ends:
             if terminates(reply):
                 return

@@ -140,15 +140,19 @@ def _game_file(machine: Machine, name: str, task: str | None, controls: Path | N
 
 
 def import_file(
-    file: Annotated[Path, typer.Argument(help="A machine file of the game's (.bsg).")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="A machine file of the game's (.bsg), or a construction tree (JSON)."),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Write the machine document (.json) to this file.")
     ] = None,
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Read a machine file of the game's, and tell what it says beyond the machine.
+    """Read a machine file of the game's or a construction tree, and tell what it says beyond.
 
+    A construction tree, BesiegeField's format, is built entry by entry, each of them checked.
     Keys and settings that a machine here does not have are stored with it, change no trial, and
     stand in the game's file again when the machine is exported without a task.
     """
