@@ -66,6 +66,17 @@ def test_the_expert_throws_five_times_as_far_as_the_best_published(engine) -> No
     assert result.metrics["energy"] < result.metrics["work"]
 
 
+def test_the_published_score_is_told_beside_it() -> None:
+    """Its distance times 1 + how far it rose, 0 below a height of 3 or where it was brought."""
+    machine, trial = honest(FASTER_FIRST[0])
+    metrics, ball = score(TASK, machine, trial).metrics, index_of(machine, "Boulder")
+    path = trial.positions[:, ball]
+    distance = metrics["distance"] + TASK.scenario.gates[0].center[1] - path[0, 1]
+    rise = path[:, 2].max() - path[0, 2]
+    assert rise > 10
+    assert metrics["parabola"] == pytest.approx(distance * (1 + rise), rel=0.02)
+
+
 def test_engines_agree_about_how_far_it_flies() -> None:
     near, far = sorted(score(TASK, *honest(engine)).indicator for engine in FASTER_FIRST)
     assert far < 1.1 * near

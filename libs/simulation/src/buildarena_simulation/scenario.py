@@ -41,7 +41,7 @@ from buildarena_simulation.fields import (
 from buildarena_simulation.line import Line
 from buildarena_simulation.offered import Senses
 from buildarena_simulation.planet import Planet
-from buildarena_simulation.rounded_terrain import with_boxes
+from buildarena_simulation.terrain_shapes import with_boxes
 
 
 class _Document(BaseModel):
@@ -258,7 +258,7 @@ class Scenario(_Document):
     Attributes:
         duration_s: Length of the trial, seconds.
         terrain: Fixed boxes besides the ground; task files may write pipes and cylinders, see
-            `buildarena_simulation.rounded_terrain`.
+            `buildarena_simulation.terrain_shapes`.
         cargo: The cargo, if the trial has one.
         placement: Where the machine is put.
         control: Who presses the keys.

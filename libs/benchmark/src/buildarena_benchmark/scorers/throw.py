@@ -59,6 +59,9 @@ _INSIDE: Final = 0.1
 _SLACK: Final = 0.5
 """Height to which its own weight may be lifted by what no work explains, units."""
 
+_LEAST_HEIGHT: Final = 3.0
+"""What the published score asks a boulder to rise above, units."""
+
 NOT_BORNE: Final = Flag(
     name="not_borne",
     meaning="The boulder flew far enough, but no machine that is joined to the starting block "
@@ -264,6 +267,7 @@ class _Throw:
             "distance": rounded(self.distance()),
             "miss": None if miss is None else rounded(miss),
             "rings": self._passed(),
+            "parabola": rounded(self._parabola()),
             "release_s": rounded(self.trajectory.time_s[self.flight.released]),
             "release_speed": rounded(float(np.linalg.norm(self.flight.velocity))),
             "flight_error": rounded(self.flight.error),
@@ -301,6 +305,21 @@ class _Throw:
         share = -along[first] / (along[first + 1] - along[first])
         at = path[first] + share * (path[first + 1] - path[first])
         return 1.0 - float(np.linalg.norm(at - middle)) / room
+
+    def _parabola(self) -> float:
+        """BesiegeField's score: the distance from its start, times 1 + how far it rose.
+
+        It is 0 where the boulder never rose above a height of 3, or comes down nearer to the
+        starting block than a quarter of that distance. Source: its public release.
+        """
+        path = self.trajectory.positions[: self.flight.landed + 1, self.ball].astype(np.float64)
+        start = starting_block(self.machine, self.trajectory)
+        block = self.trajectory.positions[self.flight.landed, start].astype(np.float64)
+        distance = float(np.linalg.norm(self.flight.end[:2] - path[0, :2]))
+        apart = float(np.linalg.norm(self.flight.end - block))
+        if path[:, 2].max() < _LEAST_HEIGHT or apart < distance / 4:
+            return 0.0
+        return distance * (1.0 + float(path[:, 2].max() - path[0, 2]))
 
     def _passed(self) -> int | None:
         """How many rings it passes; None without rings."""

@@ -21,6 +21,7 @@ QUARTER = {
     "to_deg": 90,
 }
 RING = {"shape": "pipe", "center": [0, 8, 4], "radius": 3, "length": 1, "heading_deg": 90}
+STEPS = {"shape": "heights", "center": [0, 10, 0], "cell": [2, 3], "rows": [[0, 1, 1], [2, 0, 1]]}
 HUMP = {"shape": "cylinder", "center": [0, 5, 0], "radius": 2, "length": 8}
 
 
@@ -113,6 +114,26 @@ def test_a_bend_is_a_wall_without_gaps() -> None:
         scenario(bend | {"to_deg": -90})
 
 
+def test_a_field_of_heights_is_a_box_for_each_run_of_cells() -> None:
+    boxes = [(box.center, box.size) for box in scenario(STEPS).terrain]
+    assert boxes == [
+        ((1.0, 8.5, 0.5), (4.0, 3.0, 1.0)),
+        ((-2.0, 11.5, 1.0), (2.0, 3.0, 2.0)),
+        ((2.0, 11.5, 0.5), (2.0, 3.0, 1.0)),
+    ]
+
+
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_what_falls_onto_a_field_of_heights_lies_as_high_as_that(engine) -> None:
+    field = {
+        **STEPS,
+        "center": [0, 0, 0],
+        "cell": [6, 6],
+        "rows": [[1, 1, 1], [1, 2, 1], [1, 1, 1]],
+    }
+    assert fallen(engine, field, height=3.0)[-1, 0, 2] == pytest.approx(2.5, abs=0.05)
+
+
 def test_what_is_round_is_boxes_from_then_on_and_boxes_stay_as_they_were() -> None:
     wall = {"center": [0, 9, 1], "size": [2, 1, 2]}
     world = scenario(wall, RING)
@@ -166,6 +187,11 @@ def test_what_falls_beside_the_middle_of_a_half_pipe_slides_there(engine, headin
         ({**HUMP, "shape": "wedge"}, "0: Input tag 'wedge'.*'pipe', 'cylinder'"),
         ({**HUMP, "bend": 5}, "0.cylinder.bend"),
         ({**RING, "segments": 64, "radius": -1}, "0.pipe.radius"),
+        ({**STEPS, "rows": [[1, 2], [1]]}, "rows have 1 to 2 heights"),
+        ({**STEPS, "rows": [[0.05]]}, "0.05 is below 0.1"),
+        ({**STEPS, "rows": [[float("nan")]]}, "0.heights.rows"),
+        ({**STEPS, "rows": []}, "0.heights.rows"),
+        ({**STEPS, "cell": [1, 0]}, "0.heights.cell"),
     ],
 )
 def test_what_is_round_and_wrong_is_named(entry, why) -> None:

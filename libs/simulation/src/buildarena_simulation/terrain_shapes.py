@@ -1,10 +1,11 @@
-"""Round terrain as task files write it: pipes, cylinders, cones, bends, which become fixed boxes.
+"""Terrain as task files write it: pipes, cylinders, cones, bends, heights, which become boxes.
 
 What a scenario holds, what engines collide with and what films and pages draw are the boxes.
 """
 
 import math
 from collections.abc import Iterator, Mapping
+from itertools import groupby
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
@@ -18,6 +19,7 @@ _THINNEST: Final = 0.1
 
 Place = Annotated[float, Field(allow_inf_nan=False, ge=-1e4, le=1e4)]
 Extent = Annotated[float, Field(ge=0.1, le=1000)]
+Height = Annotated[float, Field(allow_inf_nan=False, ge=0, le=1000)]
 Angle = Annotated[float, Field(allow_inf_nan=False, ge=-180, le=180)]
 
 
@@ -221,15 +223,64 @@ class Bend(_Upright):
             yield self._box(heading, self.radius + self.thickness / 2, size)
 
 
-_Shape = Pipe | Cylinder | Cone | Bend
+class Heights(BaseModel):
+    """A field of heights: ground that is higher here and lower there, in steps.
+
+    Attributes:
+        center: (3,) its middle, on the level on which it stands, world frame, units.
+        cell: (2,) size of a cell to the east and to the north, units.
+        rows: Heights above that level, units: rows from south to north, each from west to east, as
+            many in each. Where one is 0 nothing stands.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    shape: Literal["heights"]
+    center: tuple[Place, Place, Place]
+    cell: tuple[Extent, Extent]
+    rows: Annotated[
+        tuple[Annotated[tuple[Height, ...], Field(min_length=1, max_length=64)], ...],
+        Field(min_length=1, max_length=64),
+    ]
+
+    @model_validator(mode="after")
+    def _is_a_grid(self) -> Self:
+        lengths = sorted({len(row) for row in self.rows})
+        if len(lengths) > 1:
+            raise ValueError(f"rows have {lengths[0]} to {lengths[-1]} heights: all need as many")
+        thin = [height for row in self.rows for height in row if 0 < height < _THINNEST]
+        if thin:
+            raise ValueError(f"a height of {thin[0]:g} is below {_THINNEST:g}, and not 0")
+        return self
+
+    def boxes(self) -> Iterator[dict[str, Any]]:
+        """One box for each run of cells of the same height along a row."""
+        (east, north), (x, y, z) = self.cell, self.center
+        west = x - east * len(self.rows[0]) / 2
+        south = y - north * len(self.rows) / 2
+        for number, row in enumerate(self.rows):
+            begin = 0
+            for height, run in groupby(row):
+                count = len(tuple(run))
+                middle = west + east * (begin + count / 2)
+                begin += count
+                if height:
+                    center = (middle, south + north * (number + 0.5), z + height / 2)
+                    yield {
+                        "center": [round(value, _DIGITS) + 0.0 for value in center],
+                        "size": [round(value, _DIGITS) for value in (east * count, north, height)],
+                    }
+
+
+_Shape = Pipe | Cylinder | Cone | Bend | Heights
 _SHAPES: Final[TypeAdapter[_Shape]] = TypeAdapter(Annotated[_Shape, Field(discriminator="shape")])
 
 
 def with_boxes(terrain: Any) -> Any:
-    """Terrain as a task file has it, with boxes in place of what is round.
+    """Terrain as a task file has it, with boxes in place of its other shapes.
 
     Raises:
-        ValueError: Something round is none; the message names its number and what is wrong.
+        ValueError: A shape is none; the message names its number and what is wrong.
     """
     if not isinstance(terrain, list | tuple):
         return terrain
