@@ -103,7 +103,7 @@ FIRST_TRIES: Final[Mapping[str, Mapping[str, Build]]] = {
         "frame on 4 cold ones": partial(rocket_assembly, heated=False),
         "frame on 4 cannons": rocket_assembly,
     },
-    **{f"throw-{level}": _catapults() for level in (1, 2, 3, 4)},
+    **{f"throw-{level}": _catapults() for level in (1, 2, 3, 4, 5)},
     **{f"deliver-{level}": _couriers() for level in (1, 2, 3)},
     **{f"drive-{level}": _couriers() for level in (1, 2, 3, 4)},
     "fetch-1": _cranes(),

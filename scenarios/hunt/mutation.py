@@ -35,6 +35,10 @@ _MODULES: Final[Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]]] = Mappi
             (WOOD, WHEEL, "Flying Block", "Log", "Ballast", "Steering Hinge", "Large Wheel"),
             (0.3, 0.2, 0.2, 0.1, 0.08, 0.06, 0.06),
         ),
+        "throwing": (
+            (WOOD, "Log", "Ballast", "Swivel", "Hinge", "Steering Hinge", "Boulder", "Bomb Holder"),
+            (0.4, 0.1, 0.1, 0.1, 0.1, 0.1, 0.05, 0.05),
+        ),
     }
 )
 _PROGRAM_SHARE: Final = 0.5
@@ -290,5 +294,6 @@ _GROWTHS: Final[Mapping[str, tuple[tuple[Mutation, float], ...]]] = MappingProxy
         "mechanisms": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
         "flight": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
         "control": _SHAPES,
+        "throwing": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
     }
 )

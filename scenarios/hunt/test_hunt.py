@@ -165,9 +165,10 @@ def test_wrong_options_are_named(arguments, says, capsys) -> None:
 
 @pytest.mark.samples(4)
 @pytest.mark.parametrize(
-    "task", {task.scorer: name for name, task in builtin_tasks().items()}.values()
+    "task",
+    {(task.scorer, kind_of(name)): name for name, task in builtin_tasks().items()}.values(),
 )
-def test_machines_of_every_scorer_can_be_hunted(task) -> None:
+def test_machines_of_every_scorer_and_kind_can_be_hunted(task) -> None:
     draw = np.random.default_rng(4)
     pool = seeds_of(task)
     child = mutated(crossed(pool[-1], pool[0], draw), kind_of(task), draw)

@@ -10,7 +10,7 @@ CONTROL = {
     *("landing-1", "landing-2", "slalom-2", "hover-3", "hover-4"),
     *("balance-1", "balance-2", "walk-1", "walk-2", "place-2", "line-1"),
 }
-THROWING = {"throw-1", "throw-2", "throw-3", "throw-4"}
+THROWING = {f"throw-{level}" for level in (1, 2, 3, 4, 5)}
 COURSES = {
     *(f"deliver-{level}" for level in (1, 2, 3)),
     *(f"drive-{level}" for level in (1, 2, 3, 4)),

@@ -45,7 +45,7 @@ CONTROL = [
 ]
 
 
-THROWING = ["throw-1", "throw-2", "throw-3", "throw-4"]
+THROWING = ["throw-1", "throw-2", "throw-3", "throw-4", "throw-5"]
 COURSES = [
     *(f"deliver-{level}" for level in (1, 2, 3)),
     *(f"drive-{level}" for level in (1, 2, 3, 4)),

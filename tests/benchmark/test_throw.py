@@ -192,6 +192,7 @@ def test_who_throws_as_in_the_exact_world_misses_where_the_ring_is_elsewhere(eng
 
 
 STANDING: Final = builtin_tasks()["throw-4"]
+TWO: Final = builtin_tasks()["throw-5"]
 
 
 @pytest.mark.samples(1)
@@ -216,6 +217,27 @@ def test_a_ring_is_passed_in_the_air_and_with_all_of_the_boulder() -> None:
         task = replace(STANDING, scenario=STANDING.scenario.model_copy(update={"marks": marks}))
         result = score(task, machine, trial)
         assert (result.success, result.indicator, result.metrics["rings"]) == (False, 0.0, 0)
+
+
+@pytest.mark.samples(1)
+@pytest.mark.parametrize("seed", [None, 8, 11])
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_the_expert_throws_through_two_rings(engine, seed) -> None:
+    result = scored(TWO, experts_machine(TWO), engine, seed)
+    assert result.success
+    assert result.metrics["rings"] == 2
+    assert 2.0 < result.indicator < 4.0
+
+
+def test_one_ring_of_two_counts_and_is_no_success() -> None:
+    machine = experts_machine(TWO)
+    trial = simulate(machine, TWO.scenario, "mujoco")
+    marks = {mark.name: mark for mark in TWO.scenario.marks}
+    aside = marks["near"].model_copy(update={"center": (5, 8, 23)})
+    scenario = TWO.scenario.model_copy(update={"marks": (aside, marks["ring"])})
+    result = score(replace(TWO, scenario=scenario), machine, trial)
+    assert (result.success, result.metrics["rings"]) == (False, 1)
+    assert 1.0 < result.indicator < 2.0
 
 
 def test_who_throws_as_in_the_exact_world_misses_a_higher_ring() -> None:

@@ -35,7 +35,7 @@ _CONTROL: Final = (
     "place-2",
     "line-1",
 )
-_THROWING: Final = ("throw-1", "throw-2", "throw-3", "throw-4")
+_THROWING: Final = ("throw-1", "throw-2", "throw-3", "throw-4", "throw-5")
 _SPACE: Final = ("orbit-1", "orbit-2")
 _COURSES: Final = (
     "deliver-1",

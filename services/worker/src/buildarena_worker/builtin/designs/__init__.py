@@ -69,6 +69,7 @@ DESIGNS: dict[str, Callable[[int], Design]] = {
     "throw-2": throwers.catapult,
     "throw-3": throwers.aiming_catapult,
     "throw-4": throwers.ring_shooter,
+    "throw-5": throwers.ring_shooter,
     "orbit-1": spacecraft.orbiter,
     "orbit-2": spacecraft.returner,
     "deliver-1": couriers.courier,
