@@ -6,8 +6,21 @@ here=$(dirname "$0")
 
 mkdir -p "$out"
 rm -f "$out"/buildarena*.whl "$out"/buildarena*.tar.gz
-bash "$here/uv.sh" build --quiet --all-packages --no-build-isolation --python .venv/bin/python \
-    --out-dir "$out" --no-create-gitignore
+
+build() {
+    bash "$here/uv.sh" build --quiet --no-build-isolation --python .venv/bin/python \
+        --out-dir "$out" --no-create-gitignore "$@"
+}
+
 # pip takes hashes for all or for none, and our own wheels have none.
-sed -E '/^ *(--hash|#|$)/d; s/ *\\$//' requirements.lock >"$out/constraints.txt"
-echo "$out: $(ls "$out"/*.whl | wc -l) wheels, $(ls "$out"/*.tar.gz | wc -l) sdists, constraints.txt"
+constraints() {
+    sed -E '/^ *(--hash|#|$)/d; s/ *\\$//' "$1"
+}
+
+build --all-packages
+constraints requirements.lock >"$out/constraints.txt"
+for adapter in integrations/*/; do
+    build "$adapter"
+    constraints "$adapter/requirements.lock" >"$out/constraints-$(basename "$adapter").txt"
+done
+echo "$out: $(ls "$out"/*.whl | wc -l) wheels, $(ls "$out"/*.tar.gz | wc -l) sdists, $(ls "$out"/constraints*.txt | wc -l) constraints"

@@ -1,4 +1,4 @@
-.PHONY: test-integrations check-integrations lock-integrations
+.PHONY: test-integrations check-integrations lock-integrations lock-uv
 
 # Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
 INTEGRATIONS := inspect verifiers openenv gymnasium
@@ -20,3 +20,7 @@ check-integrations: $(INTEGRATION_STAMPS)
 # Physics comes in the versions of requirements.lock: elsewhere the same trial has other bytes.
 lock-integrations:
 	@set -e; $(foreach name,$(INTEGRATIONS),bash mk/integrations.sh lock $(name) $(LIBRARIES) $(LIBRARIES_$(name));)
+	@$(MAKE) --no-print-directory lock-uv
+
+lock-uv: ## Writes the adapters' uv.lock from their requirements.lock
+	@$(BIN)/python mk/uv_locks.py $(addprefix integrations/,$(INTEGRATIONS))
