@@ -1,4 +1,4 @@
-.PHONY: test-integrations check-integrations lock-integrations lock-uv
+.PHONY: test-integrations check-integrations lock-integrations lock-uv inspect-tasks
 
 # Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
 INTEGRATIONS := inspect verifiers openenv gymnasium
@@ -24,3 +24,6 @@ lock-integrations:
 
 lock-uv: ## Writes the adapters' uv.lock from their requirements.lock
 	@$(BIN)/python mk/uv_locks.py $(addprefix integrations/,$(INTEGRATIONS))
+
+inspect-tasks: $(STAMP) ## Writes the tasks of Inspect's adapter and their versions again, after a change of tasks
+	@$(BIN)/python mk/inspect_tasks.py

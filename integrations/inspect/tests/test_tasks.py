@@ -14,7 +14,6 @@ import pytest
 from inspect_ai import eval_retry, score
 from inspect_ai.approval import ApprovalPolicy, auto_approver
 from inspect_ai.model import ModelOutput, get_model
-from inspect_ai.model._providers.mockllm import MockLLM
 from inspect_ai.solver import solver
 from scripted_models import (
     EXPERTS,
@@ -36,7 +35,7 @@ from buildarena_inspect.errors import ChoiceError
 from buildarena_inspect.log_artifacts import MACHINE, TRAJECTORY
 from buildarena_inspect.scorers import indicator, machine_hash, success
 from buildarena_inspect.solvers import MAX_IDLE_TURNS
-from buildarena_inspect.tasks import TASKS
+from buildarena_inspect.task_factory import TASKS
 from buildarena_simulation import read_trajectory
 
 WOOD = {"base_block": 1, "face": "A", "new_block": "Small Wooden Block"}
@@ -280,7 +279,8 @@ def test_a_machine_that_ends_its_process_costs_one_sample_and_only_that_is_run_a
         output.usage = USAGE
         return output
 
-    monkeypatch.setattr(MockLLM, "generate", generate)  # a retry makes the model anew, by its name
+    # A retry makes the model anew, by its name.
+    monkeypatch.setattr(type(get_model("mockllm/model").api), "generate", generate)
     (again,) = eval_retry(log, log_dir="logs", display="none")
     assert again.status == "success"
     after = {sample.id: sample for sample in again.samples}

@@ -4,6 +4,6 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
-from buildarena_inspect.tasks import TASKS
+from buildarena_inspect.task_factory import TASKS
 
 __all__ = ["TASKS"]

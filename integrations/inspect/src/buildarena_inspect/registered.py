@@ -1,10 +1,11 @@
 """What Inspect loads by the entry points `buildarena` and `buildarena_inspect`."""
 
+from buildarena_inspect import tasks
 from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval
 from buildarena_inspect.roles import five_roles
 from buildarena_inspect.scorers import indicator, reward, success
 from buildarena_inspect.solvers import react_builder, workbench
-from buildarena_inspect.tasks import TASKS
+from buildarena_inspect.task_factory import TASKS
 
 __all__ = [
     "TASKS",
@@ -16,5 +17,6 @@ __all__ = [
     "reward",
     "success",
     "success_interval",
+    "tasks",
     "workbench",
 ]

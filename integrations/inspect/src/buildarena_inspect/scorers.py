@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from hashlib import sha256
-from importlib.metadata import version
 from typing import Any, Final
 
 from inspect_ai.scorer import CORRECT, INCORRECT, Score, Scorer, Target, accuracy, mean, scorer
 from inspect_ai.solver import TaskState
 
 from buildarena_benchmark.flags import is_disqualified
-from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_environment import Trial
 from buildarena_environment.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_inspect.building import Building, building_of
 from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval
-from buildarena_simulation import SIMULATION_VERSION
+from buildarena_inspect.versions import result_versions
 
 SUCCESS: Final = "success"
 INDICATOR: Final = "indicator"
@@ -92,9 +90,7 @@ def described(building: Building, trial: Trial) -> dict[str, Any]:
         "task": environment.task.name,
         "task_version": environment.task.version,
         "simulator": environment.simulator,
-        "simulation_version": SIMULATION_VERSION,
-        "engine_version": version(environment.simulator),
-        "scorer_version": SCORER_VERSION,
+        **result_versions(environment.simulator),
         "seed": environment.seed,
         "success": trial.score.success,
         "indicator": trial.score.indicator,

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Final
 
-from inspect_ai.agent import AgentAttempts, AgentState, AgentSubmit, as_solver, react
+from inspect_ai.agent import Agent, AgentAttempts, AgentState, AgentSubmit, as_solver, react
+from inspect_ai.model import get_model
 from inspect_ai.scorer import Score
 from inspect_ai.solver import Generate, Solver, TaskState, solver
+from inspect_ai.tool import Tool
 
 from buildarena_inspect.building import Building, begin, building_of
-from buildarena_inspect.tools import building_tools, submit_tool
+from buildarena_inspect.tools import building_tools, put_numbers_into_texts, submit_tool
 
 MAX_IDLE_TURNS: Final = 10
 """After so many replies in a row without a call that reaches the machine, the building ends."""
@@ -40,6 +42,7 @@ def react_builder() -> Solver:
         building = building_of(state)
         agent = react(
             prompt=None,
+            model=_replying(building),
             tools=building_tools(building),
             submit=AgentSubmit(tool=submit_tool(building), keep_in_messages=True),
             attempts=AgentAttempts(building.environment.rounds, _again),
@@ -48,6 +51,20 @@ def react_builder() -> Solver:
         return await as_solver(agent)(state, generate)
 
     return solve
+
+
+def _replying(building: Building) -> Agent:
+    """The evaluated model, whose calls may give blocks' ids as numbers."""
+
+    async def reply(state: AgentState, tools: list[Tool]) -> AgentState:
+        output = (await get_model().generate(state.messages, tools)).model_copy(deep=True)
+        for call in output.message.tool_calls or ():
+            put_numbers_into_texts(call, building.environment.tools)
+        state.output = output
+        state.messages.append(output.message)
+        return state
+
+    return reply
 
 
 async def _again(state: AgentState, scores: list[Score]) -> str:

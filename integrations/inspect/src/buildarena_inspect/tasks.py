@@ -1,136 +1,337 @@
-"""Tasks of Inspect: one for each of ours, and one with all of them as samples."""
+"""Inspect's tasks, one for each of BuildArena's. `make inspect-tasks` writes this file."""
 
-from __future__ import annotations
-
-import json
-from collections.abc import Callable, Mapping, Sequence
-from multiprocessing import current_process
-from typing import Any, Final
+from typing import Unpack
 
 from inspect_ai import Task, task
-from inspect_ai._util.registry import RegistryInfo, registry_add, registry_info
-from inspect_ai.dataset import MemoryDataset, Sample
-from inspect_ai.scorer import Scorer
-from inspect_ai.solver import Solver
 
-from buildarena_benchmark import builtin_tasks
-from buildarena_environment import DEFAULT_STEPS
-from buildarena_inspect.building import Conditions
-from buildarena_inspect.errors import ChoiceError, UnguardedProgramError
-from buildarena_inspect.log_artifacts import keep
-from buildarena_inspect.roles import five_roles
-from buildarena_inspect.scorers import indicator, reward, success
-from buildarena_inspect.solvers import react_builder, workbench
-from buildarena_simulation import DEFAULT_ENGINE
-
-NAMESPACE: Final = "buildarena"
-"""What comes before a task's name on Inspect's command line."""
-SOLVERS: Final[Mapping[str, Callable[[], Solver]]] = {"react": react_builder, "roles": five_roles}
-"""Solvers by the names that the task argument `solver` takes."""
+from buildarena_inspect.task_factory import TASK_NAMES, TaskArguments, task_of
 
 
-def _made(tasks: Sequence[str], solver: str, **conditions: Any) -> Task:
-    _require_guard()
-    if solver not in SOLVERS:
-        raise ChoiceError(f"there is no solver {solver!r}: choose from {', '.join(SOLVERS)}")
-    rewards = conditions["rewards"]
-    if isinstance(rewards, str):
-        conditions["rewards"] = rewards = _weights(rewards)
-    scorers: list[Scorer] = [success(), indicator(), *([reward()] if rewards else [])]
-    return Task(
-        dataset=MemoryDataset(
-            [_sample(Conditions(task=name, **conditions)) for name in tasks], name=NAMESPACE
-        ),
-        setup=workbench(),
-        solver=SOLVERS[solver](),
-        scorer=scorers,
-        cleanup=keep,
-        # One that crashes the engine costs one sample, and `inspect eval-retry` takes it up.
-        continue_on_fail=True,
-        version=_version(tasks),
-    )
+@task
+def transport_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A vehicle that drives and steers."""
+    return task_of("transport-1", **arguments)
 
 
-def _require_guard() -> None:
-    """Checks that this is no process of a trial which runs its parent's program again."""
-    if getattr(current_process(), "_inheriting", False):
-        raise UnguardedProgramError(
-            "trials start processes, which run a program's top level again: put what evaluates "
-            'under `if __name__ == "__main__":`'
-        )
+@task
+def transport_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that carries a 2.5 x 2.5 x 1.5 cargo."""
+    return task_of("transport-2", **arguments)
 
 
-def _sample(conditions: Conditions) -> Sample:
-    environment = conditions.environment()
-    return Sample(
-        id=conditions.task,
-        input=environment.observation.briefing,
-        target="success",
-        metadata=conditions.as_metadata(),
-    )
+@task
+def transport_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that carries a 4 x 8 x 1.5 cargo there and back."""
+    return task_of("transport-3", **arguments)
 
 
-def _version(tasks: Sequence[str]) -> str:
-    """The version of our task; several have none together."""
-    return builtin_tasks()[tasks[0]].version if len(tasks) == 1 else "0"
+@task
+def support_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A bridge over a gap of 5."""
+    return task_of("support-1", **arguments)
 
 
-def _weights(text: str) -> dict[str, float]:
-    """Weights of rewards from a command line, as JSON."""
-    try:
-        found = json.loads(text)
-        return {str(name): float(weight) for name, weight in found.items()}
-    except (AttributeError, TypeError, ValueError) as error:
-        raise ChoiceError(
-            f"rewards is {text!r}: it is an object of weights by name, such as "
-            '{"success": 1, "indicator": 0.5}'
-        ) from error
+@task
+def support_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A bridge over a gap of 10."""
+    return task_of("support-2", **arguments)
 
 
-def _named(name: str, tasks: Sequence[str]) -> Callable[..., Task]:
-    """Registers a task under our name; Inspect's own way would put the module's before it."""
-
-    def make(  # noqa: PLR0917 - Inspect gives them by name
-        simulator: str = DEFAULT_ENGINE,
-        rounds: int = 1,
-        rewards: dict[str, float] | str | None = None,
-        solver: str = "react",
-        seed: int | None = None,
-        steps: int = DEFAULT_STEPS,
-    ) -> Task:
-        return _made(
-            tasks,
-            solver,
-            simulator=simulator,
-            rounds=rounds,
-            rewards=rewards,
-            seed=seed,
-            steps=steps,
-        )
-
-    make.__name__ = make.__qualname__ = name
-    make.__doc__ = _documentation(tasks)
-    made = task(make)
-    metadata = registry_info(made).metadata
-    registry_add(made, RegistryInfo(type="task", name=f"{NAMESPACE}/{name}", metadata=metadata))
-    return made
+@task
+def support_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A bridge over a gap of 20."""
+    return task_of("support-3", **arguments)
 
 
-def _documentation(tasks: Sequence[str]) -> str:
-    title = builtin_tasks()[tasks[0]].title if len(tasks) == 1 else "All tasks, each a sample"
-    return f"""{title}.
-
-    Args:
-        simulator: Name of the engine, `pybullet` or `mujoco`.
-        rounds: How often a model may submit; a successful trial ends the building.
-        rewards: Weights of rewards by name, for the scorer `reward`.
-        solver: `react`, Inspect's agent, or `roles`, our workflow of five roles.
-        seed: Varies where machine and cargo start; the exact start, the service's, without one.
-        steps: Calls that a model may make.
-    """
+@task
+def lift_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A rocket engine."""
+    return task_of("lift-1", **arguments)
 
 
-TASKS: Final[Mapping[str, Callable[..., Task]]] = {
-    name.replace("-", "_"): _named(name.replace("-", "_"), [name]) for name in builtin_tasks()
-} | {"all": _named("all", list(builtin_tasks()))}
-"""Tasks by the names that follow `buildarena/`."""
+@task
+def lift_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A rocket."""
+    return task_of("lift-2", **arguments)
+
+
+@task
+def lift_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A rocket of engine and frame."""
+    return task_of("lift-3", **arguments)
+
+
+@task
+def mechanisms_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A vehicle for a rough road."""
+    return task_of("mechanisms-1", **arguments)
+
+
+@task
+def mechanisms_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A car that steers through a slalom."""
+    return task_of("mechanisms-2", **arguments)
+
+
+@task
+def mechanisms_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A winch of gears."""
+    return task_of("mechanisms-3", **arguments)
+
+
+@task
+def mechanisms_4(**arguments: Unpack[TaskArguments]) -> Task:
+    """An arm that moves a cargo over a wall."""
+    return task_of("mechanisms-4", **arguments)
+
+
+@task
+def flight_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that hovers with a cargo."""
+    return task_of("flight-1", **arguments)
+
+
+@task
+def flight_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A glider."""
+    return task_of("flight-2", **arguments)
+
+
+@task
+def support_4(**arguments: Unpack[TaskArguments]) -> Task:
+    """A bridge over a gap of 30, for loads to 5,000."""
+    return task_of("support-4", **arguments)
+
+
+@task
+def support_5(**arguments: Unpack[TaskArguments]) -> Task:
+    """A bridge over a gap of 45, for loads to 5,000."""
+    return task_of("support-5", **arguments)
+
+
+@task
+def mechanisms_5(**arguments: Unpack[TaskArguments]) -> Task:
+    """A car that steers through a slalom of 12 gates."""
+    return task_of("mechanisms-5", **arguments)
+
+
+@task
+def mechanisms_6(**arguments: Unpack[TaskArguments]) -> Task:
+    """An arm that puts a cargo down to 0.3."""
+    return task_of("mechanisms-6", **arguments)
+
+
+@task
+def transport_4(**arguments: Unpack[TaskArguments]) -> Task:
+    """A vehicle that stops at three points."""
+    return task_of("transport-4", **arguments)
+
+
+@task
+def flight_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that hovers at three heights."""
+    return task_of("flight-3", **arguments)
+
+
+@task
+def lift_4(**arguments: Unpack[TaskArguments]) -> Task:
+    """A rocket that takes up a payload."""
+    return task_of("lift-4", **arguments)
+
+
+@task
+def mechanisms_7(**arguments: Unpack[TaskArguments]) -> Task:
+    """A winch for a cargo that grows heavier."""
+    return task_of("mechanisms-7", **arguments)
+
+
+@task
+def support_6(**arguments: Unpack[TaskArguments]) -> Task:
+    """A bridge over a gap of 5, for loads to 10,000."""
+    return task_of("support-6", **arguments)
+
+
+@task
+def support_7(**arguments: Unpack[TaskArguments]) -> Task:
+    """A bridge over a gap of 10, for loads to 10,000."""
+    return task_of("support-7", **arguments)
+
+
+@task
+def budget_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """The lightest bridge over a gap of 10 that carries 300."""
+    return task_of("budget-1", **arguments)
+
+
+@task
+def repair_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A car with three faults, and four edits to repair it."""
+    return task_of("repair-1", **arguments)
+
+
+@task
+def identify_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A cargo taken to a height in a world that is not told."""
+    return task_of("identify-1", **arguments)
+
+
+@task
+def landing_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that lands softly on a mark."""
+    return task_of("landing-1", **arguments)
+
+
+@task
+def landing_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that lands softly on a mark with little fuel."""
+    return task_of("landing-2", **arguments)
+
+
+@task
+def slalom_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A car that finds its way through eight gates."""
+    return task_of("slalom-2", **arguments)
+
+
+@task
+def hover_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that keeps its place in gusts."""
+    return task_of("hover-3", **arguments)
+
+
+@task
+def hover_4(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that follows a moving place."""
+    return task_of("hover-4", **arguments)
+
+
+@task
+def balance_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that stands on two wheels."""
+    return task_of("balance-1", **arguments)
+
+
+@task
+def balance_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that stands on two wheels when pushed."""
+    return task_of("balance-2", **arguments)
+
+
+@task
+def walk_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that walks north."""
+    return task_of("walk-1", **arguments)
+
+
+@task
+def walk_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that walks north, and round a corner."""
+    return task_of("walk-2", **arguments)
+
+
+@task
+def place_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """An arm that puts a cargo wherever its mark is."""
+    return task_of("place-2", **arguments)
+
+
+@task
+def line_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A car that follows a line it sees from above."""
+    return task_of("line-1", **arguments)
+
+
+@task
+def throw_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that throws a boulder far."""
+    return task_of("throw-1", **arguments)
+
+
+@task
+def throw_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that throws a boulder out of a fence."""
+    return task_of("throw-2", **arguments)
+
+
+@task
+def throw_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that throws a boulder into a ring wherever that lies."""
+    return task_of("throw-3", **arguments)
+
+
+@task
+def throw_4(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that throws a boulder through a ring wherever that stands."""
+    return task_of("throw-4", **arguments)
+
+
+@task
+def throw_5(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that throws a boulder through two rings wherever those stand."""
+    return task_of("throw-5", **arguments)
+
+
+@task
+def orbit_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that flies three times round a planet."""
+    return task_of("orbit-1", **arguments)
+
+
+@task
+def orbit_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that flies round a planet and comes back softly."""
+    return task_of("orbit-2", **arguments)
+
+
+@task
+def deliver_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that delivers a ball."""
+    return task_of("deliver-1", **arguments)
+
+
+@task
+def deliver_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that delivers a ball up a ramp."""
+    return task_of("deliver-2", **arguments)
+
+
+@task
+def deliver_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that delivers a ball under a barrier."""
+    return task_of("deliver-3", **arguments)
+
+
+@task
+def drive_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A vehicle that drives up a quarter pipe."""
+    return task_of("drive-1", **arguments)
+
+
+@task
+def drive_2(**arguments: Unpack[TaskArguments]) -> Task:
+    """A vehicle that drives over half cylinders."""
+    return task_of("drive-2", **arguments)
+
+
+@task
+def drive_3(**arguments: Unpack[TaskArguments]) -> Task:
+    """A vehicle that drives through a gap and past a cone."""
+    return task_of("drive-3", **arguments)
+
+
+@task
+def drive_4(**arguments: Unpack[TaskArguments]) -> Task:
+    """A vehicle that follows a track of two bends."""
+    return task_of("drive-4", **arguments)
+
+
+@task
+def fetch_1(**arguments: Unpack[TaskArguments]) -> Task:
+    """A machine that fetches a weight out of a well."""
+    return task_of("fetch-1", **arguments)
+
+
+@task(name="all")
+def all_tasks(**arguments: Unpack[TaskArguments]) -> Task:
+    """All tasks, each a sample."""
+    return task_of(*TASK_NAMES, **arguments)

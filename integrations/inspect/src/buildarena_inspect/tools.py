@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from inspect_ai.tool import ToolDef, ToolError, ToolParams
-from inspect_ai.tool._tool_canonical import set_tool_canonical_arguments
+from inspect_ai.tool import ToolCall, ToolDef, ToolError, ToolParams
 from inspect_ai.util import JSONSchema
 
 from buildarena_environment import EpisodeOverError, NothingToSubmitError
@@ -35,6 +34,18 @@ def submit_tool(building: Building) -> ToolDef:
     return _tool(SUBMIT, execute)
 
 
+def put_numbers_into_texts(call: ToolCall, tools: Iterable[ToolDefinition]) -> None:
+    """Makes texts of the whole numbers that a call gives where a tool takes texts.
+
+    Inspect refuses what does not fit a schema; a block's id as a number does, everywhere else.
+    """
+    for tool in tools:
+        if tool.name == call.function:
+            for name, schema in tool.parameters["properties"].items():
+                if schema.get("type") == "string" and type(call.arguments.get(name)) is int:
+                    call.arguments[name] = str(call.arguments[name])
+
+
 def parameters_of(schema: Mapping[str, Any]) -> ToolParams:
     """A tool's schema as Inspect has it, which knows no bounds on the length of arrays."""
     return ToolParams(
@@ -51,20 +62,6 @@ def _action(definition: ToolDefinition, building: Building) -> ToolDef:
     async def execute(**kwargs: Any) -> str:
         return building.call(definition.name, kwargs)
 
-    texts = {
-        name
-        for name, schema in definition.parameters["properties"].items()
-        if schema.get("type") == "string"
-    }
-
-    def canonical(arguments: dict[str, Any]) -> dict[str, Any]:
-        return {
-            name: str(value) if name in texts and type(value) is int else value
-            for name, value in arguments.items()
-        }
-
-    # Inspect refuses what does not fit a schema; a block's id as a number does, everywhere else.
-    set_tool_canonical_arguments(execute, canonical)
     return _tool(definition, execute)
 
 

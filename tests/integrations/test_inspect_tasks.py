@@ -1,0 +1,36 @@
+"""The file of Inspect's tasks is current, and the number of a version rises when results change."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def writer():
+    spec = importlib.util.spec_from_file_location("inspect_tasks", ROOT / "mk/inspect_tasks.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_tasks_and_versions_are_those_of_the_catalogue(writer) -> None:
+    assert writer.TASKS.read_text() == writer.tasks_file(), "make inspect-tasks"
+    present = writer.VERSIONS.read_text()
+    assert present == writer.versions_file(present), "make inspect-tasks"
+
+
+def test_a_number_rises_by_one_for_each_change_and_never_falls(writer) -> None:
+    present = json.loads(writer.versions_file("{}"))
+    assert {entry["number"] for entry in present.values()} == {1}
+    present["support-1"] = {"number": 4, "of": "task 000000000000, simulation 7, feedback 3"}
+    del present["lift-1"]
+    after = json.loads(writer.versions_file(json.dumps(present)))
+    numbers = {name: after[name]["number"] for name in ("support-1", "support-2", "lift-1")}
+    assert numbers == {"support-1": 5, "support-2": 1, "lift-1": 1}
+    assert after["support-1"]["of"] == writer.compared("support-1")
