@@ -1,8 +1,9 @@
-"""Does what a register of evaluations does before it lists one: register_review.py FOLDER [TASK...].
+"""Does what registers do before they list an evaluation: register_review.py FOLDER [TASK...].
 
-It clones what is committed into the folder, calls `uv sync` in the adapter's, lists the tasks of its file,
-evaluates each by FILE@TASK with Inspect's mock model, evaluates a set of two, and retries a log of which
-half is missing. Without names of tasks it evaluates all.
+It clones what is committed into the folder, calls `uv sync` in the adapter's, lists the tasks of
+its file, evaluates each by FILE@TASK with Inspect's mock model, evaluates a set of two, and retries
+a log of which half is missing. Without names of tasks it evaluates all. It prints how many tasks
+there are, and of each log its folder, status, version, number of samples, and task.
 """
 
 from __future__ import annotations
@@ -25,10 +26,11 @@ write_eval_log(log, sys.argv[2])
 """
 STATES = """
 import sys
-from inspect_ai.log import list_eval_logs, read_eval_log
-for info in list_eval_logs(sys.argv[1]):
-    log = read_eval_log(info)
-    print(log.status, log.eval.task_version, len(log.samples), log.eval.task)
+from pathlib import Path
+from inspect_ai.log import read_eval_log
+for file in sorted(Path(sys.argv[1]).glob("*/*.eval")):
+    log = read_eval_log(str(file))
+    print(file.parent.name, log.status, log.eval.task_version, len(log.samples), log.eval.task)
 """
 
 
@@ -51,33 +53,29 @@ class Review:
         told = self._inspect("list tasks", "list", "tasks", FILE)
         return [line.partition("@")[2] for line in told.split()]
 
-    def evaluate(self, task: str) -> list[str]:
-        """Evaluates a task; what its log says."""
-        folder = self._logs / task
-        self._inspect(f"eval {task}", "eval", f"{FILE}@{task}", *MODEL, "--log-dir", folder)
-        return self._states(folder)
+    def evaluate(self, task: str) -> None:
+        """Evaluates a task."""
+        words = [f"{FILE}@{task}", *MODEL, "--log-dir", self._logs / task]
+        self._inspect(f"eval {task}", "eval", *words)
 
-    def evaluate_set(self, *tasks: str) -> list[str]:
-        """Evaluates several as a set; what their logs say."""
-        folder = self._logs / "set"
+    def evaluate_set(self, *tasks: str) -> None:
+        """Evaluates several tasks as a set."""
         files = [f"{FILE}@{task}" for task in tasks]
-        self._inspect("eval-set", "eval-set", *files, *MODEL, "--log-dir", folder)
-        return self._states(folder)
+        self._inspect("eval-set", "eval-set", *files, *MODEL, "--log-dir", self._logs / "set")
 
-    def retry(self, task: str) -> list[str]:
-        """Retries a log that lacks one of two epochs; what the new log says."""
-        whole, again = self._logs / "whole", self._logs / "again"
+    def retry(self, task: str) -> None:
+        """Retries a log that lacks one of two epochs."""
+        whole = self._logs / "whole"
         words = [f"{FILE}@{task}", *MODEL, "--epochs", "2", "--log-dir", whole]
         self._inspect(f"eval {task} twice", "eval", *words)
         (log,) = whole.glob("*.eval")
         half = self._logs / log.name
         self._step("halve a log", self._bin / "python", "-c", HALVE, log, half)
-        self._inspect("eval-retry", "eval-retry", half, "--log-dir", again)
-        return self._states(again)
+        self._inspect("eval-retry", "eval-retry", half, "--log-dir", self._logs / "again")
 
-    def _states(self, folder: Path) -> list[str]:
-        told = self._step(f"read {folder.name}", self._bin / "python", "-c", STATES, folder)
-        return told.splitlines()
+    def told(self) -> str:
+        """What all logs say."""
+        return self._step("read the logs", self._bin / "python", "-c", STATES, self._logs)
 
     def _inspect(self, name: str, *words: object) -> str:
         return self._step(name, self._bin / "inspect", *words)
@@ -108,11 +106,11 @@ def main() -> None:
     review = Review(folder)
     names = review.listed()
     chosen = sys.argv[2:] or names
-    print(len(names), "tasks")
     for name in chosen:
-        print(*review.evaluate(name))
-    print(*review.evaluate_set(*chosen[:2]), sep="\n")
-    print(*review.retry(chosen[0]))
+        review.evaluate(name)
+    review.evaluate_set(*chosen[:2])
+    review.retry(chosen[0])
+    sys.stdout.write(f"{len(names)} tasks\n{review.told()}")
 
 
 if __name__ == "__main__":

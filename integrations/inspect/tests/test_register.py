@@ -1,4 +1,4 @@
-"""What a register of evaluations asks for: a project that installs, and tasks that are found in a file."""
+"""What registers of evaluations ask for: a project that installs, tasks that a file shows."""
 
 from __future__ import annotations
 
@@ -77,20 +77,22 @@ def reviewed(folder: Path, *tasks: str) -> list[str]:
 
 @pytest.mark.timeout(600)
 def test_a_clone_is_installed_and_evaluated_as_a_register_does(tmp_path) -> None:
-    count, one, two, *others = reviewed(tmp_path, "support_1", "drive_1")
+    count, *logs = reviewed(tmp_path, "support_1", "drive_1")
     assert count == f"{len(TASKS)} tasks"
-    assert (one.split()[0], one.split()[2:]) == ("success", ["1", "support_1"])
-    assert (two.split()[0], two.split()[2:]) == ("success", ["1", "drive_1"])
-    assert sorted(line.split()[3] for line in others[:2]) == ["drive_1", "support_1"]
-    assert {line.split()[0] for line in others[:2]} == {"success"}
-    assert (others[2].split()[0], others[2].split()[2:]) == ("success", ["2", "support_1"])
+    assert sorted(line.split() for line in logs) == [
+        ["again", "success", inspect_version(["support-1"]), "2", "support_1"],
+        ["drive_1", "success", inspect_version(["drive-1"]), "1", "drive_1"],
+        ["set", "success", inspect_version(["drive-1"]), "1", "drive_1"],
+        ["set", "success", inspect_version(["support-1"]), "1", "support_1"],
+        ["support_1", "success", inspect_version(["support-1"]), "1", "support_1"],
+        ["whole", "success", inspect_version(["support-1"]), "2", "support_1"],
+    ]
 
 
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_a_clone_evaluates_all_tasks(tmp_path) -> None:
-    count, *lines = reviewed(tmp_path)
+    count, *logs = reviewed(tmp_path)
     assert count == f"{len(TASKS)} tasks"
-    assert len(lines) == len(TASKS) + 3
-    assert {line.split()[0] for line in lines} == {"success"}
-    assert {line.split()[3] for line in lines} == set(TASKS)
+    assert {line.split()[1] for line in logs} == {"success"}
+    assert {line.split()[0] for line in logs} == {*TASKS, "set", "whole", "again"}
