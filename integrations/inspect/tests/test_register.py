@@ -38,7 +38,7 @@ def test_versions_have_the_registers_form_and_logs_name_all_of_them(run) -> None
     log = run("buildarena/support_1", listed(call("submit", {})), message_limit=4)
     assert re.fullmatch(r"[1-9][0-9]*-[A-Z]", log.eval.task_version)
     assert log.eval.metadata == {
-        "buildarena_version": version("buildarena-inspect"),
+        "adapter_version": version("buildarena-inspect"),
         "simulator": "pybullet",
         "engine_version": engine_version("pybullet"),
         "simulation_version": SIMULATION_VERSION,

@@ -43,7 +43,7 @@ def result_versions(simulator: str) -> Mapping[str, str | int]:
 def task_metadata(tasks: Sequence[str], simulator: str) -> dict[str, object]:
     """What the log of a task of Inspect says of its versions."""
     return {
-        "buildarena_version": version("buildarena-inspect"),
+        "adapter_version": version("buildarena-inspect"),
         "simulator": simulator,
         **result_versions(simulator),
         "task_versions": {name: builtin_tasks()[name].version for name in tasks},
