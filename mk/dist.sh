@@ -23,4 +23,5 @@ for adapter in integrations/*/; do
     build "$adapter"
     constraints "$adapter/requirements.lock" >"$out/constraints-$(basename "$adapter").txt"
 done
+.venv/bin/python "$here/plain_sdists.py" "$out"/buildarena*.tar.gz
 echo "$out: $(ls "$out"/*.whl | wc -l) wheels, $(ls "$out"/*.tar.gz | wc -l) sdists, $(ls "$out"/constraints*.txt | wc -l) constraints"

@@ -11,11 +11,10 @@ for package in "$@"; do
     sed -E -i.before \
         -e "s/^version = \".*\"/version = \"$version\"/" \
         -e "s/\"(buildarena-[a-z-]+(\[[a-z]+\])?)==[^\"]+\"/\"\1==$version\"/" "$package/pyproject.toml"
-    sed -E -i.before "s/^__version__ = \".*\"/__version__ = \"$version\"/" "$package"/src/*/__init__.py
     if [ -f "$package/openenv.yaml" ]; then
         sed -E -i.before "s/^version: .*/version: $version/" "$package/openenv.yaml"
     fi
-    rm -f "$package"/openenv.yaml.before "$package"/pyproject.toml.before "$package"/src/*/__init__.py.before
+    rm -f "$package"/openenv.yaml.before "$package"/pyproject.toml.before
 done
 # Images have the version of what is in them.
 for file in docker-compose.yml .env.example deploy/kubernetes/*/*/kustomization.yaml deploy/kubernetes/*/*/jobs/kustomization.yaml; do

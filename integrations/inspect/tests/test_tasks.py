@@ -41,6 +41,7 @@ from buildarena_simulation import read_trajectory
 WOOD = {"base_block": 1, "face": "A", "new_block": "Small Wooden Block"}
 
 
+@pytest.mark.timeout(1200)
 def test_all_tasks_end_to_end_score_as_the_library_does(run) -> None:
     log = run("buildarena/all", task_args={"simulator": "mujoco"})
     assert log.status == "success"

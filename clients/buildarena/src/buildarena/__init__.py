@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from buildarena.service import job_machine, job_trial, jobs, leaderboard
     from buildarena.trials import Trial, simulate, simulate_all
 
-__version__ = "1.0.0rc1"
+    __version__: str
 
 _PLACES: Final = {
     "Feedback": "machines",
@@ -47,6 +47,10 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Loads what is asked for."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version(__name__)
     if name not in _PLACES:
         raise AttributeError(f"module 'buildarena' has no {name!r}; it has {', '.join(_PLACES)}")
     attribute = getattr(import_module(f"buildarena.{_PLACES[name]}"), name)

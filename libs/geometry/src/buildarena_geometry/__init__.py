@@ -3,6 +3,8 @@
 from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
+from importlib.metadata import version
+
 from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
 from buildarena_geometry.documents.log import ActionLog, ActionRecord
 from buildarena_geometry.documents.write import DOCUMENT_VERSION
@@ -39,7 +41,7 @@ from buildarena_geometry.tools import (
     tool_definitions,
 )
 
-__version__ = "1.0.0rc1"
+__version__ = version("buildarena-geometry")
 
 __all__ = [
     "DOCUMENT_VERSION",

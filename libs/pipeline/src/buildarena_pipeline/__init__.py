@@ -4,4 +4,6 @@ Postgres is the truth; messages are only hints. A lost message, a doubled messag
 therefore loses nothing: the reaper notifies workers again of what waits too long.
 """
 
-__version__ = "1.0.0rc1"
+from importlib.metadata import version
+
+__version__ = version("buildarena-pipeline")
