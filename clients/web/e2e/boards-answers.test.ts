@@ -54,6 +54,22 @@ describe("failures", () => {
     await page.locator(`article[data-turn="${turn ?? ""}"][data-chosen]`).waitFor();
     await context.close();
   });
+
+  it("are found by what roles were told, which their turns say when they are asked", async () => {
+    const { page, context } = await opened("/transcripts?text=drawing&of=prompts");
+    const hit = page.locator("article.turn").first();
+    await hit.getByText("was told before").waitFor();
+    await hit.getByRole("link").click();
+    const told = page.locator("article[data-chosen] details.told");
+    const { id } = (await ask<Schemas["JobPage"]>("/v1/jobs?limit=1")).jobs[0] ?? { id: "" };
+    expect(page.url()).toContain(id);
+    const [first] = (await ask<Schemas["PromptsView"]>(`/v1/jobs/${id}/prompts`)).prompts;
+    expect(await told.locator("pre").first().isVisible()).toBe(false);
+    await told.locator("summary").click();
+    expect(await told.locator("pre").allTextContents()).toEqual([first?.system, ...(first?.user ?? [])]);
+    await expectNoSeriousFault(page);
+    await context.close();
+  });
 });
 
 it("two rows of the board are compared in two ticks and a click, in the board's scope", async () => {

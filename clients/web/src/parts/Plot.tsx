@@ -2,8 +2,13 @@ import * as ObservablePlot from "@observablehq/plot";
 import { useElementSize } from "@mantine/hooks";
 import { useRouter } from "@tanstack/react-router";
 import { useEffect, useRef } from "react";
+import { apart, type Box } from "./labels";
 
 const NARROW = 260;
+/** The class of points that labels stand beside. */
+export const POINTS = "points";
+/** The class of labels beside points, and how far from them they stand. */
+export const BESIDE = { className: "beside", dx: 10, textAnchor: "start" } as const;
 const XLINK = "http://www.w3.org/1999/xlink";
 
 /** A drawing of statistics, as wide as its place; `label` says it to those who don't see it. */
@@ -31,6 +36,7 @@ export default function Plot({
     // The whole has a label; groups without a role may have none.
     for (const part of drawn.querySelectorAll("g[aria-label]")) part.removeAttribute("aria-label");
     place.current.replaceChildren(drawn);
+    keepApart(drawn);
     return () => {
       drawn.remove();
     };
@@ -50,4 +56,19 @@ export default function Plot({
       />
     </div>
   );
+}
+
+/** Moves labels beside points that cover each other, or that the drawing has no room for. */
+function keepApart(drawn: Element): void {
+  const labels = [...drawn.querySelectorAll<SVGTextElement>(`.${BESIDE.className} text`)];
+  const whole = drawn.getBoundingClientRect();
+  const boxOf = (part: Element): Box => {
+    const { x, y, width, height } = part.getBoundingClientRect();
+    return { x: x - whole.x, y: y - whole.y, width, height };
+  };
+  const points = [...drawn.querySelectorAll(`.${POINTS} > *`)].map(boxOf);
+  for (const [index, { dx, dy }] of apart(labels.map(boxOf), points, whole, BESIDE.dx).entries()) {
+    const label = labels[index];
+    if (label !== undefined && (dx !== 0 || dy !== 0)) label.style.translate = `${dx}px ${dy}px`;
+  }
 }
