@@ -113,20 +113,23 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
   );
 }
 
-/** What the two ticked rows lead to, the board's scope with them. */
+/** What ticked rows lead to, the board's scope with them: one is compared with the best of the others. */
 function Ticked({ models, board, search }: { models: readonly string[]; board: Board; search: BoardSearch }) {
-  const [first, second] = models;
+  const [first, ticked] = models;
   if (first === undefined) return null;
+  const second = ticked ?? board.overall.find((row) => row.rank !== null && row.model !== first)?.model;
   if (second === undefined) return <Text size="sm">Tick a second model to compare it with {first}.</Text>;
   const scope = isSite ? { track: board.track ?? undefined } : { ...scoped(search), track: board.track ?? undefined };
   return (
-    <Button
-      size="xs"
-      mb="xs"
-      renderRoot={(props) => <Link to="/compare" search={{ models: `${first},${second}`, ...scope }} {...props} />}
-    >
-      Compare {first} and {second}
-    </Button>
+    <Group gap="sm" mb="xs">
+      <Button
+        size="xs"
+        renderRoot={(props) => <Link to="/compare" search={{ models: `${first},${second}`, ...scope }} {...props} />}
+      >
+        Compare {first} and {second}
+      </Button>
+      {ticked === undefined && <Text size="sm">or tick a second model</Text>}
+    </Group>
   );
 }
 
