@@ -92,9 +92,11 @@ export async function numbersOf(track: string, ask: Ask): Promise<Numbers[]> {
 export async function expectNumbers(page: Page, { name, expected }: Numbers): Promise<void> {
   const wanted = expected.filter((text) => /\d/.test(text)).slice(0, 2 * TEN);
   expect(wanted.length, name).toBeGreaterThanOrEqual(TEN);
-  for (const fold of await page.locator("main details:not([open]) > summary").all()) await fold.click();
   const lacking = async (): Promise<string[]> => {
-    const shown = await page.locator("main").innerText();
+    const shown = await page.locator("main").evaluate((main) => {
+      for (const fold of main.querySelectorAll("details")) fold.open = true;
+      return main.innerText;
+    });
     return wanted.filter((text) => !hasNumber(shown, text));
   };
   await expect.poll(lacking, { timeout: 15_000, message: name }).toEqual([]);
