@@ -95,7 +95,7 @@ export async function expectNumbers(page: Page, { name, expected }: Numbers): Pr
   const lacking = async (): Promise<string[]> => {
     const shown = await page.locator("main").evaluate((main) => {
       for (const fold of main.querySelectorAll("details")) fold.open = true;
-      return main.innerText;
+      return (main as HTMLElement).innerText;
     });
     return wanted.filter((text) => !hasNumber(shown, text));
   };

@@ -24,21 +24,12 @@ export default function Plot({
   const place = useRef<HTMLDivElement>(null);
   useEffect(() => {
     if (place.current === null || width < NARROW / 2) return;
-    const drawn = ObservablePlot.plot({ ...options(Math.max(NARROW, width)), width: Math.max(NARROW, width) });
-    const links = [...drawn.querySelectorAll("a")].filter((link) => link.hasAttributeNS(XLINK, "href"));
-    // What is an image has nothing to press in it.
-    drawn.setAttribute("role", links.length > 0 ? "group" : "img");
-    drawn.setAttribute("aria-label", label);
-    for (const link of links) {
-      link.setAttribute("href", link.getAttributeNS(XLINK, "href") ?? "");
-      link.setAttribute("aria-label", link.querySelector("title")?.textContent ?? "");
-    }
-    // The whole has a label; groups without a role may have none.
-    for (const part of drawn.querySelectorAll("g[aria-label]")) part.removeAttribute("aria-label");
-    place.current.replaceChildren(drawn);
-    keepApart(drawn);
+    // One drawing a task: between them the page does what is asked of it.
+    const waiting = setTimeout(() => {
+      draw(place.current, options(Math.max(NARROW, width)), Math.max(NARROW, width), label);
+    });
     return () => {
-      drawn.remove();
+      clearTimeout(waiting);
     };
   }, [options, width, label]);
   return (
@@ -56,6 +47,23 @@ export default function Plot({
       />
     </div>
   );
+}
+
+function draw(place: Element | null, options: ObservablePlot.PlotOptions, width: number, label: string): void {
+  if (place === null) return;
+  const drawn = ObservablePlot.plot({ ...options, width });
+  const links = [...drawn.querySelectorAll("a")].filter((link) => link.hasAttributeNS(XLINK, "href"));
+  // What is an image has nothing to press in it.
+  drawn.setAttribute("role", links.length > 0 ? "group" : "img");
+  drawn.setAttribute("aria-label", label);
+  for (const link of links) {
+    link.setAttribute("href", link.getAttributeNS(XLINK, "href") ?? "");
+    link.setAttribute("aria-label", link.querySelector("title")?.textContent ?? "");
+  }
+  // The whole has a label; groups without a role may have none.
+  for (const part of drawn.querySelectorAll("g[aria-label]")) part.removeAttribute("aria-label");
+  place.replaceChildren(drawn);
+  keepApart(drawn);
 }
 
 /** Moves labels beside points that cover each other, or that the drawing has no room for. */
