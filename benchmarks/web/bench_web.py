@@ -1,7 +1,8 @@
 """Measures the dashboard in a browser that draws in software, and prints the figures as JSON.
 
 Run by `make bench-web`. A machine of 100 blocks and its trial, a transcript of 300 turns, the first
-page, and the board of 3,000 jobs on a processor four times as slow; each beside its bar. Frames are those the page gets done, on however busy a machine.
+page, and the board of 3,000 jobs on a processor four times as slow; each beside its bar. Frames are
+those the page gets done, on however busy a machine.
 """
 
 import json

@@ -92,7 +92,7 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
             {published.map((row) => (
               <Table.Tr key={`paper ${row.model}`} className="ghost">
                 <Table.Td>
-                  <Group gap={6} maw={{ base: 150, sm: 420 }}>
+                  <Group gap={6} className="name-and-badges">
                     {row.model}
                     <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
                       paper
@@ -187,7 +187,7 @@ function OverallRow({ row, label, most, tied, over, ticked, onTick }: RowOf) {
   return (
     <Table.Tr>
       <Table.Td>
-        <Group gap={6} maw={{ base: 150, sm: 420 }}>
+        <Group gap={6} className="name-and-badges">
           <Group gap={6} wrap="nowrap">
             <Checkbox size="xs" checked={ticked} onChange={onTick} aria-label={`Compare ${label}`} />
             <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>

@@ -65,7 +65,8 @@ def _told(value: dict[str, Any]) -> dict[str, Any]:
     ]
     if not set(value) <= {"system", "user"} or not all(isinstance(text, str) for text in texts):
         raise ValueError("what a role was told is a system message and a list of others")
-    return _plain(value)
+    _plain(value)
+    return value
 
 
 Json = Annotated[Any, AfterValidator(_plain)]
