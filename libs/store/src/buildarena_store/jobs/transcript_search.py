@@ -205,14 +205,17 @@ SEARCH: Final = text(
     ORDER BY shown.created_at DESC, shown.job_id, turn NULLS LAST, place DESC
     """  # noqa: S608 - made of our own constants
 ).bindparams(*(bindparam(name, type_=Text()) for name in TEXTS))
-# Jobs of one task are told the same, so which jobs are wanted is asked before any are left out.
+# Jobs of one task are told the same, so which jobs are wanted is asked before any are left out;
+# with OFFSET 0 the words are looked up first, by their index.
 SEARCH_PROMPTS: Final = text(
     f"""
     WITH asked AS MATERIALIZED (SELECT websearch_to_tsquery('english', :words) AS words),
     told AS MATERIALIZED (
-        SELECT journal.job_id, journal.sequence FROM journal JOIN jobs ON jobs.id = journal.job_id
-        WHERE journal.told IS NOT NULL AND ({TOLD_WORDS.text}) @@ (SELECT words FROM asked)
-            AND {WANTED} LIMIT :most
+        SELECT found.job_id, found.sequence FROM (
+            SELECT job_id, sequence FROM journal
+            WHERE told IS NOT NULL AND ({TOLD_WORDS.text}) @@ (SELECT words FROM asked) OFFSET 0
+        ) AS found JOIN jobs ON jobs.id = found.job_id
+        WHERE {WANTED} LIMIT :most
     ),
     shown AS (
         SELECT first.job_id, first.sequence, jobs.task, jobs.model, jobs.seed, jobs.outcome,
