@@ -75,8 +75,9 @@ function keepApart(drawn: Element): void {
     return { x: x - whole.x, y: y - whole.y, width, height };
   };
   const points = [...drawn.querySelectorAll(`.${POINTS} > *`)].map(boxOf);
-  for (const [index, { dx, dy }] of apart(labels.map(boxOf), points, whole, BESIDE.dx).entries()) {
+  for (const [index, shift] of apart(labels.map(boxOf), points, whole, BESIDE.dx).entries()) {
     const label = labels[index];
-    if (label !== undefined && (dx !== 0 || dy !== 0)) label.style.translate = `${dx}px ${dy}px`;
+    if (shift === null) label?.remove();
+    else if (label !== undefined) label.style.translate = `${shift.dx}px ${shift.dy}px`;
   }
 }

@@ -19,9 +19,19 @@ it("a label without room on the right stands on the left of its point, within th
 
 it("no label leaves the drawing above or below", () => {
   const shifts = apart([box(10, 2), box(10, 2), box(10, 2)], [], SIZE, 10);
-  expect(shifts.map(({ dy }) => dy)).toEqual([0, 14, 28]);
+  expect(shifts.map((shift) => shift?.dy)).toEqual([0, 14, 28]);
 });
 
 it("a label covers no point", () => {
   expect(apart([box(10, 50)], [box(60, 52, 10)], SIZE, 10)).toEqual([{ dx: 0, dy: -14 }]);
+});
+
+it("of labels that crowd around one point some are left out", () => {
+  const shifts = apart(
+    Array.from({ length: 7 }, () => box(10, 100)),
+    [],
+    SIZE,
+    10,
+  );
+  expect(shifts.filter((shift) => shift === null)).toHaveLength(2);
 });
