@@ -5,7 +5,7 @@ import { ask, launched, settled, type Visit, visit } from "./browser";
 
 // The questions that people open the pages with, and in how many clicks from the front page they are
 // answered. The fifth, "show this machine to somebody who has no service", takes one command:
-// `buildarena job page ID`, which tests/web/test_job_room.py opens from a file.
+// `buildarena job page ID`, whose file tests/notebooks/test_service.py reads.
 
 type Schemas = components["schemas"];
 
