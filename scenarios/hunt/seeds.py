@@ -59,17 +59,28 @@ def exploits(folder: Path = EXPLOITS) -> list[Exploit]:
 def seeds_of(task_name: str) -> list[Genome]:
     """Genomes to start from: all that suit the task's kind and number of sub-structures.
 
-    Those of the expert are among them for kinds of which no machine is stored.
+    Where no machine of the task's family is stored, the expert's are among them, of all tasks of
+    its kind that have none either.
     """
     whole = builtin_tasks()[task_name].constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
-    kind, stored = kind_of(task_name), list(_stored())
-    if kind not in {kind_of(other) for other, _ in stored}:
-        found += map(expert_genome, filter(lambda name: kind_of(name) == kind, DESIGNS))
+    stored = list(_stored())
+    families = {_family(other) for other, _ in stored}
+    if _family(task_name) not in families:
+        alike = [name for name in DESIGNS if kind_of(name) == kind_of(task_name)]
+        found += [
+            expert_genome(name)
+            for name in alike
+            if _family(name) not in families and builtin_tasks()[name].beginning is None
+        ]
     for other, genome in stored:
-        if kind_of(other) == kind and bool(genome.sub_structures) != whole:
+        if kind_of(other) == kind_of(task_name) and bool(genome.sub_structures) != whole:
             found.append(genome)
     return found
+
+
+def _family(task_name: str) -> str:
+    return task_name.rpartition("-")[0]
 
 
 def expert_genome(task_name: str) -> Genome:

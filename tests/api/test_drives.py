@@ -128,6 +128,18 @@ def test_a_drive_stands_under_a_name_with_the_keys_and_is_verified(context, serv
     assert driven(context, served, driver="ada", seconds=1.0)["job"] != job.id
 
 
+@pytest.mark.slow
+def test_a_drive_of_twenty_seconds_is_verified(context, served) -> None:
+    ended = driven(context, served, driver="ada", seconds=20)
+    assert ended["why"] == "time"
+    work(context, queues=("simulate.mujoco",))
+    job = job_of(context, ended)
+    stored = context.artifacts.get(context.store.jobs.artifacts(job.id)["trajectory-0"])
+    assert read_trajectory(stored).time_s[-1] == pytest.approx(20, abs=0.1)
+    report = verifier(context).verify(job.id)
+    assert report.verdict == "verified", report
+
+
 def test_a_page_that_is_gone_ends_the_drive_with_what_there_is(context, served) -> None:
     text = TASK.read_text("utf-8")
     task = parse_custom_task(text, origin="test")

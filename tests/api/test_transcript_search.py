@@ -13,12 +13,17 @@ SAID = "I will attach two powered wheels below the beam, so that it can drive."
 ANSWERED = "Refused: block 7 would overlap block 3."
 
 
-def take(context, lease: Lease, index: int, said: str, answered: str | None = None) -> None:
+TOLD = {"system": "You are the drafter. Draw gearboxes.", "user": ["Lift a weight.", "Again."]}
+
+
+def take(
+    context, lease: Lease, index: int, said: str, answered: str | None = None, **more: object
+) -> None:
     """A turn of a session: a reply in the journal, and what came of it; its sequence is odd."""
     sequence = 2 * index + 1
     calls = [] if answered is None else [["c", "attach", {}]]
     reply = {"text": said, "calls": calls, "finish": "stop"}
-    context.store.journal.append(lease, journal_entry(sequence, reply=reply))
+    context.store.journal.append(lease, journal_entry(sequence, reply=reply, **more))
     results = [] if answered is None else [(False, "overlap", answered)]
     context.store.turns.append(
         lease, TurnResult(index=index, sequence=sequence, sub_structure=None, results=results)
@@ -114,16 +119,48 @@ def test_of_very_many_turns_some_are_searched_and_it_says_so(api, context, monke
     assert found(api, "beam")["complete"] is False
 
 
-@pytest.mark.usefixtures("sweep")
-def test_every_part_of_a_search_goes_by_an_index(context) -> None:
+def plan_of(context, query: str) -> str:
+    """How the database means to answer a search."""
     values = {"words": "wheel", "task": None, "model": None, "sweep": None}
     more = {"most": 10, "limit": 10, "options": ""}
-    plan = text(f"EXPLAIN {transcript_search.SEARCH.text}").bindparams(
-        *(bindparam(name, type_=Text()) for name in values)
-    )
+    plan = text(f"EXPLAIN {query}").bindparams(*(bindparam(name, type_=Text()) for name in values))
     with context.store.database.transaction() as connection:
         connection.execute(text("SET LOCAL enable_seqscan = off"))
-        shown = "\n".join(connection.execute(plan, {**values, **more}).scalars())
+        return "\n".join(connection.execute(plan, {**values, **more}).scalars())
+
+
+@pytest.mark.usefixtures("sweep")
+def test_every_part_of_a_search_goes_by_an_index(context) -> None:
+    shown = plan_of(context, transcript_search.SEARCH.text)
     for index in ("ix_journal_words", "ix_events_words", "ix_external_calls_words"):
         assert index in shown, shown
     assert "Seq Scan" not in shown
+
+
+def test_what_roles_were_told_is_kept_and_found_once_a_job(api, context) -> None:
+    sweep = api.post("/v1/sweeps", json=SPEC).json()["id"]
+    first, second = claim(context), claim(context)
+    take(context, first, 0, "Yes.", told=TOLD)
+    take(context, first, 1, "Yes.")
+    take(context, first, 2, "Yes.", told={"user": ["Draw the gearbox again."]})
+    take(context, second, 0, "A gearbox?", told={"user": ["Build a bridge."]})
+    (match,) = found(api, "gearbox", of="prompts")["matches"]
+    assert (match["job"], match["turn"], match["where"]) == (first.job.id, 0, "prompt")
+    assert [piece["text"] for piece in match["excerpt"] if piece["match"]] == ["gearboxes"]
+    assert [m["turn"] for m in found(api, '"lift weights"', of="prompts")["matches"]] == []
+    assert found(api, "gearbox")["matches"][0]["where"] == "reply"
+    both = found(api, "bridge or gearbox", of="prompts", sweep=sweep)["matches"]
+    assert {match["job"] for match in both} == {first.job.id, second.job.id}
+    assert found(api, "gearbox", of="prompts", task="lift-1")["matches"] == []
+    kept = api.get(f"/v1/jobs/{first.job.id}/prompts").json()["prompts"]
+    assert kept == [
+        {"turn": 0, **TOLD},
+        {"turn": 2, "system": None, "user": ["Draw the gearbox again."]},
+    ]
+    assert api.get("/v1/jobs/job_0/prompts").status_code == 404
+
+
+def test_a_search_of_prompts_goes_by_an_index(context) -> None:
+    shown = plan_of(context, transcript_search.SEARCH_PROMPTS.text)
+    assert "ix_journal_told" in shown, shown
+    assert "Seq Scan on journal" not in shown

@@ -98,6 +98,16 @@ def test_a_job_in_work_is_tried_and_verified_with_its_own_version(context, play,
         assert_verified(context, context.store.jobs.get(job.id))
 
 
+@pytest.mark.samples(1)
+@pytest.mark.parametrize("level", ["car-1", "catapult-8", "delivery-1"])
+def test_the_expert_plays_levels_of_besiegefield(context, submit, finish, level) -> None:
+    name = f"besiegefield-{level}"
+    add(context, (BRIDGE.parent / "besiegefield" / f"{name}.yaml").read_text())
+    job = finish(submit(task=name, model="builtin/expert", workflow="builder").id)
+    assert (job.outcome, job.success) == ("success", True), job.detail
+    assert_verified(context, job)
+
+
 def test_what_a_task_asks_of_modules_is_checked(context, play) -> None:
     add(context, EXAMPLE.replace("scenario:", "constraints: {min_modules: {Winch: 2}}\nscenario:"))
     job = play("narrow-gap")

@@ -112,6 +112,20 @@ def test_replies_alternate_with_what_is_read(play, played_requests) -> None:
             }, where
 
 
+def test_what_is_kept_as_told_is_what_the_session_says_and_each_text_once(
+    play, played_requests
+) -> None:
+    for _, where, request in all_requests(play, played_requests):
+        begins = all(message.role != "assistant" for message in request.messages)
+        told = [message.text for message in request.told]
+        if where[1] != "builder":  # who forgets is asked as if anew each time
+            assert begins == any(message.role == "system" for message in request.told), where
+        for text in told:
+            assert any(text in message.text for message in request.messages), where
+        kept = "\n".join(told)
+        assert not begins or not told or all(text in kept for text in _told(request)), where
+
+
 def test_nobody_is_told_of_tools_that_are_not_there(play, played_requests) -> None:
     for _, where, request in all_requests(play, played_requests):
         text = "\n".join(_told(request))

@@ -65,6 +65,40 @@ async function frames(
   );
 }
 
+/** A track whose board has thousands of jobs. */
+const board = process.env.BUILDARENA_WEB_BOARD ?? "";
+const THROTTLE = 4;
+
+describe.skipIf(board === "")("a board of thousands of jobs", () => {
+  it("leaves the page's thread free", async () => {
+    const page = await browser.newPage({ viewport: { width: 1280, height: 900 } });
+    const session = await page.context().newCDPSession(page);
+    await session.send("Emulation.setCPUThrottlingRate", { rate: THROTTLE });
+    await page.addInitScript(() => {
+      const found: number[] = [];
+      Object.assign(globalThis, { longTasks: found });
+      new PerformanceObserver((list) => {
+        for (const entry of list.getEntries()) found.push(entry.duration);
+      }).observe({ type: "longtask", buffered: true });
+    });
+    const longest = (): Promise<number> =>
+      page.evaluate(() => Math.max(0, ...(globalThis as unknown as { longTasks: number[] }).longTasks.splice(0)));
+    const began = performance.now();
+    await page.goto(`${URL_OF_SERVICE}/?track=${encodeURIComponent(board)}`);
+    await page.locator("a.heat-cell").first().waitFor();
+    figures.shown_ms_board_4x = performance.now() - began;
+    await page.waitForTimeout(4000);
+    figures.longest_task_ms_board_4x = await longest();
+    await page.getByText("Every figure, task by task").click();
+    await page.waitForTimeout(2000);
+    figures.longest_task_ms_board_figures_4x = await longest();
+    await page.getByText("Bridges", { exact: true }).click();
+    await page.waitForTimeout(2000);
+    figures.longest_task_ms_board_scope_4x = await longest();
+    await page.close();
+  });
+});
+
 describe.skipIf(large === "")("speed", () => {
   it("of 3D", async () => {
     const page = await opened(browser, `/jobs/${large}`);

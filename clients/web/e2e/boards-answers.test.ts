@@ -1,7 +1,7 @@
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
-import { ask, launched, textsOf, URL_OF_SERVICE, visit, type Visit } from "./browser";
+import { ask, expectNoSeriousFault, launched, textsOf, URL_OF_SERVICE, visit, type Visit } from "./browser";
 
 type Schemas = components["schemas"];
 
@@ -52,6 +52,22 @@ describe("failures", () => {
     expect(await hit.locator("mark").count()).toBeGreaterThan(0);
     await hit.getByRole("link").click();
     await page.locator(`article[data-turn="${turn ?? ""}"][data-chosen]`).waitFor();
+    await context.close();
+  });
+
+  it("are found by what roles were told, which their turns say when they are asked", async () => {
+    const { page, context } = await opened("/transcripts?text=drawing&of=prompts");
+    const hit = page.locator("article.turn").first();
+    await hit.getByText("was told before").waitFor();
+    await hit.getByRole("link").click();
+    const told = page.locator("article[data-chosen] details.told");
+    await told.waitFor();
+    const id = /job_[0-9a-f]+/.exec(page.url())?.[0] ?? "";
+    const [first] = (await ask<Schemas["PromptsView"]>(`/v1/jobs/${id}/prompts`)).prompts;
+    expect(await told.locator("pre").first().isVisible()).toBe(false);
+    await told.locator("summary").click();
+    expect(await told.locator("pre").allTextContents()).toEqual([first?.system, ...(first?.user ?? [])]);
+    await expectNoSeriousFault(page);
     await context.close();
   });
 });

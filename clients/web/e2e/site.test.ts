@@ -5,6 +5,7 @@ import { listed, type Rows } from "../src/api/kept-jobs";
 import type { Site } from "../src/api/site";
 import { count, number, percent, places } from "../src/format";
 import { expectNoSeriousFault, launched, LONG, URL_OF_SERVICE } from "./browser";
+import { expectNumbers, numbersOf } from "./numbers";
 
 type Board = components["schemas"]["Board"];
 type JobPage = components["schemas"]["JobPage"];
@@ -96,6 +97,15 @@ describe.skipIf(WHOLE === "")("a published site", () => {
       await page.context().close();
     },
   );
+
+  it("has ten numbers of each page as the service has them", async () => {
+    const track = rows.jobs.find((job) => job.id === built)?.track ?? "";
+    for (const numbers of await numbersOf(track, asked)) {
+      const { page } = await opened(WHOLE, numbers.path);
+      await expectNumbers(page, numbers);
+      await page.context().close();
+    }
+  });
 
   it("has the board of the service", async () => {
     const board = await asked<Board>(`/v1/leaderboard?${site.sweeps.map((id) => `sweep=${id}`).join("&")}`);

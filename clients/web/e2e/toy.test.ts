@@ -53,3 +53,16 @@ it("begins with another's machine", async () => {
   expect(faults).toEqual([]);
   await context.close();
 });
+
+it("begins with a template of the task's", async () => {
+  const { page, context, faults } = await visit(browser, "/build?task=transport-1");
+  await page.getByLabel("Your name on the board").fill("templated");
+  await page.getByRole("combobox", { name: "Begin with" }).click();
+  await page.getByRole("option", { name: /^Car chassis/ }).click();
+  await page.getByRole("button", { name: "Begin" }).click();
+  await page.waitForURL(/session=job_/);
+  await settled(page);
+  await expect.poll(() => parts(page)).toBe(9);
+  expect(faults).toEqual([]);
+  await context.close();
+});

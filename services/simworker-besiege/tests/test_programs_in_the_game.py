@@ -294,7 +294,8 @@ NOT_STAGED = [
     name
     for name, task in builtin_tasks().items()
     # What throws is refused for its boulder, which this machine has not.
-    if task.scenario.senses is not None and name not in {"slalom-2", "throw-3", "throw-4", "throw-5"}
+    if task.scenario.senses is not None
+    and name not in {"slalom-2", "throw-3", "throw-4", "throw-5"}
 ]
 
 

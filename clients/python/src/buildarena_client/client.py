@@ -173,6 +173,7 @@ class Client:
     wait_for_job = _call(Api.wait_for_job)
     wait_for_verification = _call(Api.wait_for_verification)
     transcript = _call(Api.transcript)
+    prompts = _call(Api.prompts)
     machine = _call(Api.machine)
     replay = _call(Api.replay)
     machine_model = _call(Api.machine_model)

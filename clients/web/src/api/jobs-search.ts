@@ -40,6 +40,8 @@ export interface TranscriptsSearch {
   text?: string;
   task?: string;
   model?: string;
+  /** What is searched, if not what was said and answered. */
+  of?: "prompts";
 }
 
 export function readTranscriptsSearch(raw: Record<string, unknown>): TranscriptsSearch {
@@ -47,7 +49,8 @@ export function readTranscriptsSearch(raw: Record<string, unknown>): Transcripts
     const words = typeof value === "number" ? String(value) : value;
     return typeof words === "string" && words !== "" ? words : undefined;
   };
-  return { text: text(raw.text), task: text(raw.task), model: text(raw.model) };
+  const of = raw.of === "prompts" ? raw.of : undefined;
+  return { text: text(raw.text), task: text(raw.task), model: text(raw.model), of };
 }
 
 /** What the address of a job says: how far it is built, which part is chosen, or that the trial is shown. */

@@ -130,10 +130,10 @@ export const jobSummary = (filters: JobFilters) =>
   });
 
 /** Turns of all jobs in which words stand. */
-export const transcriptSearch = ({ text = "", task, model }: TranscriptsSearch) =>
+export const transcriptSearch = ({ text = "", ...narrowed }: TranscriptsSearch) =>
   queryOptions({
-    queryKey: ["transcripts", text, task, model],
-    queryFn: () => taken(client.GET("/v1/transcripts", { params: { query: { text, task, model } } })),
+    queryKey: ["transcripts", text, narrowed],
+    queryFn: () => taken(client.GET("/v1/transcripts", { params: { query: { text, ...narrowed } } })),
     staleTime: 60_000,
   });
 

@@ -1,4 +1,5 @@
 import { Table } from "@mantine/core";
+import { Fold } from "./Fold";
 import { SortHead, useSorting } from "./SortHead";
 import { valueOfText, type Values } from "./sorting";
 
@@ -19,8 +20,7 @@ export function DataTable({
   );
   const { rows: sorted, head } = useSorting(rows, values);
   return (
-    <details>
-      <summary style={{ cursor: "pointer", fontSize: 13 }}>{title}</summary>
+    <Fold title={title}>
       <Table.ScrollContainer
         minWidth={260}
         type="native"
@@ -51,6 +51,6 @@ export function DataTable({
           </Table.Tbody>
         </Table>
       </Table.ScrollContainer>
-    </details>
+    </Fold>
   );
 }

@@ -150,6 +150,20 @@ class EndingView(_Answer):
     jobs: int
 
 
+class PromptView(_Answer):
+    """What a role was told before a turn."""
+
+    turn: int | None = Field(description="Place in the transcript; null for a reply in no turn")
+    system: str | None = Field(description="The role's system message, before its first turn")
+    user: list[str] = Field(description="Further messages, in order")
+
+
+class PromptsView(_Answer):
+    """What a session told its roles."""
+
+    prompts: list[PromptView] = Field(description="In order; turns that were told nothing lack")
+
+
 class JobSummaryView(_Answer):
     """What a list of jobs comes to."""
 

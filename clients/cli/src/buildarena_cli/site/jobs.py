@@ -39,6 +39,7 @@ def job_answers(client: Client, job_id: str) -> Answers:
     detail = answers[f"/v1/jobs/{job_id}"]
     artifacts = {} if detail is None else json.loads(detail.content)["artifacts"]
     put("transcript")
+    put("prompts")
     put("replay")
     for name in artifacts:
         if match := ROLLOUT.fullmatch(name):

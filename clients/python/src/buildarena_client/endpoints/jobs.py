@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import AsyncGenerator, Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Unpack, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, Unpack, cast
 
 from buildarena_client.endpoints.sending import Sender
 from buildarena_client.errors import BadArgumentError
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         JobSummaryFilters,
         JobSummaryView,
         JobView,
+        PromptsView,
         ReplayView,
         SceneView,
         TranscriptMatchesView,
@@ -59,6 +60,7 @@ class Jobs(Sender):
         task: str | None = None,
         model: str | None = None,
         sweep: str | None = None,
+        of: Literal["transcripts", "prompts"] = "transcripts",
     ) -> TranscriptMatchesView:
         """Turns of all jobs in which words stand, in what was said or answered.
 
@@ -68,8 +70,9 @@ class Jobs(Sender):
             task: Only of jobs on this task.
             model: Only of this model's jobs.
             sweep: Only of this sweep's jobs.
+            of: ``prompts`` searches what roles were told, and finds the first turn of each job.
         """
-        narrowed = {"task": task, "model": model, "sweep": sweep}
+        narrowed = {"task": task, "model": model, "sweep": sweep, "of": of}
         answer = await self.get("/v1/transcripts", text=words, limit=limit, **narrowed)
         return cast("TranscriptMatchesView", answer)
 
@@ -131,6 +134,10 @@ class Jobs(Sender):
     async def transcript(self, job_id: str) -> Any:
         """All turns of a job's session, of one under way those so far."""
         return await self.get(at("jobs", job_id, "transcript"))
+
+    async def prompts(self, job_id: str) -> PromptsView:
+        """What each role of a job's session was told before its turns."""
+        return cast("PromptsView", await self.get(at("jobs", job_id, "prompts")))
 
     async def machine(self, job_id: str) -> Any:
         """The machine document of a job."""

@@ -1,8 +1,10 @@
 import { Anchor, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link } from "@tanstack/react-router";
-import { lazy, Suspense } from "react";
+import { lazy, memo, Suspense, useDeferredValue, useMemo } from "react";
 import { board, type Board, type TaskBoard } from "../../api/queries";
+import { Fold } from "../../parts/Fold";
+import { Later } from "../../parts/Later";
 import { Section } from "../../parts/Section";
 import { Answered, Empty, Loading } from "../../parts/States";
 import { TaskTable } from "../../parts/TaskTable";
@@ -34,7 +36,7 @@ export default function BoardPage() {
       </div>
       <ScopeChips search={search} />
       <Answered query={query} rows={12}>
-        {(found) => <Found found={found} search={search} />}
+        {(found) => <Unhurried found={found} search={search} />}
       </Answered>
     </Stack>
   );
@@ -44,7 +46,14 @@ function shown(task: TaskBoard, search: BoardSearch): TaskBoard {
   return search.baselines === "no" ? { ...task, rows: task.rows.filter((row) => !row.baseline) } : task;
 }
 
-function Found({ found, search }: { found: Board; search: BoardSearch }) {
+/** A board, made bit by bit: its thousands of cells would hold up what is pressed meanwhile. */
+function Unhurried({ found, search }: { found: Board; search: BoardSearch }) {
+  const now = useMemo(() => ({ found, search }), [found, search]);
+  const later = useDeferredValue<typeof now | null>(now, null);
+  return later === null ? <Loading rows={12} /> : <Found {...later} />;
+}
+
+const Found = memo(function Found({ found, search }: { found: Board; search: BoardSearch }) {
   if (found.track === null) {
     return (
       <Empty title="No job has ended yet">
@@ -75,9 +84,10 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
         )}
       </Section>
       <Section title="Model by task">
-        <HeatMap board={found} search={search} />
-        <details style={{ marginTop: 12 }}>
-          <summary style={{ cursor: "pointer", fontSize: 14 }}>Every figure, task by task</summary>
+        <Later rows={8}>
+          <HeatMap board={found} search={search} />
+        </Later>
+        <Fold title="Every figure, task by task" size={14} style={{ marginTop: 12 }}>
           <Stack gap="lg" mt="md">
             {found.tasks.map((task) => (
               <div key={task.task}>
@@ -89,7 +99,7 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
               </div>
             ))}
           </Stack>
-        </details>
+        </Fold>
       </Section>
       <Suspense fallback={<Loading rows={8} />}>
         <BoardPlots board={found} search={search} />
@@ -102,4 +112,4 @@ function Found({ found, search }: { found: Board; search: BoardSearch }) {
       </Group>
     </>
   );
-}
+});

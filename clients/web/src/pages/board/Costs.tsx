@@ -3,7 +3,7 @@ import * as Plot from "@observablehq/plot";
 import type { Figures } from "../../api/queries";
 import { count, dollars, number, percent } from "../../format";
 import { DataTable } from "../../parts/DataTable";
-import Drawing from "../../parts/Plot";
+import Drawing, { BESIDE, POINTS } from "../../parts/Plot";
 import { keyOf, type Entry } from "./entries";
 
 /** Cost against performance: who is not beaten at a lower price. */
@@ -17,7 +17,7 @@ export function Costs({ figures, entries }: { figures: Figures; entries: readonl
   const drawn = rows.filter((row) => row.mean_rank !== null && row[price] !== null);
   const options = (): Plot.PlotOptions => ({
     height: 300,
-    marginRight: 120,
+    marginRight: 40,
     marginTop: 26,
     marginBottom: 42,
     style: { fontSize: "12px" },
@@ -32,12 +32,13 @@ export function Costs({ figures, entries }: { figures: Figures; entries: readonl
         x: price,
         y: "mean_rank",
         r: 5.5,
+        className: POINTS,
         symbol: (row: { pareto: boolean }) => (row.pareto ? "diamond" : "circle"),
         fill: (row: { pareto: boolean }) => (row.pareto ? "#009e73" : "#999999"),
         stroke: "currentColor",
         strokeWidth: 1,
       }),
-      Plot.text(drawn, { x: price, y: "mean_rank", text: "label", dx: 10, textAnchor: "start" }),
+      Plot.text(drawn, { x: price, y: "mean_rank", text: "label", ...BESIDE }),
     ],
   });
   if (rows.length === 0) return <Text size="sm">Nothing was scored yet.</Text>;
@@ -52,7 +53,7 @@ export function Costs({ figures, entries }: { figures: Figures; entries: readonl
   return (
     <>
       {drawn.length > 0 && <Drawing options={options} label={rows.map((row) => figure(row).join(", ")).join("; ")} />}
-      <Text size="xs" className="dimmed" mb={4}>
+      <Text size="xs" className="dimmed" mt={6} mb={4}>
         Diamonds and their line: the Pareto front, models that no other beats at a lower price.{" "}
         {!priced && "No job has cost anything: output tokens stand in on the axis."}
       </Text>

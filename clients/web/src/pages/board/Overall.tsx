@@ -92,7 +92,7 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
             {published.map((row) => (
               <Table.Tr key={`paper ${row.model}`} className="ghost">
                 <Table.Td>
-                  <Group gap={6} maw={{ base: 150, sm: 420 }}>
+                  <Group gap={6} className="name-and-badges">
                     {row.model}
                     <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
                       paper
@@ -113,20 +113,23 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
   );
 }
 
-/** What the two ticked rows lead to, the board's scope with them. */
+/** What ticked rows lead to, the board's scope with them: one is compared with the best of the others. */
 function Ticked({ models, board, search }: { models: readonly string[]; board: Board; search: BoardSearch }) {
-  const [first, second] = models;
+  const [first, ticked] = models;
   if (first === undefined) return null;
+  const second = ticked ?? board.overall.find((row) => row.rank !== null && row.model !== first)?.model;
   if (second === undefined) return <Text size="sm">Tick a second model to compare it with {first}.</Text>;
   const scope = isSite ? { track: board.track ?? undefined } : { ...scoped(search), track: board.track ?? undefined };
   return (
-    <Button
-      size="xs"
-      mb="xs"
-      renderRoot={(props) => <Link to="/compare" search={{ models: `${first},${second}`, ...scope }} {...props} />}
-    >
-      Compare {first} and {second}
-    </Button>
+    <Group gap="sm" mb="xs">
+      <Button
+        size="xs"
+        renderRoot={(props) => <Link to="/compare" search={{ models: `${first},${second}`, ...scope }} {...props} />}
+      >
+        Compare {first} and {second}
+      </Button>
+      {ticked === undefined && <Text size="sm">or tick a second model</Text>}
+    </Group>
   );
 }
 
@@ -184,7 +187,7 @@ function OverallRow({ row, label, most, tied, over, ticked, onTick }: RowOf) {
   return (
     <Table.Tr>
       <Table.Td>
-        <Group gap={6} maw={{ base: 150, sm: 420 }}>
+        <Group gap={6} className="name-and-badges">
           <Group gap={6} wrap="nowrap">
             <Checkbox size="xs" checked={ticked} onChange={onTick} aria-label={`Compare ${label}`} />
             <Link className="quiet" to="/models/$" params={{ _splat: row.model }}>

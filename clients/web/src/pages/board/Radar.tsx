@@ -62,15 +62,16 @@ export function Radar({ figures, entries }: { figures: Figures; entries: readonl
             { x: "x", y: "y", text: "name", fontSize: 12, textAnchor },
           ),
         ),
-        Plot.text(
-          RINGS.map((ring) => ({ ring: String(ring), ...spotOf(0.5, names.length, 0.86 * ring) })),
-          { x: "x", y: "y", text: "ring", fontSize: 9, fillOpacity: 0.7 },
-        ),
         ...rows.map(({ dimensions }, index) =>
           Plot.line(
             corners((name) => dimensions[name] ?? 0),
             { x: "x", y: "y", strokeWidth: 2.2, ...strokeOf(index) },
           ),
+        ),
+        // Above the lines, which would strike them out.
+        Plot.text(
+          RINGS.map((ring) => ({ ring: String(ring), ...spotOf(0.5, names.length, 0.86 * ring) })),
+          { x: "x", y: "y", text: "ring", fontSize: 9, stroke: "var(--mantine-color-body)", fill: "currentColor" },
         ),
       ],
     };

@@ -72,7 +72,7 @@ function Both({ jobs }: { jobs: readonly [JobDetail, JobDetail] }) {
             <Table.Tbody>
               {shown.map(({ name, a, b }) => (
                 <Table.Tr key={name}>
-                  <Table.Th scope="row" fw={500}>
+                  <Table.Th scope="row" fw={500} style={{ overflowWrap: "normal" }}>
                     {name}
                   </Table.Th>
                   <Table.Td className={a === b ? "dimmed" : "differs"}>{a}</Table.Td>

@@ -52,8 +52,9 @@ export default function DrivePage() {
       <div>
         <Title order={1}>Drive</Title>
         <Text maw={720}>
-          Hold the keys, and the machine moves: the same physics as in every trial, while you watch. With a name, the
-          keys that you held are simulated again and scored, and stand on the board as human/your-name, piloted.
+          Hold a key, and your machine moves; let go, and it stops. It is the same physics as in every trial. With a
+          name, the keys that you held are simulated again and scored, and stand on the board as human/your-name,
+          piloted.
         </Text>
       </div>
       {machine.isError && <ProblemNote error={machine.error} retry={() => void machine.refetch()} />}

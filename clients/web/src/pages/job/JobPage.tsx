@@ -15,7 +15,7 @@ import { BuildPart } from "./BuildPart";
 import { JobFacts, JobHead } from "./JobFacts";
 import { JobRecords } from "./JobRecords";
 import { useLive } from "./live";
-import { replay as replayQuery, rolloutsOf, transcript as transcriptQuery } from "./queries";
+import { prompts as promptsQuery, replay as replayQuery, rolloutsOf, transcript as transcriptQuery } from "./queries";
 import { TrialPart } from "./TrialPart";
 import { useBuild } from "./build";
 import { TranscriptView } from "./TranscriptView";
@@ -70,6 +70,7 @@ function Room({ job }: { job: JobDetail }) {
   const search = route.useSearch();
   const navigate = useNavigate({ from: "/jobs/$id" });
   const transcript = useQuery(transcriptQuery(job.id));
+  const prompts = useQuery(promptsQuery(job.id));
   const replay = useQuery(replayQuery(job.id));
   const build = useBuild(replay.data ?? null, transcript.data?.turns, search, (change) => {
     void navigate({ search: (before) => ({ ...before, ...change }), replace: true, resetScroll: false });
@@ -133,7 +134,7 @@ function Room({ job }: { job: JobDetail }) {
             found === null || found.turns.length === 0 ? (
               <Empty title={ended ? "This job has no transcript" : "No turn was taken yet"} />
             ) : (
-              <TranscriptView turns={found.turns} build={build} chosen={search.turn} />
+              <TranscriptView turns={found.turns} prompts={prompts.data} build={build} chosen={search.turn} />
             )
           }
         </Answered>

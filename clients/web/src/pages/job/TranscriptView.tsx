@@ -3,7 +3,7 @@ import { useVirtualizer } from "@tanstack/react-virtual";
 import { memo, useEffect, useMemo, useRef, useState } from "react";
 import { count, dollars, duration, words } from "../../format";
 import type { Build } from "./build";
-import { callLine, chosenTurns, ROLE_COLOURS, type Turn, type TurnAction } from "./transcript";
+import { callLine, chosenTurns, messagesOf, type Prompt, ROLE_COLOURS, type Turn, type TurnAction } from "./transcript";
 
 const ESTIMATE_PX = 140;
 const HEIGHT_PX = 760;
@@ -11,10 +11,13 @@ const HEIGHT_PX = 760;
 /** A session's turns, virtualised: only those in sight are drawn. */
 export function TranscriptView({
   turns,
+  prompts,
   build,
   chosen,
 }: {
   turns: readonly Turn[];
+  /** What roles were told; there is none of agents and of former releases. */
+  prompts?: readonly Prompt[] | null | undefined;
   build: Build;
   /** The turn that the address names: shown first, and marked. */
   chosen?: number | undefined;
@@ -24,6 +27,7 @@ export function TranscriptView({
   const [text, setText] = useState("");
   const frame = useRef<HTMLDivElement>(null);
   const shown = useMemo(() => chosenTurns(turns, { role, refusedOnly, text }), [turns, role, refusedOnly, text]);
+  const told = useMemo(() => new Map((prompts ?? []).map((prompt) => [prompt.turn, prompt])), [prompts]);
   const list = useVirtualizer({
     count: shown.length,
     getScrollElement: () => frame.current,
@@ -105,6 +109,7 @@ export function TranscriptView({
                 {turn !== undefined && (
                   <TurnCard
                     turn={turn}
+                    prompt={told.get(turn.index)}
                     marked={markedIn(build.markedAction, turn.index) ?? (turn.index === chosen ? -1 : null)}
                     stepOf={build.stepOf}
                     go={go}
@@ -154,12 +159,13 @@ function useInStep(
 
 interface TurnProps {
   turn: Turn;
+  prompt: Prompt | undefined;
   marked: number | null;
   stepOf: ReadonlyMap<string, number>;
   go: (step: number) => void;
 }
 
-const TurnCard = memo(function TurnCard({ turn, marked, stepOf, go }: TurnProps) {
+const TurnCard = memo(function TurnCard({ turn, prompt, marked, stepOf, go }: TurnProps) {
   const colour = ROLE_COLOURS[turn.role] ?? "gray";
   return (
     <article
@@ -186,6 +192,7 @@ const TurnCard = memo(function TurnCard({ turn, marked, stepOf, go }: TurnProps)
           </span>
         )}
       </header>
+      {prompt !== undefined && <Told prompt={prompt} role={turn.role} />}
       {turn.text !== "" && <div className="turn-text">{turn.text}</div>}
       {turn.actions.map((action, index) => (
         <ActionFold
@@ -199,6 +206,32 @@ const TurnCard = memo(function TurnCard({ turn, marked, stepOf, go }: TurnProps)
     </article>
   );
 });
+
+/** What the session told the role before it spoke: folded, as it is long and mostly known. */
+function Told({ prompt, role }: { prompt: Prompt; role: string }) {
+  const messages = messagesOf(prompt);
+  const characters = messages.reduce((sum, { text }) => sum + text.length, 0);
+  return (
+    <details className="told">
+      <summary style={{ cursor: "pointer" }}>
+        What the {role} was told{" "}
+        <span className="dimmed figures">
+          {prompt.system === null ? "" : "system message and "}
+          {count(prompt.user.length)} {prompt.user.length === 1 ? "message" : "messages"}, {count(characters)}{" "}
+          characters
+        </span>
+      </summary>
+      {messages.map(({ kind, text }, index) => (
+        <div key={index}>
+          <span className="tag">{kind}</span>
+          <pre className="feedback told-text" tabIndex={0} role="region" aria-label={`${kind} message, scrolls`}>
+            {text}
+          </pre>
+        </div>
+      ))}
+    </details>
+  );
+}
 
 function ActionFold({
   action,

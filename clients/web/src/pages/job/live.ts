@@ -2,7 +2,7 @@ import { useQueryClient } from "@tanstack/react-query";
 import { useCallback, useEffect, useRef } from "react";
 import { useEvents, type ServiceEvent, type StreamState } from "../../api/events";
 import { job as jobQuery, type JobDetail } from "../../api/queries";
-import { replay as replayQuery, transcript as transcriptQuery } from "./queries";
+import { prompts as promptsQuery, replay as replayQuery, transcript as transcriptQuery } from "./queries";
 import { isWhole, withTurns } from "./replay";
 import type { Transcript, Turn } from "./transcript";
 
@@ -23,7 +23,11 @@ export function useLive(job: JobDetail | undefined, id: string): StreamState | "
   const queries = useQueryClient();
   const open = job !== undefined && job.state !== "done";
   const readAgain = useAgain(
-    useCallback(() => queries.refetchQueries({ queryKey: replayQuery(id).queryKey }), [queries, id]),
+    useCallback(
+      () =>
+        Promise.all([replayQuery(id), promptsQuery(id)].map(({ queryKey }) => queries.refetchQueries({ queryKey }))),
+      [queries, id],
+    ),
   );
   const onEvents = useCallback(
     (events: ServiceEvent[]) => {

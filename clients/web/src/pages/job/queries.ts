@@ -25,6 +25,14 @@ export const transcript = (id: string) =>
     queryFn: () => ifAny(jsonOf<Transcript>(path(id, "transcript"))),
   });
 
+/** What each role was told before its turns; null where nothing of it is kept. */
+export const prompts = (id: string) =>
+  queryOptions({
+    queryKey: ["job", id, "prompts"],
+    staleTime: Infinity,
+    queryFn: async () => (await ifAny(jsonOf<Schema<"PromptsView">>(path(id, "prompts"))))?.prompts ?? null,
+  });
+
 export const replay = (id: string) =>
   queryOptions({
     queryKey: ["job", id, "replay"],

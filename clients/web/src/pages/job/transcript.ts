@@ -1,3 +1,5 @@
+import type { Schema } from "../../api/client";
+
 export interface TurnAction {
   name: string;
   arguments: unknown;
@@ -20,6 +22,17 @@ export interface Turn {
   cost_usd?: string;
   latency_s?: number;
   tries?: number;
+}
+
+/** What a role was told before a turn. */
+export type Prompt = Schema<"PromptView">;
+
+/** The messages of a prompt, each with what it is. */
+export function messagesOf(prompt: Prompt): { kind: "system" | "user"; text: string }[] {
+  return [
+    ...(prompt.system === null ? [] : [{ kind: "system" as const, text: prompt.system }]),
+    ...prompt.user.map((text) => ({ kind: "user" as const, text })),
+  ];
 }
 
 export interface Transcript {

@@ -18,8 +18,9 @@ export default function TranscriptsPage() {
       <div>
         <Title order={1}>Search transcripts</Title>
         <Text size="sm" className="dimmed">
-          What models said, and what they were answered, in all jobs whose transcripts are not packed. Words are found
-          in all their forms; “in quotes” as a phrase, “or” between two, “-” before what must not stand there.
+          What models said and were answered, or what they were told before, in all jobs whose transcripts are not
+          packed. Words are found in all their forms; “in quotes” as a phrase, “or” between two, “-” before what must
+          not stand there.
         </Text>
       </div>
       <Fields key={JSON.stringify(search)} search={search} />
@@ -31,7 +32,8 @@ export default function TranscriptsPage() {
             ) : (
               <>
                 <Text size="sm" className="dimmed" role="status">
-                  {found.matches.length} {found.matches.length === 1 ? "turn" : "turns"}, of the newest jobs first
+                  {found.matches.length} {search.of === "prompts" ? "job" : "turn"}
+                  {found.matches.length === 1 ? "" : "s"}, the newest jobs first
                   {found.complete ? "" : "; there are more: further words narrow them down"}
                 </Text>
                 {found.matches.map((match) => (
@@ -84,6 +86,19 @@ function Fields({ search }: { search: TranscriptsSearch }) {
             setGiven({ ...given, text: event.currentTarget.value });
           }}
         />
+        <Select
+          label="In"
+          data={[
+            { value: "", label: "what was said and answered" },
+            { value: "prompts", label: "what roles were told" },
+          ]}
+          value={given.of ?? ""}
+          allowDeselect={false}
+          w={220}
+          onChange={(value) => {
+            setGiven({ ...given, of: value === "prompts" ? value : undefined });
+          }}
+        />
         {choice(
           "task",
           "Task",
@@ -102,6 +117,12 @@ function Fields({ search }: { search: TranscriptsSearch }) {
   );
 }
 
+const WHERE: Readonly<Record<TranscriptMatch["where"], string>> = {
+  reply: "said",
+  feedback: "was answered",
+  prompt: "was told before",
+};
+
 function Match({ match }: { match: TranscriptMatch }) {
   return (
     <article className="turn">
@@ -112,7 +133,7 @@ function Match({ match }: { match: TranscriptMatch }) {
         </Link>
         {match.outcome !== null && <OutcomeBadge value={match.outcome} size="sm" />}
         <Text size="xs" className="dimmed">
-          {match.where === "reply" ? "said" : "was answered"}
+          {WHERE[match.where]}
         </Text>
       </Group>
       <div className="turn-text">

@@ -1,8 +1,10 @@
 import { Group, Stack, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
+import { useMemo } from "react";
 import { task as taskQuery, type JobDetail } from "../../api/queries";
 import { number, words } from "../../format";
-import { rolloutsOf } from "../job/queries";
+import { opposedWheels, opposedWords } from "../../scene/rolling";
+import { rolloutsOf, scene as sceneQuery, trial as trialQuery } from "../job/queries";
 import { TrialPart } from "../job/TrialPart";
 
 /** The score of an ended job, what it was judged by, and its trial. */
@@ -27,6 +29,7 @@ export function Result({ job }: { job: JobDetail }) {
           {number(job.indicator)} of {number(wanted)} {unit} that the task asks for.
         </Text>
       )}
+      {job.success !== true && trials.length > 0 && <Wheels job={job} number={trials.at(-1) ?? 0} />}
       {job.reason !== null && (
         <Text size="sm">
           {words(job.reason)}
@@ -44,6 +47,17 @@ export function Result({ job }: { job: JobDetail }) {
       {trials.length > 0 && <TrialPart job={job} numbers={trials} />}
     </Stack>
   );
+}
+
+/** Which wheels of a trial worked against each other, where some did. */
+function Wheels({ job, number: rollout }: { job: JobDetail; number: number }) {
+  const scene = useQuery(sceneQuery(job.id, rollout)).data?.machine;
+  const trial = useQuery(trialQuery(job.id, rollout, job.artifacts[`trajectory-${rollout}`])).data;
+  const opposed = useMemo(
+    () => (scene == null || trial === undefined ? null : opposedWheels(trial, scene.blocks)),
+    [scene, trial],
+  );
+  return opposed === null ? null : <Text size="sm">{opposedWords(opposed)}</Text>;
 }
 
 /** How much of what is measured a task asks for, where more was asked for than there is; null where it names none. */

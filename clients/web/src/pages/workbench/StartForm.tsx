@@ -11,6 +11,7 @@ import { ProblemNote } from "../../parts/Problem";
 import { Section } from "../../parts/Section";
 import { remix } from "./remix";
 import { rememberSession, useLastSession } from "./session";
+import { callsOf, make, templatesFor } from "./templates";
 
 const route = getRouteApi("/build");
 const FIRST = "transport-1";
@@ -25,6 +26,9 @@ export function StartForm() {
   const [task, setTask] = useState(search.task ?? FIRST);
   const [name, setName] = useState(() => localStorage.getItem(NAME) ?? "");
   const simulator = useSimulator();
+  const offered = search.remix === undefined ? templatesFor(task) : [];
+  const [wanted, setWanted] = useState("");
+  const template = offered.find(({ name }) => name === wanted);
   const [seed, setSeed] = useState<number | string>(0);
   const opening = useMutation({
     mutationFn: async () => {
@@ -42,6 +46,7 @@ export function StartForm() {
       );
       // One that was open already has something on its workbench.
       if (search.remix !== undefined && opened.calls === 0) await remix(search.remix, opened.id);
+      else if (template !== undefined && opened.calls === 0) await make(callsOf(template), opened.id);
       return opened;
     },
     onSuccess: ({ id }) => {
@@ -60,8 +65,8 @@ export function StartForm() {
       <div>
         <Title order={1}>Build by hand</Title>
         <Text maw={720}>
-          Pick a task and build a machine for it, with the same tools, rules and feedback that models get. Your result
-          stands on the leaderboard of the external track as human/your-name.
+          Put blocks together, press Start, and see whether your machine does it. You get the same tools, rules and
+          answers as the models, and your result stands on the leaderboard of the external track as human/your-name.
         </Text>
       </div>
       {search.remix !== undefined && (
@@ -106,6 +111,21 @@ export function StartForm() {
                 }}
                 w={{ base: "100%", xs: 220 }}
               />
+              {offered.length > 0 && (
+                <Select
+                  label="Begin with"
+                  data={[
+                    { value: "", label: "nothing" },
+                    ...offered.map(({ name, about }) => ({ value: name, label: `${name}: ${about}` })),
+                  ]}
+                  value={template?.name ?? ""}
+                  allowDeselect={false}
+                  onChange={(value) => {
+                    setWanted(value ?? "");
+                  }}
+                  w={{ base: "100%", xs: 260 }}
+                />
+              )}
               <SimulatorSelect choice={simulator} />
               <NumberInput label="Seed" min={0} allowDecimal={false} value={seed} onChange={setSeed} w={100} />
               <Button type="submit" leftSection={<IconHammer size={16} aria-hidden />} loading={opening.isPending}>

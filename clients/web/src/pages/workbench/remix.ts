@@ -1,5 +1,6 @@
-import { client, jsonOf, taken } from "../../api/client";
+import { jsonOf } from "../../api/client";
 import { ASSEMBLY, MAIN, type Call } from "./session";
+import { make } from "./templates";
 
 interface Logged {
   log: { name: string; arguments: Record<string, unknown>; reason: string | null }[];
@@ -19,12 +20,8 @@ export function stepsOf(document: Logged): { machine: string; call: Call }[] {
 /** Builds a job's machine again in a session that is empty; what is refused there is left out. */
 export async function remix(job: string, session: string): Promise<void> {
   const document = await jsonOf<Logged>(`/v1/jobs/${encodeURIComponent(job)}/artifacts/machine`);
-  for (const { machine, call } of stepsOf(document)) {
-    await taken(
-      client.POST("/v1/sessions/{session_id}/calls", {
-        params: { path: { session_id: session } },
-        body: { ...call, machine },
-      }),
-    );
-  }
+  await make(
+    stepsOf(document).map(({ machine, call }) => ({ ...call, machine })),
+    session,
+  );
 }

@@ -57,8 +57,21 @@ def _past(value: datetime) -> datetime:
     return value
 
 
+def _told(value: dict[str, Any]) -> dict[str, Any]:
+    """What a session told a role: a system message and others, all texts."""
+    texts = [
+        value.get("system", ""),
+        *(value["user"] if isinstance(value.get("user"), list) else [0]),
+    ]
+    if not set(value) <= {"system", "user"} or not all(isinstance(text, str) for text in texts):
+        raise ValueError("what a role was told is a system message and a list of others")
+    _plain(value)
+    return value
+
+
 Json = Annotated[Any, AfterValidator(_plain)]
 JsonObject = Annotated[dict[str, Any], AfterValidator(_plain)]
+Told = Annotated[dict[str, Any], AfterValidator(_told)]
 JsonList = Annotated[list[Any], AfterValidator(_plain)]
 Time = Annotated[AwareDatetime, AfterValidator(_past)]
 Count = Annotated[int, Field(ge=0, le=LARGEST_COUNT)]
@@ -239,6 +252,7 @@ class JournalRow(_Row):
     payer: Annotated[str | None, AfterValidator(lambda _: None)]
     owner: Annotated[str | None, AfterValidator(lambda _: None)]
     created_at: Time
+    told: Told | None = None
 
 
 class ExternalCallRow(_Row):

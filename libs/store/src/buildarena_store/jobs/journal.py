@@ -71,6 +71,8 @@ class JournalEntry:
         tries: Sendings, 1 when the first was answered.
         provider_request_id: The provider's own id, if it gave one.
         created_at: When it was written; None before.
+        told: What the session told the role since its last reply: ``system``, its system message
+            where it had none yet, and ``user``, texts. What others said meanwhile is not in it.
     """
 
     sequence: int
@@ -83,6 +85,7 @@ class JournalEntry:
     tries: int = 1
     provider_request_id: str | None = None
     created_at: datetime | None = None
+    told: Mapping[str, Any] | None = None
 
     @property
     def answers(self) -> bool:
@@ -119,12 +122,12 @@ _APPEND = text(
     INSERT INTO journal (
         job_id, sequence, token, stage, role, request_hash, reply, input_tokens, output_tokens,
         cached_tokens, reasoning_tokens, cost_usd, latency_s, tries, provider_request_id,
-        payer, owner
+        payer, owner, told
     )
     SELECT
         id, :sequence, :token, :stage, :role, :request_hash, CAST(:reply AS json), :input_tokens,
         :output_tokens, :cached_tokens, :reasoning_tokens, :cost_usd, :latency_s, :tries,
-        CAST(:provider_request_id AS text), payer, owner
+        CAST(:provider_request_id AS text), payer, owner, CAST(:told AS json)
     FROM job
     """  # noqa: S608 - the state is our own constant
 )
@@ -172,6 +175,7 @@ class Journal:
                     "latency_s": entry.latency_s,
                     "tries": entry.tries,
                     "provider_request_id": entry.provider_request_id,
+                    "told": None if entry.told is None else json.dumps(entry.told),
                 },
             )
             if written.rowcount != 1:
@@ -199,6 +203,7 @@ class Journal:
                     tries=row.tries,
                     provider_request_id=row.provider_request_id,
                     created_at=row.created_at,
+                    told=row.told,
                 )
                 for row in connection.execute(_OF_JOB, {"job_id": job_id})
             ]

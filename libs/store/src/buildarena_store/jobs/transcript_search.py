@@ -10,14 +10,14 @@ from typing import Final, Literal
 from sqlalchemy import Connection, Text, bindparam, text
 
 from buildarena_store.states import TURN
-from buildarena_store.tables import ANSWER_WORDS, FEEDBACK_WORDS, REPLY_WORDS
+from buildarena_store.tables import ANSWER_WORDS, FEEDBACK_WORDS, REPLY_WORDS, TOLD_WORDS
 
 MAX_MATCHES: Final = 5_000
 """Turns with the words that are looked at, of each kind; of more, only some are."""
 BEGIN, END = "\x02", "\x03"
 """What stands around a match in an excerpt; transcripts have neither."""
 
-Where = Literal["reply", "feedback"]
+Where = Literal["reply", "feedback", "prompt"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,11 +28,13 @@ class TranscriptFilter:
         task: Of jobs on this task.
         model: Of this model's jobs.
         sweep_id: Of this sweep's jobs.
+        prompts: Whether what roles were told is searched, in place of what was said and answered.
     """
 
     task: str | None = None
     model: str | None = None
     sweep_id: str | None = None
+    prompts: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +48,7 @@ class TranscriptMatch:
         seed: Which try it was.
         outcome: How the job ended; None while it has not.
         turn: The turn's place in the transcript; None where only its reply is kept.
-        where: In what the model said, or in what it was answered.
+        where: In what the model said, in what it was answered, or in what it was told before.
         excerpt: The text around the words: pieces, and whether each is one of them.
     """
 
@@ -84,7 +86,8 @@ def search_transcripts(
 ) -> TranscriptMatches:
     """The turns in which words stand, in any form that English has of them.
 
-    Histories that were packed are not searched.
+    Histories that were packed are not searched. Of prompts, which repeat themselves, it is the
+    first turn of each job.
 
     Args:
         connection: A transaction of its own.
@@ -103,7 +106,7 @@ def search_transcripts(
         "limit": limit + 1,
         "options": f"StartSel={BEGIN}, StopSel={END}, MinWords=15, MaxWords=35",
     }
-    rows = connection.execute(SEARCH, values).all()
+    rows = connection.execute(SEARCH_PROMPTS if wanted.prompts else SEARCH, values).all()
     return TranscriptMatches(
         matches=[
             TranscriptMatch(
@@ -135,6 +138,14 @@ def _pieces(excerpt: str) -> list[tuple[str, bool]]:
     return found
 
 
+TEXTS: Final = ("words", "task", "model", "sweep")
+WANTED: Final = """
+    (CAST(:task AS text) IS NULL OR jobs.task = :task)
+    AND (CAST(:model AS text) IS NULL OR jobs.model = :model)
+    AND (CAST(:sweep AS text) IS NULL OR EXISTS (
+        SELECT FROM sweep_jobs WHERE sweep_id = :sweep AND job_id = jobs.id
+    ))
+"""
 SEARCH: Final = text(
     f"""
     WITH asked AS MATERIALIZED (SELECT websearch_to_tsquery('english', :words) AS words),
@@ -158,11 +169,7 @@ SEARCH: Final = text(
     shown AS (
         SELECT places.*, jobs.task, jobs.model, jobs.seed, jobs.outcome, jobs.created_at
         FROM places JOIN jobs ON jobs.id = places.job_id
-        WHERE (CAST(:task AS text) IS NULL OR jobs.task = :task)
-            AND (CAST(:model AS text) IS NULL OR jobs.model = :model)
-            AND (CAST(:sweep AS text) IS NULL OR EXISTS (
-                SELECT FROM sweep_jobs WHERE sweep_id = :sweep AND job_id = places.job_id
-            ))
+        WHERE {WANTED}
         ORDER BY jobs.created_at DESC, places.job_id, places.event, places.sequence LIMIT :limit
     )
     SELECT
@@ -197,4 +204,43 @@ SEARCH: Final = text(
     ) AS taken ON TRUE
     ORDER BY shown.created_at DESC, shown.job_id, turn NULLS LAST, place DESC
     """  # noqa: S608 - made of our own constants
-).bindparams(*(bindparam(name, type_=Text()) for name in ("words", "task", "model", "sweep")))
+).bindparams(*(bindparam(name, type_=Text()) for name in TEXTS))
+# Jobs of one task are told the same, so which jobs are wanted is asked before any are left out;
+# with OFFSET 0 the words are looked up first, by their index.
+SEARCH_PROMPTS: Final = text(
+    f"""
+    WITH asked AS MATERIALIZED (SELECT websearch_to_tsquery('english', :words) AS words),
+    told AS MATERIALIZED (
+        SELECT found.job_id, found.sequence FROM (
+            SELECT job_id, sequence FROM journal
+            WHERE told IS NOT NULL AND ({TOLD_WORDS.text}) @@ (SELECT words FROM asked) OFFSET 0
+        ) AS found JOIN jobs ON jobs.id = found.job_id
+        WHERE {WANTED} LIMIT :most
+    ),
+    shown AS (
+        SELECT first.job_id, first.sequence, jobs.task, jobs.model, jobs.seed, jobs.outcome,
+            jobs.created_at
+        FROM (SELECT job_id, min(sequence) AS sequence FROM told GROUP BY job_id) AS first
+        JOIN jobs ON jobs.id = first.job_id
+        ORDER BY jobs.created_at DESC, jobs.id LIMIT :limit
+    )
+    SELECT
+        shown.job_id, shown.task, shown.model, shown.seed, shown.outcome, 'prompt' AS place,
+        taken.turn, (SELECT count(*) FROM told) >= :most AS crowded,
+        ts_headline('english', concat_ws(
+            E'\n\n', said.told ->> 'system',
+            (
+                SELECT string_agg(text, E'\\n\\n')
+                FROM json_array_elements_text(said.told -> 'user') AS text
+            )
+        ), (SELECT words FROM asked), :options) AS excerpt
+    FROM shown
+    JOIN journal AS said ON said.job_id = shown.job_id AND said.sequence = shown.sequence
+    LEFT JOIN LATERAL (
+        SELECT (data ->> 'index')::int AS turn FROM events
+        WHERE events.job_id = shown.job_id AND events.kind = '{TURN}'
+            AND (events.data ->> 'sequence')::int = shown.sequence LIMIT 1
+    ) AS taken ON TRUE
+    ORDER BY shown.created_at DESC, shown.job_id
+    """  # noqa: S608 - made of our own constants
+).bindparams(*(bindparam(name, type_=Text()) for name in TEXTS))

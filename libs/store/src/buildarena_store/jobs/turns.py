@@ -61,6 +61,21 @@ class TurnRecord:
     tries: int
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Prompt:
+    """What a session told a role before one of its replies.
+
+    Attributes:
+        turn: Place of the reply in the transcript; None where it is in none.
+        system: The role's system message, if it had none yet.
+        user: Further messages: the task, what is to be done, results of trials.
+    """
+
+    turn: int | None
+    system: str | None
+    user: Sequence[str]
+
+
 # The lock makes a worker that lost its lease write before the next one counts, or not at all.
 _APPEND = text(
     f"""
@@ -86,6 +101,19 @@ _READ = text(
     WHERE taken.job_id = :job_id AND taken.kind = '{TURN}'
         AND taken.id > :after AND taken.id <= :until
     ORDER BY taken.id
+    """  # noqa: S608 - the kind is our own constant
+)
+_PROMPTS = text(
+    f"""
+    SELECT taken.turn, said.told->>'system' AS system, said.told->'user' AS user
+    FROM journal AS said
+    LEFT JOIN LATERAL (
+        SELECT (data->>'index')::int AS turn FROM events
+        WHERE events.job_id = said.job_id AND events.kind = '{TURN}'
+            AND (events.data->>'sequence')::int = said.sequence LIMIT 1
+    ) AS taken ON TRUE
+    WHERE said.job_id = :job_id AND said.told IS NOT NULL
+    ORDER BY said.sequence
     """  # noqa: S608 - the kind is our own constant
 )
 LAST_ID = 2**63 - 1
@@ -118,6 +146,12 @@ class Turns:
         """Whether there is anything to search for."""
         with self._database.statement() as connection:
             return has_words(connection, words)
+
+    def prompts(self, job_id: str) -> list[Prompt]:
+        """What a job's session told its roles, in order; empty where no journal has it."""
+        with self._database.statement() as connection:
+            rows = connection.execute(_PROMPTS, {"job_id": job_id}).mappings()
+            return [Prompt(**row) for row in rows]
 
     def count(self, job_id: str) -> int:
         """How many turns of a job are there."""

@@ -22,6 +22,8 @@ from buildarena_api.schemas import (
     JobPage,
     JobSummaryView,
     JobView,
+    PromptsView,
+    PromptView,
 )
 from buildarena_api.withholding import require_told
 from buildarena_pipeline.catalog.specs import JobSpec
@@ -126,6 +128,19 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
         attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
         artifacts=context.store.jobs.artifacts(job_id),
     )
+
+
+@router.get("/{job_id}/prompts", responses=problem_responses(404, 503))
+def show_prompts(job_id: str, context: ContextDep) -> PromptsView:
+    """What each role was told before its turns: system messages, the task, results of trials.
+
+    Of a session under way, what was told so far. Very long messages are cut.
+    What roles said to one another stands in the transcript and is not repeated. Nothing is known
+    of agents' jobs, of jobs of releases that did not keep it, and of packed histories.
+    """
+    context.store.jobs.get(job_id)
+    found = context.store.turns.prompts(job_id)
+    return PromptsView(prompts=[PromptView.model_validate(prompt) for prompt in found])
 
 
 @router.post("/{job_id}/cancel", responses=problem_responses(404, 409, 503))

@@ -38,8 +38,8 @@ class TranscriptMatchView(BaseModel):
     turn: int | None = Field(
         description="Place in the transcript, from 0; null where only the reply is kept"
     )
-    where: Literal["reply", "feedback"] = Field(
-        description="In what was said, or in what it was answered"
+    where: Literal["reply", "feedback", "prompt"] = Field(
+        description="In what was said, in what it was answered, or in what the role was told before"
     )
     excerpt: list[ExcerptPiece]
 
@@ -68,10 +68,15 @@ def search_transcripts(
     task: Annotated[str | None, Query()] = None,
     model: Annotated[str | None, Query()] = None,
     sweep: Annotated[str | None, Query(description="Only of this sweep's jobs")] = None,
+    of: Annotated[
+        Literal["transcripts", "prompts"],
+        Query(description="prompts: what roles were told; the first turn of each job is found"),
+    ] = "transcripts",
     limit: Annotated[int, Query(ge=1, le=200)] = 50,
 ) -> TranscriptMatchesView:
     """Searches the transcripts of all jobs for words, in what models said and were answered.
 
+    With `of=prompts`, in system messages, tasks and results that sessions told their roles.
     Histories that were packed are not searched.
     """
     if "\0" in text or not context.store.turns.has_words(text):
@@ -80,7 +85,7 @@ def search_transcripts(
         raise ProblemError(422, f"text: {message}", errors=[issue])
     if sweep is not None:
         context.store.sweeps.get(sweep)
-    wanted = TranscriptFilter(task=task, model=model, sweep_id=sweep)
+    wanted = TranscriptFilter(task=task, model=model, sweep_id=sweep, prompts=of == "prompts")
     found = context.store.turns.search(text, wanted, limit=limit)
     if not found.matches:
         require_known(context, registry, JobFilter(equals={"task": task, "model": model}))

@@ -116,7 +116,13 @@ class Dialogue:
         Raises:
             ConstructionFailedError: The role raised an objection.
         """
-        reply = self._session.ask(self._view(role), role.tools, phase=self._phase, role=role.name)
+        reply = self._session.ask(
+            self._view(role),
+            role.tools,
+            phase=self._phase,
+            role=role.name,
+            told=self._told(role),
+        )
         actions = _carry_out(role, reply)
         self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
         written = () if reply.calls or role.carry_out is None else role.carry_out(reply.text)
@@ -146,6 +152,18 @@ class Dialogue:
                 received.append(_rendered(said))
         self._hear(messages, received)
         return messages
+
+    def _told(self, role: Role) -> list[Message]:
+        """What the session says to a role that it has not said before."""
+        begun, remarks = False, list[str]()
+        for said in self._thread:
+            if isinstance(said, _Utterance) and said.role == role.name:
+                begun, remarks = True, []
+            elif isinstance(said, _Remark) and said.to == role.name:
+                remarks.append(said.text)
+        first = [] if begun else [role.brief or self._opening]
+        system = [] if begun else [Message(role="system", text=role.system)]
+        return system + [Message(role="user", text=text) for text in [*first, *remarks]]
 
     def _beginning(self, role: Role) -> int:
         """From where on in the thread a role reads."""

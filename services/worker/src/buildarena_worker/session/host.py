@@ -30,6 +30,8 @@ GARBAGE_IN_A_ROW = 6
 """After so many answers in a row that can't be read, the provider is taken to be out of order."""
 FIRST_WAIT_S = 0.25
 OUTAGE_DELAY_S = 30.0
+LONGEST_TOLD = 40_000
+"""Characters of a message to a role that a journal keeps."""
 
 
 class SessionHost(Protocol):
@@ -253,6 +255,7 @@ class LiveHost:
                 latency_s=latency_s,
                 tries=completion.attempts,
                 provider_request_id=clean(completion.provider_request_id),
+                told=clean(_told(request)),
             )
             self._store(entry)
         self._replay.count(entry)
@@ -305,3 +308,15 @@ class LiveHost:
     def trajectory(self, record: RolloutRecord) -> Trajectory | None:
         """The trajectory of a rollout; None when its machine could not be simulated."""
         return self._replay.trajectory(record)
+
+
+def _told(request: Request) -> dict[str, Any] | None:
+    """What the session says with a request, as journals keep it; None when it says nothing."""
+    told: dict[str, Any] = {"user": []}
+    for message in request.told:
+        text = message.text[:LONGEST_TOLD]
+        if message.role == "system":
+            told["system"] = text
+        else:
+            told["user"].append(text)
+    return told if request.told else None

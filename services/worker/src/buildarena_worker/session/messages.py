@@ -71,16 +71,19 @@ class Request:
         messages: The conversation.
         tools: Tools that may be used.
         seed: The job's seed, sent where providers take one.
+        told: The messages that the session itself adds with this request; a part of nothing that
+            is sent, as `messages` has them already.
     """
 
     model_config: Mapping[str, Any]
     messages: Sequence[Message]
     tools: Sequence[ToolDefinition] = ()
     seed: int = 0
+    told: Sequence[Message] = ()
 
     @property
     def hash(self) -> str:
-        """SHA-256 of everything in it."""
+        """SHA-256 of everything that is sent."""
         return content_hash(
             {
                 "model": dict(self.model_config),

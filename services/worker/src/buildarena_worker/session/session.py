@@ -113,9 +113,22 @@ class Session:
         return acting(self.task, machine)
 
     def ask(
-        self, messages: Sequence[Message], tools: Sequence[ToolDefinition], *, phase: str, role: str
+        self,
+        messages: Sequence[Message],
+        tools: Sequence[ToolDefinition],
+        *,
+        phase: str,
+        role: str,
+        told: Sequence[Message] = (),
     ) -> Completion:
         """The model's reply to a conversation.
+
+        Args:
+            messages: The conversation.
+            tools: Tools that may be used.
+            phase: The workflow's phase.
+            role: Who speaks.
+            told: Which of the messages, or what in them, the session says for the first time.
 
         Raises:
             ConstructionFailedError: The conversation outgrew the model's context, or what a worker
@@ -127,7 +140,11 @@ class Session:
                 f"the {role}'s conversation is longer than {MAX_CONVERSATION:,} characters",
             )
         request = Request(
-            model_config=self._model_config, messages=messages, tools=tools, seed=self.seed
+            model_config=self._model_config,
+            messages=messages,
+            tools=tools,
+            seed=self.seed,
+            told=told,
         )
         completion = self.host.ask(request, phase=phase, role=role)
         if completion.finish == "context_overflow":
