@@ -64,9 +64,9 @@ class Newcomer:
         return text
 
     async def open(self, title: str, *, simulator: int) -> str:
-        """Opens a session for the task with this in its title; the reply."""
+        """Opens a session for the first task with this in its title; the reply."""
         tasks = await self.use("List the tasks", {})
-        (task,) = re.findall(rf"^(\S+): .*{title}.*$", tasks, re.MULTILINE)
+        task, *_ = re.findall(rf"^(\S+): .*{title}.*$", tasks, re.MULTILINE)
         opening = self._tool("Begin to build")
         simulators = opening.input_schema["properties"][self._argument(opening, "simulates")][
             "enum"
