@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.figures import tell
-from support.machines.expert_calls import control_of
+from support.machines.expert_calls import built
 from support.machines.families import car, rocket, rocket_assembly
 from support.machines.people import bridges, rockets, vehicles
 
@@ -31,15 +31,8 @@ _STRAIGHT: Final = (("UpArrow", 0.5, 20.0),)
 _SHUTTLE: Final = (("UpArrow", 3.0, 1.4), ("DownArrow", 6.5, 1.4))
 
 
-def built(design: Design) -> Machine:
-    """A design of one part with its keys."""
-    machine = Machine(catalogue=catalogue_of("all"))
-    (part,) = design.parts.values()
-    for tool, arguments in [*part.actions, *control_of(design.control or {})]:
-        outcome = machine.act(tool, dict(arguments))
-        if not outcome.ok:
-            raise ValueError(outcome.text)
-    return machine
+def _machine(design: Callable[[], Design]) -> Machine:
+    return built(design(), Machine(catalogue=catalogue_of("all")))
 
 
 def _bridges(gap: int) -> dict[str, Build]:
@@ -69,16 +62,13 @@ def _catapults() -> dict[str, Build]:
         "5 springs, flat cup": Shape(springs=5, cup_deg=0),
         "7 springs, short arm": Shape(springs=7, arm=5, lean_deg=47),
     }
-    return {
-        name: partial(lambda shape: built(plain_catapult(shape)), s) for name, s in shapes.items()
-    }
+    designs = {name: partial(plain_catapult, shape) for name, shape in shapes.items()}
+    return {name: partial(_machine, design) for name, design in designs.items()}
 
 
 def _cranes() -> dict[str, Build]:
     names = ("mechanisms-4", "mechanisms-3", "place-2")
-    return {
-        f"the arm of {name}": partial(lambda name: built(DESIGNS[name](0)), name) for name in names
-    }
+    return {f"the arm of {name}": partial(_machine, partial(DESIGNS[name], 0)) for name in names}
 
 
 FIRST_TRIES: Final[Mapping[str, Mapping[str, Build]]] = {

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from support.machines.expert_calls import control_of
+from support.machines.expert_calls import built
 from support.machines.piloted import FASTER_FIRST
 
 from buildarena_benchmark import Task, parse_custom_task, score
@@ -21,14 +21,9 @@ def level(name: str) -> Task:
     return parse_custom_task((FOLDER / f"{name}.yaml").read_text(), origin=name)
 
 
-def experts_machine(task: Task, seed: int = 0) -> Machine:
-    design = LEVEL_DESIGNS[task.name](seed)
+def experts_machine(task: Task) -> Machine:
     machine = task.new_machine(task.constraints.catalogue)
-    actions = [*next(iter(design.parts.values())).actions, *control_of(design.control)]
-    for tool, arguments in actions:
-        outcome = machine.act(tool, dict(arguments))
-        assert outcome.ok, outcome.text
-    return machine
+    return built(LEVEL_DESIGNS[task.name](0), machine)
 
 
 def test_there_are_all_levels_of_the_four_families() -> None:

@@ -73,6 +73,20 @@ def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -
     return design.steer(seen)
 
 
+def built(design: Design, machine: Machine) -> Machine:
+    """A machine after all that builds a design of one part, and binds and presses its keys.
+
+    Raises:
+        ValueError: Something of it is refused.
+    """
+    (part,) = design.parts.values()
+    for tool, arguments in [*part.actions, *control_of(design.control or {})]:
+        outcome = machine.act(tool, dict(arguments))
+        if not outcome.ok:
+            raise ValueError(outcome.text)
+    return machine
+
+
 def control_of(answer: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     actions: list[tuple[str, dict[str, Any]]] = []
     for bound in answer.get("control_config", ()):
