@@ -4,15 +4,18 @@ from typing import Final
 
 from buildarena_benchmark import builtin_tasks
 
-KINDS: Final = ("support", "transport", "lift", "mechanisms", "flight", "control", "throwing")
+KINDS: Final = (
+    *("support", "transport", "lift", "mechanisms", "flight", "control"),
+    *("throwing", "driving", "delivering"),
+)
 
 _FAMILIES: Final = {
     "budget": "support",
     "repair": "transport",
     "identify": "flight",
     "throw": "throwing",
-    "deliver": "transport",
-    "drive": "transport",
+    "deliver": "delivering",
+    "drive": "driving",
     "fetch": "mechanisms",
 }
 """What sort of machine a family asks for, where its name does not say so."""

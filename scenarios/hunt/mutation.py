@@ -15,6 +15,7 @@ Draw = np.random.Generator
 Mutation = Callable[[Machine, str, Draw], Actions]
 
 WOOD, WHEEL, CANNON, TORCH = "Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch"
+_COMMON: Final = (0.4, 0.3, 0.1, 0.1, 0.05, 0.05)
 _MODULES: Final[Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]]] = MappingProxyType(
     {
         "support": ((WOOD, WHEEL), (0.95, 0.05)),
@@ -39,6 +40,8 @@ _MODULES: Final[Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]]] = Mappi
             (WOOD, "Log", "Ballast", "Swivel", "Hinge", "Steering Hinge", "Boulder", "Bomb Holder"),
             (0.4, 0.1, 0.1, 0.1, 0.1, 0.1, 0.05, 0.05),
         ),
+        "driving": ((WOOD, WHEEL, "Large Wheel", "Log", "Steering Hinge", "Ballast"), _COMMON),
+        "delivering": ((WOOD, WHEEL, "Grabber", "Log", "Piston", "Swivel"), _COMMON),
     }
 )
 _PROGRAM_SHARE: Final = 0.5
@@ -264,7 +267,7 @@ def _bind(machine: Machine, category: str, draw: Draw) -> Actions:
         params = {"block_id": block.id, "action": action, "new_key": key}
         done = act(machine, "add_control_key", params)
         made += [] if done is None else [done]
-    driven = category in ("transport", "mechanisms", "flight")
+    driven = _GROWTHS[category] is _DRIVEN
     return made + (_press(machine, category, draw, key) if driven else [])
 
 
@@ -286,14 +289,17 @@ _SHAPES: Final[tuple[tuple[Mutation, float], ...]] = (
     (_connect, 2.0),
     (_move, 1.5),
 )
+_DRIVEN: Final = (*_SHAPES, (_bind, 2.0), (_press, 1.0))
 _GROWTHS: Final[Mapping[str, tuple[tuple[Mutation, float], ...]]] = MappingProxyType(
     {
         "support": _SHAPES,
-        "transport": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
+        "transport": _DRIVEN,
         "lift": (*_SHAPES, (_bind, 1.5)),
-        "mechanisms": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
-        "flight": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
+        "mechanisms": _DRIVEN,
+        "flight": _DRIVEN,
         "control": _SHAPES,
-        "throwing": (*_SHAPES, (_bind, 2.0), (_press, 1.0)),
+        "throwing": _DRIVEN,
+        "driving": _DRIVEN,
+        "delivering": _DRIVEN,
     }
 )

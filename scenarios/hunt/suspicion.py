@@ -18,8 +18,10 @@ from support.machines.piloted import listened, repeated, scored
 
 from buildarena_benchmark import Score, Task
 from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.scorers.measures.thrown import loose_ball
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.scenario import SpanPlacement
 
 Floats = NDArray[np.float64]
@@ -252,6 +254,64 @@ def _drawn(evidence: Evidence, trial: Callable[[Task, Machine], Score]) -> bool:
     return counts(result)
 
 
+# Throwing and delivering
+
+
+def _no_key_before_it_flies(evidence: Evidence) -> bool:
+    """The boulder is fast before the first key: something else than a command throws it."""
+    trajectory = evidence.trajectory
+    ball = loose_ball(evidence.machine, trajectory)
+    presses = [press.time_s for press in evidence.machine.control_sequence]
+    if ball is None or evidence.machine.controller is not None:
+        return False
+    speed = np.linalg.norm(np.diff(_path(trajectory)[:, ball], axis=0), axis=1) * SAMPLE_RATE_HZ
+    fast = int((speed > 0.5 * speed.max()).argmax())
+    return bool(trajectory.time_s[fast] < min(presses, default=np.inf))
+
+
+def _breaks_as_it_throws(evidence: Evidence) -> bool:
+    """A joint breaks in the second around the boulder's greatest speed."""
+    trajectory = evidence.trajectory
+    ball = loose_ball(evidence.machine, trajectory)
+    if ball is None:
+        return False
+    speed = np.linalg.norm(np.diff(_path(trajectory)[:, ball], axis=0), axis=1)
+    fastest = trajectory.time_s[int(speed.argmax())]
+    return any(abs(event.time_s - fastest) < 0.5 for event in trajectory.breaks)
+
+
+def _travels(evidence: Evidence) -> bool:
+    """The starting block moves by more than a unit before the boulder is fastest."""
+    path = _path(evidence.trajectory)
+    ball = loose_ball(evidence.machine, evidence.trajectory)
+    if ball is None:
+        return False
+    speed = np.linalg.norm(np.diff(path[:, ball], axis=0), axis=1)
+    way = np.linalg.norm(path[: int(speed.argmax()) + 1, 0] - path[0, 0], axis=1)
+    return bool(way.max() > 1.0)
+
+
+def _cargo_runs_ahead(evidence: Evidence) -> bool:
+    """The cargo is faster than any part of the machine while it makes most of its way."""
+    cargo = evidence.trajectory.cargo_position
+    if cargo is None:
+        return False
+    pace = np.linalg.norm(np.diff(cargo.astype(np.float64), axis=0), axis=1)
+    parts = np.linalg.norm(np.diff(_path(evidence.trajectory), axis=0), axis=2).max(axis=1)
+    alone = pace > 1.2 * parts
+    return bool(pace[alone].sum() > 0.5 * pace.sum())
+
+
+def _reaches_over_the_way(evidence: Evidence) -> bool:
+    """The machine is longer than half of what the cargo travels."""
+    cargo = evidence.trajectory.cargo_position
+    if cargo is None:
+        return False
+    start = _path(evidence.trajectory)[0]
+    extent = float(np.linalg.norm((start.max(axis=0) - start.min(axis=0))[:2]))
+    return extent > 0.5 * float(np.linalg.norm(cargo[:, :2] - cargo[0, :2], axis=1).max())
+
+
 # All categories
 
 
@@ -306,13 +366,30 @@ CHECKS: Final[Mapping[str, Mapping[str, Check]]] = MappingProxyType(
             "no cannon with the start": _no_cannon_with_the_start,
             "idle structure": _idle_structure,
         },
+        "driving": {
+            "wheels hang in the air": _wheels_hang_in_the_air,
+            "falls over": _falls_over,
+            "rolls on without keys": _rolls_on_without_keys,
+            "fewer than three wheels": _few_wheels,
+        },
+        "delivering": {
+            "falls over": _falls_over,
+            "rolls on without keys": _rolls_on_without_keys,
+            "cargo runs ahead": _cargo_runs_ahead,
+            "reaches over the way": _reaches_over_the_way,
+        },
+        "throwing": {
+            "no key before it flies": _no_key_before_it_flies,
+            "breaks as it throws": _breaks_as_it_throws,
+            "travels": _travels,
+        },
         "control": {
             "needs no program": _needs_no_program,
             "looks at nothing": _looks_at_nothing,
         },
     }
 )
-"""Checks of one category by name."""
+"""Checks of one kind by name."""
 
 GENERAL: Final[Mapping[str, Check]] = MappingProxyType(
     {
