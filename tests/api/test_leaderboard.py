@@ -137,6 +137,29 @@ def test_each_reading_of_flags_can_be_asked_for(api, played) -> None:
     assert (row["trials"], row["success_rate"]) == (0, None)
 
 
+def test_throws_stand_under_the_published_policy_by_the_parabola(api, context) -> None:
+    sweep = {"tasks": ["throw-1"], "models": ["builtin/expert"], "seeds": [0, 1]}
+    sweep_id = api.post("/v1/sweeps", json={"name": "throws", **sweep}).json()["id"]
+    for parabola in (120.0, None):
+        metrics = {"parts": 7, "parabola": parabola, "robustness": 1.0, "robust_indicator": 50.0}
+        finish(context, claim(context), "success", 55.0, metrics=metrics)
+    before = (datetime.now(UTC) - timedelta(hours=1)).isoformat()
+    for period in ({}, {"since": before}):
+        (ours,) = board(api, task="throw-1", **period)["tasks"]
+        row = ours["rows"][0]
+        assert (ours["indicator"], ours["unit"]) == ("distance", "units")
+        assert (row["indicator_mean"], row["score"] is None) == (50.0, False)
+        (published,) = board(api, task="throw-1", policy="published", **period)["tasks"]
+        row = published["rows"][0]
+        assert (published["indicator"], published["unit"]) == ("parabola", "")
+        assert (row["indicator_mean"], row["indicator_best"]) == ((120.0 + 55.0) / 2, 120.0)
+        assert (row["successes"], row["score"]) == (2, None)
+    results = api.get(f"/v1/sweeps/{sweep_id}/results").json()
+    assert {result["published"] for result in results} == {120.0, None}
+    listed = {task["name"]: task["published_metric"] for task in api.get("/v1/tasks").json()}
+    assert (listed["throw-5"], listed["lift-1"]) == ("parabola", None)
+
+
 @pytest.mark.parametrize("path", ["", "/compare", "/export", "/changes", "/manifest"])
 def test_an_unknown_reading_is_refused_with_the_choices(api, path) -> None:
     given = {"policy": "theirs", "first": "a", "second": "b"}

@@ -11,6 +11,7 @@ from buildarena_benchmark.leaderboard import (
     EndedJob,
     TrackBoard,
     compare_models,
+    counted_trials,
     summarise,
 )
 from buildarena_benchmark.scorers.registry import known_flags
@@ -112,6 +113,20 @@ def test_the_published_reading_leaves_out_what_it_calls_hacked(flag, success) ->
 def test_the_published_reading_knows_no_flags_but_its_own(flag) -> None:
     cell = summarise(trials("lift-1", "a", 3, 4, flags=(flag,)), policy=ScoringPolicy.PUBLISHED)
     assert (cell.flagged, cell.successes, cell.trials) == (0, 3, 4)
+
+
+def test_the_published_policy_reads_the_metric_that_was_published() -> None:
+    found = [replace(t, published=3.0 * t.seed) for t in trials("throw-1", "a", 2, 4)]
+    found[0] = replace(found[0], robustness=1.0, robust_indicator=50.0)
+    ours = summarise(found)
+    assert (ours.indicator_mean, ours.indicator_best) == ((50.0 + 11.0) / 4, 50.0)
+    assert ours.score is not None
+    published = summarise(found, policy=ScoringPolicy.PUBLISHED)
+    assert (published.indicator_mean, published.indicator_best) == (4.5, 9.0)
+    assert (published.successes, published.score) == (2, None)
+    counted = counted_trials(found, policy=ScoringPolicy.PUBLISHED)
+    assert [trial.indicator for trial in counted] == [0.0, 3.0, 6.0, 9.0]
+    assert [t.indicator for t in counted_trials(found)] == [50.0, 11.0, 0.0, 0.0]
 
 
 def bridges(model: str, successes: int, load: float, *flags: str) -> list[EndedJob]:

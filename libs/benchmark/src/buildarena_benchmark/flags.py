@@ -16,7 +16,8 @@ class ScoringPolicy(StrEnum):
         OURS: A disqualified trial is a failure, and a failure has an indicator of 0; other flags
             change nothing.
         PUBLISHED: As the published evaluation does it: trials that it calls hacked are left out,
-            and everything else counts as it was scored.
+            and everything else counts as it was scored, by the metric that was published where
+            that is not the indicator.
     """
 
     OURS = "ours"

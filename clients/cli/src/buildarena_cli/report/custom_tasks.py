@@ -10,7 +10,6 @@ from buildarena_benchmark.leaderboard import Board, EndedJob
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.report.document import Block, Grid, Heading, Paragraph
 from buildarena_cli.report.material import Material, ReportTask
-from buildarena_cli.terminal.output import in_words
 
 
 def read_tasks(client: Client, trials: Sequence[EndedJob]) -> dict[str, ReportTask]:
@@ -46,7 +45,7 @@ def custom_tasks(material: Material, board: Board) -> list[Block]:
                     task.name,
                     task.document["title"],
                     task.version,
-                    in_words(task.indicator, task.unit),
+                    task.figure(material.policy),
                     *_limits(task.document),
                     str(shown.outdated),
                 )
@@ -87,6 +86,6 @@ def _limits(document: Mapping[str, Any]) -> tuple[str, str, str, str]:
 
 
 def _task(entry: Mapping[str, Any]) -> ReportTask:
-    names = ("name", "version", "category", "indicator", "unit", "difficulty")
+    names = ("name", "version", "category", "indicator", "unit", "published_metric", "difficulty")
     document = entry.get("document") if entry["custom"] else None
     return ReportTask(**{name: entry[name] for name in names}, document=document)

@@ -8,6 +8,7 @@ from typing import Any
 
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Cell, EndedJob, PublishedRow, published_rows
+from buildarena_cli.terminal.output import in_words
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,6 +21,7 @@ class ReportTask:
         category: Tasks of one category are pooled.
         indicator: Name of the figure it is ranked by.
         unit: The figure's unit.
+        published_metric: Name of what the published policy reads instead, if it does.
         difficulty: Weight of each difficulty dimension; empty if not stated.
         document: Its whole document, if it is a user's own.
     """
@@ -29,8 +31,15 @@ class ReportTask:
     category: str
     indicator: str
     unit: str
+    published_metric: str | None
     difficulty: Mapping[str, int]
     document: Mapping[str, Any] | None = None
+
+    def figure(self, policy: ScoringPolicy) -> str:
+        """What a scoring policy reads, with its unit, in words."""
+        if policy == ScoringPolicy.PUBLISHED and self.published_metric is not None:
+            return self.published_metric
+        return in_words(self.indicator, self.unit)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

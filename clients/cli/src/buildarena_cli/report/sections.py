@@ -22,7 +22,7 @@ from buildarena_cli.report.material import (
     percent,
 )
 from buildarena_cli.report.plots import indicator_plot, radar_plot, shares_plot, success_plot
-from buildarena_cli.terminal.output import in_words, number
+from buildarena_cli.terminal.output import number
 
 READ: Final[Mapping[ScoringPolicy, str]] = {
     ScoringPolicy.OURS: "Disqualified jobs count as failures with an indicator of 0.",
@@ -140,7 +140,7 @@ def _performance(
         *(PARTS.heading, "paper", "flagged"),
     )
     labels = {
-        name: in_words(material.tasks[name].indicator, material.tasks[name].unit)
+        name: material.tasks[name].figure(material.policy)
         for name in cells
         if name in material.tasks
     }

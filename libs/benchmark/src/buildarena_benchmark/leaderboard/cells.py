@@ -27,7 +27,7 @@ from buildarena_benchmark.statistics import (
     pass_at_k,
     pass_hat_k,
 )
-from buildarena_benchmark.tasks.loading import references
+from buildarena_benchmark.tasks.loading import builtin_tasks, references
 
 PASS_K: Final = (1, 2, 4, 8)
 """The k of pass@k and pass^k."""
@@ -130,7 +130,8 @@ def counted_trials(
         if not trial.scored or is_left_out(trial.flags, policy):
             continue
         if policy != ScoringPolicy.OURS:
-            counted.append(replace(trial, robustness=None, robust_indicator=None))
+            exact = replace(trial, robustness=None, robust_indicator=None)
+            counted.append(replace(exact, indicator=trial.as_published))
         elif is_disqualified(trial.flags):
             failed = replace(trial, robustness=None, robust_indicator=None)
             counted.append(replace(failed, success=False, indicator=0.0))
@@ -176,7 +177,7 @@ def summarise_tallies(
     outcomes = _counts((tally.outcome, tally.number) for tally in tallies)
     low_high = exact_interval(successes, number) if counted else (None, None)
     figures = _figures(counted)
-    score, score_ends = _score(name.task, figures)
+    score, score_ends = _score(name.task, figures, policy)
     indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
     actions = sum(tally.actions for tally in counted)
     refused = sum(tally.refused_actions for tally in counted)
@@ -239,8 +240,8 @@ def counted_tallies(
     In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
     model would lose nothing by trying to cheat, and one whose machines blow up would gain. So does
     every failure: tasks say when a trial succeeds, and what fails has done nothing that counts.
-    A job that was tried in varied worlds counts by what it did in these; the published reading
-    knows the exact one alone.
+    A job that was tried in varied worlds counts by what it did in these; the published policy
+    knows the exact one alone, and the figure that was published where that is another.
     """
     counted = []
     for tally in tallies:
@@ -257,11 +258,13 @@ def counted_tallies(
 
 
 def _score(
-    task: str, figures: NDArray[np.float64]
+    task: str, figures: NDArray[np.float64], policy: ScoringPolicy
 ) -> tuple[float | None, tuple[float, float] | None]:
-    """The mean score beside the expert's, and its interval."""
+    """The mean score beside the expert's indicator, and its interval."""
     reference = references().get(task)
     if reference is None or not len(figures):
+        return None, None
+    if policy == ScoringPolicy.PUBLISHED and builtin_tasks()[task].published_metric:
         return None, None
     scores = expert_scores(figures[:, 1], reference)
     return _mean(scores), mean_interval(scores, figures[:, 0] > 0)

@@ -49,7 +49,7 @@ class Tally:
         imported: Whether they came from another service's archive.
         by_runner: Whether runners ran trials of theirs.
         unverified: Whether they wait for their verification, or were refuted.
-        indicators: (N,) float64, of each trial, in the exact world.
+        indicators: (N,) float64, of each trial in the exact world, as `EndedJob.as_published`.
         shares: (N,) float64, 0 to 1, what each trial's success is worth: in varied worlds where
             there were any.
         gained: (N,) float64, what each trial's indicator is worth, as `EndedJob.gained`.
@@ -212,7 +212,7 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
         imported=imported,
         by_runner=by_runner,
         unverified=unverified,
-        indicators=np.array([trial.indicator for trial in trials], np.float64),
+        indicators=np.array([trial.as_published for trial in trials], np.float64),
         shares=np.array([trial.share for trial in trials], np.float64),
         gained=np.array([trial.gained for trial in trials], np.float64),
         costs_usd=np.array(

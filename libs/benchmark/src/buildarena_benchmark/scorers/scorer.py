@@ -125,6 +125,8 @@ class Scorer:
             where the whole trial decides.
         ceiling: The greatest indicator that there is, given parameters and scenario, or what none
             reaches; None where only what can be built bounds it.
+        published: The metric that a published evaluation scores by, which boards read under that
+            policy; None where it is the indicator.
     """
 
     parameters: type[Document]
@@ -133,6 +135,7 @@ class Scorer:
     flags: tuple[Flag, ...] = ()
     decision: "Callable[[Any, Scenario], Decision] | None" = None
     ceiling: Callable[[Any, Scenario], float | None] = _unbounded
+    published: str | None = None
 
     @property
     def name(self) -> str:

@@ -396,4 +396,5 @@ SCORER: Final = Scorer(
         FORCES_NOT_MEASURED,
     ),
     ceiling=ceiling,
+    published="parabola",
 )

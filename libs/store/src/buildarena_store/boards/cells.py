@@ -46,7 +46,7 @@ from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
 from buildarena_store.tables import board_changes, jobs, tasks
 
-FORMAT: Final = 4
+FORMAT: Final = 5
 """Of rows; programs of different formats may use one database at once."""
 FILL_LOCK: Final = 0x63656C6C73  # "cells": of processes that find none, one makes them
 MAX_STORED_AT_ONCE: Final = 50

@@ -15,9 +15,9 @@ from buildarena_store.boards.cells import BoardCells
 from buildarena_store.boards.trials import (
     COUNTS,
     RANKED,
-    TRIAL_COLUMNS,
     TrialFilter,
     read_trials,
+    trial_columns,
 )
 from buildarena_store.database import Database
 from buildarena_store.rows import columns_of, value_of
@@ -96,7 +96,7 @@ class Boards:
 
     def trials(self, wanted: TrialFilter) -> list[EndedJob]:
         """Single ended jobs, in no order; a million of them take a gigabyte."""
-        query = select(*TRIAL_COLUMNS).where(*wanted.conditions())
+        query = select(*trial_columns()).where(*wanted.conditions())
         with self._database.transaction() as connection:
             return list(read_trials(connection, query))
 
@@ -120,7 +120,7 @@ class Boards:
         """A sweep's ended jobs with their rounds, in a fixed order."""
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         query = (
-            select(*TRIAL_COLUMNS)
+            select(*trial_columns())
             .where(jobs.c.state == JobState.DONE, jobs.c.id.in_(members))
             .order_by(jobs.c.task, jobs.c.model, jobs.c.seed, jobs.c.id)
         )

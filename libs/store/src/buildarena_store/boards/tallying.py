@@ -39,7 +39,7 @@ from buildarena_benchmark.leaderboard import (
     tally_between,
 )
 from buildarena_store.boards.packing import floats, integers
-from buildarena_store.boards.trials import COUNTS, CellId, TrialFilter, decoding_of
+from buildarena_store.boards.trials import COUNTS, CellId, TrialFilter, decoding_of, published
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import EXTERNAL_PROVIDER
 from buildarena_store.tables import jobs
@@ -105,7 +105,10 @@ def cell_record(
 def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
     """The cells of the jobs that are meant, made by two queries in one transaction."""
     found: dict[CellId, list[Row[Any]]] = {}
-    query = select(*_GROUPS, *_EACH).where(*wanted.conditions()).group_by(*_GROUPS)
+    exact = func.coalesce(published(), jobs.c.indicator, 0.0)  # as `EndedJob.as_published`
+    indicators = _bytes_of(func.float8send(exact)).label("indicators")
+    figures: list[Any] = [*_GROUPS, indicators, *_EACH]
+    query = select(*figures).where(*wanted.conditions()).group_by(*_GROUPS)
     for row in connection.execute(query):
         found.setdefault(_id_of(row), []).append(row)
     samples = [rows[0].sample for rows in found.values()]
@@ -162,7 +165,6 @@ _OBJECT: Final = func.jsonb_typeof(jobs.c.refusals) == "object"
 _EACH: Final = [
     func.min(jobs.c.id).label("sample"),
     func.count().label("number"),
-    _bytes_of(func.float8send(func.coalesce(jobs.c.indicator, 0.0))).label("indicators"),
     _bytes_of(func.float8send(_SHARE)).label("shares"),
     _bytes_of(func.float8send(_GAINED)).label("gained"),
     _bytes_of(func.float8send(cast(jobs.c.cost_usd, Double))).label("costs"),

@@ -6,11 +6,13 @@ import sys
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cache
 from typing import Any, Final, NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
 
 from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS, EndedJob
+from buildarena_benchmark.scorers.registry import published_metrics
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import EXTERNAL_PROVIDER, FILE_PROVIDER, Audit, JobState
 from buildarena_store.tables import jobs, sweep_jobs
@@ -94,7 +96,21 @@ def in_cells(cells: Collection[CellId]) -> ColumnElement[bool]:
 COUNTS: Final = func.coalesce(jobs.c.audit, Audit.VERIFIED.value) == Audit.VERIFIED
 """Whether a scored job counts, as far as its audit goes."""
 RANKED: Final = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
-TRIAL_COLUMNS: Final = [
+
+
+@cache
+def published() -> ColumnElement[float]:
+    """As `EndedJob.published`: the metric that was published, where a job's scorer has one."""
+    return func.coalesce(*(jobs.c.metrics[name].as_float() for name in published_metrics()))
+
+
+@cache
+def trial_columns() -> tuple[Any, ...]:
+    """What `read_trials` reads of each job."""
+    return (*_COLUMNS, published().label("published"))
+
+
+_COLUMNS: Final = [
     jobs.c.track,
     jobs.c.task,
     jobs.c.task_version,
@@ -128,7 +144,7 @@ TRIAL_COLUMNS: Final = [
 
 
 def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
-    """The trials that a query of `TRIALTRIAL_COLUMNS` finds."""
+    """The trials that a query of `trial_columns` finds."""
     # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
     decodings: dict[str, Mapping[str, Any]] = {}
     result = connection.execution_options(stream_results=True).execute(query)
@@ -148,6 +164,7 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             reason=None if row.reason is None else sys.intern(row.reason),
             success=bool(row.success),
             indicator=row.indicator or 0.0,
+            published=row.published,
             robustness=row.robustness,
             robust_indicator=row.robust_indicator,
             parts=row.parts,

@@ -10,7 +10,7 @@ from urllib.parse import quote_plus
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.leaderboard.policies import UnderPolicy
-from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark import Task, builtin_tasks
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
@@ -300,8 +300,7 @@ def board_view(
                 version=found.version,
                 custom=found.task not in builtin_tasks(),
                 outdated=found.outdated,
-                indicator=task.indicator.name if task else "indicator",
-                unit=task.indicator.unit if task else "",
+                **_figure(task, policy),
                 rows=[row(ranked, found.task) for ranked in found.rows],
                 published=_published(found.task, registry),
                 peers=_peers(found.task),
@@ -321,6 +320,15 @@ def board_view(
         verdict=None if verdict is None else VerdictView.model_validate(verdict),
         published=published_ranking(),
     )
+
+
+def _figure(task: Task | None, policy: ScoringPolicy) -> dict[str, str]:
+    """Name and unit of what rows give as their indicator."""
+    if task is None:
+        return {"indicator": "indicator", "unit": ""}
+    if policy == ScoringPolicy.PUBLISHED and task.published_metric is not None:
+        return {"indicator": task.published_metric, "unit": ""}
+    return {"indicator": task.indicator.name, "unit": task.indicator.unit}
 
 
 def published_ranking() -> list[PublishedOverall]:
