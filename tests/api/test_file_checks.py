@@ -223,4 +223,4 @@ def test_a_file_that_takes_too_much_memory_is_refused(checker) -> None:
 
 
 def test_what_is_refused_is_told_in_words() -> None:
-    assert "not a machine document" in str(read_upload(b"[]"))
+    assert "neither a machine document" in str(read_upload(b"[]"))

@@ -1,5 +1,8 @@
 """Going back to an earlier value of a machine: equal to having gone there by copying."""
 
+import pickle
+from copy import deepcopy
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -29,6 +32,17 @@ actions = st.lists(st.one_of(attach, attach, attach, remove, twist, start, reset
 
 def done(machine: Machine, todo) -> list[str]:
     return [machine.act(name, arguments).text for name, arguments in todo]
+
+
+@settings(max_examples=30, deadline=None)
+@given(first=actions, then=actions)
+@pytest.mark.parametrize("again", [deepcopy, lambda machine: pickle.loads(pickle.dumps(machine))])
+def test_a_machine_is_pickled_and_goes_on(again, first, then) -> None:
+    machine = Machine()
+    done(machine, [("start", {}), *first])
+    copy = again(machine)
+    assert (copy, copy.logged) == (machine, machine.logged)
+    assert done(copy, then) == done(machine, then)
 
 
 @settings(max_examples=60, deadline=None)

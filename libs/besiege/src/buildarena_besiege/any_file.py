@@ -46,7 +46,7 @@ def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> 
         return read_machine_file(data)
     content = _json(data, where)
     if looks_like_tree(content):
-        return _from_tree(data, where)
+        return read_tree_file(data, where=where)
     machine = machine_of(content, where=where, version=dialect)
     return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
 
@@ -85,7 +85,16 @@ def read_presses(
     return tuple(presses)
 
 
-def _from_tree(data: bytes, where: str) -> ImportedMachine:
+def read_tree_file(data: bytes, *, where: str) -> ImportedMachine:
+    """The machine of a construction tree, built from all module types.
+
+    Args:
+        data: JSON, UTF-8.
+        where: What messages call the file.
+
+    Raises:
+        DocumentError: It is none, or an entry can't be built; the message names it.
+    """
     machine = Machine(catalogue=module_set("all"))
     try:
         for _ in tree_actions(read_tree(data.decode("utf-8-sig")), machine):

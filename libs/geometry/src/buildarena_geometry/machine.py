@@ -317,6 +317,10 @@ class Machine:
         changed = (*change.placed, *change.touched, *change.removed)
         return Accepted(changed=changed, render=lambda: _rendered(before, change))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled and deep-copied as what it is; what finds overlaps is made anew."""
+        return self.restored, (self.logged,)
+
     def _collision_world(self) -> CollisionWorld:
         if self._world is None:
             self._world = CollisionWorld()

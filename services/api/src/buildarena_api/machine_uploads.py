@@ -21,9 +21,11 @@ from buildarena_besiege import (
     MachineFileError,
     file_data_lines,
     read_machine_file,
+    read_tree_file,
 )
 from buildarena_geometry import DocumentError, Machine
 from buildarena_geometry.json_texts import TooDeepError, read_json
+from buildarena_geometry.trees import looks_like_tree
 from buildarena_simulation.constants import MAX_PARTS
 
 MAX_BYTES: Final = 2 << 20
@@ -74,10 +76,11 @@ class UploadChecker:
         """The machine of a file, told apart by content.
 
         Args:
-            data: A machine document (JSON) or a machine file of the game (.bsg).
+            data: A machine document or a construction tree (JSON), or a machine file of the game
+                (.bsg).
 
         Raises:
-            ProblemError: It is neither, is not sound, or can't be read within the bounds.
+            ProblemError: It is none of these, is not sound, or can't be read within the bounds.
         """
         try:
             answer: Upload | str = self._checker.ask(data)
@@ -118,7 +121,10 @@ class _RefusedError(Exception):
 def _content(data: bytes) -> ImportedMachine:
     if data.lstrip(_BLANKS).startswith(b"<"):
         return read_machine_file(data)
-    machine = Machine.from_document(_document(data))
+    content = _json(data)
+    if looks_like_tree(content):
+        return read_tree_file(data, where="the tree")
+    machine = Machine.from_document(_document(content))
     return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
 
 
@@ -135,7 +141,7 @@ def refused(message: str) -> ProblemError:
     return ProblemError(422, message, errors=[ValidationIssue(path="file", message=message)])
 
 
-def _document(data: bytes) -> object:
+def _json(data: bytes) -> object:
     if data.startswith(_GLB):
         raise _RefusedError("a GLB file has shapes only: it can be looked at, not checked or tried")
     try:
@@ -146,9 +152,14 @@ def _document(data: bytes) -> object:
         raise _RefusedError(
             f"neither a machine document (JSON) nor a machine file of the game (.bsg): {error}"
         ) from error
+    return content
+
+
+def _document(content: object) -> dict[str, Any]:
     if not isinstance(content, dict) or "blocks" not in content:
         raise _RefusedError(
-            "not a machine document: a JSON object with blocks, joints and connectors"
+            "neither a machine document, a JSON object with blocks, joints and connectors, nor a "
+            "construction tree, a JSON list of blocks"
         )
     count = _parts(content)
     if count > MAX_PARTS:
