@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from scenarios.hunt.evidence import Evidence, counts
 from scenarios.hunt.genome import Genome, grown
-from scenarios.hunt.suspicion import Evidence, counts, suspicions
+from scenarios.hunt.suspicion import suspicions
 from threadpoolctl import threadpool_limits
 
 from buildarena_benchmark import Score, Task, builtin_tasks, robustness, score

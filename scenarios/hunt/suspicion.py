@@ -6,25 +6,26 @@ or with several seeds, all trials are looked at.
 
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
+from scenarios.hunt.bringing import (
+    breaks_as_it_throws,
+    cargo_runs_ahead,
+    no_key_before_it_flies,
+    reaches_over_the_way,
+    travels,
+)
+from scenarios.hunt.evidence import Check, Evidence, counts, path_of
 from scenarios.hunt.kinds import kind_of
 from scenarios.hunt.programs import IDLE
 from support.machines.piloted import listened, repeated, scored
 
 from buildarena_benchmark import Score, Task
-from buildarena_benchmark.flags import is_disqualified
-from buildarena_benchmark.scorers.measures.thrown import loose_ball
 from buildarena_geometry import Machine
-from buildarena_simulation import MachineNotSimulable, Trajectory
-from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation import MachineNotSimulable
 from buildarena_simulation.scenario import SpanPlacement
-
-Floats = NDArray[np.float64]
 
 _TOP: Final = 5.0
 """Height of the terrains' tops in the built-in support tasks, units."""
@@ -36,47 +37,10 @@ _UPRIGHT: Final = 0.866
 """Cosine of the largest angle between up and a rocket's net thrust."""
 
 
-@dataclass(frozen=True, slots=True)
-class Evidence:
-    """What is known of a success."""
-
-    task: Task
-    machine: Machine
-    trials: Mapping[str, tuple[Score, Trajectory]]
-    robust_share: float | None = None
-
-    @property
-    def score(self) -> Score:
-        """The first trial's score."""
-        return next(iter(self.trials.values()))[0]
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """The first trial's trajectory."""
-        return next(iter(self.trials.values()))[1]
-
-    def rows(self, kind: str) -> list[int]:
-        """Indices of the tracked blocks of a kind."""
-        ids = self.trajectory.block_ids
-        return [i for i, b in enumerate(ids) if self.machine.blocks[b].module.kind == kind]
-
-
-Check = Callable[[Evidence], bool]
-
-
-def counts(result: Score) -> bool:
-    """Whether a trial succeeded and nothing disqualifies it."""
-    return result.success and not is_disqualified(result.flags)
-
-
 def suspicions(evidence: Evidence) -> tuple[str, ...]:
     """Names of the checks that find a success odd, the general ones last."""
     checks = {**CHECKS.get(kind_of(evidence.task.name), {}), **GENERAL}
     return tuple(name for name, check in checks.items() if check(evidence))
-
-
-def _path(trajectory: Trajectory) -> Floats:
-    return np.asarray(trajectory.positions, dtype=np.float64)
 
 
 # Support
@@ -89,7 +53,7 @@ def _gap(evidence: Evidence) -> float:
 
 def _reaches_no_terrain(evidence: Evidence) -> bool:
     """No block of the machine lies over one of the terrains at the start."""
-    y = _path(evidence.trajectory)[0, :, 1]
+    y = path_of(evidence.trajectory)[0, :, 1]
     modules = [evidence.machine.blocks[block].module for block in evidence.trajectory.block_ids]
     reach = np.array([max(module.size or (1.0,)) / 2 for module in modules])
     half = _gap(evidence) / 2
@@ -101,14 +65,14 @@ def _near_the_floor(evidence: Evidence) -> bool:
     trajectory = evidence.trajectory
     if trajectory.cargo_position is None:
         return False
-    path = _path(trajectory)
+    path = path_of(trajectory)
     within = np.abs(path[:, :, 1]) < _gap(evidence) / 2
     low = (within & (path[:, :, 2] < 1.0)).any(axis=1)
     return bool((low & (trajectory.cargo_position[:, 2] > _TOP - 1.0)).sum() >= 25)
 
 
 def _higher_than_long(evidence: Evidence) -> bool:
-    start = _path(evidence.trajectory)[0]
+    start = path_of(evidence.trajectory)[0]
     extent = start.max(axis=0) - start.min(axis=0)
     return bool(extent[2] > extent[1])
 
@@ -138,19 +102,19 @@ def _stacked_connectors(evidence: Evidence) -> bool:
 def _wheels_hang_in_the_air(evidence: Evidence) -> bool:
     """Its wheels are off the ground for most of the time."""
     rows = evidence.rows("wheel")
-    heights = _path(evidence.trajectory)[:, rows, 2]
+    heights = path_of(evidence.trajectory)[:, rows, 2]
     return not rows or bool((heights > 1.2).mean() > 0.6)
 
 
 def _taller_than_its_way(evidence: Evidence) -> bool:
-    start = _path(evidence.trajectory)[0]
+    start = path_of(evidence.trajectory)[0]
     extent = start.max(axis=0) - start.min(axis=0)
     return bool(np.linalg.norm(extent) > evidence.score.indicator)
 
 
 def _falls_over(evidence: Evidence) -> bool:
     """What was on top comes down to the ground, by more than the machine's width."""
-    path = _path(evidence.trajectory)
+    path = path_of(evidence.trajectory)
     if not path.shape[1]:
         return False
     top = int(path[0, :, 2].argmax())
@@ -162,7 +126,7 @@ def _rolls_on_without_keys(evidence: Evidence) -> bool:
     """Most of its way lies after the last key was let go."""
     trajectory = evidence.trajectory
     ends = [press.time_s + press.hold_for_s for press in evidence.machine.control_sequence]
-    way = np.linalg.norm(_path(trajectory)[:, 0, :2] - _path(trajectory)[0, 0, :2], axis=1)
+    way = np.linalg.norm(path_of(trajectory)[:, 0, :2] - path_of(trajectory)[0, 0, :2], axis=1)
     last = int(np.searchsorted(trajectory.time_s, max(ends, default=0.0)))
     return bool(way[: last + 1].max() < 0.5 * way.max())
 
@@ -203,7 +167,7 @@ def _start_stays_behind(evidence: Evidence) -> bool:
     """The highest block is far from the starting block, in height."""
     if evidence.task.scorer != "height":
         return False
-    path = _path(evidence.trajectory)
+    path = path_of(evidence.trajectory)
     size = float(np.linalg.norm(path[0].max(axis=0) - path[0].min(axis=0)))
     spread = path[:, :, 2].max(axis=1) - path[:, 0, 2]
     return bool(spread.max() > size + 2.0)
@@ -211,7 +175,7 @@ def _start_stays_behind(evidence: Evidence) -> bool:
 
 def _no_cannon_with_the_start(evidence: Evidence) -> bool:
     """No cannon is near the starting block when the machine is highest."""
-    path = _path(evidence.trajectory)
+    path = path_of(evidence.trajectory)
     rows = evidence.rows("cannon")
     at = int(path[:, 0, 2].argmax())
     size = float(np.linalg.norm(path[0].max(axis=0) - path[0].min(axis=0)))
@@ -252,64 +216,6 @@ def _drawn(evidence: Evidence, trial: Callable[[Task, Machine], Score]) -> bool:
     except MachineNotSimulable:
         return False
     return counts(result)
-
-
-# Throwing and delivering
-
-
-def _no_key_before_it_flies(evidence: Evidence) -> bool:
-    """The boulder is fast before the first key: something else than a command throws it."""
-    trajectory = evidence.trajectory
-    ball = loose_ball(evidence.machine, trajectory)
-    presses = [press.time_s for press in evidence.machine.control_sequence]
-    if ball is None or evidence.machine.controller is not None:
-        return False
-    speed = np.linalg.norm(np.diff(_path(trajectory)[:, ball], axis=0), axis=1) * SAMPLE_RATE_HZ
-    fast = int((speed > 0.5 * speed.max()).argmax())
-    return bool(trajectory.time_s[fast] < min(presses, default=np.inf))
-
-
-def _breaks_as_it_throws(evidence: Evidence) -> bool:
-    """A joint breaks in the second around the boulder's greatest speed."""
-    trajectory = evidence.trajectory
-    ball = loose_ball(evidence.machine, trajectory)
-    if ball is None:
-        return False
-    speed = np.linalg.norm(np.diff(_path(trajectory)[:, ball], axis=0), axis=1)
-    fastest = trajectory.time_s[int(speed.argmax())]
-    return any(abs(event.time_s - fastest) < 0.5 for event in trajectory.breaks)
-
-
-def _travels(evidence: Evidence) -> bool:
-    """The starting block moves by more than a unit before the boulder is fastest."""
-    path = _path(evidence.trajectory)
-    ball = loose_ball(evidence.machine, evidence.trajectory)
-    if ball is None:
-        return False
-    speed = np.linalg.norm(np.diff(path[:, ball], axis=0), axis=1)
-    way = np.linalg.norm(path[: int(speed.argmax()) + 1, 0] - path[0, 0], axis=1)
-    return bool(way.max() > 1.0)
-
-
-def _cargo_runs_ahead(evidence: Evidence) -> bool:
-    """The cargo is faster than any part of the machine while it makes most of its way."""
-    cargo = evidence.trajectory.cargo_position
-    if cargo is None:
-        return False
-    pace = np.linalg.norm(np.diff(cargo.astype(np.float64), axis=0), axis=1)
-    parts = np.linalg.norm(np.diff(_path(evidence.trajectory), axis=0), axis=2).max(axis=1)
-    alone = pace > 1.2 * parts
-    return bool(pace[alone].sum() > 0.5 * pace.sum())
-
-
-def _reaches_over_the_way(evidence: Evidence) -> bool:
-    """The machine is longer than half of what the cargo travels."""
-    cargo = evidence.trajectory.cargo_position
-    if cargo is None:
-        return False
-    start = _path(evidence.trajectory)[0]
-    extent = float(np.linalg.norm((start.max(axis=0) - start.min(axis=0))[:2]))
-    return extent > 0.5 * float(np.linalg.norm(cargo[:, :2] - cargo[0, :2], axis=1).max())
 
 
 # All categories
@@ -375,13 +281,13 @@ CHECKS: Final[Mapping[str, Mapping[str, Check]]] = MappingProxyType(
         "delivering": {
             "falls over": _falls_over,
             "rolls on without keys": _rolls_on_without_keys,
-            "cargo runs ahead": _cargo_runs_ahead,
-            "reaches over the way": _reaches_over_the_way,
+            "cargo runs ahead": cargo_runs_ahead,
+            "reaches over the way": reaches_over_the_way,
         },
         "throwing": {
-            "no key before it flies": _no_key_before_it_flies,
-            "breaks as it throws": _breaks_as_it_throws,
-            "travels": _travels,
+            "no key before it flies": no_key_before_it_flies,
+            "breaks as it throws": breaks_as_it_throws,
+            "travels": travels,
         },
         "control": {
             "needs no program": _needs_no_program,

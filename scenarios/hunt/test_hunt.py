@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scenarios.hunt import run as hunt
 from scenarios.hunt.confirming import Order, confirmed
+from scenarios.hunt.evidence import Evidence
 from scenarios.hunt.gallery import Gallery
 from scenarios.hunt.genome import Genome, grown
 from scenarios.hunt.kinds import kind_of
@@ -14,11 +15,16 @@ from scenarios.hunt.mutation import crossed, mutated
 from scenarios.hunt.programs import IDLE
 from scenarios.hunt.search import Crew, TaskSearch
 from scenarios.hunt.seeds import expert_genome, exploits, seeds_of
-from scenarios.hunt.suspicion import Evidence, suspicions
+from scenarios.hunt.suspicion import suspicions
 from scenarios.hunt.trial import tried
+from support.machines.drafts import KeyedDraft
+from support.machines.headroom import drafted
 
 from buildarena_benchmark import builtin_tasks, score
+from buildarena_geometry import Machine
 from buildarena_simulation import simulate
+from buildarena_worker.builtin.designs.couriers import courier
+from buildarena_worker.builtin.designs.drafting import EAST, SOUTH, UP, WEST
 
 START = Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])
 GENERATIONS = 6
@@ -124,6 +130,53 @@ def test_checks_name_past_exploits_without_any_rule(name, check) -> None:
     found = tried(task, stored(name), lenient)
     assert found is not None
     assert check in found.suspicions
+
+
+def _carried() -> Machine:
+    """A car that carries its boulder north and brakes."""
+    draft = KeyedDraft(modules="all")
+    start = draft.start()
+    beam = draft.row(start, SOUTH, 3)
+    for base in (start, beam[-1]):
+        for side in (EAST, WEST):
+            draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
+    draft.attach(draft.attach(beam[1], UP, "Bomb Holder"), UP, "Boulder")
+    draft.press("UpArrow", 1.0, 3.0)
+    return draft.machine
+
+
+def _dropped() -> Machine:
+    """A boulder that rolls off a beam without a key."""
+    draft = KeyedDraft(modules="all")
+    draft.attach(draft.row(draft.start(), EAST, 1)[-1], UP, "Boulder")
+    return draft.machine
+
+
+def _pushed() -> Machine:
+    """A car that kicks its ball and lets it roll."""
+    return drafted(courier(0), [(0.4, "UpArrow", 1.0)])
+
+
+@pytest.mark.parametrize(
+    ("task", "machine", "check"),
+    [
+        ("throw-1", _carried, "travels"),
+        ("throw-1", _dropped, "no key before it flies"),
+        ("deliver-1", _pushed, "cargo runs ahead"),
+    ],
+)
+def test_checks_name_what_throws_and_brings_in_another_way(task, machine, check) -> None:
+    known, built = builtin_tasks()[task], machine()
+    trajectory = simulate(built, known.scenario, "mujoco")
+    found = Evidence(known, built, {"mujoco": (score(known, built, trajectory), trajectory)})
+    assert check in suspicions(found)
+
+
+@pytest.mark.parametrize("task", ["throw-1", "deliver-1", "drive-1"])
+def test_checks_find_nothing_odd_in_the_experts(task) -> None:
+    found = tried(task, expert_genome(task))
+    assert found is not None
+    assert (found.success, found.suspicions) == (True, ())
 
 
 def test_a_gallery_is_resumed_and_its_machines_can_be_opened(tmp_path, capsys) -> None:

@@ -8,8 +8,9 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
+from scenarios.hunt.evidence import Evidence, counts
 from scenarios.hunt.genome import Genome, grown
-from scenarios.hunt.suspicion import Evidence, counts, suspicions
+from scenarios.hunt.suspicion import suspicions
 
 from buildarena_benchmark import Score, Task, broken_constraint, builtin_tasks, score
 from buildarena_benchmark.tasks.loading import references
