@@ -1,6 +1,7 @@
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import { expectNoSeriousFault, launched, visit } from "./browser";
+import { expectAllReached } from "./walking";
 
 const PACKAGES = process.env.BUILDARENA_WEB_PACKAGES ?? "";
 const PICTURES = process.env.BUILDARENA_WEB_PICTURES;
@@ -43,12 +44,14 @@ describe("challenges", () => {
     await page.getByRole("table", { name: "Your packages" }).getByText("scored").waitFor();
     await expectNoSeriousFault(page);
     expect(faults).toEqual([]);
+    await expectAllReached(page);
     if (PICTURES !== undefined) await page.screenshot({ path: `${PICTURES}/season-${scheme}.png`, fullPage: true });
     await board.getByRole("link", { name: "Three bridges" }).first().click();
     await page.getByRole("heading", { name: "support-3.json" }).waitFor();
     await page.getByRole("rowheader", { name: "machines" }).waitFor();
     await expectNoSeriousFault(page);
     expect(faults).toEqual([]);
+    await expectAllReached(page);
     if (PICTURES !== undefined) await page.screenshot({ path: `${PICTURES}/entry-${scheme}.png`, fullPage: true });
     await context.close();
   });

@@ -1,13 +1,12 @@
-import type { Browser, Page } from "playwright-core";
+import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
 import { act, ask, expectNoSeriousFault, launched, openSession, settled, URL_OF_SERVICE, visit } from "./browser";
 import { expectNumbers, numbersOf } from "./numbers";
+import { expectAllReached } from "./walking";
 
 type Schemas = components["schemas"];
 
-/** Presses that a page may take beyond its controls: the frame's own, and what takes two. */
-const SPARE = 20;
 /** Colours fade from one mode to the other. */
 const FADE_MS = 250;
 
@@ -55,43 +54,11 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["address that nobody has", () => "/nowhere"],
 ];
 
-/** Marks what a person can press, type into or open, and counts it. */
-function markControls(page: Page): Promise<number> {
-  return page.evaluate(() => {
-    const kinds = "a[href], button, input, select, textarea, summary, [tabindex], [contenteditable=true]";
-    const controls = [...document.querySelectorAll<HTMLElement>(kinds)].filter((found) => {
-      const off = found.matches(":disabled, [tabindex='-1'], [type=hidden], [aria-hidden=true], [aria-hidden=true] *");
-      if (off || !found.checkVisibility({ visibilityProperty: true })) return false;
-      if (!(found instanceof HTMLInputElement) || found.type !== "radio") return true;
-      // Of radio buttons Tab reaches the chosen one, and the arrows the others.
-      const group = document.querySelectorAll<HTMLInputElement>(`input[type=radio][name="${found.name}"]`);
-      return found.checked || ![...group].some((one) => one.checked);
-    });
-    for (const control of controls) control.dataset.walk = "wanted";
-    document.addEventListener("focusin", ({ target }) => {
-      if (target instanceof HTMLElement) target.dataset.walk = "reached";
-    });
-    (document.activeElement as HTMLElement | null)?.blur();
-    return controls.length;
-  });
-}
-
-function missed(page: Page): Promise<string[]> {
-  return page.evaluate(() =>
-    [...document.querySelectorAll('[data-walk="wanted"]')].map((control) => control.outerHTML.slice(0, 160)),
-  );
-}
-
 describe.each(PAGES)("the page: %s", (name, path) => {
   it("has no serious fault in either mode and size, and every control is reached by the keyboard", async () => {
     const { page, context, faults } = await visit(browser, path());
     await page.waitForTimeout(300);
-    const controls = await markControls(page);
-    for (let presses = 0; presses < controls + SPARE; presses += 1) {
-      await page.keyboard.press("Tab");
-      if (presses >= controls - 1 && (await missed(page)).length === 0) break;
-    }
-    expect(await missed(page), name).toEqual([]);
+    await expectAllReached(page);
     for (const width of [1280, 390]) {
       await page.setViewportSize({ width, height: 900 });
       for (const colorScheme of ["light", "dark"] as const) {
