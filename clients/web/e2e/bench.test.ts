@@ -3,7 +3,7 @@ import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, it } from "vitest";
 import { launched, opened, URL_OF_SERVICE } from "./browser";
 
-/** What is measured: "FILE,JOB of 100 blocks with a trial,JOB of 300 turns". */
+/** What is measured: "FILE,JOB of 135 blocks with a trial,JOB of 300 turns". */
 const [file, large = "", long = ""] = (process.env.BUILDARENA_WEB_BENCH ?? "").split(",");
 const figures: Record<string, number> = {};
 
@@ -104,11 +104,11 @@ describe.skipIf(large === "")("speed", () => {
     const page = await opened(browser, `/jobs/${large}`);
     await page.locator("canvas").waitFor();
     await page.waitForTimeout(1500);
-    figures.fps_machine_100_blocks = (await frames(page, 4, "turn")).fps;
+    figures.fps_machine_135_blocks = (await frames(page, 4, "turn")).fps;
     await page.getByRole("tab", { name: "The trial" }).click();
     await page.getByRole("button", { name: "Play" }).click();
     await page.waitForTimeout(500);
-    figures.fps_trial_100_blocks = (await frames(page, 5, "none")).fps;
+    figures.fps_trial_135_blocks = (await frames(page, 5, "none")).fps;
     await page.close();
   });
 

@@ -69,41 +69,30 @@ const Found = memo(function Found({ found, search }: { found: Board; search: Boa
     <>
       <Verdict board={found} search={search} />
       <Controls board={found} search={search} />
-      <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
-        {found.overall.length === 0 ? (
-          <Empty title="No job of these tasks has ended on this track">
-            Choose other tasks above, or another track.
-          </Empty>
-        ) : (
-          <>
-            <Text size="sm" className="dimmed" mb="xs">
-              {rankedOver(found.ranked, found.tasks.length)}
-            </Text>
-            <Overall board={found} search={search} />
-          </>
-        )}
-      </Section>
-      <Section title="Model by task">
+      <Later rows={8}>
+        <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
+          {found.overall.length === 0 ? (
+            <Empty title="No job of these tasks has ended on this track">
+              Choose other tasks above, or another track.
+            </Empty>
+          ) : (
+            <>
+              <Text size="sm" className="dimmed" mb="xs">
+                {rankedOver(found.ranked, found.tasks.length)}
+              </Text>
+              <Overall board={found} search={search} />
+            </>
+          )}
+        </Section>
         <Later rows={8}>
-          <HeatMap board={found} search={search} />
+          <TaskByTask board={found} search={search} />
+          <Later rows={8}>
+            <Suspense fallback={<Loading rows={8} />}>
+              <BoardPlots board={found} search={search} />
+            </Suspense>
+          </Later>
         </Later>
-        <Fold title="Every figure, task by task" size={14} style={{ marginTop: 12 }}>
-          <Stack gap="lg" mt="md">
-            {found.tasks.map((task) => (
-              <div key={task.task}>
-                <Title order={3} size="h5" mb={4}>
-                  {task.task}
-                </Title>
-                <TaskTable task={shown(task, search)} search={search} />
-                {search.paper === "yes" && <Peers task={task} />}
-              </div>
-            ))}
-          </Stack>
-        </Fold>
-      </Section>
-      <Suspense fallback={<Loading rows={8} />}>
-        <BoardPlots board={found} search={search} />
-      </Suspense>
+      </Later>
       <Group>
         <Text size="xs" className="dimmed">
           Intervals hold at 95 %. Places are given with the interval that holds them; models whose trials do not show
@@ -113,3 +102,24 @@ const Found = memo(function Found({ found, search }: { found: Board; search: Boa
     </>
   );
 });
+
+function TaskByTask({ board, search }: { board: Board; search: BoardSearch }) {
+  return (
+    <Section title="Model by task">
+      <HeatMap board={board} search={search} />
+      <Fold title="Every figure, task by task" size={14} style={{ marginTop: 12 }}>
+        <Stack gap="lg" mt="md">
+          {board.tasks.map((task) => (
+            <div key={task.task}>
+              <Title order={3} size="h5" mb={4}>
+                {task.task}
+              </Title>
+              <TaskTable task={shown(task, search)} search={search} />
+              {search.paper === "yes" && <Peers task={task} />}
+            </div>
+          ))}
+        </Stack>
+      </Fold>
+    </Section>
+  );
+}

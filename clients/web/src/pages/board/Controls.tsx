@@ -1,4 +1,4 @@
-import { Group, MultiSelect, SegmentedControl, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
+import { Chip, Group, MultiSelect, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useNavigate } from "@tanstack/react-router";
 import { tasks, type Board } from "../../api/queries";
@@ -46,17 +46,21 @@ export function Controls({ board, search }: { board: Board; search: BoardSearch 
         <Text size="sm" fw={500} id="reading">
           Flagged results
         </Text>
-        <SegmentedControl
-          aria-labelledby="reading"
-          data={[
-            { value: "ours", label: "count as failures" },
-            { value: "published", label: "as the paper" },
-          ]}
+        <Chip.Group
           value={search.policy ?? "ours"}
           onChange={(policy) => {
             set({ policy: policy === "published" ? "published" : undefined });
           }}
-        />
+        >
+          <Group gap={6} role="radiogroup" aria-labelledby="reading">
+            <Chip value="ours" size="sm" radius="sm">
+              count as failures
+            </Chip>
+            <Chip value="published" size="sm" radius="sm">
+              as the paper
+            </Chip>
+          </Group>
+        </Chip.Group>
       </Stack>
       <Stack gap={6}>
         <Switch

@@ -1,4 +1,4 @@
-import { Group, SegmentedControl, Text } from "@mantine/core";
+import { Chip, Group, Text } from "@mantine/core";
 import { Link, useNavigate } from "@tanstack/react-router";
 import type { Board, Row, TaskBoard } from "../../api/queries";
 import { dollars, measured, number, percent, successes } from "../../format";
@@ -33,10 +33,7 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
           {figure === "indicator" && "Mean performance indicator, in each task’s unit. "}
           {figure === "cost" && "Mean dollars a job. "}A cell opens the jobs behind it.
         </Text>
-        <SegmentedControl
-          size="xs"
-          aria-label="Figure"
-          data={[...FIGURES]}
+        <Chip.Group
           value={figure}
           onChange={(value) => {
             const chosen = FIGURES.find((one) => one.value === value)?.value;
@@ -46,7 +43,15 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
               resetScroll: false,
             });
           }}
-        />
+        >
+          <Group gap={6} role="radiogroup" aria-label="Figure">
+            {FIGURES.map(({ value, label }) => (
+              <Chip key={value} value={value} size="xs" radius="sm">
+                {label}
+              </Chip>
+            ))}
+          </Group>
+        </Chip.Group>
       </Group>
       <ModelByTask
         heads={board.tasks.map((task) => ({

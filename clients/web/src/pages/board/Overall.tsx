@@ -1,4 +1,4 @@
-import { Badge, Button, Checkbox, Group, Table, Text, Tooltip } from "@mantine/core";
+import { Badge, Button, Checkbox, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import type { Board, OverallView } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
@@ -9,6 +9,7 @@ import { scoped } from "../compare/search";
 import { entriesOf, keyOf, namesOf } from "./entries";
 import { SCORE, sharedRanks } from "../../parts/ranks";
 import { SortHead, useSorting } from "../../parts/SortHead";
+import { Tip } from "../../parts/Tip";
 import type { Values } from "../../parts/sorting";
 import type { BoardSearch } from "../../api/board-search";
 
@@ -144,11 +145,9 @@ function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean })
           <>
             {row.rank}
             {tied && (
-              <Tooltip label="Statistically tied: the trials do not show which is better">
-                <Text span size="xs" ml={4} className="dimmed" tabIndex={0}>
-                  tied
-                </Text>
-              </Tooltip>
+              <Text span size="xs" ml={4} className="dimmed">
+                <Tip label="Statistically tied: the trials do not show which is better">tied</Tip>
+              </Text>
             )}
           </>
         )}
@@ -200,11 +199,9 @@ function OverallRow({ row, label, most, tied, over, ticked, onTick }: RowOf) {
             </Badge>
           )}
           {row.pareto && (
-            <Tooltip label="No other model is both better and cheaper">
-              <Badge variant="outline" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
-                Pareto
-              </Badge>
-            </Tooltip>
+            <Badge variant="outline" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
+              <Tip label="No other model is both better and cheaper">Pareto</Tip>
+            </Badge>
           )}
         </Group>
         {row.missing.length > 0 && (
