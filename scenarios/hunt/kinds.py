@@ -1,5 +1,7 @@
 """Kinds of tasks: what sort of machine each asks for, in whichever category boards list it."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Final
 
 from buildarena_benchmark import builtin_tasks
@@ -19,6 +21,12 @@ _FAMILIES: Final = {
     "fetch": "mechanisms",
 }
 """What sort of machine a family asks for, where its name does not say so."""
+
+
+ALIKE: Final[Mapping[str, str]] = MappingProxyType(
+    {"driving": "transport", "delivering": "transport"}
+)
+"""Another kind whose machines are worth a try, too."""
 
 
 def kind_of(task: str) -> str:

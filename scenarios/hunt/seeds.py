@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenarios.hunt.genome import Genome, grown
-from scenarios.hunt.kinds import kind_of
+from scenarios.hunt.kinds import ALIKE, kind_of
 from support.machines.expert_calls import control_of
 
 from buildarena_benchmark import builtin_tasks
@@ -60,7 +60,7 @@ def seeds_of(task_name: str) -> list[Genome]:
     """Genomes to start from: all that suit the task's kind and number of sub-structures.
 
     Where no machine of the task's family is stored, the expert's are among them, of all tasks of
-    its kind that have none either.
+    its kind that have none either. Some kinds begin with the machines of another, too.
     """
     whole = builtin_tasks()[task_name].constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
@@ -73,8 +73,9 @@ def seeds_of(task_name: str) -> list[Genome]:
             for name in alike
             if _family(name) not in families and builtin_tasks()[name].beginning is None
         ]
+    kind = kind_of(task_name)
     for other, genome in stored:
-        if kind_of(other) == kind_of(task_name) and bool(genome.sub_structures) != whole:
+        if kind_of(other) in {kind, ALIKE.get(kind)} and bool(genome.sub_structures) != whole:
             found.append(genome)
     return found
 
