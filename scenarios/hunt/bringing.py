@@ -35,13 +35,16 @@ def travels(evidence: Evidence) -> bool:
 
 
 def cargo_runs_ahead(evidence: Evidence) -> bool:
-    """The cargo is faster than any part of the machine while it makes most of its way."""
-    cargo = evidence.trajectory.cargo_position
-    if cargo is None:
+    """The cargo is faster than any part of the machine on most of its way to the last gate."""
+    cargo, gates = evidence.trajectory.cargo_position, evidence.task.scenario.gates
+    if cargo is None or not gates:
         return False
-    pace = np.linalg.norm(np.diff(cargo.astype(np.float64), axis=0), axis=1)
-    parts = np.linalg.norm(np.diff(path_of(evidence.trajectory), axis=0), axis=2).max(axis=1)
-    alone = pace > 1.2 * parts
+    way = np.linalg.norm(cargo[:, :2] - cargo[0, :2], axis=1)
+    there = way >= np.linalg.norm(np.array(gates[-1].center) - cargo[0, :2])
+    end = int(there.argmax()) if there.any() else len(way)
+    pace = np.linalg.norm(np.diff(cargo[:end].astype(np.float64), axis=0), axis=1)
+    parts = np.linalg.norm(np.diff(path_of(evidence.trajectory)[:end], axis=0), axis=2)
+    alone = pace > 1.2 * parts.max(axis=1)
     return bool(pace[alone].sum() > 0.5 * pace.sum())
 
 
