@@ -136,7 +136,8 @@ def judge(
             metrics=metrics,
             deciding=Deciding(samples=passed + 1, members=joined, cargo=False),
         )
-    verdict = _landed(scoring.landing, machine, trajectory, arms, (joined, start, passed))
+    around = (planet.radius, arms, heights)
+    verdict = _landed(scoring.landing, machine, trajectory, around, (joined, start, passed))
     return Verdict(
         success=verdict.success,
         indicator=rounded(scoring.cycles * verdict.indicator),
@@ -160,7 +161,7 @@ def _landed(
     rules: Return,
     machine: "Machine",
     trajectory: "Trajectory",
-    arms: Series,
+    around: tuple[float, Series, Series],
     flight: tuple[Mask, int, int],
 ) -> Verdict:
     """How a machine came down after its flight; the indicator is flights a minute.
@@ -169,13 +170,13 @@ def _landed(
         rules: How it must.
         machine: The machine.
         trajectory: The trial.
-        arms: (T, N, 3) of the blocks from the planet's centre, units.
+        around: The planet's radius; of the blocks, from its centre (T, N, 3), and their heights
+            (T, N), units.
         flight: What is joined to the starting block (T, N), its index, and the sample from which
             on the machine may land.
     """
     joined, start, passed = flight
-    radius = float(np.linalg.norm(arms[0, start])) - float(trajectory.positions[0, start, 2])
-    heights = np.linalg.norm(arms, axis=2) - radius
+    radius, arms, heights = around
     low = np.where(joined, heights, np.inf).min(axis=1)
     down = np.flatnonzero(low[passed:] < _NEAR)
     end = (
