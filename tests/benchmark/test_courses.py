@@ -44,6 +44,19 @@ def test_who_never_steers_does_not_get_through(name) -> None:
     assert not tried(name, straight()).success
 
 
+@pytest.mark.samples(1)
+@pytest.mark.parametrize("seed", [1, 3, 2])
+def test_a_car_whose_wheels_bear_in_turns_has_driven(seed) -> None:
+    """Large wheels on its rear ones lift these, so that it rocks from one front wheel to another."""
+    car = straight()
+    wheels = [name for name, block in car.blocks.items() if block.module.motor]
+    for rear in sorted(wheels, key=lambda name: car.blocks[name].center[1])[:2]:
+        hub = {"base_block": rear, "face": "E", "new_block": "Large Wheel"}
+        assert car.act("attach_block_to", hub).ok
+    result = scored(builtin_tasks()["drive-2"], car, "mujoco", seed)
+    assert (result.success, result.flags) == (True, ())
+
+
 def test_a_tower_that_topples_over_the_gates_drives_nothing() -> None:
     """Its mass gets over the first two lines of drive-2, and its wheels turn in the air."""
     draft = KeyedDraft(modules="workshop")

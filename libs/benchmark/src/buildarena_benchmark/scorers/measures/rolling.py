@@ -45,8 +45,9 @@ def driven_distances(
     motor can do, and aside by no more than ahead. Turning slower, or no longer being told to, takes
     the speed that it gave away gradually, so a skid after a drive counts. Between two samples the
     machine is driven as much as its best wheel: that share of the motion of each wheel that bears
-    counts. The distance is the largest of the wheels' displacements made up so, in the direction
-    of the path's, with `ERROR` and `SLACK` added, units.
+    counts. The distance is the largest of the wheels' displacements made up so, and of the one
+    that is made up of whichever wheel moved farthest at the time (wheels may bear in turns), in
+    the direction of the path's, with `ERROR` and `SLACK` added, units.
 
     Args:
         machine: Gives the wheels.
@@ -80,9 +81,12 @@ def driven_distances(
         moves.append(np.where(touches[:, None], moved, 0.0))
         shares.append(np.where(touches, share, 0.0))
     driven = np.max(shares, axis=0)[None, :, None] * np.array(moves)
+    farthest = np.linalg.norm(driven, axis=2).argmax(axis=0)
+    in_turns = np.take_along_axis(driven, farthest[None, :, None], axis=0)
+    driven = np.concatenate([driven, in_turns])
     away = path[:, :2] - path[since, :2]
     direction = away / np.maximum(np.linalg.norm(away, axis=1), 1e-9)[:, None]
-    carried = np.zeros((len(columns), *away.shape))
+    carried = np.zeros((len(driven), *away.shape))
     carried[:, since + 1 :] = np.cumsum(driven[:, since:], axis=1)
     explained = (carried * direction).sum(axis=2).max(axis=0).clip(0.0)
     return np.asarray(explained * (1.0 + ERROR) + SLACK)
