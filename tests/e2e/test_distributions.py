@@ -92,6 +92,30 @@ def test_the_meta_distribution_installs_all_but_adapters(installed) -> None:
     assert ours == {project(path)["name"] for path in PROJECTS if path not in ADAPTERS}
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("installed")
+def test_the_command_is_run_from_wheels_without_an_environment(dist) -> None:
+    found = ["--find-links", str(dist), "--constraints", str(dist / "constraints.txt")]
+    python = ["--python", sys.executable]
+    done = _uv(
+        "tool", "run", "--quiet", "--isolated", *python, *found, "buildarena", "demo", "--help"
+    )
+    assert "run one small sweep" in done.stdout
+    assert not done.stderr
+
+
+@pytest.mark.slow
+def test_the_client_alone_brings_nothing_else(dist, tmp_path) -> None:
+    venv = tmp_path / "venv"
+    _uv("venv", "--quiet", "--no-project", "--python", sys.executable, str(venv))
+    words = ["--python", str(venv / "bin/python"), "--no-index", "--find-links", str(dist)]
+    _uv("pip", "install", "--quiet", *words, "buildarena-client")
+    listed = json.loads(_uv("pip", "list", "--format", "json", *words[:2]).stdout)
+    assert [package["name"] for package in listed] == ["buildarena-client"]
+    code = "from buildarena_client import Client; Client('http://127.0.0.1:1')"
+    subprocess.run([str(venv / "bin/python"), "-c", code], cwd=tmp_path, check=True)
+
+
 def test_a_new_version_goes_everywhere(tmp_path) -> None:
     for path in PROJECTS:
         copy = tmp_path / path.parent.relative_to(ROOT)
