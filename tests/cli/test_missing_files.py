@@ -15,7 +15,7 @@ from buildarena_cli import main
 
 WRITTEN = {"out", "video", "data", "trace"}
 """Parameters of paths that commands write, or keep what they run on in."""
-NAMES_OR_FILES = ("or a task file", "or the path of its YAML file")
+NAMES_OR_FILES = ("or a task file", "or the path of its YAML file", "Folder or URL of")
 """What the help of parameters says that are names or paths."""
 
 

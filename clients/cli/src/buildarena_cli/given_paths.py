@@ -25,6 +25,17 @@ def to_read(path: Path | None) -> Path | None:
     return path
 
 
+def to_read_or_url(place: str) -> str:
+    """The same for what is a path, or the URL of a store.
+
+    Raises:
+        CommandError: It is no URL, and nothing is there; a usage error.
+    """
+    if "://" not in place:
+        to_read(Path(place))
+    return place
+
+
 def to_read_or_name(name: str) -> str:
     """The same for what is a name, or the path of a YAML file.
 
