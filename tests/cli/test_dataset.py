@@ -82,11 +82,6 @@ def called(messages: list[dict]) -> list[tuple[str, dict]]:
     return [(call["function"]["name"], json.loads(call["function"]["arguments"])) for call in calls]
 
 
-def test_columns_begin_with_what_people_read_first() -> None:
-    first = [column.name for column in JOBS[:7]]
-    assert first == ["job_id", "task", "model", "seed", "outcome", "success", "indicator"]
-
-
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_sweep_loads_and_every_machine_is_found_again(url, context, tmp_path):
     submitted(url)
