@@ -17,6 +17,7 @@ requirements)
     [ -x "$python" ] || uv venv --no-project --python "$(python3 -c 'import sys; print(sys._base_executable)')" "$environment"
     uv pip install --python "$python" --require-hashes --no-deps -r "$recipe/locks/$name.lock"
     "$python" "$recipe/shrink.py" "$began"
+    "$python" "$recipe/licences.py" "$environment/licenses"
     ;;
 parts)
     # The distribution of this name and, of the others, those that it asks for.

@@ -31,6 +31,15 @@ def test_csv_and_parquet_hold_the_same_rows(api) -> None:
         rate = typed["success_rate"]
         assert text["success_rate"] == ("" if rate is None else str(rate))
     ours = table[0]
+    assert list(ours)[:7] == [
+        "task",
+        "model",
+        "source",
+        "track",
+        "task_version",
+        "indicator",
+        "unit",
+    ]
     assert (ours["source"], ours["trials"], ours["success_rate"]) == ("measured", 2, 0.5)
     assert {row["source"] for row in table[1:]} == {"published"}
     assert all(row["rank"] is None for row in table[1:])

@@ -88,7 +88,6 @@ def test_other_keys_may_be_pressed(machine, tmp_path) -> None:
         (("--out", "x.glb", "--task", "lift-1"), "--task is for .bsg files"),
         (("--out", "Big Name.bsg"), "lower case letters"),
         (("--out", "x.bsg", "--task", "lift-9"), "no task 'lift-9'"),
-        (("--out", "x.bsg", "--controls", "none.json"), "none.json"),
     ],
 )
 def test_wrong_words_are_named(machine, tmp_path, monkeypatch, words, says) -> None:

@@ -234,12 +234,14 @@ def test_refusals_name_the_offender_and_the_choices(context, elsewhere, tmp_path
     assert command(context, "backup", place, "--name", "one").returncode == 0
     other = elsewhere()
     manifest = tmp_path / "b/one/manifest.json"
+    empty = tmp_path / "empty"
+    empty.mkdir()
     for words, said in (
         (("backup", place, "--name", "one"), "has a backup 'one' already"),
         (("backup", place, "--name", "../one"), "can't be called '../one'"),
         (("backup", place, "--name", "artifacts"), "can't be called 'artifacts'"),
         (("restore", place, "--name", "two"), "no whole backup 'two'; the newest are: one"),
-        (("restore", str(tmp_path / "nothing")), "there is no whole backup in"),
+        (("restore", str(empty)), "there is no whole backup in"),
         (("restore", place), "the database is not empty"),
         (("backup", "/proc/nowhere"), "can't be used for backups"),
     ):

@@ -74,7 +74,7 @@ def test_a_folder_of_packages_is_a_table(package: Path) -> None:
     assert [(entry["name"], entry["rank"]) for entry in json.loads(text)] == [("entry", 1)]
     code, text = run("table", package.parent)
     assert "entry" in text
-    assert run("table", package / "nothing")[0] == 1
+    assert run("table", package / "nothing")[0] == 2
 
 
 def test_seasons_are_listed_and_shown() -> None:

@@ -43,7 +43,7 @@ def test_what_differs_is_said(url, file) -> None:
 
 def test_refusals_name_what_is_wrong(url, tmp_path) -> None:
     missing = run("besiege", "evidence", "add", str(tmp_path / "x.zip"), "--url", url)
-    assert (missing.returncode, "x.zip" in missing.stderr) == (1, True)
+    assert (missing.returncode, "x.zip" in missing.stderr) == (2, True)
     (tmp_path / "x.zip").write_bytes(b"PK")
     refused = run("besiege", "evidence", "add", str(tmp_path / "x.zip"), "--url", url)
     assert (refused.returncode, "no sound ZIP file" in refused.stderr) == (1, True)

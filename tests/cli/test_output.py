@@ -5,6 +5,7 @@ from support.clients.commands import printed
 from support.clients.terminals import on_terminal, piped
 
 from buildarena_cli.commands.job_lists import COLUMNS
+from buildarena_cli.dataset.columns import JOBS
 from buildarena_cli.terminal.output import columns, print_table
 from buildarena_cli.terminal.progress import FAULTS
 from buildarena_client.waiting import STOPPED
@@ -98,3 +99,8 @@ def test_a_sweep_is_listed_with_its_progress(url, context) -> None:
 def test_states_and_outcomes_are_spelled_as_the_service_spells_them() -> None:
     assert set(FAULTS) <= set(Outcome)
     assert set(STOPPED) <= set(SweepState)
+
+
+def test_a_datasets_columns_begin_with_what_people_read_first() -> None:
+    first = [column.name for column in JOBS[:7]]
+    assert first == ["job_id", "task", "model", "seed", "outcome", "success", "indicator"]

@@ -76,7 +76,7 @@ def test_a_key_that_no_block_has_is_refused_with_those_that_there_are(task) -> N
     assert code == 1
     assert "expected one of E, M3, Q, M4, UpArrow" in err
     done = run("machine", "simulate", str(THREE), "--task", str(task), "--keys", "none.json")
-    assert done.returncode == 1
+    assert done.returncode == 2
     assert "none.json: No such file" in done.stderr
 
 

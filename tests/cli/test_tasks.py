@@ -53,8 +53,8 @@ def test_check_and_add_say_the_same_faults(url, file) -> None:
 def test_a_missing_file_is_reported(url, tmp_path) -> None:
     for words in (["check"], ["add", "--url", url]):
         done = run("task", words[0], str(tmp_path / "nowhere.yaml"), *words[1:])
-        assert done.returncode == 1
-        assert "nowhere.yaml: cannot be read" in done.stderr
+        assert done.returncode == 2
+        assert "nowhere.yaml: No such file" in done.stderr
 
 
 def test_an_added_task_is_listed_with_a_mark_and_shown(url, file) -> None:

@@ -113,7 +113,9 @@ def test_a_frame_without_rows_has_its_columns(kind) -> None:
     for make in (sweeps_frame, results_frame):
         assert len(make([], kind=kind)) == 0
     board = {"track": None, "tracks": [], "tasks": [], "policy": "ours"}
-    assert "success_rate" in leaderboard_frame(board, kind=kind).columns
+    columns = list(leaderboard_frame(board, kind=kind).columns)
+    assert columns[:2] == ["task", "model"]
+    assert "success_rate" in columns
     assert "mean_rank" in leaderboard_frame(board, overall=True, kind=kind).columns
 
 

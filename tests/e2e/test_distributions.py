@@ -69,6 +69,17 @@ def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return venv / "bin"
 
 
+@pytest.fixture(params=["3.11", "3.12", "3.13"])
+def interpreter(request: pytest.FixtureRequest) -> str:
+    """A Python of a version that we promise; of others than this one, where it is found."""
+    if sys.version_info[:2] == tuple(map(int, request.param.split("."))):
+        return sys.executable
+    found = _uv("python", "find", "--no-python-downloads", request.param, check=False)
+    if found.returncode:
+        pytest.skip(f"no Python {request.param} is on PATH")
+    return found.stdout.strip()
+
+
 def _uv(*words: str, check: bool = True) -> subprocess.CompletedProcess[str]:
     command = ["bash", str(ROOT / "mk/uv.sh"), *words]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=check)
@@ -90,6 +101,31 @@ def test_the_meta_distribution_installs_all_but_adapters(installed) -> None:
     listed = _uv("pip", "list", "--format", "json", "--python", str(installed / "python"))
     ours = {p["name"] for p in json.loads(listed.stdout) if p["name"].startswith("buildarena")}
     assert ours == {project(path)["name"] for path in PROJECTS if path not in ADAPTERS}
+
+
+@pytest.mark.slow
+def test_a_demo_runs_from_wheels_without_an_environment(dist, interpreter, tmp_path) -> None:
+    """As `uvx` runs it: in a temporary environment, by the distribution's own command."""
+    found = ["--find-links", str(dist), "--constraints", str(dist / "constraints.txt")]
+    words = ["tool", "run", "--quiet", "--isolated", "--python", interpreter, *found]
+    demo = ["demo", "--task", "support-1", "--data", str(tmp_path), "--port", str(free_port())]
+    done = _uv(*words, "buildarena", *demo, check=False)
+    if done.returncode and not ALL_MUST_RUN and "Failed to fetch" in done.stderr:
+        pytest.skip("installing the wheels needs a package index, and none answers")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r"builtin/expert\*\s+4/4", done.stdout), done.stdout
+
+
+@pytest.mark.slow
+def test_the_client_alone_brings_nothing_else(dist, tmp_path) -> None:
+    venv = tmp_path / "venv"
+    _uv("venv", "--quiet", "--no-project", "--python", sys.executable, str(venv))
+    words = ["--python", str(venv / "bin/python"), "--no-index", "--find-links", str(dist)]
+    _uv("pip", "install", "--quiet", *words, "buildarena-client")
+    listed = json.loads(_uv("pip", "list", "--format", "json", *words[:2]).stdout)
+    assert [package["name"] for package in listed] == ["buildarena-client"]
+    code = "from buildarena_client import Client; Client('http://127.0.0.1:1')"
+    subprocess.run([str(venv / "bin/python"), "-c", code], cwd=tmp_path, check=True)
 
 
 def test_a_new_version_goes_everywhere(tmp_path) -> None:
@@ -165,14 +201,16 @@ def test_a_package_index_would_take_every_distribution(dist) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("adapter", ADAPTERS, ids=lambda path: path.parent.name)
-def test_an_adapter_is_installed_by_its_readmes_command(dist, adapter, tmp_path) -> None:
+def test_an_adapter_is_installed_by_its_readmes_command(
+    dist, adapter, interpreter, tmp_path
+) -> None:
     """In the versions of its lock, from wheels alone."""
     name = adapter.parent.name
     readme = (adapter.parent / "README.md").read_text()
     (command,) = re.findall(r"^pip install (.+ \"?buildarena-.+)$", readme, re.MULTILINE)
     (tmp_path / "dist").symlink_to(dist)
     python = str(tmp_path / "venv/bin/python")
-    _uv("venv", "--quiet", "--no-project", "--python", sys.executable, str(tmp_path / "venv"))
+    _uv("venv", "--quiet", "--no-project", "--python", interpreter, str(tmp_path / "venv"))
     words = ["--directory", str(tmp_path), "pip", "install", "--quiet", "--python", python]
     done = _uv(*words, *shlex.split(command), check=False)
     if done.returncode and not ALL_MUST_RUN and "Failed to fetch" in done.stderr:

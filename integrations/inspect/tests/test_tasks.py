@@ -64,6 +64,8 @@ def test_all_tasks_end_to_end_score_as_the_library_does(run) -> None:
     assert figures["mean_rank"] == 1.5
     load = tried("support-1", "mujoco").score.indicator
     assert figures["support-1 load (mass units)"] == pytest.approx(load, rel=0.02)
+    assert "lift-1 thrust_to_weight" in figures
+    assert not [name for name in figures if "(1)" in name]
 
 
 def test_tools_are_those_of_everybody(run) -> None:

@@ -17,6 +17,7 @@ from fastapi import FastAPI
 from openenv.validation.parsers.openenv_yaml import OpenEnvYamlParser
 
 from buildarena_environment import UnknownChoiceError
+from buildarena_environment.rewards import DEFAULT_WEIGHTS
 from buildarena_openenv import BuildAction, BuildClient
 from buildarena_openenv import server as module
 from buildarena_openenv.environment import Terms
@@ -141,6 +142,8 @@ def test_what_a_server_is_asked_to_offer_is_checked_at_its_start() -> None:
 def test_the_description_is_one_that_openenv_reads() -> None:
     manifest = OpenEnvYamlParser().parse(ROOM)
     assert manifest.name == "buildarena"
+    assert DEFAULT_WEIGHTS.keys() == {"success"}
+    assert manifest.reward.range == (0.0, DEFAULT_WEIGHTS["success"])
     module, _, name = yaml.safe_load((ROOM / "openenv.yaml").read_text())["app"].partition(":")
     assert isinstance(getattr(importlib.import_module(module), name), FastAPI)
 

@@ -1,4 +1,4 @@
-"""The environment behind verifiers' own server, as trainers use it."""
+"""The environment behind verifiers' own server, as trainers use it, and prime-rl's form."""
 
 from __future__ import annotations
 
@@ -6,20 +6,75 @@ import asyncio
 import multiprocessing
 import os
 import signal
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
 import verifiers.v1 as vf
 from conftest import SUBMIT
 from stand_in import serving
+from support.documents.code_blocks import shown_in
 from verifiers.v1.serve import EnvClient, env_config_data, serve_env
+from verifiers.v1.utils.loaders import resolve_env_config
 
-from buildarena_verifiers import load_environment
+from buildarena_verifiers import BuildEnv, load_environment
+
+README = Path(__file__).parents[1] / "README.md"
+SOURCE = {"name", "env", "serve", "sampling", "group_size", "ratio", "interval"}
+"""What prime-rl reads of a source; all but `env` and `serve` is its own."""
 
 
-@pytest.mark.parametrize("workers", [2])
-def test_a_served_environment_plays_rows_that_it_is_sent(workers, scripts) -> None:
-    environment = load_environment("lift-1", rewards={"indicator": 1.0}, processes=1)
+def sources() -> Iterator[dict[str, Any]]:
+    """The sources of the configurations for prime-rl that the README shows."""
+    for shown in shown_in(README):
+        if shown.language == "toml":
+            told = tomllib.loads(shown.code)
+            groups = told.get("orchestrator", {"eval": told})
+            for group in groups.values():
+                yield from group["source"]
+
+
+def test_prime_rls_sources_name_rows_of_ours() -> None:
+    names = []
+    for source in sources():
+        assert source.keys() <= SOURCE
+        config = resolve_env_config(source["env"])
+        vf.ServeConfig.model_validate(source.get("serve", {}))
+        environment = vf.load_environment(config)
+        assert isinstance(environment, BuildEnv)
+        assert config.agent_harnesses()["agent"].id == "buildarena_verifiers"
+        assert config.agent.runtime.type == "subprocess"
+        names.append([task.data.name for task in environment.taskset])
+    bridges, training, held_out = names
+    assert bridges == ["support-1"]
+    assert len(training) == 16
+    assert not set(training) & set(held_out)
+
+
+def test_a_wrong_setting_of_a_source_is_refused() -> None:
+    source = next(sources())
+    source["env"]["taskset"]["task"] = {"trial_timout_s": 3}
+    with pytest.raises(ValueError, match="trial_timout_s"):
+        resolve_env_config(source["env"])
+
+
+@pytest.mark.parametrize(
+    ("name", "configured", "worth"),
+    [
+        (
+            "lift-1",
+            lambda: load_environment("lift-1", rewards={"indicator": 1.0}, processes=1),
+            1.0,
+        ),
+        ("support-1", lambda: vf.load_environment(resolve_env_config(next(sources())["env"])), 1.5),
+    ],
+    ids=["program", "prime-rl"],
+)
+def test_a_served_environment_plays_rows_that_it_is_sent(name, configured, worth, scripts) -> None:
+    environment = configured()
     (task,) = environment.taskset
     processes = multiprocessing.get_context("spawn")
     addresses = processes.Queue()
@@ -27,7 +82,7 @@ def test_a_served_environment_plays_rows_that_it_is_sent(workers, scripts) -> No
         target=serve_env,
         kwargs={
             "config_data": env_config_data(environment.config),
-            "max_workers": workers,
+            "max_workers": 2,
             "address": "tcp://127.0.0.1:0",
             "address_queue": addresses,
         },
@@ -53,11 +108,11 @@ def test_a_served_environment_plays_rows_that_it_is_sent(workers, scripts) -> No
             finally:
                 await client.close()
 
-        with serving({"lift-1": [[scripts["lift-1"], SUBMIT]]}) as stand_in:
+        with serving({name: [[scripts[name], SUBMIT]]}) as stand_in:
             episodes = asyncio.run(play(stand_in.url))
         for episode in episodes:
             (trace,) = episode.traces
-            assert trace.reward == pytest.approx(1.0, rel=0.02)
+            assert trace.reward == pytest.approx(worth, rel=0.02)
         children = psutil.Process(server.pid).children(recursive=True)
         assert children
     finally:

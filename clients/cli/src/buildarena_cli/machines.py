@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from buildarena_cli.errors import FAILED, CommandError
+from buildarena_cli.given_paths import to_read, to_read_or_name
 from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import warn
 
@@ -26,7 +27,8 @@ MachineFile = Annotated[
     Path,
     typer.Argument(
         help="A machine document, an action log, a construction tree or the game's .bsg; "
-        "- reads standard input."
+        "- reads standard input.",
+        callback=to_read,
     ),
 ]
 
@@ -96,7 +98,7 @@ def chosen_task(name: str) -> Task:
     known = builtin_tasks()
     if name in known:
         return known[name]
-    if Path(name).exists():
+    if Path(to_read_or_name(name)).exists():
         return load_task(Path(name))
     raise CommandError(
         f"no task {name!r}; there are {', '.join(known)}, or name a task file"
@@ -152,4 +154,4 @@ def shown_errors() -> Iterator[None]:
         raise typer.Exit(FAILED) from error
     except known as error:
         warn(f"error: {error}")
-        raise typer.Exit(FAILED) from error
+        raise typer.Exit(error.code if isinstance(error, CommandError) else FAILED) from error

@@ -114,14 +114,17 @@ def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind
         for row in task["rows"]
     ]
     of_task = {name: _columns(schemas.TaskBoard)[name] for name in TASK_COLUMNS}
-    return _made(rows, {**of_task, **_columns(schemas.Row)}, kind)
+    return _made(rows, _as_read({**of_task, **_columns(schemas.Row)}), kind)
 
 
 def _frame(rows: Iterable[Any], row_type: Any, kind: Kind) -> Any:
-    columns = _columns(row_type)
+    return _made(rows, _as_read(_columns(row_type)), kind)
+
+
+def _as_read(columns: Columns) -> Columns:
+    """The columns, with those that people read first before the others."""
     first = [name for name in FIRST if name in columns]
-    ordered = {name: columns[name] for name in dict.fromkeys((*first, *columns))}
-    return _made(rows, ordered, kind)
+    return {name: columns[name] for name in dict.fromkeys((*first, *columns))}
 
 
 def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> Any:

@@ -14,6 +14,11 @@ DIGITS: Final = 4
 """References have so many; more would make equal figures differ."""
 
 
+def named(indicator: str, unit: str) -> str:
+    """An indicator with its unit in brackets; a ratio has none."""
+    return indicator if unit == "1" else f"{indicator} ({unit})"
+
+
 @metric(scores="unreduced")
 def success_interval() -> Metric:
     """The 95 % Wilson interval of the success rate; each epoch is a trial."""
@@ -43,7 +48,7 @@ def indicator_by_task() -> Metric:
             about = found[0].score.metadata or {}
             values = np.array([one.score.as_float() for one in found])
             won = np.array([bool((one.score.metadata or {})["success"]) for one in found])
-            name = f"{task} {about['indicator']} ({about['unit']})"
+            name = f"{task} {named(about['indicator'], about['unit'])}"
             told[name] = float(values.mean())
             interval = mean_interval(values, won)
             if interval is not None:

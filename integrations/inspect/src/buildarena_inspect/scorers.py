@@ -14,7 +14,7 @@ from buildarena_environment.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_inspect.building import Building, building_of
-from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval
+from buildarena_inspect.metrics import indicator_by_task, mean_rank, named, success_interval
 from buildarena_inspect.versions import result_versions
 
 SUCCESS: Final = "success"
@@ -50,7 +50,7 @@ def indicator() -> Scorer:
         figure = building.environment.task.indicator
         return Score(
             value=counted_indicator(trial),
-            explanation=f"{figure.name}, {figure.unit}",
+            explanation=named(figure.name, figure.unit),
             metadata={
                 "task": building.conditions.task,
                 "indicator": figure.name,

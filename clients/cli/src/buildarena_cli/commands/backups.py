@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from buildarena_cli.errors import PARTIAL, CommandError
+from buildarena_cli.given_paths import to_read_or_url
 from buildarena_cli.options import DataOption, JsonOption
 from buildarena_cli.terminal.output import print_json, say
 
@@ -74,7 +75,9 @@ def backup(
 
 
 def restore(
-    place: Annotated[str, typer.Argument(help="Folder or URL of the backups.")],
+    place: Annotated[
+        str, typer.Argument(help="Folder or URL of the backups.", callback=to_read_or_url)
+    ],
     *,
     name: Annotated[
         str | None, typer.Option("--name", help="Which backup; the newest by default.")

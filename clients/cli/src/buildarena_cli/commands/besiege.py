@@ -11,6 +11,7 @@ from buildarena_cli.client import Client
 from buildarena_cli.commands import evidence
 from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import chosen_task, read_machine, shown_errors
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
@@ -53,8 +54,11 @@ def level(
 
 @app.command("score")
 def score_log(
-    log: Annotated[Path, typer.Argument(help="A log of the game: ours, or a published run's CSV.")],
-    machine: Annotated[Path, typer.Option(help="The machine that was played.")],
+    log: Annotated[
+        Path,
+        typer.Argument(help="A log of the game: ours, or a published run's CSV.", callback=to_read),
+    ],
+    machine: Annotated[Path, typer.Option(help="The machine that was played.", callback=to_read)],
     task: Annotated[str, typer.Option("--task", help="A built-in task's name, or a task file.")],
     run: Annotated[
         str | None, typer.Option("--run", help="The run's id, where the log is of several.")

@@ -12,6 +12,7 @@ import typer
 
 from buildarena_cli.client import Client
 from buildarena_cli.errors import DONE, FAILED, CommandError
+from buildarena_cli.given_paths import to_read, to_read_or_name
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
 from buildarena_cli.terminal.output import (
@@ -33,9 +34,13 @@ DEFAULT_SEASON: Final = "s01-stable-orbit"
 SeasonName = Annotated[
     str, typer.Argument(help="Name of a season, or the path of its YAML file.", show_default=False)
 ]
+ServedSeason = Annotated[str, typer.Argument(help="Name of a season of the service.")]
 PackageId = Annotated[str, typer.Argument(help="Id of the package.")]
 SeasonOption = Annotated[
     str, typer.Option("--season", help="Name of a season, or the path of its YAML file.")
+]
+ServedSeasonOption = Annotated[
+    str, typer.Option("--season", help="Name of a season of the service.")
 ]
 TrackOption = Annotated[
     str | None, typer.Option("--track", help="Track; the season's first if left out.")
@@ -85,7 +90,9 @@ def show_season(season: SeasonName, *, as_json: JsonOption = False) -> None:
 
 @app.command("check")
 def check(
-    package: Annotated[Path, typer.Argument(help="Folder or ZIP file with the package's files.")],
+    package: Annotated[
+        Path, typer.Argument(help="Folder or ZIP file with the package's files.", callback=to_read)
+    ],
     season: SeasonOption = DEFAULT_SEASON,
     track: TrackOption = None,
     settings: SetOption = None,
@@ -108,7 +115,9 @@ def check(
 
 @app.command("table")
 def table(
-    folder: Annotated[Path, typer.Argument(help="Folder of packages: folders and ZIP files.")],
+    folder: Annotated[
+        Path, typer.Argument(help="Folder of packages: folders and ZIP files.", callback=to_read)
+    ],
     season: SeasonOption = DEFAULT_SEASON,
     track: TrackOption = None,
     settings: SetOption = None,
@@ -151,9 +160,11 @@ def table(
 
 @app.command("submit")
 def submit(
-    package: Annotated[Path, typer.Argument(help="Folder or ZIP file with the package's files.")],
+    package: Annotated[
+        Path, typer.Argument(help="Folder or ZIP file with the package's files.", callback=to_read)
+    ],
     name: Annotated[str, typer.Option("--name", help="What the entry is called.")],
-    season: SeasonOption = DEFAULT_SEASON,
+    season: ServedSeasonOption = DEFAULT_SEASON,
     track: Annotated[str, typer.Option("--track", help="Track.")] = "autopilot",
     *,
     url: UrlOption = DEFAULT_URL,
@@ -199,7 +210,7 @@ def show_package(
 
 @app.command("board")
 def board(
-    season: SeasonName,
+    season: ServedSeason,
     track: Annotated[str, typer.Option("--track", help="Track.")] = "autopilot",
     *,
     url: UrlOption = DEFAULT_URL,
@@ -246,7 +257,9 @@ def withdraw(package: PackageId, *, url: UrlOption = DEFAULT_URL) -> None:
 
 
 @app.command("audit")
-def audit(season: SeasonName, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+def audit(
+    season: ServedSeason, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
+) -> None:
     """Show who decided what of a season's packages, and why; for admins."""
     changes = Client(url).season_changes(season)
     if as_json:
@@ -266,7 +279,9 @@ def audit(season: SeasonName, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
 def _season(name: str, settings: list[str] | None) -> Season:
     from buildarena_pipeline.challenges.season import season_named
 
-    return season_named(name).with_parameters(dict(map(_parameter, settings or ())))
+    return season_named(to_read_or_name(name)).with_parameters(
+        dict(map(_parameter, settings or ()))
+    )
 
 
 def _parameter(text: str) -> tuple[str, Any]:

@@ -10,6 +10,7 @@ import typer
 
 from buildarena_cli.client import Client
 from buildarena_cli.errors import CommandError
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
 from buildarena_cli.terminal.output import (
@@ -29,7 +30,9 @@ app = new_group("Send and look at what evenings with the game showed.")
 
 @app.command("add")
 def add_evidence(
-    file: Annotated[Path, typer.Argument(help="ZIP file that `besiege first-evening` wrote.")],
+    file: Annotated[
+        Path, typer.Argument(help="ZIP file that `besiege first-evening` wrote.", callback=to_read)
+    ],
     *,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,

@@ -13,6 +13,7 @@ from buildarena_cli.commands.job_lists import list_jobs
 from buildarena_cli.commands.job_page import page
 from buildarena_cli.commands.job_replay import replay
 from buildarena_cli.errors import DONE, FAILED
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.ids import whole_id
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, ModelName, TaskName, UrlOption
@@ -29,7 +30,8 @@ def submit_job(
     *,
     seed: Annotated[int, typer.Option(help="Seed or sample number.")] = 0,
     options: Annotated[
-        Path | None, typer.Option(help="YAML file of further fields: simulator, limits, …")
+        Path | None,
+        typer.Option(help="YAML file of further fields: simulator, limits, …", callback=to_read),
     ] = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,

@@ -11,6 +11,7 @@ from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import gathered, show_cursor
 from buildarena_cli.commands.keys import spent
 from buildarena_cli.errors import CommandError
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.ids import whole_id
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import (
@@ -54,7 +55,7 @@ ESTIMATE = columns(
 
 @app.command("run")
 def run_sweep(
-    file: Annotated[Path, typer.Argument(help="YAML file of the sweep.")],
+    file: Annotated[Path, typer.Argument(help="YAML file of the sweep.", callback=to_read)],
     *,
     dry_run: Annotated[
         bool,
@@ -252,7 +253,9 @@ def export_sweep(
 
 @app.command("import")
 def import_sweep(
-    file: Annotated[Path, typer.Argument(help="ZIP file that `sweep export` wrote.")],
+    file: Annotated[
+        Path, typer.Argument(help="ZIP file that `sweep export` wrote.", callback=to_read)
+    ],
     *,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,

@@ -10,6 +10,7 @@ import typer
 
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.errors import FAILED, CommandError
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JsonOption, TaskName, UrlOption
 from buildarena_cli.suggestions import did_you_mean, suggested_field
@@ -23,7 +24,7 @@ COLUMNS = columns(
     "task", "title", "indicator", "version", leaving=("version", "indicator", "title")
 )
 
-TaskFile = Annotated[Path, typer.Argument(help="YAML file of the task.")]
+TaskFile = Annotated[Path, typer.Argument(help="YAML file of the task.", callback=to_read)]
 
 
 @app.command("list")

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from buildarena_cli.defaults import KEY_VARIABLE
-from buildarena_cli.errors import CommandError
+from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.exec import exec_module
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
 from buildarena_cli.suggestions import did_you_mean
@@ -36,11 +37,15 @@ ApiOption = Annotated[
 ]
 KeyFileOption = Annotated[
     Path | None,
-    typer.Option("--key-file", help=f"File with the runner key; default: {KEY_VARIABLE}."),
+    typer.Option(
+        "--key-file", help=f"File with the runner key; default: {KEY_VARIABLE}.", callback=to_read
+    ),
 ]
 CaFileOption = Annotated[
     Path | None,
-    typer.Option("--ca-file", help="Certificates to trust besides the system's (PEM)."),
+    typer.Option(
+        "--ca-file", help="Certificates to trust besides the system's (PEM).", callback=to_read
+    ),
 ]
 AllowHttpOption = Annotated[
     bool, typer.Option("--allow-http", help="Send the key unencrypted to another machine.")
@@ -142,7 +147,7 @@ def roles(
         try:
             urls[role] = Path(file).read_text(encoding="utf-8").strip()
         except OSError as error:
-            raise CommandError(f"{file} can't be read: {error.strerror}") from error
+            raise CommandError(f"{file} can't be read: {error.strerror}", USAGE) from error
     with _database() as database:
         try:
             make_roles(database, urls)

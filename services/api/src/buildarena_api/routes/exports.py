@@ -178,7 +178,8 @@ def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], B
 def _columns() -> list[str]:
     names = [name for name in Row.model_fields if name not in PLACES]
     extra = [name for name in PublishedView.model_fields if name not in Row.model_fields]
-    return ["source", "track", "task", "task_version", "indicator", "unit", *names, *extra]
+    about = ("source", "track", "task_version", "indicator", "unit")
+    return list(dict.fromkeys(["task", "model", *about, *names, *extra]))
 
 
 def _flat(board: Board) -> list[dict[str, Any]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.errors import DONE, FAILED, CommandError
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
@@ -85,12 +86,16 @@ def export(
     ] = None,
     controls: Annotated[
         Path | None,
-        typer.Option(help="For a .bsg: press these keys, a JSON list, in place of its own."),
+        typer.Option(
+            help="For a .bsg: press these keys, a JSON list, in place of its own.", callback=to_read
+        ),
     ] = None,
     *,
     controller: Annotated[
         Path | None,
-        typer.Option(help="For a .bsg: a program (.lua) in place of the machine's own."),
+        typer.Option(
+            help="For a .bsg: a program (.lua) in place of the machine's own.", callback=to_read
+        ),
     ] = None,
     dialect: DialectOption = None,
 ) -> None:
@@ -142,7 +147,10 @@ def _game_file(machine: Machine, name: str, task: str | None, controls: Path | N
 def import_file(
     file: Annotated[
         Path,
-        typer.Argument(help="A machine file of the game's (.bsg), or a construction tree (JSON)."),
+        typer.Argument(
+            help="A machine file of the game's (.bsg), or a construction tree (JSON).",
+            callback=to_read,
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Write the machine document (.json) to this file.")

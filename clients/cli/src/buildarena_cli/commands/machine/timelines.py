@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from buildarena_cli.errors import CommandError
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import (
     DialectOption,
@@ -28,8 +29,10 @@ OutOption = Annotated[Path, typer.Option(help="File to write (.json).")]
 
 @app.command("import")
 def import_timeline(
-    file: Annotated[Path, typer.Argument(help="A timeline of schema v2 (.json).")],
-    machine: Annotated[Path, typer.Option(help="The machine that it is for.")],
+    file: Annotated[
+        Path, typer.Argument(help="A timeline of schema v2 (.json).", callback=to_read)
+    ],
+    machine: Annotated[Path, typer.Option(help="The machine that it is for.", callback=to_read)],
     out: OutOption,
     dialect: DialectOption = None,
 ) -> None:
@@ -58,7 +61,8 @@ def export_timeline(
     file: MachineFile,
     out: OutOption,
     controller: Annotated[
-        Path | None, typer.Option(help="A program (.lua) in place of what the machine has.")
+        Path | None,
+        typer.Option(help="A program (.lua) in place of what the machine has.", callback=to_read),
     ] = None,
     seconds: Annotated[
         float, typer.Option(help="For how long a program is asked.", min=0.04, max=600.0)

@@ -11,6 +11,7 @@ import typer
 
 from buildarena_cli.commands.machine.robustness import show_robustness
 from buildarena_cli.errors import CommandError
+from buildarena_cli.given_paths import to_read
 from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
@@ -72,13 +73,17 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     ] = None,
     controller: Annotated[
         Path | None,
-        typer.Option(help="A program (.lua) that acts in place of its keys: docs/control.md."),
+        typer.Option(
+            help="A program (.lua) that acts in place of its keys: docs/control.md.",
+            callback=to_read,
+        ),
     ] = None,
     keys: Annotated[
         Path | None,
         typer.Option(
             help="Key presses in place of its own (JSON: time, key, hold_for); of a .bsg its own "
-            "keys, whichever the game has."
+            "keys, whichever the game has.",
+            callback=to_read,
         ),
     ] = None,
     dialect: DialectOption = None,
@@ -138,7 +143,9 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
 def render(
     file: MachineFile,
     task: TaskName,
-    trajectory: Annotated[Path, typer.Option(help="A trajectory (.parquet) of this machine.")],
+    trajectory: Annotated[
+        Path, typer.Option(help="A trajectory (.parquet) of this machine.", callback=to_read)
+    ],
     video: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
 ) -> None:
     """Draw a trial that was simulated before."""
