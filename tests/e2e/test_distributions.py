@@ -69,7 +69,9 @@ def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return venv / "bin"
 
 
-@pytest.fixture(params=["3.11", "3.12", "3.13"])
+@pytest.fixture(
+    params=["3.11", *(pytest.param(later, marks=pytest.mark.long) for later in ("3.12", "3.13"))]
+)
 def interpreter(request: pytest.FixtureRequest) -> str:
     """A Python of a version that we promise; of others than this one, where it is found."""
     if sys.version_info[:2] == tuple(map(int, request.param.split("."))):
