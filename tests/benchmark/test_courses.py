@@ -47,7 +47,7 @@ def test_who_never_steers_does_not_get_through(name) -> None:
 @pytest.mark.samples(1)
 @pytest.mark.parametrize("seed", [1, 3, 2])
 def test_a_car_whose_wheels_bear_in_turns_has_driven(seed) -> None:
-    """Large wheels on its rear ones lift these, so that it rocks from one front wheel to another."""
+    """Large wheels on its rear ones lift these, so that it rocks on the front ones."""
     car = straight()
     wheels = [name for name, block in car.blocks.items() if block.module.motor]
     for rear in sorted(wheels, key=lambda name: car.blocks[name].center[1])[:2]:
