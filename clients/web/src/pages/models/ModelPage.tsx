@@ -72,7 +72,7 @@ function Profile({ board: found, name }: { board: Board; name: string }) {
       <Best name={name} track={found.track ?? undefined} />
       <Section title="Task by task">
         <JobsSummary search={{ model: name, track: found.track ?? undefined, state: "done" }} />
-        <Stack gap="lg">
+        <Stack gap="lg" mt="md">
           {tasks.map((task) => (
             <div key={task.task}>
               <Link className="quiet" to="/tasks/$name" params={{ name: task.task }}>
