@@ -1,8 +1,11 @@
-.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-agreement-throwing bench-processors bench-game bench-control bench-worlds bench-ceilings bench-repeats \
+.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-agreement-throwing bench-processors bench-game bench-control bench-worlds bench-ceilings bench-repeats bench-trials \
 	game-evidence evidence-machines
 
 bench-simulation: $(STAMP) ## Measures the simulation and the engines' agreement; JSON in .buildarena/
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_simulation --json .buildarena/bench-simulation.json
+
+bench-trials: $(STAMP) ## Measures whole trials, many of one machine, and those with controllers; five minutes
+	@$(TEST_PYTHON) -m benchmarks.simulation.bench_trials --json .buildarena/bench-trials.json
 
 bench-agreement: $(STAMP) ## Compares the engines on 300 machines that nobody chose; 10 minutes
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_agreement --json .buildarena/bench-agreement.json

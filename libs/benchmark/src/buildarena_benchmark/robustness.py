@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from buildarena_benchmark.constraints import broken_constraint
 from buildarena_benchmark.scores import failed_score, score
-from buildarena_simulation import MachineNotSimulable, simulate
+from buildarena_simulation import MachineNotSimulable, Play, simulate_many
 
 if TYPE_CHECKING:
     from buildarena_benchmark.scores import Score
@@ -60,13 +60,12 @@ def robustness(
     if broken_constraint(task, machine) is not None:
         scores = [failed_score(task, machine)] * len(seeds)
         return Robustness(seeds=tuple(seeds), scores=tuple(scores))
-    for k, seed in enumerate(seeds, 1):
-        try:
-            trajectory = simulate(machine, task.scenario, engine, seed=seed)
-        except MachineNotSimulable:
+    plays = (Play(seed=seed) for seed in seeds)
+    for k, outcome in enumerate(simulate_many(machine, task.scenario, engine, plays=plays), 1):
+        if isinstance(outcome, MachineNotSimulable):
             scores.append(failed_score(task, machine))
         else:
-            scores.append(score(task, machine, trajectory))
+            scores.append(score(task, machine, outcome))
         if on_progress:
             on_progress(k / len(seeds))
     return Robustness(seeds=tuple(seeds), scores=tuple(scores))

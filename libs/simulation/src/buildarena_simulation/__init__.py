@@ -19,8 +19,9 @@ from buildarena_simulation.errors import (
     UnknownEngineError,
 )
 from buildarena_simulation.parquet import read_trajectory, schema_of, write_trajectory
+from buildarena_simulation.plays import Play, simulate, simulate_many
 from buildarena_simulation.processor import processor
-from buildarena_simulation.rollout import SIMULATION_VERSION, require_engine, simulate, world_of
+from buildarena_simulation.rollout import SIMULATION_VERSION, require_engine, world_of
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.trajectory import (
     Bearing,
@@ -46,6 +47,7 @@ __all__ = [
     "KeyDrive",
     "MachineNotSimulable",
     "Piloting",
+    "Play",
     "Scenario",
     "SimulationError",
     "Trajectory",
@@ -58,6 +60,7 @@ __all__ = [
     "require_engine",
     "schema_of",
     "simulate",
+    "simulate_many",
     "world_of",
     "write_trajectory",
 ]

@@ -39,8 +39,9 @@ class BearingMeter:
         """
         up = forces.force[:, 2] / self._gravity
         fixed = (surface >= 0).nonzero()[0]
-        on_surface = np.bincount(surface[fixed], up[fixed], minlength=self._surfaces)
-        on_block = np.bincount(forces.block[fixed], up[fixed], minlength=self._blocks)
+        borne = up.take(fixed)
+        on_surface = np.bincount(surface.take(fixed), borne, self._surfaces)
+        on_block = np.bincount(forces.block.take(fixed), borne, self._blocks)
         self.on_blocks = np.asarray(on_block, dtype=np.float64)
         cargo = -up[other == CARGO].sum()
         self.now = np.concatenate([on_surface, [cargo], on_block[self._wheels]])

@@ -276,12 +276,14 @@ class BreakingModel:
         cargo = engine.cargo() if self._has_cargo else None
         faces = self._faces.find(clusters, motion, cargo)
         contacts = faces.joined_to(self._contacts(engine, cargo), clusters.cluster_of)
-        others = [self._pushes(thrusts), self._pulls(tensions)]
+        others = [self._pushes(thrusts)] if len(thrusts) else []
+        if len(tensions):
+            others.append(self._pulls(tensions))
         if self.holding is not None:
             others.append(self.holding.forces(clusters, motion))
         if self._field is not None:
             others.append(self._field.taken(clusters, motion))
-        contacts, shared = self._supports.settled(
+        settled = self._supports.settled(
             contacts,
             self._sharing.shared(contacts),
             corners=faces.corners,
@@ -289,10 +291,10 @@ class BreakingModel:
             motion=motion,
             others=others,
         )
-        self.bearing.read(contacts.other, contacts.surface, shared)
+        self.bearing.read(settled.other, settled.surface, settled.forces)
         if self.holding is not None:
             self.bearing.add_held(*self.holding.lifts())
-        return together([shared, *others])
+        return together([settled.forces, *others])
 
     def _contacts(self, engine: Engine, cargo: CargoPose | None) -> ContactForces:
         """The engine's contacts, with what the cargo's bounce adds to them."""

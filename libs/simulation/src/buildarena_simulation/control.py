@@ -96,6 +96,26 @@ Parts are counted as in `bindings_of`: the blocks, then the springs.
 """
 
 
+class Steady:
+    """Levels that are the same at all of some steps; see `Levels`.
+
+    Args:
+        levels: What is asked for, 0 to 1; the rest is not.
+        count: How many steps.
+    """
+
+    def __init__(self, levels: Mapping[tuple[int, str], float], count: int) -> None:
+        self._levels, self._count = levels, count
+
+    def __call__(self, part: int, action: str) -> FloatArray:
+        """The level at each step, (S,)."""
+        return np.full(self._count, self.share(part, action))
+
+    def share(self, part: int, action: str) -> float:
+        """The level at all steps."""
+        return self._levels.get((part, action), 0.0)
+
+
 def key_levels(bindings: Bindings, keys: Sequence[KeyHold], times: FloatArray) -> Levels:
     """What keys ask for: 1 while one of an action's keys is held.
 
@@ -154,12 +174,11 @@ class Drives:
         directions alike, it brakes.
         """
         wanted, before = np.zeros((step_count, len(self._speeds))), self._speeds
+        asked: Callable[[int, str], FloatArray | float]
+        asked = levels.share if isinstance(levels, Steady) else levels
         for wheel in self._wheels:
-            forward, backward = (
-                levels(wheel.part, wheel.forward),
-                levels(wheel.part, wheel.backward),
-            )
-            wanted[:, wheel.column] = wheel.speed * (forward - backward)
+            way = asked(wheel.part, wheel.forward) - asked(wheel.part, wheel.backward)
+            wanted[:, wheel.column] = wheel.speed * way
         targets, self._speeds = lagged(wanted, self._blend, before=before)
         none = np.zeros(step_count)
         for d, part, sign, joint, drive in self._driven:

@@ -1,5 +1,7 @@
 """Fuel: for how long fans and cannons may push."""
 
+import math
+
 import numpy as np
 
 from buildarena_simulation.constants import GRAVITY
@@ -39,7 +41,7 @@ class Tank:
             forces: Commands to fans; None without any.
             time_step_s: Length of a step, seconds.
         """
-        if np.isinf(self.left_s):
+        if math.isinf(self.left_s):
             return
         burnt = drives.firing @ self._cannons
         if forces is not None:

@@ -5,6 +5,7 @@ feels the blow almost at once. Both are worked out here, for all engines alike. 
 several intervals to stop a cargo; what they show is added up.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -49,17 +50,17 @@ class Landing:
     @property
     def over(self) -> bool:
         """Whether the cargo has been stopped."""
-        return self.leaving >= -_LEFT * float(np.linalg.norm(self.change))
+        return self.leaving >= -_LEFT * _size(self.change)
 
     @property
     def counts(self) -> bool:
         """Whether it was fast enough to be one."""
-        return float(np.linalg.norm(self.change)) >= MIN_LANDING_SPEED
+        return _size(self.change) >= MIN_LANDING_SPEED
 
     @property
     def _approach(self) -> float:
         """Speed with which the cargo came, units/s."""
-        return float(np.linalg.norm(self.change)) - self.leaving
+        return _size(self.change) - self.leaving
 
     @property
     def _rebound(self) -> float:
@@ -79,8 +80,13 @@ class Landing:
     @property
     def bounced(self) -> FloatArray:
         """(3,) what the cargo's velocity gains by bouncing off, units/s."""
-        size = float(np.linalg.norm(self.change))
+        size = _size(self.change)
         return self.change * ((self._rebound - self.leaving) / size)
+
+
+def _size(vector: FloatArray) -> float:
+    """Norm of a vector (3,)."""
+    return math.sqrt(vector.dot(vector))
 
 
 def landing_of(
@@ -108,17 +114,17 @@ def landing_of(
     """
     weight = np.array([0.0, 0.0, gravity * interval_s])
     stopped = now.velocity - before.velocity + weight
-    pressed = float(np.linalg.norm(contacts.force[contacts.other == CARGO].sum(axis=0)))
-    if pressed < _MIN_SHARE * mass * float(np.linalg.norm(stopped)) / interval_s:
+    pressed = _size(np.add.reduce(contacts.force[contacts.other == CARGO]))
+    if pressed < _MIN_SHARE * mass * _size(stopped) / interval_s:
         return None
     begun = so_far is not None and not so_far.over
     # What holds a cargo up is no blow: it rests for half of the interval in which it lands.
     change = stopped - weight * (1.0 if begun else 0.5)
-    speed = float(np.linalg.norm(change))
+    speed = _size(change)
     if speed < _MIN_CHANGE or change[2] < _UPWARDS * speed:
         return None
     total = change if so_far is None or so_far.over else so_far.change + change
-    size = float(np.linalg.norm(total))
+    size = _size(total)
     return Landing(
         change=total,
         blow=min(mass * speed / interval_s / pressed, 1.0),

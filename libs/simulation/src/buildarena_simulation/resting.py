@@ -29,11 +29,10 @@ _OVERLAP: Final = 0.01
 _FLAT: Final = 0.9
 """Cosine of the greatest angle between a face's normal and a contact's that belongs to it."""
 
-_NONE: Final[tuple[np.ndarray, ...]] = (
-    *(np.zeros(0, dtype=np.int64) for _ in range(3)),
-    *(np.zeros((0, *shape)) for shape in ((3,), (3,), (4, 3), ())),
-)
-"""The columns of `RestingFaces` where nothing rests."""
+_UPSIDE_DOWN: Final = np.diag([1.0, -1.0, -1.0])
+_UP: Final = np.array([0.0, 0.0, 1.0])
+_SIDES: Final = np.array([[1, 2], [0, 2], [0, 1]])
+"""The axes across each axis."""
 
 _CORNERS: Final = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
 
@@ -74,20 +73,19 @@ class RestingFaces:
             return contacts
         count = len(cluster_of)
         normal, weight = contacts.normal.copy(), contacts.weight.copy()
-        for number in (WORLD, CARGO):
-            mine = (self.other == number).nonzero()[0]
-            rows = (contacts.other == number).nonzero()[0]
-            if not len(mine) or not len(rows):
-                continue
-            of_cluster = np.zeros((count, 3))
-            of_cluster[cluster_of[self.block[mine]]] = self.normal[mine]
-            wanted = of_cluster[cluster_of[contacts.block[rows]]]
-            flat = (wanted * normal[rows]).sum(axis=1) > _FLAT
-            rows, wanted = rows[flat], wanted[flat]
-            normal[rows] = wanted
-            rests = np.zeros(count, dtype=bool)
-            rests[self.block[mine]] = True
-            weight[rows[rests[contacts.block[rows]]]] = 0.0
+        # Rests of the world come first in the tables, rests of the cargo after them.
+        after = np.where(self.other == WORLD, 0, count)
+        of_cluster, rests = np.zeros((2 * count, 3)), np.zeros(2 * count, dtype=bool)
+        of_cluster[cluster_of.take(self.block) + after] = self.normal
+        rests[self.block + after] = True
+        rows = (contacts.other < 0).nonzero()[0]
+        block, after = contacts.block.take(rows), np.where(contacts.other == WORLD, 0, count)
+        after = after.take(rows)
+        wanted = of_cluster.take(cluster_of.take(block) + after, 0)
+        flat = (np.add.reduce(wanted * normal.take(rows, 0), axis=1) > _FLAT).nonzero()[0]
+        rows = rows.take(flat)
+        normal[rows] = wanted.take(flat, 0)
+        weight[rows[rests.take((block + after).take(flat))]] = 0.0
         return ContactForces(
             block=np.concatenate([contacts.block, self.block]),
             other=np.concatenate([contacts.other, self.other]),
@@ -98,6 +96,17 @@ class RestingFaces:
             point=np.concatenate([contacts.point, self.point]),
             force=np.concatenate([contacts.force, np.zeros((len(self.block), 3))]),
         )
+
+
+_NONE: Final = RestingFaces(
+    block=np.zeros(0, dtype=np.int64),
+    other=np.zeros(0, dtype=np.int64),
+    surface=np.zeros(0, dtype=np.int64),
+    normal=np.zeros((0, 3)),
+    point=np.zeros((0, 3)),
+    corners=np.zeros((0, 4, 3)),
+    area=np.zeros(0),
+)
 
 
 class FaceFinder:
@@ -119,18 +128,18 @@ class FaceFinder:
         self._center = np.array([shape.center for shape in shapes]).reshape(-1, 3)
         self._rotation = np.array([shape.rotation for shape in shapes]).reshape(-1, 3, 3)
         self._half = np.array([shape.half_extents for shape in shapes]).reshape(-1, 3)
+        self._volume = self._half.prod(axis=1)
         self._farthest = np.linalg.norm(self._half, axis=1) + _GAP
-        self._tops = [
-            (
-                k,
-                np.array([*box.center[:2], box.center[2] + box.size[2] / 2]),
-                np.array(box.size) / 2,
-            )
+        tops = [
+            (k, [*box.center[:2], box.center[2] + box.size[2] / 2], np.array(box.size[:2]) / 2)
             for k, box in enumerate(world.terrain, 1)
             if not box.slope_deg and not box.heading_deg
         ]
         if world.ground:
-            self._tops.insert(0, (0, np.zeros(3), np.array([1e6, 1e6, 0.0])))
+            tops.insert(0, (0, [0.0, 0.0, 0.0], np.array([1e6, 1e6])))
+        self._surface = np.array([k for k, _, _ in tops], dtype=np.int64)
+        self._top = np.array([top for _, top, _ in tops]).reshape(-1, 3)
+        self._size = np.array([size for _, _, size in tops]).reshape(-1, 2)
         flat = world.cargo is not None and not world.cargo.is_ball
         self._cargo_half = world.cargo.size / 2 if world.cargo is not None and flat else None
 
@@ -142,99 +151,113 @@ class FaceFinder:
             motion: Where they are.
             cargo: Where the cargo is, if there is one.
         """
-        c = clusters.cluster_of[self._block]
-        center = motion.position[c] + turned(motion.rotation[c], self._center)
-        rotation = motion.rotation[c] @ self._rotation
-        faces = [
-            self._resting(center, rotation, (top, np.eye(3), half[:2]), (WORLD, surface))
-            for surface, top, half in self._tops
-        ]
+        c = clusters.cluster_of.take(self._block)
+        turns = motion.rotation.take(c, 0)
+        center = motion.position.take(c, 0) + turned(turns, self._center)
+        top, near = self._near(center[:, 2] - self._top[:, 2:])
+        frame = None
         if cargo is not None and self._cargo_half is not None:
-            turn = rotation_of(cargo.quaternion) @ np.diag([1.0, -1.0, -1.0])
-            bottom = cargo.position + turn[:, 2] * self._cargo_half[2]
-            frame = (bottom, turn, self._cargo_half[:2])
-            faces.append(self._resting(center, rotation, frame, (CARGO, -1)))
-        faces = [columns for columns in faces if len(columns[0])] or [_NONE]
-        block, other, surface, normal, point, corners, area = (
-            np.concatenate(column) for column in zip(*faces, strict=True)
-        )
-        return RestingFaces(
-            block=block,
-            other=other,
-            surface=surface,
-            normal=normal,
-            point=point,
-            corners=corners,
-            area=area,
-        )
+            axes = rotation_of(cargo.quaternion) @ _UPSIDE_DOWN
+            bottom = cargo.position + axes[:, 2] * self._cargo_half[2]
+            under = self._near(((center - bottom) @ axes[:, 2])[None])[1]
+            frame = (bottom, axes) if len(under) else None
+        if not len(near) and frame is None:
+            return _NONE
+        # A level top's axes are the world's, which turn nothing.
+        rotation = turns @ self._rotation
+        local, turn = center.take(near, 0) - self._top.take(top, 0), rotation.take(near, 0)
+        size = self._size.take(top, 0)
+        if frame is not None and self._cargo_half is not None:
+            bottom, axes = frame
+            local = np.concatenate([local, (center.take(under, 0) - bottom) @ axes])
+            turn = np.concatenate([turn, axes.T @ rotation.take(under, 0)])
+            size = np.concatenate([size, self._cargo_half[None, :2].repeat(len(under), axis=0)])
+            near = np.concatenate([near, under])
+        return self._resting(near, (local, turn, size), top, frame)
+
+    def _near(self, height: FloatArray) -> tuple[IntArray, IntArray]:
+        """Plane and box, for each box whose middle is at (S, B) heights just above a plane."""
+        plane, box = ((height > 0.0) & (height < self._farthest)).nonzero()
+        return plane, box
 
     def _resting(
         self,
-        center: FloatArray,
-        rotation: FloatArray,
-        frame: tuple[FloatArray, FloatArray, FloatArray],
-        numbers: tuple[int, int],
-    ) -> tuple[np.ndarray, ...]:
-        """Blocks that all but rest on a rectangle.
+        box: IntArray,
+        places: tuple[FloatArray, FloatArray, FloatArray],
+        top: IntArray,
+        frame: tuple[FloatArray, FloatArray] | None,
+    ) -> RestingFaces:
+        """Those of some boxes that rest on a rectangle each.
 
         Args:
-            center: (B, 3) of the boxes, world frame, units.
-            rotation: (B, 3, 3) world_from_box.
-            frame: The rectangle's middle (3,), its axes (3, 3), the third towards the blocks, and
-                its half-extents (2,).
-            numbers: The rectangle's body and surface.
-
-        Returns:
-            The columns of `RestingFaces`.
+            box: (R,) the boxes, those above level tops first.
+            places: Each box's middle (R, 3) and axes (R, 3, 3) in its rectangle's frame, whose
+                third axis points to the box, and half-extents (R, 2) of that rectangle.
+            top: The level tops; the other rows are the cargo's.
+            frame: Middle (3,) and axes (3, 3) of the cargo's underside; None without such rows.
         """
-        middle, axes, size = frame
-        height = (center - middle) @ axes[:, 2]
-        near = ((height > 0.0) & (height < self._farthest)).nonzero()[0]
-        if not len(near):
-            return _NONE
-        local, turn = (center[near] - middle) @ axes, axes.T @ rotation[near]
-        cosines, half = np.abs(turn[:, 2]), self._half[near]
-        reach = (cosines * half).sum(axis=1)
-        across = (np.abs(turn[:, :2]) @ half[:, :, None])[:, :, 0]
+        local, turn, size = places
+        half, along = self._half.take(box, 0), np.abs(turn)
+        cosines = along[:, 2]
+        reach = np.add.reduce(cosines * half, axis=1)
+        across = (along[:, :2] @ half[:, :, None])[:, :, 0]
         low = np.maximum(local[:, :2] - across, -size)
-        high = np.minimum(local[:, :2] + across, size)
-        wide = high - low > _OVERLAP
-        touching = (
-            (np.abs(local[:, 2] - reach) < _GAP)
-            & (cosines.max(axis=1) > _LEVEL)
-            & wide[:, 0]
-            & wide[:, 1]
-        ).nonzero()[0]
-        if not len(touching):
+        wide = np.minimum(local[:, :2] + across, size) - low
+        touches = np.abs(local[:, 2] - reach) < _GAP
+        touches &= np.maximum.reduce(cosines, axis=1) > _LEVEL
+        touches &= np.minimum.reduce(wide, axis=1) > _OVERLAP
+        rows = touches.nonzero()[0]
+        if not len(rows):
             return _NONE
-        rows = near[touching]
-        corners = self._corners(local[touching], turn[touching], half[touching], size)
-        plane = axes[:, :2].T
-        count = len(rows)
-        # A turned face is smaller than its bounding rectangle; its overlap in proportion.
-        face = (
-            half.prod(axis=1)[touching]
-            / half[np.arange(len(half)), cosines.argmax(axis=1)][touching]
+        box, local, turn = box.take(rows), local.take(rows, 0)[:, :2], turn.take(rows, 0)
+        half, size, low, wide, across, cosines = (
+            each.take(rows, 0) for each in (half, size, low, wide, across, cosines)
         )
-        share = face / across[touching].prod(axis=1)
-        return (
-            self._block[rows],
-            np.full(count, numbers[0], dtype=np.int64),
-            np.full(count, numbers[1], dtype=np.int64),
-            np.full((count, 3), axes[:, 2]),
-            middle + ((low + high) / 2)[touching] @ plane,
-            middle + corners @ plane,
-            (high - low)[touching].prod(axis=1) * share,
+        down = cosines.argmax(axis=1)
+        corners = _corners(local, turn, half, size, down)
+        middle = (low + np.minimum(local + across, size)) / 2
+        # A turned face is smaller than its bounding rectangle; its overlap in proportion.
+        face = self._volume.take(box) / half[np.arange(len(rows)), down]
+        count = int(np.searchsorted(rows, len(top)))
+        top = top.take(rows[:count])
+        other = np.full(len(rows), WORLD, dtype=np.int64)
+        surface = np.full(len(rows), -1, dtype=np.int64)
+        surface[:count] = self._surface.take(top)
+        spots = np.zeros((len(rows), 6, 3))
+        spots[:, 0] = _UP
+        spots[:, 1, :2], spots[:, 2:, :2] = middle, corners
+        spots[:count, 1:] += self._top.take(top, 0)[:, None]
+        if frame is not None:
+            (bottom, axes), plane = frame, frame[1][:, :2].T
+            other[count:] = CARGO
+            spots[count:, 0] = axes[:, 2]
+            spots[count:, 1] = bottom + middle[count:] @ plane
+            spots[count:, 2:] = bottom + corners[count:] @ plane
+        return RestingFaces(
+            block=self._block.take(box),
+            other=other,
+            surface=surface,
+            normal=spots[:, 0],
+            point=spots[:, 1],
+            corners=spots[:, 2:],
+            area=wide[:, 0] * wide[:, 1] * (face / (across[:, 0] * across[:, 1])),
         )
 
-    def _corners(
-        self, local: FloatArray, turn: FloatArray, half: FloatArray, size: FloatArray
-    ) -> FloatArray:
-        """Corners of the lower faces, moved onto the rectangle where they overhang, (B, 4, 2)."""
-        down = np.abs(turn[:, 2]).argmax(axis=1)
-        sides = np.array([[1, 2], [0, 2], [0, 1]])[down]
-        rows = np.arange(len(local))[:, None]
-        reach = half[rows, sides]
-        axes = np.moveaxis(turn[:, :2], 1, 2)[rows, sides]
-        offset = (_CORNERS[None, :, :, None] * (reach[..., None] * axes)[:, None]).sum(axis=2)
-        return np.asarray(np.clip(local[:, None, :2] + offset, -size, size))
+
+def _corners(
+    local: FloatArray, turn: FloatArray, half: FloatArray, size: FloatArray, down: IntArray
+) -> FloatArray:
+    """Corners of the lower faces, moved onto their rectangles where they overhang, (R, 4, 2).
+
+    Args:
+        local: (R, 2) middles of boxes, in the rectangles' frames.
+        turn: (R, 3, 3) their axes there.
+        half: (R, 3) their half-extents.
+        size: (R, 2) half-extents of the rectangles.
+        down: (R,) which of a box's axes is upright.
+    """
+    sides, rows = _SIDES[down], np.arange(len(local))[:, None]
+    along = half[rows, sides][:, :, None] * turn[:, :2].transpose(0, 2, 1)[rows, sides]
+    offset = _CORNERS[:, :1] * along[:, None, 0] + _CORNERS[:, 1:] * along[:, None, 1]
+    ends = size[:, None]
+    return np.asarray(np.minimum(np.maximum(local[:, None] + offset, -ends), ends))

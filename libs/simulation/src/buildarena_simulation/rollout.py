@@ -1,9 +1,9 @@
-"""One trial: a machine put through a scenario by an engine."""
+"""One trial: a structure put through a scenario by an engine."""
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from weakref import finalize
 
 from buildarena_simulation.clearance import require_clear_start
@@ -26,7 +26,6 @@ from buildarena_simulation.errors import (
     UnknownEngineError,
 )
 from buildarena_simulation.gusts import Blows
-from buildarena_simulation.machine import bindings_of, part_ids, structure_of
 from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.planning import Keys
 from buildarena_simulation.processor import warn_if_late
@@ -37,9 +36,6 @@ from buildarena_simulation.structure.planet import Surroundings
 from buildarena_simulation.threads import single_threaded
 from buildarena_simulation.trajectory import Trajectory
 from buildarena_simulation.trial import Decision, Trial
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
 
 SIMULATION_VERSION: Final = "7"
 """Version of the shared model: rises with every change that can move a trajectory."""
@@ -61,66 +57,6 @@ def require_engine(name: str) -> str:
             f"there are {installed}"
         )
     raise UnknownEngineError(f"no engine {name!r}; there are {installed}")
-
-
-def simulate(
-    machine: "Machine",
-    scenario: Scenario,
-    engine: str = DEFAULT_ENGINE,
-    *,
-    controls: Sequence[KeyHold] | None = None,
-    start: Start | None = None,
-    seed: int | None = None,
-    substeps: int = 1,
-    until: Decision | None = None,
-    on_progress: Callable[[float], None] | None = None,
-) -> Trajectory:
-    """Puts a machine through a scenario. The same input gives the same bytes.
-
-    Args:
-        machine: The machine.
-        scenario: What it is put through.
-        engine: Name of the engine; see `ENGINES`.
-        controls: A control sequence to use in place of the machine's own, or of its controller.
-        start: Where machine and cargo start, in place of where the scenario puts them.
-        seed: Draws what the scenario leaves to it, and varies the start as a fair repetition would,
-            see `start_of`; None for the exact one.
-        substeps: Into how many each of the engine's usual steps is divided, to distinguish a
-            result of the model from one of the step size.
-        until: Ends the trial after the first sample for which it is true; by default it lasts for
-            the scenario's duration.
-        on_progress: Called now and then with the share of the trial that is done, 0 to 1.
-
-    Returns:
-        The trajectory.
-
-    Raises:
-        MachineNotSimulable: The machine is empty, unplaceable or too large, or its controller
-            failed; a failed trial.
-        UnknownEngineError: No engine of this name is installed.
-        ValueError: A start and a seed are given, or only one of start and scenario has a cargo.
-        SimulationError: The simulator failed; never scored.
-    """
-    require_engine(engine)
-    structure, bindings = structure_of(machine), bindings_of(machine)
-    pilot = None
-    if machine.controller and controls is None:
-        ids = part_ids(machine)
-        world = scenario.world(seed)
-        pilot = ProgramPilot(machine.controller, structure, bindings, ids, world, seed=seed or 0)
-    return simulate_structure(
-        structure,
-        scenario,
-        engine,
-        bindings=bindings,
-        controls=machine.control_sequence if controls is None else controls,
-        pilot=pilot,
-        start=start,
-        seed=seed,
-        substeps=substeps,
-        until=until,
-        on_progress=on_progress,
-    )
 
 
 def simulate_structure(

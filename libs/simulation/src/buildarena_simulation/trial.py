@@ -7,8 +7,7 @@ import numpy as np
 
 from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-from buildarena_simulation.control import Levels, recoil
-from buildarena_simulation.controllers.answers import constant
+from buildarena_simulation.control import Levels, Steady, recoil
 from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.senses import Seen
 from buildarena_simulation.engines.base import Engine, World
@@ -112,7 +111,7 @@ class Trial:
 
     def ask(self, levels: Mapping[tuple[int, str], float]) -> None:
         """Says what is asked for in the next tick; see `Channels.levels`."""
-        self._plan(constant(levels, self._per_sample))
+        self._plan(Steady(levels, self._per_sample))
 
     def press(self, keys: Keys) -> None:
         """Says which keys are held in the next tick."""

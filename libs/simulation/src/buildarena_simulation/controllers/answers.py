@@ -4,13 +4,11 @@ import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
-import numpy as np
-
-from buildarena_simulation.control import Bindings, Levels, channel
+from buildarena_simulation.control import Bindings, channel
 from buildarena_simulation.errors import ControllerFailed
 
 if TYPE_CHECKING:
-    from buildarena_simulation.structure.model import FloatArray, Structure
+    from buildarena_simulation.structure.model import Structure
 
 _NEAR: Final = 3
 
@@ -90,16 +88,6 @@ class Channels:
 def near_names(name: str, names: Iterable[str]) -> list[str]:
     """Those of some names that somebody may have meant, the nearest first; at most three."""
     return difflib.get_close_matches(name, list(names), n=_NEAR, cutoff=0.4)
-
-
-def constant(levels: Mapping[tuple[int, str], float], count: int) -> Levels:
-    """The same levels for some steps, as schedules are planned from."""
-    shares = {share: np.full(count, share) for share in {0.0, *levels.values()}}
-
-    def level(part: int, action: str) -> "FloatArray":
-        return shares[levels.get((part, action), 0.0)]
-
-    return level
 
 
 def _switches(structure: "Structure") -> set[tuple[int, str]]:

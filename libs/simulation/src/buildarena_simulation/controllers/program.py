@@ -81,6 +81,7 @@ class Program:
         self._time_s = 0.0
         self._clock_s = 0.0
         self._driver = self._guarded(lambda: _started(seed, most_s))
+        self._take, self._answer = self._driver["take"], self._driver["answer"]
         self._read(data)
         self.sensors = self._listed()
 
@@ -136,11 +137,10 @@ class Program:
             ) from None
 
     def _asked(self, time_s: float, values: Sequence[float]) -> Any:
-        driver = self._driver
-        driver["take"](*values[:_PER_CALL])
+        self._take(*values[:_PER_CALL])
         for first in range(_PER_CALL, len(values), _PER_CALL):
-            driver["more"](*values[first : first + _PER_CALL])
-        return driver["answer"](time_s, MAX_ANSWERS, MAX_NAME)
+            self._driver["more"](*values[first : first + _PER_CALL])
+        return self._answer(time_s, MAX_ANSWERS, MAX_NAME)
 
     def _listed(self) -> tuple[str, ...]:
         listed = self._guarded(lambda: self._driver["sensors"](MAX_SENSORS))

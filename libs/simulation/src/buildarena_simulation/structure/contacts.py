@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from buildarena_simulation.structure.model import FloatArray, IntArray
-from buildarena_simulation.structure.vectors import cross, summed_by
+from buildarena_simulation.structure.vectors import columns_of, cross, summed_at
 
 WORLD: Final = -1
 """Ground and terrain on the other side of a contact: one body."""
@@ -26,6 +26,7 @@ _NORMAL_GRID: Final = 4.0
 
 _NORMAL_DIGITS: Final = np.array([256, 16, 1])
 _ROUNDS: Final = 4
+_UNIT: Final = np.eye(3)
 _LINE_TOLERANCE: Final = 1e-6
 """Points in a line bear no moment about it; this share of the spread keeps that solvable."""
 
@@ -121,8 +122,7 @@ class EvenSharing:
 
     def __init__(self, cluster_of: IntArray) -> None:
         self._cluster_of = cluster_of
-        self._key: IntArray = np.zeros(0, dtype=np.int64)
-        self._block: IntArray = np.zeros(0, dtype=np.int64)
+        self._known: tuple[bytes, bytes] = (b"", b"")
         self._patches = _NO_PATCHES
 
     def shared(self, contacts: ContactForces) -> PointForces:
@@ -134,9 +134,9 @@ class EvenSharing:
 
     def _patches_of(self, contacts: ContactForces) -> "_Patches":
         key = _patch_keys(contacts, self._cluster_of)
-        same = np.array_equal(key, self._key) and np.array_equal(contacts.block, self._block)
-        if not same:
-            self._key, self._block = key, contacts.block
+        known = key.tobytes(), contacts.block.tobytes()
+        if known != self._known:
+            self._known = known
             self._patches = _find_patches(key, contacts.block)
         return self._patches
 
@@ -149,13 +149,15 @@ class _Patches:
         of: (K,) patch of each contact.
         count: How many patches there are.
         beside: (K,) index of contact's block and patch together.
-        columns: (K, 19) where the sums over each patch go, flat.
+        columns: (19 K,) where the sums over each patch go, flat.
+        vectors: (3 K,) the same for sums of vectors.
     """
 
     of: IntArray
     count: int
     beside: IntArray
     columns: IntArray
+    vectors: IntArray
 
 
 _SUMS: Final = 19
@@ -163,73 +165,76 @@ _NO_PATCHES: Final = _Patches(
     of=np.zeros(0, dtype=np.int64),
     count=0,
     beside=np.zeros(0, dtype=np.int64),
-    columns=np.zeros((0, _SUMS), dtype=np.int64),
+    columns=np.zeros(0, dtype=np.int64),
+    vectors=np.zeros(0, dtype=np.int64),
 )
 
 
 def _patch_keys(contacts: ContactForces, cluster_of: IntArray) -> IntArray:
     """A number for each contact that it shares with those of its patch."""
     way = (contacts.normal * _NORMAL_GRID + 8.5).astype(np.int64) @ _NORMAL_DIGITS
-    key = (cluster_of[contacts.block] * 2**22 + contacts.other + 2**20) * 2**12 + way
+    key = (cluster_of.take(contacts.block) * 2**22 + contacts.other + 2**20) * 2**12 + way
     return np.asarray(key, dtype=np.int64)
 
 
 def _find_patches(key: IntArray, block: IntArray) -> _Patches:
     _, of = np.unique(key, return_inverse=True)
     _, beside = np.unique(of * (int(block.max()) + 1) + block, return_inverse=True)
-    columns = (of[:, None] * _SUMS + np.arange(_SUMS)).reshape(-1)
-    return _Patches(of=of, count=int(of.max()) + 1, beside=beside, columns=columns)
+    return _Patches(
+        of=of,
+        count=int(of.max()) + 1,
+        beside=beside,
+        columns=columns_of(of, _SUMS),
+        vectors=columns_of(of, 3),
+    )
 
 
 def _spread(contacts: ContactForces, patches: _Patches) -> FloatArray:
     of, count = patches.of, patches.count
     anchor = np.empty((count, 3))
     anchor[of] = contacts.point
-    x = contacts.point - anchor[of]
+    x = contacts.point - anchor.take(of, 0)
     # Points share a patch by blocks: how many points a block has is the solver's choice.
-    of_block = np.bincount(patches.beside, contacts.weight)[patches.beside]
+    of_block = np.bincount(patches.beside, contacts.weight).take(patches.beside)
     weight = contacts.weight / np.maximum(of_block, 1e-12)
     weight = np.where(contacts.area > 0.0, contacts.area, weight)
+    normal = summed_at(patches.vectors, contacts.normal, count).take(of, 0)
+    rows = np.empty((len(x), _SUMS))
+    rows[:, 13:16] = contacts.force
+    rows[:, 16:19] = cross(x, contacts.force)
     for _ in range(_ROUNDS):
-        spread, normal = _even(contacts, x, weight, patches)
-        pulling = (spread * normal[of]).sum(axis=1) < 0.0
+        spread = _even(rows, x, weight, patches)
+        pulling = np.add.reduce(spread * normal, axis=1) < 0.0
         if not pulling.any():
             return spread
         pushing = np.where(pulling, 0.0, weight)
         whole = np.bincount(of, pushing, minlength=count)
         # A patch that would lose all its points stays as it was.
-        weight = np.where(whole[of] > 0.0, pushing, weight)
+        weight = np.where(whole.take(of) > 0.0, pushing, weight)
     return spread
 
 
-def _even(
-    contacts: ContactForces, x: FloatArray, weight: FloatArray, patches: _Patches
-) -> tuple[FloatArray, FloatArray]:
-    """Forces w·(a + cross(b, r)), (K, 3), and the patches' summed normals, (P, 3).
+def _even(rows: FloatArray, x: FloatArray, weight: FloatArray, patches: _Patches) -> FloatArray:
+    """Forces w·(a + cross(b, r)), (K, 3).
 
     Args:
-        contacts: The contacts.
+        rows: (K, 19) what is summed over each patch; forces and moments are there, from 13 on, and
+            the others are written.
         x: (K, 3) points from an anchor of their patch, units.
         weight: (K,) of each point.
         patches: Which belong together.
     """
-    heavy = weight[:, None] * x
-    rows = np.empty((len(x), _SUMS))
+    of, heavy = patches.of, weight[:, None] * x
     rows[:, 0], rows[:, 1:4] = weight, heavy
     rows[:, 4:13] = (heavy[:, :, None] * x[:, None, :]).reshape(-1, 9)
-    rows[:, 13:16] = contacts.force
-    rows[:, 16:19] = cross(x, contacts.force)
-    normal = summed_by(patches.of, contacts.normal, patches.count)
-    flat = np.bincount(patches.columns, rows.reshape(-1), minlength=patches.count * _SUMS)
-    sums = np.asarray(flat.reshape(patches.count, _SUMS), dtype=np.float64)
+    sums = summed_at(patches.columns, rows, patches.count)
     whole, total, moment = sums[:, :1], sums[:, 13:16], sums[:, 16:19]
     center = sums[:, 1:4] / whole
     second = sums[:, 4:13].reshape(-1, 3, 3)
     second = second - whole[:, :, None] * center[:, :, None] * center[:, None, :]
     trace = (second[:, 0, 0] + second[:, 1, 1] + second[:, 2, 2])[:, None, None]
-    inertia = ((1.0 + _LINE_TOLERANCE) * trace + _POINT_TOLERANCE) * np.eye(3) - second
+    inertia = ((1.0 + _LINE_TOLERANCE) * trace + _POINT_TOLERANCE) * _UNIT - second
     rest = (moment - cross(center, total))[:, :, None]
     b = np.asarray(np.linalg.solve(inertia, rest)[:, :, 0], dtype=np.float64)
-    r = x - center[patches.of]
-    spread = weight[:, None] * ((total / whole)[patches.of] + cross(b[patches.of], r))
-    return np.asarray(spread), normal
+    turning = cross(b.take(of, 0), x - center.take(of, 0))
+    return np.asarray(weight[:, None] * ((total / whole).take(of, 0) + turning))

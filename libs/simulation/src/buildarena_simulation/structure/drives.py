@@ -116,14 +116,18 @@ def _lagged_few(
     targets: FloatArray, blend: FloatArray, before: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """The same in plain numbers: of a few speeds for a few steps it is sooner done."""
-    columns = []
-    for wanted, share, speed in zip(
-        targets.T.tolist(), blend.tolist(), before.tolist(), strict=True
-    ):
-        now, column = speed, []
-        for target in wanted:
-            now += share * (target - now)
-            column.append(now)
-        columns.append(column)
-    speeds = np.array(columns).T
+    speeds = targets.copy()
+    followed: dict[tuple[float, ...], FloatArray] = {}
+    columns = zip(targets.T.tolist(), blend.tolist(), before.tolist(), strict=True)
+    for number, (wanted, share, speed) in enumerate(columns):
+        # The wheels of one side are alike.
+        key = (share, speed, *wanted)
+        column = followed.get(key)
+        if column is None:
+            now, reached = speed, []
+            for target in wanted:
+                now += share * (target - now)
+                reached.append(now)
+            column = followed[key] = np.array(reached)
+        speeds[:, number] = column
     return speeds, speeds[-1]

@@ -16,7 +16,14 @@ from buildarena_simulation.structure.contacts import PointForces
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.stiffness import StiffnessModel
-from buildarena_simulation.structure.vectors import cross, summed_by, turned, turned_wrenches
+from buildarena_simulation.structure.vectors import (
+    columns_of,
+    cross,
+    summed_at,
+    summed_by,
+    turned,
+    turned_wrenches,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +67,7 @@ class LoadModel:
         self._structure = structure
         self._weights = structure.masses * (gravity / GRAVITY)
         self.wind: FloatArray = np.zeros(3)
+        self._limits = (structure.members.share[:, None] * structure.members.limits).T.copy()
         self._stiffness = StiffnessModel(structure)
         self._wrenches = np.zeros((len(structure), 6))
         self.holds: BoolArray = np.ones(len(structure.members), dtype=bool)
@@ -124,14 +132,13 @@ class LoadModel:
         wrenches = self._wrenches
         if self._children:
             relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
-            wrenches = turned_wrenches(relative[clusters.cluster_of], wrenches)
+            wrenches = turned_wrenches(relative.take(clusters.cluster_of, 0), wrenches)
             self._add_joint_reactions(wrenches, motion, force, moment)
         members = self._solver.solve(self._relieved(wrenches))
         inside = self._solver.inside
-        force[inside] = np.sqrt((members[:, :3] ** 2).sum(axis=1))
-        moment[inside] = np.sqrt((members[:, 3:] ** 2).sum(axis=1))
-        limits = self._structure.members.share[:, None] * self._structure.members.limits
-        ratio = np.maximum(force / limits[:, 0], moment / limits[:, 1])
+        norms = np.sqrt(np.add.reduce((members * members).reshape(-1, 2, 3), axis=2))
+        force[inside], moment[inside] = norms[:, 0], norms[:, 1]
+        ratio = np.maximum(force / self._limits[0], moment / self._limits[1])
         self._add_shared_faces(members, ratio)
         return JointLoads(force=force, moment=moment, ratio=ratio)
 
@@ -148,7 +155,7 @@ class LoadModel:
         """
         wrenches = self._unfiltered(forces, motion)
         relative = motion.rotation.transpose(0, 2, 1) @ self._root_rotation
-        wrenches = turned_wrenches(relative[self._clusters.cluster_of], wrenches)
+        wrenches = turned_wrenches(relative.take(self._clusters.cluster_of, 0), wrenches)
         if self._children:
             count = len(self.holds)
             self._add_joint_reactions(wrenches, motion, np.zeros(count), np.zeros(count))
@@ -165,6 +172,7 @@ class LoadModel:
         self._velocity, self._spin = motion.velocity, motion.spin
         self._solver = self._stiffness.factorize(clusters, self.holds)
         self._arm = structure.centers_of_mass - clusters.center_of_mass[clusters.cluster_of]
+        self._columns = columns_of(clusters.cluster_of, 6)
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia), dtype=np.float64)
         self._sliding = np.array(
             [s >= 0 and structure.parts[s].physics.joint_type == "slider" for s in clusters.seated]
@@ -182,34 +190,29 @@ class LoadModel:
         local = self._unfiltered(forces, motion)
         to_root = self._root_rotation.transpose(0, 2, 1)
         self._wrenches += blend * (local - fading * self._wrenches)
-        rate = np.concatenate(
-            [
-                clusters.mass[:, None] * (motion.velocity - self._velocity),
-                turned(
-                    motion.rotation @ clusters.inertia @ motion.rotation.transpose(0, 2, 1),
-                    motion.spin - self._spin,
-                ),
-            ],
-            axis=1,
-        ) / (elapsed_s * GRAVITY)
+        rate = np.empty((len(clusters), 6))
+        rate[:, :3] = clusters.mass[:, None] * (motion.velocity - self._velocity)
+        inertia = motion.rotation @ clusters.inertia @ motion.rotation.transpose(0, 2, 1)
+        rate[:, 3:] = turned(inertia, motion.spin - self._spin)
+        rate /= elapsed_s * GRAVITY
         self._velocity, self._spin = motion.velocity, motion.spin
         self._inertial += blend * (turned_wrenches(to_root, rate) - fading * self._inertial)
 
     def _unfiltered(self, forces: PointForces, motion: Motion) -> FloatArray:
         """Wrenches on the blocks now, weight included, (N, 6), in the axes of their roots."""
         structure, clusters = self._structure, self._clusters
-        self._root_rotation = motion.rotation[clusters.root]
+        self._root_rotation = motion.rotation.take(clusters.root, 0)
         centers = motion.points(clusters, structure.centers_of_mass)
-        moments = cross(forces.point - centers[forces.block], forces.force)
-        world = summed_by(
-            forces.block, np.concatenate([forces.force, moments], axis=1), len(structure)
-        )
+        wrenches = np.empty((len(forces.block), 6))
+        wrenches[:, :3] = forces.force
+        wrenches[:, 3:] = cross(forces.point - centers.take(forces.block, 0), forces.force)
+        world = summed_by(forces.block, wrenches, len(structure))
         world /= GRAVITY
         world[:, 2] -= self._weights
         if self.wind.any():
             world[:, :3] += self._structure.masses[:, None] * (self.wind / GRAVITY)
         to_root = self._root_rotation.transpose(0, 2, 1)
-        return turned_wrenches(to_root[clusters.cluster_of], world)
+        return turned_wrenches(to_root.take(clusters.cluster_of, 0), world)
 
     def _add_joint_reactions(
         self, wrenches: FloatArray, motion: Motion, force: FloatArray, moment: FloatArray
@@ -285,25 +288,25 @@ class LoadModel:
         member, sign, face = members.ends.T
         count = int(face.max()) + 1
         total = summed_by(face, sign[:, None] * of_member[member], count)
-        norms = np.sqrt((total.reshape(-1, 2, 3) ** 2).sum(axis=2))[face]
+        norms = np.sqrt(np.add.reduce((total * total).reshape(-1, 2, 3), axis=2))[face]
         together = (norms / members.limits[member]).max(axis=1)
         bears = (of_member[member] != 0.0).any(axis=1)
         np.maximum.at(ratio, member[bears], together[bears])
 
     def _cluster_totals(self, wrenches: FloatArray) -> FloatArray:
         """Resultant on each cluster about its centre of mass, (C, 6)."""
-        moments = wrenches[:, 3:] + cross(self._arm, wrenches[:, :3])
-        both = np.concatenate([wrenches[:, :3], moments], axis=1)
-        return summed_by(self._clusters.cluster_of, both, len(self._clusters))
+        both = wrenches.copy()
+        both[:, 3:] += cross(self._arm, wrenches[:, :3])
+        return summed_at(self._columns, both, len(self._clusters))
 
     def _relieved(self, wrenches: FloatArray) -> FloatArray:
         """Wrenches less what accelerates the blocks (inertia relief)."""
         structure, clusters = self._structure, self._clusters
         total = self._cluster_totals(wrenches)
         of = clusters.cluster_of
-        a = (total[:, :3] / clusters.mass[:, None])[of]
-        alpha = turned(self._compliance, total[:, 3:])[of]
-        relieved = wrenches.copy()
-        relieved[:, :3] -= structure.masses[:, None] * (a + cross(alpha, self._arm))
-        relieved[:, 3:] -= turned(structure.inertias, alpha)
-        return relieved
+        a = (total[:, :3] / clusters.mass[:, None]).take(of, 0)
+        alpha = turned(self._compliance, total[:, 3:]).take(of, 0)
+        needed = np.empty_like(wrenches)
+        np.multiply(structure.masses[:, None], a + cross(alpha, self._arm), out=needed[:, :3])
+        needed[:, 3:] = turned(structure.inertias, alpha)
+        return wrenches - needed

@@ -28,7 +28,7 @@ class Motion:
     def points(self, clusters: Clusters, points: FloatArray) -> FloatArray:
         """World position of one machine-frame point per block, (N, 3)."""
         c = clusters.cluster_of
-        return np.asarray(self.position[c] + turned(self.rotation[c], points))
+        return np.asarray(self.position.take(c, 0) + turned(self.rotation.take(c, 0), points))
 
     def centers_of_mass(self, clusters: Clusters) -> FloatArray:
         """Centres of mass of the clusters, (C, 3), world frame, units."""

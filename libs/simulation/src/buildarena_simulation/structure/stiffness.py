@@ -168,7 +168,8 @@ class MemberForces:
         if self._solver is None:
             return np.zeros((len(self.inside), 6))
         displacement = self.displacements(wrenches)
-        ends = np.concatenate([displacement[self._first], displacement[self._second]], axis=1)
+        first, second = displacement.take(self._first, 0), displacement.take(self._second, 0)
+        ends = np.concatenate([first, second], axis=1)
         return np.asarray((self._stress @ ends[:, :, None])[:, :, 0])
 
 

@@ -16,28 +16,15 @@ from buildarena_simulation.structure.contacts import (
     WORLD,
     ContactForces,
     PointForces,
-    joined,
     together,
 )
-from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray
+from buildarena_simulation.structure.least_energy import LeastEnergy
+from buildarena_simulation.structure.model import FloatArray, IntArray
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import cross
 
 _FOUNDATION: Final = 1e6
 """Stiffness of the ground under a corner: a hundred times a joint's, so that edges are sharp."""
-
-_SOFTNESS: Final = 1e-9
-"""Lets resultants through that points in a line cannot bear; negligible else."""
-
-_ROUNDS: Final = 12
-_TOLERANCE: Final = 1e-9
-"""A pull below this share of the resultant is none."""
-
-_CLOSED: Final = 1e-10
-"""The same for a gap, per mass·g of the resultant: a thousandth of what the ground yields."""
-
-_MISMATCH: Final = 1e-3
-"""Share of the resultant that may be missed before the even spread is kept."""
 
 _STILL: Final = 2e-3
 """Points that moved less than this in the machine frame are where they were, units."""
@@ -73,6 +60,21 @@ class _Candidates:
     base: FloatArray
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settled:
+    """Forces on blocks from what touches them; K of them.
+
+    Attributes:
+        other: (K,) as in `ContactForces`.
+        surface: (K,) as in `ContactForces`.
+        forces: The forces.
+    """
+
+    other: IntArray
+    surface: IntArray
+    forces: PointForces
+
+
 class EdgeSupports:
     """Finds how ground and terrain share a structure's weight among its blocks.
 
@@ -95,8 +97,8 @@ class EdgeSupports:
         structure: ElasticStructure,
         motion: Motion,
         others: Sequence[PointForces],
-    ) -> tuple[ContactForces, PointForces]:
-        """The contacts with the terrain's forces where an elastic structure would take them.
+    ) -> Settled:
+        """The contacts' forces with the terrain's where an elastic structure would take them.
 
         Args:
             contacts: The contacts, resting faces last.
@@ -107,19 +109,19 @@ class EdgeSupports:
             others: Further forces on the blocks: thrust, ropes.
 
         Returns:
-            Contacts and forces, one row each; the first rows are those given.
+            Forces; the first rows are the contacts'.
         """
         first_face = len(contacts.block) - len(corners)
         patches: list[tuple[IntArray, _Candidates]] = []
-        of = self._cluster_of[contacts.block]
-        resting = contacts.other[first_face:] == WORLD
-        for c in sorted(set(of[first_face:][resting].tolist())):
-            rows = self._patch(contacts, of, first_face, c)
+        of = self._cluster_of.take(contacts.block)
+        on_world = contacts.other == WORLD
+        for c in sorted(set(of[first_face:][on_world[first_face:]].tolist())):
+            rows = _patch(contacts, (on_world & (of == c)).nonzero()[0], first_face)
             candidates = _candidates(contacts, spread, corners, rows, first_face)
             if (candidates.block != candidates.block[0]).any() and self._matters(candidates):
                 patches.append((rows, candidates))
         if not patches:
-            return contacts, spread
+            return Settled(other=contacts.other, surface=contacts.surface, forces=spread)
         displaced = structure.displacements(together([spread, *others]), motion)
         force = spread.force.copy()
         added: list[tuple[_Candidates, FloatArray]] = []
@@ -127,21 +129,16 @@ class EdgeSupports:
             normal = contacts.normal[rows[-1]]
             pushes = self._pushes(candidates, normal, structure, motion, displaced)
             if pushes is not None:
-                along = force[rows] @ normal
-                force[rows] -= along[:, None] * normal
+                pushed = force.take(rows, 0)
+                force[rows] = pushed - (pushed @ normal)[:, None] * normal
                 added.append((candidates, pushes[:, None] * normal))
         return _with(
             contacts, PointForces(block=spread.block, point=spread.point, force=force), added
         )
 
-    def _patch(self, contacts: ContactForces, of: IntArray, first_face: int, c: int) -> IntArray:
-        """Rows of a cluster's contacts with the world along the normal of its resting faces."""
-        mine: IntArray = ((of == c) & (contacts.other == WORLD)).nonzero()[0]
-        normal = contacts.normal[mine[mine >= first_face][0]]
-        return np.asarray(mine[(contacts.normal[mine] == normal).all(axis=1)])
-
     def _matters(self, candidates: _Candidates) -> bool:
-        reach = float(np.ptp(candidates.point, axis=0).max())
+        point = candidates.point
+        reach = float((np.maximum.reduce(point) - np.minimum.reduce(point)).max())
         return abs(float(candidates.base.sum())) / self._gravity * reach > _NEGLIGIBLE
 
     def _pushes(
@@ -153,33 +150,42 @@ class EdgeSupports:
         displaced: FloatArray,
     ) -> FloatArray | None:
         """Force at each point, (P,), mass·unit/s²; None where the even spread has to do."""
-        block, point, base = candidates.block, candidates.point, candidates.base / self._gravity
-        c = self._cluster_of[block[0]]
+        block, base = candidates.block, candidates.base / self._gravity
+        c = int(self._cluster_of[block[0]])
         turn = motion.rotation[c]
         inward = turn.T @ normal
-        local = (point - motion.position[c]) @ turn
-        moments = cross(local - self._centers[block], inward[None])
-        unit = np.concatenate([np.full((len(block), 3), inward), moments], axis=1)
-        known = self._system(block, unit, local, structure)
-        gap = (unit * displaced[block]).sum(axis=1) + base / _FOUNDATION
+        local = (candidates.point - motion.position[c]) @ turn
+        unit = np.empty((len(block), 6))
+        unit[:, :3] = inward
+        unit[:, 3:] = cross(local - self._centers.take(block, 0), inward[None])
+        known = self._system(c, block, unit, local, structure)
+        gap = np.add.reduce(unit * displaced.take(block, 0), axis=1) + base / _FOUNDATION
         force = known.solver.solve(known.compliance @ base - gap, base)
         return None if force is None else force * self._gravity
 
     def _system(
-        self, block: IntArray, unit: FloatArray, local: FloatArray, structure: ElasticStructure
+        self,
+        c: int,
+        block: IntArray,
+        unit: FloatArray,
+        local: FloatArray,
+        structure: ElasticStructure,
     ) -> "_System":
         """How points yield to forces at each other; remembered while they hardly move.
 
         Args:
+            c: Their cluster.
             block: (P,) block of each point.
             unit: (P, 6) wrench of a unit force there on its block.
             local: (P, 3) the points, machine frame, units.
             structure: The structure.
         """
-        blocks, place = np.unique(block, return_inverse=True)
+        known = self._systems.get(c)
+        if known is not None and known.block.tobytes() == block.tobytes():
+            blocks, place = known.blocks, known.place
+        else:
+            blocks, place = np.unique(block, return_inverse=True)
         flexible = structure.flexibility(blocks)
-        cluster = int(self._cluster_of[block[0]])
-        known = self._systems.get(cluster)
         if (
             known is not None
             and known.flexible is flexible
@@ -193,13 +199,16 @@ class EdgeSupports:
         reach = max(float(np.abs(local - middle).max()), 1.0)
         across = _across(unit[0, :3]) @ (local - middle).T / reach
         balance = np.concatenate([np.ones((1, len(local))), across])
-        self._systems[cluster] = _System(
+        self._systems[c] = _System(
+            block=block,
+            blocks=blocks,
+            place=place,
             flexible=flexible,
             unit=unit,
             compliance=compliance,
-            solver=_LeastEnergy(compliance, balance),
+            solver=LeastEnergy(compliance, balance),
         )
-        return self._systems[cluster]
+        return self._systems[c]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,16 +216,22 @@ class _System:
     """The points of one cluster that may bear, and how they yield.
 
     Attributes:
+        block: (P,) block of each point.
+        blocks: (B,) each block once.
+        place: (P,) where each point's block is among them.
         flexible: What `compliance` was made from.
         unit: (P, 6) what it was made with.
         compliance: (P, P) how far each point yields under a unit force at each.
         solver: Shares a resultant among the points.
     """
 
+    block: IntArray
+    blocks: IntArray
+    place: IntArray
     flexible: FloatArray
     unit: FloatArray
     compliance: FloatArray
-    solver: "_LeastEnergy"
+    solver: LeastEnergy
 
 
 def _condensed(flexible: FloatArray, place: IntArray, unit: FloatArray) -> FloatArray:
@@ -242,69 +257,11 @@ def _condensed(flexible: FloatArray, place: IntArray, unit: FloatArray) -> Float
     return np.asarray(table[np.ix_(where, where)])
 
 
-class _LeastEnergy:
-    """Finds the f >= 0 that minimises f·h·f / 2 - target·f with the resultant of a given f.
-
-    Args:
-        h: (P, P) positive definite.
-        balance: (3, P) from forces to resultant.
-    """
-
-    def __init__(self, h: FloatArray, balance: FloatArray) -> None:
-        self._h, self._balance = h, balance
-        self._bearing: BoolArray = np.ones(len(h), dtype=bool)
-        self._factors: tuple[bytes, object] = (b"", None)
-
-    def solve(self, target: FloatArray, forces: FloatArray) -> FloatArray | None:
-        """The forces; None if none have the resultant.
-
-        Args:
-            target: (P,).
-            forces: (P,) forces with the resultant that is wanted.
-        """
-        bearing, wanted = self._bearing, self._balance @ forces
-        scale = float(np.abs(wanted).max()) + 1e-12
-        for turn in range(_ROUNDS):
-            if not bearing.any():
-                break
-            force, opening = self._with(bearing, target, wanted)
-            pulling = force < -_TOLERANCE * scale
-            # A point without load opens; where it would close again, it bears.
-            closing = ~bearing & (opening < -_CLOSED * scale)
-            if turn >= _ROUNDS // 2:
-                closing[:] = False
-            if not pulling.any() and not closing.any():
-                break
-            bearing = (bearing & ~pulling) | closing
-        else:
-            force = np.maximum(force, 0.0)
-        if not bearing.any() or np.abs(self._balance @ force - wanted).max() > _MISMATCH * scale:
-            self._bearing = np.ones(len(bearing), dtype=bool)
-            return None
-        self._bearing = bearing
-        return force
-
-    def _with(
-        self, bearing: BoolArray, target: FloatArray, wanted: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Forces of points that bear, and how far the others open, each (P,)."""
-        from scipy.linalg import lu_factor, lu_solve
-
-        held = bearing.nonzero()[0]
-        size = len(held)
-        if self._factors[0] != bearing.tobytes():
-            matrix = np.zeros((size + 3, size + 3))
-            matrix[:size, :size] = self._h[np.ix_(held, held)]
-            matrix[:size, size:] = self._balance[:, held].T
-            matrix[size:, :size] = self._balance[:, held]
-            matrix[size:, size:] = -_SOFTNESS * np.eye(3)
-            self._factors = (bearing.tobytes(), lu_factor(matrix, check_finite=False))
-        right = np.concatenate([target[held], wanted])
-        solution = lu_solve(self._factors[1], right, check_finite=False)
-        force = np.zeros(len(target))
-        force[held] = solution[:size]
-        opening = self._h @ force - target + solution[size:] @ self._balance
-        return force, opening
+def _patch(contacts: ContactForces, rows: IntArray, first_face: int) -> IntArray:
+    """Of a cluster's contacts with the world, those along the normal of its resting faces."""
+    normal = contacts.normal.take(rows, 0)
+    along = normal[np.searchsorted(rows, first_face)]
+    return np.asarray(rows[np.logical_and.reduce(normal == along, axis=1)])
 
 
 def _candidates(
@@ -315,16 +272,24 @@ def _candidates(
     first_face: int,
 ) -> _Candidates:
     """Corners of the resting faces and points of what else touches, among some rows."""
-    along = (spread.force[rows] * contacts.normal[rows]).sum(axis=1)
-    face = rows >= first_face
-    weighted = contacts.weight[rows] > 0.0
-    faces, points = rows[face], rows[~face & weighted]
+    pushes = spread.force.take(rows, 0) * contacts.normal.take(rows, 0)
+    along = np.add.reduce(pushes, axis=1)
+    count = int(np.searchsorted(rows, first_face))
+    weighted = (contacts.weight.take(rows[:count]) > 0.0).nonzero()[0]
+    faces, points = rows[count:], rows[weighted]
     return _Candidates(
-        block=np.concatenate([np.repeat(contacts.block[faces], 4), contacts.block[points]]),
-        point=np.concatenate([corners[faces - first_face].reshape(-1, 3), contacts.point[points]]),
-        surface=np.concatenate([np.repeat(contacts.surface[faces], 4), contacts.surface[points]]),
-        base=np.concatenate([np.repeat(along[face] / 4, 4), along[~face & weighted]]),
+        block=_of_corners(contacts.block, faces, points),
+        point=np.concatenate(
+            [corners.take(faces - first_face, 0).reshape(-1, 3), contacts.point.take(points, 0)]
+        ),
+        surface=_of_corners(contacts.surface, faces, points),
+        base=np.concatenate([(along[count:] / 4).repeat(4), along.take(weighted)]),
     )
+
+
+def _of_corners(of: IntArray, faces: IntArray, points: IntArray) -> IntArray:
+    """What belongs to the four corners of faces, and then to points."""
+    return np.concatenate([of.take(faces).repeat(4), of.take(points)])
 
 
 def _across(axis: FloatArray) -> FloatArray:
@@ -337,26 +302,18 @@ def _across(axis: FloatArray) -> FloatArray:
 
 def _with(
     contacts: ContactForces, spread: PointForces, added: Sequence[tuple[_Candidates, FloatArray]]
-) -> tuple[ContactForces, PointForces]:
-    """The contacts and forces with further rows."""
+) -> Settled:
+    """The forces of the contacts and further ones on ground and terrain."""
     if not added:
-        return contacts, spread
-    block = np.concatenate([points.block for points, _ in added])
-    point = np.concatenate([points.point for points, _ in added])
-    surface = np.concatenate([points.surface for points, _ in added])
-    force = np.concatenate([forces for _, forces in added])
-    count = len(block)
-    more = ContactForces(
-        block=block,
-        other=np.full(count, WORLD, dtype=np.int64),
-        surface=surface,
-        weight=np.ones(count),
-        area=np.zeros(count),
-        normal=np.full((count, 3), [0.0, 0.0, 1.0]),
-        point=point,
-        force=force,
-    )
-    return (
-        joined([contacts, more]),
-        together([spread, PointForces(block=block, point=point, force=force)]),
+        return Settled(other=contacts.other, surface=contacts.surface, forces=spread)
+    more = [points for points, _ in added]
+    world = np.full(sum(len(points.block) for points in more), WORLD, dtype=np.int64)
+    return Settled(
+        other=np.concatenate([contacts.other, world]),
+        surface=np.concatenate([contacts.surface, *(points.surface for points in more)]),
+        forces=PointForces(
+            block=np.concatenate([spread.block, *(points.block for points in more)]),
+            point=np.concatenate([spread.point, *(points.point for points in more)]),
+            force=np.concatenate([spread.force, *(force for _, force in added)]),
+        ),
     )

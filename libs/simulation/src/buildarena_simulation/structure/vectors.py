@@ -1,20 +1,20 @@
 """Products of many small vectors at once, without the overhead of NumPy's general ones."""
 
+from typing import Final
+
 import numpy as np
 
-from buildarena_simulation.structure.model import FloatArray
+from buildarena_simulation.structure.model import FloatArray, IntArray
+
+_FORTH: Final = np.array([1, 2, 0])
+_BACK: Final = np.array([2, 0, 1])
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross products of the rows of two broadcastable (..., 3) arrays."""
-    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
-    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
-    first = a1 * b2 - a2 * b1
-    product = np.empty((*first.shape, 3))
-    product[..., 0] = first
-    product[..., 1] = a2 * b0 - a0 * b2
-    product[..., 2] = a0 * b1 - a1 * b0
-    return product
+    # `take` costs a third of an index, which is most of a product of few vectors.
+    forth, back = _FORTH, _BACK
+    return a.take(forth, -1) * b.take(back, -1) - a.take(back, -1) * b.take(forth, -1)
 
 
 def axis_frame(direction: FloatArray) -> FloatArray:
@@ -50,6 +50,16 @@ def summed_by(index: np.ndarray, rows: FloatArray, count: int) -> FloatArray:
     """Sums of the rows (K, m) that share an index, (count, m); deterministic."""
     if not len(index):
         return np.zeros((count, rows.shape[1]))
-    flat = index[:, None] * rows.shape[1] + np.arange(rows.shape[1])
-    sums = np.bincount(flat.reshape(-1), rows.reshape(-1), minlength=count * rows.shape[1])
-    return np.asarray(sums.reshape(count, -1), dtype=np.float64)
+    return summed_at(columns_of(index, rows.shape[1]), rows, count)
+
+
+def columns_of(index: np.ndarray, width: int) -> IntArray:
+    """Where `summed_at` puts the numbers of rows (K, width) with an index each, (K · width,)."""
+    return np.asarray(index[:, None] * width + np.arange(width)).reshape(-1)
+
+
+def summed_at(columns: IntArray, rows: FloatArray, count: int) -> FloatArray:
+    """As `summed_by`, for rows whose `columns_of` are known; at least one."""
+    width = rows.shape[1]
+    sums = np.bincount(columns, rows.reshape(-1), count * width)
+    return np.asarray(sums.reshape(count, width), dtype=np.float64)

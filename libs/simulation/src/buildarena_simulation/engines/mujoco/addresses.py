@@ -25,7 +25,7 @@ class Addresses:
         surface_of_geom: Fixed body of each geom as in `ContactForces.surface`.
         joints: The driven joints.
         thrust_actuators: (K,) actuator of each cannon.
-        free_dofs: (F, 3) linear velocities of the free bodies, the cargo first.
+        free_dofs: (3 F,) linear velocities of the free bodies, the cargo first.
         spin_dofs: (P, 3) angular velocities of the components.
         tendons: Tendon of each rope that holds.
     """
@@ -82,7 +82,7 @@ def addresses_in(
         surface_of_geom=surface_of_geom,
         joints=joint_addresses(model, structure, clusters),
         thrust_actuators=_ids(model.actuator(f"cannon {i}").id for i in structure.cannons),
-        free_dofs=_ids(free)[:, None] + np.arange(3),
+        free_dofs=(_ids(free)[:, None] + np.arange(3)).reshape(-1),
         spin_dofs=_ids(components)[:, None] + np.arange(3, 6),
         tendons={int(r): model.tendon(f"rope {r}").id for r in np.flatnonzero(rope_alive)},
     )

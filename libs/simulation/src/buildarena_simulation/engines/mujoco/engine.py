@@ -14,7 +14,11 @@ from buildarena_simulation.engines.base import (
     rotation_of,
 )
 from buildarena_simulation.engines.mujoco.addresses import addresses_in
-from buildarena_simulation.engines.mujoco.contacts import StepContacts, step_contacts
+from buildarena_simulation.engines.mujoco.contacts import (
+    ContactReader,
+    StepContacts,
+    step_contacts,
+)
 from buildarena_simulation.engines.mujoco.joints import (
     drag_apart,
     enter_joint,
@@ -22,13 +26,12 @@ from buildarena_simulation.engines.mujoco.joints import (
 from buildarena_simulation.engines.mujoco.model import MjcfSettings, MjcfState, mjcf_of
 from buildarena_simulation.engines.mujoco.tendons import Tendons, hold_as_they_are, weld_wrenches
 from buildarena_simulation.engines.mujoco.wheels import wheel_contacts
-from buildarena_simulation.engines.shared.closest_points import ShapeTable, shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
 from buildarena_simulation.engines.shared.joint_frames import is_simple_component
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import ContactForces
 from buildarena_simulation.structure.grips import Hold
-from buildarena_simulation.structure.model import FloatArray, IntArray
+from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.solids import Solids
 from buildarena_simulation.structure.vectors import cross, turned, turned_wrenches
@@ -74,6 +77,8 @@ class MujocoEngine:
         self._cargo_state: tuple[FloatArray, FloatArray] | None = None
         self._targets: FloatArray | None = None
         self._wind = np.zeros(3)
+        self._motion: Motion | None = None
+        self._cargo_pose: CargoPose | None = None
 
     @property
     def time_step_s(self) -> float:
@@ -138,7 +143,8 @@ class MujocoEngine:
             ropes=self._structure.ropes,
             of=self._addresses.tendons,
         )
-        self._shapes: dict[int, ShapeTable] = {}
+        self._roots = self._model.body_rootid[self._addresses.bodies]
+        self._reader = ContactReader(self._structure, clusters, self._addresses)
         if self._world.cargo is not None:
             self._cargo_body = self._model.body("cargo").id
             self._scale_cargo_by_mass()
@@ -146,6 +152,7 @@ class MujocoEngine:
         self._set_velocities(motion)
         hold_as_they_are(self._model, self._data, self._holds)
         mujoco.mj_forward(self._model, self._data)
+        self._motion = self._cargo_pose = None
         wheels = len(self._structure.wheels)
         self._wheels = wheel_contacts(
             self._model, self._data, wheels, friction_s=_FRICTION_S, gravity=self._world.gravity
@@ -195,19 +202,24 @@ class MujocoEngine:
             time_step_s=self.time_step_s,
             mass=self._mass + self._cargo_mass,
         )
-        velocity = data.qvel[at.free_dofs]
+        # A view, which the steps write to.
+        rates, free = data.qvel, at.free_dofs
+        velocity, exerts, last = rates.take(free), self._world.field is not None, len(targets) - 1
         if self._world.field is not None:
             self._tendons.set_lengths(self._world.field.rest_lengths())
         for step, row in enumerate(targets):
-            self._apply_own_forces(step)
+            if exerts:
+                self._apply_own_forces(step)
             at.joints.follow(model, data, row)
-            if step + 1 == len(targets):
+            if step == last:
                 contacts = step_contacts(data)
                 impacts.before_last(contacts.pressed, partial(self._contacts_of, contacts))
             mujoco.mj_step(model, data)
-            before, velocity = velocity, data.qvel[at.free_dofs]
+            before, velocity = velocity, rates.take(free)
             if impacts.is_impact(velocity - before):
+                self._motion = None
                 impacts.take(self._contacts_of(step_contacts(data)))
+        self._motion = None
         self._last_contacts = step_contacts(data)
         if impacts.ends_in_blow(self._last_contacts.pressed):
             impacts.take(self._contacts_of(self._last_contacts))
@@ -240,26 +252,33 @@ class MujocoEngine:
 
     def motion(self) -> Motion:
         """See `Engine`."""
+        if self._motion is None:
+            self._motion = self._read_motion()
+        return self._motion
+
+    def _read_motion(self) -> Motion:
         data, bodies = self._data, self._addresses.bodies
-        rotation = data.xmat[bodies].reshape(-1, 3, 3) @ self._axes.transpose(0, 2, 1)
-        center, spin = data.xipos[bodies], data.cvel[bodies, :3]
-        anchor = data.subtree_com[self._model.body_rootid[bodies]]
+        rotation = data.xmat.take(bodies, 0).reshape(-1, 3, 3) @ self._axes.transpose(0, 2, 1)
+        center, rates = data.xipos.take(bodies, 0), data.cvel.take(bodies, 0)
+        anchor, spin = data.subtree_com.take(self._roots, 0), rates[:, :3]
         return Motion(
             position=center - turned(rotation, self._clusters.center_of_mass),
             rotation=rotation,
-            velocity=data.cvel[bodies, 3:] + cross(spin, center - anchor),
+            velocity=rates[:, 3:] + cross(spin, center - anchor),
             spin=spin,
         )
 
     def cargo(self) -> CargoPose:
         """See `Engine`."""
-        place, rates = self._data.qpos[:7].copy(), self._data.qvel[:6].copy()
-        return CargoPose(
-            position=place[:3],
-            quaternion=place[3:],
-            velocity=rates[:3],
-            spin=rotation_of(place[3:]) @ rates[3:],
-        )
+        if self._cargo_pose is None:
+            place, rates = self._data.qpos[:7].copy(), self._data.qvel[:6].copy()
+            self._cargo_pose = CargoPose(
+                position=place[:3],
+                quaternion=place[3:],
+                velocity=rates[:3],
+                spin=rotation_of(place[3:]) @ rates[3:],
+            )
+        return self._cargo_pose
 
     def close(self) -> None:
         """See `Engine`."""
@@ -287,11 +306,13 @@ class MujocoEngine:
 
     def _bring_up(self) -> None:
         """Brings the kinematics up to the end of the last step, which leaves its start's behind."""
+        self._motion = None
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_comVel(self._model, self._data)
 
     def _keep_cargo_state(self) -> None:
+        self._cargo_pose = None
         if self._world.cargo is not None:
             self._cargo_state = (self._data.qpos[:7].copy(), self._data.qvel[:6].copy())
 
@@ -344,47 +365,4 @@ class MujocoEngine:
             self._data.qvel[dofs] = spins * scale[:, None]
 
     def _contacts_of(self, contacts: StepContacts) -> ContactForces:
-        at, geoms = self._addresses, contacts.geoms
-        frames, components = contacts.frames, contacts.components
-        # MuJoCo's contact force acts on the second geom; its frame's rows are normal and tangents.
-        force = (components[:, None] @ frames)[:, 0]
-        clusters = at.body_of_geom[geoms]
-        sides = [((clusters[:, k] >= 0).nonzero()[0], k, sign) for k, sign in ((0, -1.0), (1, 1.0))]
-        row = np.concatenate([rows for rows, _, _ in sides])
-        own = np.concatenate([geoms[rows, k] for rows, k, _ in sides])
-        facing = np.concatenate([geoms[rows, 1 - k] for rows, k, _ in sides])
-        sign = np.concatenate([np.full((len(rows), 1), sign) for rows, _, sign in sides])
-        point = contacts.point[row]
-        index, block, weight = self._blocks_at(own, point)
-        return ContactForces(
-            block=block,
-            other=at.body_of_geom[facing][index],
-            surface=at.surface_of_geom[facing][index],
-            weight=weight,
-            area=np.zeros(len(block)),
-            normal=(sign * frames[row, 0])[index],
-            point=point[index],
-            force=(sign * force[row])[index] * weight[:, None],
-        )
-
-    def _blocks_at(
-        self, geoms: IntArray, points: FloatArray
-    ) -> tuple[IntArray, IntArray, FloatArray]:
-        """Rows of one contact and one block each: the contact's index, the block, its share."""
-        at = self._addresses
-        block = at.block_of_geom[geoms]
-        lone = (block >= 0).nonzero()[0]
-        rows, blocks, weights = [lone], [block[lone]], [np.ones(len(lone))]
-        if len(lone) < len(geoms):
-            motion = self.motion()
-            cluster = np.where(block >= 0, -1, at.body_of_geom[geoms])
-            for c in sorted(set(cluster[cluster >= 0].tolist())):
-                if c not in self._shapes:
-                    self._shapes[c] = shape_table(self._structure, self._clusters.blocks[c])
-                among = (cluster == c).nonzero()[0]
-                local = (points[among] - motion.position[c]) @ motion.rotation[c]
-                row, sharing, weight = self._shapes[c].share(local)
-                rows.append(among[row])
-                blocks.append(sharing)
-                weights.append(weight)
-        return np.concatenate(rows), np.concatenate(blocks), np.concatenate(weights)
+        return self._reader.forces(contacts, self.motion)

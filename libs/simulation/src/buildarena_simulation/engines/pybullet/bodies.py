@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -85,6 +86,33 @@ def set_friction(client: Mapping[str, int], body: int, link: int, friction: floa
         restitution=0,
         **client,
     )
+
+
+def load_body(
+    client: Mapping[str, int], file: Path, text: str, center: FloatArray, turn: FloatArray
+) -> int:
+    """Puts a body into the world.
+
+    Args:
+        client: The engine's world.
+        file: A file that its description is written to meanwhile, of a name that no other had.
+        text: URDF.
+        center: (3,) where its centre of mass is, world frame, units.
+        turn: (4,) world_from_principal as (w, x, y, z).
+    """
+    file.write_text(text, encoding="ascii")
+    body = pybullet.loadURDF(
+        str(file),
+        center.tolist(),
+        turn[[1, 2, 3, 0]].tolist(),
+        flags=pybullet.URDF_USE_INERTIA_FROM_FILE
+        | pybullet.URDF_MAINTAIN_LINK_ORDER
+        | pybullet.URDF_USE_IMPLICIT_CYLINDER,
+        useMaximalCoordinates=0,
+        **client,
+    )
+    file.unlink()
+    return int(body)
 
 
 def pose_of(client: Mapping[str, int], body: int | None) -> CargoPose:

@@ -10,7 +10,6 @@ import numpy as np
 
 from buildarena_simulation.engines.shared.closest_points import ShapeTable
 from buildarena_simulation.structure.contacts import WORLD, ContactForces
-from buildarena_simulation.structure.model import FloatArray
 from buildarena_simulation.structure.motion import Motion
 
 TOUCHING: Final = 0.005
@@ -62,35 +61,42 @@ def read_contacts(
             )
     for c, row in added:
         rows.setdefault(c, []).append((*row[:9], WORLD, row[9]))
-    return _gathered(
-        [_to_blocks(np.array(table), c, shapes[c], motion) for c, table in sorted(rows.items())]
-    )
-
-
-def _to_blocks(table: FloatArray, c: int, shapes: ShapeTable, motion: Motion) -> ContactForces:
-    local = (table[:, :3] - motion.position[c]) @ motion.rotation[c]
-    row, block, weight = shapes.share(local)
+    if not rows:
+        return _NONE
+    inside = sorted(rows)
+    table = np.array([row for c in inside for row in rows[c]])
+    shares, first = [], 0
+    for c in inside:
+        last = first + len(rows[c])
+        local = (table[first:last, :3] - motion.position[c]) @ motion.rotation[c]
+        index, block, weight = shapes[c].share(local)
+        shares.append((index + first, block, weight))
+        first = last
+    if len(shares) == 1:
+        index, block, weight = shares[0]
+    else:
+        index, block, weight = (np.concatenate(each) for each in zip(*shares, strict=True))
+    spread = table.take(index, 0)
+    numbers = spread[:, 9:].astype(np.int64)
     return ContactForces(
         block=block,
-        other=table[row, 9].astype(np.int64),
-        surface=table[row, 10].astype(np.int64),
+        other=numbers[:, 0],
+        surface=numbers[:, 1],
         weight=weight,
         area=np.zeros(len(block)),
-        normal=table[row, 6:9],
-        point=table[row, :3],
-        force=table[row, 3:6] * weight[:, None],
+        normal=spread[:, 6:9],
+        point=spread[:, :3],
+        force=spread[:, 3:6] * weight[:, None],
     )
 
 
-def _gathered(parts: Sequence[ContactForces]) -> ContactForces:
-    none = np.zeros(0, dtype=np.int64)
-    return ContactForces(
-        block=np.concatenate([none, *(f.block for f in parts)]),
-        other=np.concatenate([none, *(f.other for f in parts)]),
-        surface=np.concatenate([none, *(f.surface for f in parts)]),
-        weight=np.concatenate([np.zeros(0), *(f.weight for f in parts)]),
-        area=np.concatenate([np.zeros(0), *(f.area for f in parts)]),
-        normal=np.concatenate([np.zeros((0, 3)), *(f.normal for f in parts)]),
-        point=np.concatenate([np.zeros((0, 3)), *(f.point for f in parts)]),
-        force=np.concatenate([np.zeros((0, 3)), *(f.force for f in parts)]),
-    )
+_NONE: Final = ContactForces(
+    block=np.zeros(0, dtype=np.int64),
+    other=np.zeros(0, dtype=np.int64),
+    surface=np.zeros(0, dtype=np.int64),
+    weight=np.zeros(0),
+    area=np.zeros(0),
+    normal=np.zeros((0, 3)),
+    point=np.zeros((0, 3)),
+    force=np.zeros((0, 3)),
+)

@@ -9,8 +9,6 @@ import itertools
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as distribution_version
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +26,7 @@ from buildarena_simulation.engines.pybullet.bodies import (
     free_of_damping,
     friction_of,
     limit_spin,
+    load_body,
     pose_of,
     push_cargo,
     put_cargo,
@@ -50,6 +49,7 @@ from buildarena_simulation.engines.pybullet.quiet_output import quiet_output
 from buildarena_simulation.engines.pybullet.ropes import pull_ends, rope_forces
 from buildarena_simulation.engines.pybullet.slipping import SlippingWheels, changes_of
 from buildarena_simulation.engines.pybullet.urdf import urdf_of
+from buildarena_simulation.engines.pybullet.version import version
 from buildarena_simulation.engines.shared.closest_points import shape_table
 from buildarena_simulation.engines.shared.impacts import ImpactWatch
 from buildarena_simulation.engines.shared.joint_frames import (
@@ -68,18 +68,12 @@ from buildarena_simulation.structure.solids import Solids
 with quiet_output():
     import pybullet
 
+__all__ = ["PyBulletEngine", "create", "version"]
+
 _TIME_STEP_S = 1 / 500
 _STEPS_PER_EVALUATION = 20
 _ITERATIONS, _ITERATIONS_OF_JOINTS = 100, 60
 _ORIGIN = (0.0, 0.0, 0.0)
-
-
-def version() -> str:
-    """Version of the PyBullet library."""
-    try:
-        return distribution_version("pybullet")
-    except PackageNotFoundError:
-        return distribution_version("pybullet-arm64")  # the same library with more wheels
 
 
 def create(world: World) -> "PyBulletEngine":
@@ -100,7 +94,8 @@ class PyBulletEngine:
         self._mass = float(world.structure.masses.sum())
         self._cargo_mass = world.cargo.mass if world.cargo else 0.0
         self._iterations = _ITERATIONS_OF_JOINTS if has_joints(world.structure) else _ITERATIONS
-        self._client = {"physicsClientId": pybullet.connect(pybullet.DIRECT)}
+        self._number = pybullet.connect(pybullet.DIRECT)
+        self._client = {"physicsClientId": self._number}
         self._folder = Path(tempfile.mkdtemp(prefix="buildarena-"))
         self._serial = itertools.count()
         self._components: list[HingedComponent] = []
@@ -110,6 +105,7 @@ class PyBulletEngine:
         )
         self._grips = BulletGrips(self._client)
         self._fresh: Motion | None = None
+        self._pose: CargoPose | None = None
         self._own: list[tuple[int, Force]] = []
         self._slipping = SlippingWheels(
             self._client, world.structure, self._surfaces, world.gravity
@@ -150,6 +146,7 @@ class PyBulletEngine:
             set_time_step(self._client, self.time_step_s)
         if cargo is not None and self._cargo is not None:
             put_cargo(self._client, self._cargo, cargo)
+            self._pose = None
         self._clusters, self._motion = clusters, motion
         self._axes, self._moments = principal_frames(clusters)
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia))
@@ -187,6 +184,7 @@ class PyBulletEngine:
         """See `Engine`."""
         if self._cargo is not None:
             push_cargo(self._client, self._cargo, change)
+            self._pose = None
 
     def drop_rope(self, index: int) -> None:
         """See `Engine`."""
@@ -196,7 +194,10 @@ class PyBulletEngine:
     def advance(self, targets: FloatArray, thrusts: FloatArray) -> None:
         """See `Engine`."""
         external_forces = thrust_forces(self._structure, self._clusters, self._axes, thrusts)
-        drags = [] if self._world.planet is not None else self._drags()
+        drags: list[tuple[int, Force]] = []
+        if self._world.planet is None:
+            bodies = self._structure, self._clusters, self._motion
+            drags = drag_forces(*bodies, self._axes, self._moments)
         impacts = ImpactWatch(
             len(targets),
             gravity=self._world.gravity,
@@ -213,12 +214,12 @@ class PyBulletEngine:
             self._slipping.push(step, change)
             if step + 1 == len(targets):
                 impacts.before_last(*self._step_contacts())
-            pybullet.stepSimulation(**self._client)
+            pybullet.stepSimulation(self._number)
             before, velocity = velocity, self._free_velocities()
             if impacts.is_impact(velocity - before):
                 self._motion = self._read_motion()
                 impacts.take(self._step_contacts()[1]())
-        self._targets = targets[-1]
+        self._targets, self._pose = targets[-1], None
         self._motion = self._read_motion()
         pressed, self._last_contacts = self._step_contacts()
         if impacts.ends_in_blow(pressed):
@@ -255,7 +256,9 @@ class PyBulletEngine:
 
     def cargo(self) -> CargoPose:
         """See `Engine`."""
-        return pose_of(self._client, self._cargo)
+        if self._pose is None:
+            self._pose = pose_of(self._client, self._cargo)
+        return self._pose
 
     def close(self) -> None:
         """See `Engine`."""
@@ -304,36 +307,25 @@ class PyBulletEngine:
         clusters, root = self._clusters, inside[0]
         solids = {c: self._solids.of(clusters.blocks[c]) for c in inside}
         text = urdf_of(self._structure, clusters, solids, axes=self._axes, moments=self._moments)
-        file = self._folder / f"{next(self._serial)}.urdf"
-        file.write_text(text, encoding="ascii")
-        turn = quaternion_of(motion.rotation[root] @ self._axes[root])
-        body = pybullet.loadURDF(
-            str(file),
-            motion.centers_of_mass(clusters)[root].tolist(),
-            turn[[1, 2, 3, 0]].tolist(),
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE
-            | pybullet.URDF_MAINTAIN_LINK_ORDER
-            | pybullet.URDF_USE_IMPLICIT_CYLINDER,
-            useMaximalCoordinates=0,
-            **self._client,
+        return load_body(
+            self._client,
+            self._folder / f"{next(self._serial)}.urdf",
+            text,
+            motion.centers_of_mass(clusters)[root],
+            quaternion_of(motion.rotation[root] @ self._axes[root]),
         )
-        file.unlink()
-        return int(body)
 
     def _apply_forces(
         self, thrusts: list[tuple[int, Force]], drags: list[tuple[int, Force]]
     ) -> None:
-        frame, client, address = pybullet.LINK_FRAME, self._client, self._address
+        frame, number, address = pybullet.LINK_FRAME, self._number, self._address
         for c, (force, point) in thrusts:
-            pybullet.applyExternalForce(*address[c], force, point, frame, **client)
+            pybullet.applyExternalForce(*address[c], force, point, frame, number)
         for c, (force, torque) in drags:
-            pybullet.applyExternalForce(*address[c], force, _ORIGIN, frame, **client)
-            pybullet.applyExternalTorque(*address[c], torque, frame, **client)
+            pybullet.applyExternalForce(*address[c], force, _ORIGIN, frame, number)
+            pybullet.applyExternalTorque(*address[c], torque, frame, number)
         if self._rope_alive.any():
             self._pull_ropes()
-
-    def _drags(self) -> list[tuple[int, Force]]:
-        return drag_forces(self._structure, self._clusters, self._motion, self._axes, self._moments)
 
     def _own_forces(self, step: int) -> list[tuple[int, Force]]:
         field = self._world.field
@@ -360,9 +352,9 @@ class PyBulletEngine:
         pull_ends(self._client, pulls.forces, clusters, self._address)
 
     def _free_velocities(self) -> FloatArray:
-        """Velocity of every component and of the cargo, (K, 3), units/s."""
-        client = self._client
-        return np.array([pybullet.getBaseVelocity(body, **client)[0] for body in self._free_bodies])
+        """Velocity of every component and of the cargo, (3 K,), units/s."""
+        ask, number = pybullet.getBaseVelocity, self._number
+        return np.array([rate for body in self._free_bodies for rate in ask(body, number)[0]])
 
     def _read_motion(self) -> Motion:
         """Poses and velocities of all clusters, children by way of their hinges' angles."""

@@ -41,21 +41,22 @@ class ShapeTable:
         Returns:
             Rows of one point and one block each: the point's index, the block, and its share.
         """
-        candidates = self._nearby(points)
-        apart = points[:, None] - self.center[candidates]
-        along = np.abs((apart[:, :, None] @ self.rotation[candidates])[:, :, 0])
-        outside = np.maximum(along - self.half[candidates], 0.0)
-        distance = np.sqrt((outside * outside).sum(axis=2))
-        near = distance <= distance.min(axis=1)[:, None] + _TIE
-        weight = near / near.sum(axis=1)[:, None]
-        row, column = np.nonzero(near)
-        return row, self.block[candidates[row, column]], weight[row, column]
+        block, center, rotation, half = self.block, self.center, self.rotation, self.half
+        if few := len(block) <= _CANDIDATES:
+            apart = points[:, None] - center
+        else:
+            nearby = self._nearby(points)
+            block, rotation, half = block[nearby], rotation[nearby], half[nearby]
+            apart = points[:, None] - center[nearby]
+        outside = np.maximum(np.abs((apart[:, :, None] @ rotation)[:, :, 0]) - half, 0.0)
+        distance = np.sqrt(np.add.reduce(outside * outside, axis=2))
+        near = distance <= np.minimum.reduce(distance, axis=1)[:, None] + _TIE
+        row, column = near.nonzero()
+        weight = 1.0 / np.add.reduce(near, axis=1).take(row)
+        return row, block.take(column) if few else block[row, column], weight
 
     def _nearby(self, points: FloatArray) -> IntArray:
-        """The shapes whose centres are nearest to each point, (K, up to 16)."""
-        count = len(self.block)
-        if count <= _CANDIDATES:
-            return np.broadcast_to(np.arange(count), (len(points), count))
+        """The shapes whose centres are nearest to each point, (K, 16)."""
         squares = (self.center * self.center).sum(axis=1) - 2.0 * points @ self.center.T
         return np.argpartition(squares, _CANDIDATES, axis=1)[:, :_CANDIDATES]
 

@@ -58,9 +58,9 @@ class ImpactWatch:
         """Whether the step just made must be read.
 
         Args:
-            change: (K, 3) change of velocity of every free body in it, units/s.
+            change: (3 K,) change of velocity of every free body in it, units/s.
         """
-        self._ends_in_impact = bool(np.abs(change).max() > self._limit)
+        self._ends_in_impact = bool(np.maximum.reduce(np.abs(change)) > self._limit)
         return self._ends_in_impact
 
     def ends_in_blow(self, pressed: float) -> bool:
