@@ -37,6 +37,22 @@ export default defineConfig({
     // The policy has no data: for scripts, and small files compress well.
     assetsInlineLimit: 0,
     chunkSizeWarningLimit: 1200,
+    // Libraries that every page needs are read one after the other, so that none holds a page up for long.
+    rolldownOptions: {
+      output: {
+        codeSplitting: {
+          groups: [
+            { name: "react", test: /node_modules[\\/](react|react-dom|scheduler)[\\/]/ },
+            {
+              name: "tanstack",
+              test: /node_modules[\\/]@tanstack[\\/](react-router|router-core|react-query|query-core|history)[\\/]/,
+            },
+            // What several pages share is one file: two dozen small ones take longer than it does.
+            { name: "shared", minShareCount: 4, test: /node_modules[\\/]@mantine|src[\\/](parts|api|format)/ },
+          ],
+        },
+      },
+    },
   },
   server: {
     fs: { allow: [here("../..")] },

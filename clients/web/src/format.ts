@@ -1,15 +1,27 @@
 /** Figures and times as people read them. */
 const NONE = "–";
 
+const kept = new Map<string, Intl.NumberFormat>();
+
+/** A number in digits; what writes it takes long to make, so each is made once. */
+function written(value: number, least = 0, most = 3, notation: "standard" | "compact" = "standard"): string {
+  const key = `${least} ${most} ${notation}`;
+  const known = kept.get(key);
+  if (known !== undefined) return known.format(value);
+  const made = new Intl.NumberFormat("en", { minimumFractionDigits: least, maximumFractionDigits: most, notation });
+  kept.set(key, made);
+  return made.format(value);
+}
+
 export function number(value: number | null | undefined, digits = 1): string {
   if (value === null || value === undefined || !Number.isFinite(value)) return NONE;
   const size = Math.abs(value);
   const shown = size >= 1000 ? 0 : size !== 0 && size < 0.1 ? Math.max(digits, 3) : digits;
-  return value.toLocaleString("en", { minimumFractionDigits: shown, maximumFractionDigits: shown });
+  return written(value, shown, shown);
 }
 
 export function count(value: number | null | undefined): string {
-  return value === null || value === undefined ? NONE : Math.round(value).toLocaleString("en");
+  return value === null || value === undefined ? NONE : written(Math.round(value));
 }
 
 export function percent(share: number | null | undefined, digits = 0): string {
@@ -18,18 +30,18 @@ export function percent(share: number | null | undefined, digits = 0): string {
 
 /** Successes of trials, which are worth a share each where worlds vary: "3" or "2.75". */
 export function successes(value: number): string {
-  return value.toLocaleString("en", { maximumFractionDigits: 2 });
+  return written(value, 0, 2);
 }
 
 export function dollars(value: number | null | undefined): string {
   if (value === null || value === undefined) return NONE;
   const digits = value !== 0 && Math.abs(value) < 0.1 ? 4 : 2;
-  return `$${value.toLocaleString("en", { minimumFractionDigits: digits, maximumFractionDigits: digits })}`;
+  return `$${written(value, digits, digits)}`;
 }
 
 export function compact(value: number | null | undefined): string {
   if (value === null || value === undefined) return NONE;
-  return value.toLocaleString("en", { notation: "compact", maximumFractionDigits: 1 });
+  return written(value, 0, 1, "compact");
 }
 
 export function bytes(size: number): string {
@@ -95,11 +107,12 @@ export function secondsBetween(from: string | null, to: string | null): number |
   return (Date.parse(to) - Date.parse(from)) / 1000;
 }
 
-const MOMENT = new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeStyle: "short" });
+let moments: Intl.DateTimeFormat | undefined;
 
 /** A moment in the reader's zone, in an order that nobody takes for another: "26 Nov 2026, 06:05". */
 export function moment(time: string): string {
-  return MOMENT.format(new Date(time));
+  moments ??= new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeStyle: "short" });
+  return moments.format(new Date(time));
 }
 
 /** Rules of a task's document in words: `{max_sub_structures: 4}` is "Sub structures: at most 4". What is not set is no rule. */

@@ -3,25 +3,14 @@ import "@mantine/notifications/styles.css";
 import "./style.css";
 import { MantineProvider } from "@mantine/core";
 import { Notifications } from "@mantine/notifications";
-import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
+import { QueryClientProvider } from "@tanstack/react-query";
 import { RouterProvider } from "@tanstack/react-router";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
-import { ApiError } from "./api/problem";
+import { queries } from "./api/cache";
 import { wakeWithService } from "./api/waking";
 import { fetchWhenIdle, router } from "./router";
 import { theme } from "./theme";
-
-const TRIES = 2;
-
-const queries = new QueryClient({
-  defaultOptions: {
-    queries: {
-      retry: (tries, error) => tries < TRIES && error instanceof ApiError && error.passing,
-      staleTime: 2_000,
-    },
-  },
-});
 
 wakeWithService(queries);
 fetchWhenIdle();

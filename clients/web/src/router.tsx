@@ -5,6 +5,9 @@ import {
   createRouter,
   lazyRouteComponent,
 } from "@tanstack/react-router";
+import { noop } from "@tanstack/react-query";
+import { queries } from "./api/cache";
+import { board as boardOf, tasks as tasksOf } from "./api/queries";
 import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
 import { readBuildSearch } from "./pages/workbench/search";
@@ -23,6 +26,12 @@ const board = createRoute({
   getParentRoute: () => root,
   path: "/",
   validateSearch: readSearch,
+  loaderDeps: ({ search }) => search,
+  // Asked for while the page's script is on its way; what fails is told by the page, which asks again.
+  loader: ({ deps }) => {
+    queries.query(boardOf(deps)).catch(noop);
+    queries.query(tasksOf()).catch(noop);
+  },
   component: lazyRouteComponent(() => import("./pages/board/BoardPage")),
 });
 const sweeps = createRoute({

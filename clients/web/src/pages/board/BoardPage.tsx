@@ -68,28 +68,30 @@ const Found = memo(function Found({ found, search }: { found: Board; search: Boa
   return (
     <>
       <Verdict board={found} search={search} />
-      <Controls board={found} search={search} />
-      <Later rows={8}>
-        <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
-          {found.overall.length === 0 ? (
-            <Empty title="No job of these tasks has ended on this track">
-              Choose other tasks above, or another track.
-            </Empty>
-          ) : (
-            <>
-              <Text size="sm" className="dimmed" mb="xs">
-                {rankedOver(found.ranked, found.tasks.length)}
-              </Text>
-              <Overall board={found} search={search} />
-            </>
-          )}
-        </Section>
+      <Later rows={10}>
+        <Controls board={found} search={search} />
         <Later rows={8}>
-          <TaskByTask board={found} search={search} />
+          <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
+            {found.overall.length === 0 ? (
+              <Empty title="No job of these tasks has ended on this track">
+                Choose other tasks above, or another track.
+              </Empty>
+            ) : (
+              <>
+                <Text size="sm" className="dimmed" mb="xs">
+                  {rankedOver(found.ranked, found.tasks.length)}
+                </Text>
+                <Overall board={found} search={search} />
+              </>
+            )}
+          </Section>
           <Later rows={8}>
-            <Suspense fallback={<Loading rows={8} />}>
-              <BoardPlots board={found} search={search} />
-            </Suspense>
+            <TaskByTask board={found} search={search} />
+            <Later rows={8}>
+              <Suspense fallback={<Loading rows={8} />}>
+                <BoardPlots board={found} search={search} />
+              </Suspense>
+            </Later>
           </Later>
         </Later>
       </Later>
