@@ -134,7 +134,7 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
         (["construct", "--api", "http://127.0.0.1:1"], "needs the database"),
         (["simulate.unity", "--api", "http://127.0.0.1:1"], "choose from"),
         (["simulate.mujoco", "--at-once", "2"], "--at-once: only with --api"),
-        (["simulate.mujoco", "--key-file", "k"], "--key-file: only with --api"),
+        (["simulate.mujoco", "--key-file", __file__], "--key-file: only with --api"),
     ],
 )
 def test_wrong_options_are_named(words, says) -> None:
