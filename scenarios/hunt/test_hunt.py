@@ -17,6 +17,7 @@ from scenarios.hunt.search import Crew, TaskSearch
 from scenarios.hunt.seeds import expert_genome, exploits, seeds_of
 from scenarios.hunt.suspicion import suspicions
 from scenarios.hunt.trial import tried
+from support.machines.boulders import car_with_boulder
 from support.machines.drafts import KeyedDraft
 from support.machines.headroom import drafted
 
@@ -24,7 +25,7 @@ from buildarena_benchmark import builtin_tasks, score
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs.couriers import courier
-from buildarena_worker.builtin.designs.drafting import EAST, SOUTH, UP, WEST
+from buildarena_worker.builtin.designs.drafting import EAST, UP
 
 START = Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])
 GENERATIONS = 6
@@ -132,19 +133,6 @@ def test_checks_name_past_exploits_without_any_rule(name, check) -> None:
     assert check in found.suspicions
 
 
-def _carried() -> Machine:
-    """A car that carries its boulder north and brakes."""
-    draft = KeyedDraft(modules="all")
-    start = draft.start()
-    beam = draft.row(start, SOUTH, 3)
-    for base in (start, beam[-1]):
-        for side in (EAST, WEST):
-            draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
-    draft.attach(draft.attach(beam[1], UP, "Bomb Holder"), UP, "Boulder")
-    draft.press("UpArrow", 1.0, 3.0)
-    return draft.machine
-
-
 def _dropped() -> Machine:
     """A boulder that rolls off a beam without a key."""
     draft = KeyedDraft(modules="all")
@@ -160,7 +148,7 @@ def _pushed() -> Machine:
 @pytest.mark.parametrize(
     ("task", "machine", "check"),
     [
-        ("throw-1", _carried, "travels"),
+        ("throw-1", car_with_boulder, "travels"),
         ("throw-1", _dropped, "no key before it flies"),
         ("deliver-1", _pushed, "cargo runs ahead"),
     ],
