@@ -145,6 +145,7 @@ def _pushed() -> Machine:
     return drafted(courier(0), [(0.4, "UpArrow", 1.0)])
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize(
     ("task", "machine", "check"),
     [
@@ -160,6 +161,7 @@ def test_checks_name_what_throws_and_brings_in_another_way(task, machine, check)
     assert check in suspicions(found)
 
 
+@pytest.mark.samples(1)
 @pytest.mark.parametrize("task", ["throw-1", "deliver-1", "drive-1"])
 def test_checks_find_nothing_odd_in_the_experts(task) -> None:
     found = tried(task, expert_genome(task))
