@@ -61,15 +61,15 @@ def test_a_port_that_is_no_port() -> None:
 
 @pytest.mark.samples(1)
 @pytest.mark.parametrize(
-    ("text", "says"),
-    [("tasks: [", "not valid YAML"), ("- 1", "must be a mapping"), (None, "No such")],
+    ("text", "code", "says"),
+    [("tasks: [", 1, "not valid YAML"), ("- 1", 1, "must be a mapping"), (None, 2, "No such")],
 )
-def test_a_bad_sweep_file(tmp_path, text, says) -> None:
+def test_a_bad_sweep_file(tmp_path, text, code, says) -> None:
     file = tmp_path / "sweep.yaml"
     if text is not None:
         file.write_text(text)
     done = piped("sweep", "run", str(file), "--url", "http://127.0.0.1:1")
-    assert done.returncode == 1
+    assert done.returncode == code
     assert says in done.stderr
 
 

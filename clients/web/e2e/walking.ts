@@ -3,6 +3,8 @@ import { expect } from "vitest";
 
 /** Presses that a page may take beyond its controls: the frame's own, and what takes two. */
 const SPARE = 20;
+/** A page that made no control for so long has made all. */
+const QUIET_MS = 700;
 
 /** Marks what a person can press, type into or open, and counts it. */
 function markControls(page: Page): Promise<number> {
@@ -31,9 +33,19 @@ function missed(page: Page): Promise<string[]> {
   );
 }
 
+/** Marks the controls once a page makes no more of them; how many there are. */
+async function settledControls(page: Page): Promise<number> {
+  for (let before = -1; ; ) {
+    const now = await markControls(page);
+    if (now === before) return now;
+    before = now;
+    await page.waitForTimeout(QUIET_MS);
+  }
+}
+
 /** Expects that Tab alone reaches every control of a page. */
 export async function expectAllReached(page: Page): Promise<void> {
-  const controls = await markControls(page);
+  const controls = await settledControls(page);
   for (let presses = 0; presses < controls + SPARE; presses += 1) {
     await page.keyboard.press("Tab");
     if (presses >= controls - 1 && (await missed(page)).length === 0) break;

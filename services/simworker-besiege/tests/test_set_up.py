@@ -54,7 +54,7 @@ def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> 
 def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     places = {**Calibration().positions, "open_machine": (0.9, 0.9)}
     Calibration(positions=places).save(rig.folder / "state" / "calibration.json")
-    done = answer(["calibrate", "--try"], replace(rig, patience=0.1), screen)
+    done = answer(["calibrate", "--try"], replace(rig, patience=0.2), screen)
     assert done.returncode == 1
     assert "It does not work yet: " in done.stdout
     assert "load the machine batry: the list of machines stayed open" in done.stdout
