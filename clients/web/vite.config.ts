@@ -26,24 +26,8 @@ export const moduleShapes: Plugin = {
   },
 };
 
-/** The first page's script is asked for with the frame's: it need not wait until that has run. */
-const firstPageAtOnce: Plugin = {
-  name: "first-page-at-once",
-  transformIndexHtml: {
-    order: "post",
-    handler: (_, { bundle = {} }) =>
-      Object.values(bundle)
-        .filter((part) => part.type === "chunk" && part.facadeModuleId?.endsWith("/BoardPage.tsx"))
-        .map(({ fileName }) => ({
-          tag: "link",
-          attrs: { rel: "modulepreload", crossorigin: true, href: `/${fileName}` },
-          injectTo: "head",
-        })),
-  },
-};
-
 export default defineConfig({
-  plugins: [react(), moduleShapes, firstPageAtOnce],
+  plugins: [react(), moduleShapes],
   // Scripts find each other wherever the pages lie: `buildarena site` publishes them under any path.
   experimental: { renderBuiltUrl: (file, { hostType }) => (hostType === "html" ? `/${file}` : { relative: true }) },
   build: {
