@@ -35,7 +35,7 @@ function missed(page: Page): Promise<string[]> {
 
 /** Marks the controls once a page makes no more of them; how many there are. */
 async function settledControls(page: Page): Promise<number> {
-  for (let before = -1; ; ) {
+  for (let before = -1; ;) {
     const now = await markControls(page);
     if (now === before) return now;
     before = now;
