@@ -26,7 +26,15 @@ const board = createRoute({
   getParentRoute: () => root,
   path: "/",
   validateSearch: readSearch,
-  loaderDeps: ({ search }) => search,
+  // What changes the board itself: how it is shown asks for nothing.
+  loaderDeps: ({ search: { track, task, category, policy, since, until } }) => ({
+    track,
+    task,
+    category,
+    policy,
+    since,
+    until,
+  }),
   // Asked for while the page's script is on its way; what fails is told by the page, which asks again.
   loader: ({ deps }) => {
     queries.query(boardOf(deps)).catch(noop);
