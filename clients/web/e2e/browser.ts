@@ -36,6 +36,20 @@ export async function expectNoSeriousFault(page: Page): Promise<void> {
   expect(serious.map(({ id, nodes }) => [id, ...nodes.slice(0, 3).map((node) => node.html.slice(0, 160))])).toEqual([]);
 }
 
+/** Changes a page's colours and waits until they have faded from one mode to the other, however slow the machine. */
+export async function recolour(page: Page, colorScheme: "light" | "dark"): Promise<void> {
+  await page.emulateMedia({ colorScheme });
+  await page.waitForFunction((scheme) => document.documentElement.dataset.mantineColorScheme === scheme, colorScheme);
+  await page.evaluate(async () => {
+    const drawn = () => new Promise((resolve) => requestAnimationFrame(resolve));
+    const fading = () => document.getAnimations().filter((each) => each instanceof CSSTransition);
+    for (await drawn(), await drawn(); fading().length > 0; await drawn()) {
+      // A transition that is cancelled by a new one is over too.
+      await Promise.allSettled(fading().map((each) => each.finished));
+    }
+  });
+}
+
 /** Waits until a page has read what it shows. */
 export async function settled(page: Page): Promise<void> {
   await page.locator("h1").waitFor();

@@ -1,6 +1,6 @@
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { ATTACH, act, expectNoSeriousFault, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
+import { ATTACH, act, expectNoSeriousFault, launched, opened, openSession, recolour, URL_OF_SERVICE } from "./browser";
 
 const LONG_MS = 90_000;
 const TASK = "transport-1";
@@ -300,7 +300,7 @@ describe("in the dark, at 390", () => {
       where = `/build?session=${id}`;
     }
     const page = await opened(browser, where, 390);
-    await page.emulateMedia({ colorScheme: "dark" });
+    await recolour(page, "dark");
     for (const tab of path === "room" ? ["Attach", "Part", "Keys", "All tools"] : [""]) {
       if (tab !== "") await page.getByRole("tab", { name: tab }).click();
       if (tab === "Part") await page.getByText("1 Starting Block").click();

@@ -1,14 +1,21 @@
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
-import { act, ask, expectNoSeriousFault, launched, openSession, settled, URL_OF_SERVICE, visit } from "./browser";
+import {
+  act,
+  ask,
+  expectNoSeriousFault,
+  launched,
+  openSession,
+  recolour,
+  settled,
+  URL_OF_SERVICE,
+  visit,
+} from "./browser";
 import { expectNumbers, numbersOf } from "./numbers";
 import { expectAllReached } from "./walking";
 
 type Schemas = components["schemas"];
-
-/** Colours fade from one mode to the other. */
-const FADE_MS = 250;
 
 let browser: Browser;
 const ids = { sweep: "", second: "", job: "", other: "", session: "" };
@@ -62,8 +69,7 @@ describe.each(PAGES)("the page: %s", (name, path) => {
     for (const width of [1280, 390]) {
       await page.setViewportSize({ width, height: 900 });
       for (const colorScheme of ["light", "dark"] as const) {
-        await page.emulateMedia({ colorScheme });
-        await page.waitForTimeout(FADE_MS);
+        await recolour(page, colorScheme);
         await expectNoSeriousFault(page);
       }
       expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `${width}`).toBe(true);
