@@ -10,6 +10,8 @@ export const theme = createTheme({
   headings: { fontWeight: "650", sizes: { h1: { fontSize: "1.6rem" }, h2: { fontSize: "1.15rem" } } },
   defaultRadius: "md",
   cursorType: "pointer",
+  // The options of a closed list are not made, and nothing is measured to place them.
+  components: { Combobox: { defaultProps: { keepMounted: false } } },
 });
 
 /** A colour for each way a job can end or stand; a word always stands beside it. */

@@ -46,10 +46,15 @@ function shown(task: TaskBoard, search: BoardSearch): TaskBoard {
   return search.baselines === "no" ? { ...task, rows: task.rows.filter((row) => !row.baseline) } : task;
 }
 
+/** So few cells are made at once: each step of a board costs a paint. */
+const FEW_CELLS = 60;
+
+const isSmall = (board: Board): boolean => board.overall.length * board.tasks.length <= FEW_CELLS;
+
 /** A board, made bit by bit: its thousands of cells would hold up what is pressed meanwhile. */
 function Unhurried({ found, search }: { found: Board; search: BoardSearch }) {
   const now = useMemo(() => ({ found, search }), [found, search]);
-  const later = useDeferredValue<typeof now | null>(now, null);
+  const later = useDeferredValue<typeof now | null>(now, isSmall(found) ? now : null);
   return later === null ? <Loading rows={12} /> : <Found {...later} />;
 }
 
@@ -65,12 +70,13 @@ const Found = memo(function Found({ found, search }: { found: Board; search: Boa
       </Empty>
     );
   }
+  const now = isSmall(found);
   return (
     <>
       <Verdict board={found} search={search} />
-      <Later rows={10}>
+      <Later rows={10} now={now}>
         <Controls board={found} search={search} />
-        <Later rows={8}>
+        <Later rows={8} now={now}>
           <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
             {found.overall.length === 0 ? (
               <Empty title="No job of these tasks has ended on this track">
@@ -85,9 +91,9 @@ const Found = memo(function Found({ found, search }: { found: Board; search: Boa
               </>
             )}
           </Section>
-          <Later rows={8}>
+          <Later rows={8} now={now}>
             <TaskByTask board={found} search={search} />
-            <Later rows={8}>
+            <Later rows={8} now={now}>
               <Suspense fallback={<Loading rows={8} />}>
                 <BoardPlots board={found} search={search} />
               </Suspense>
