@@ -25,6 +25,7 @@ def test_a_failure_names_every_threshold_of_its_scorer(name):
     # Where a trial looks for progress is no threshold.
     assert "target" not in text
     assert "0.25" in text
+    assert ": 0.25 1." not in text, "a ratio has no unit"
     assert "Criterion" not in score_text(task, replace(FAILED, success=True))
 
 

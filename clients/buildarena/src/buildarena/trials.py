@@ -56,12 +56,12 @@ class Trial:
         return {"text/plain": repr(self), "text/html": head + self._shown().frame()}
 
     def _verdict(self) -> str:
-        figure, unit = self.task.indicator.name, self.task.indicator.unit
-        shown = f"{self.score.indicator:,.2f}" + ("" if unit == "1" else f" {unit}")
+        indicator = self.task.indicator
+        shown = f"{self.score.indicator:,.2f}{indicator.suffix}"
         least = "at least " if is_censored(self.score.flags) else ""
         engine = "" if self.trajectory is None else f" ({self.trajectory.engine})"
         word = "success" if self.score.success else "no success"
-        return f"{self.task.title}: {word}, {figure} {least}{shown}{engine}"
+        return f"{self.task.title}: {word}, {indicator.name} {least}{shown}{engine}"
 
     def _remarks(self) -> list[str]:
         refused = [] if self.refusal is None else [f"Not tried: {self.refusal}"]

@@ -158,7 +158,7 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
     succeeded = score.success and not is_disqualified(score.flags)
     parts = [
         "It succeeded." if succeeded else f"It did not succeed. Criterion: {_criterion(task)}.",
-        f"{indicator.name.capitalize()}: {score.indicator:.2f} {indicator.unit}.".strip(),
+        f"{indicator.name.capitalize()}: {score.indicator:.2f}{indicator.suffix}.",
     ]
     known = [
         f"{name} {_rendered(value)}" for name, value in score.metrics.items() if value is not None

@@ -185,6 +185,11 @@ class Indicator(Document):
     name: Word
     unit: Word
 
+    @property
+    def suffix(self) -> str:
+        """What stands after a figure: a blank and the unit, nothing for a ratio."""
+        return "" if self.unit == "1" else f" {self.unit}"
+
 
 class Difficulty(Document):
     """Weight of each difficulty dimension, 1 (low) to 3 (high)."""

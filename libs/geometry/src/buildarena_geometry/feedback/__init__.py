@@ -1,5 +1,5 @@
 """What models read about a machine. Short on purpose: every word is paid for on every turn."""
 
 FEEDBACK_VERSION = (
-    "3"  # changes with every change of wording: results of different ones don't compare
+    "4"  # changes with every change of wording: results of different ones don't compare
 )

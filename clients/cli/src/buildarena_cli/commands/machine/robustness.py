@@ -74,7 +74,7 @@ def _print(task: Task, engine: str, measured: Robustness) -> None:
     indicators = [result.indicator for result in measured.scores]
     flags = sorted({flag for result in measured.scores for flag in result.flags})
     failed = [str(r["seed"]) for r in report["results"] if not r["success"]]
-    unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
+    unit = task.indicator.suffix
     rows = [
         (
             "robustness",

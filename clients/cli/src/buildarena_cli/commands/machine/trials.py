@@ -268,12 +268,11 @@ def print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
     engine = f" on {rollout.engine} {rollout.engine_version}" if rollout else ""
     from buildarena_benchmark.flags import is_censored, meaning
 
-    unit = "" if task.indicator.unit == "1" else f" {task.indicator.unit}"
     rows = [
         ("verdict", "success" if result.success else "failure"),
         (
             task.indicator.name,
-            number(result.indicator, 2, at_least=is_censored(result.flags)) + unit,
+            number(result.indicator, 2, at_least=is_censored(result.flags)) + task.indicator.suffix,
         ),
         *(("flag", f"{flag}: {meaning(flag)}") for flag in result.flags),
         *((name, "" if value is None else str(value)) for name, value in result.metrics.items()),
