@@ -18,7 +18,12 @@ TARGETS = ("api", "construct", "simulate-pybullet", "simulate-mujoco", "tools", 
 BASES = ("python", "postgres", "valkey", "caddy", "s3")
 KEPT = "12GB"
 """Of what an engine of our own has built, how much stays for the next run."""
-NEEDED = {"docker": "docker.io", "docker-compose": "docker-compose", "debootstrap": "debootstrap"}
+NEEDED = {
+    "docker": "docker.io",
+    "docker-compose": "docker-compose",
+    "debootstrap": "debootstrap",
+    "iptables": "iptables",
+}
 
 
 def say(line: str) -> None:

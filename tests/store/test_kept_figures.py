@@ -11,7 +11,8 @@ from sqlalchemy import delete, func, select, text, update
 
 from buildarena_store import STAGE_SECONDS, NewSweep, TrialFilter
 from buildarena_store.derived_tables import figure_changes
-from buildarena_store.jobs.pages import JobFilter, Order
+from buildarena_store.jobs.filters import JobFilter
+from buildarena_store.jobs.pages import Order
 from buildarena_store.tables import attempts, jobs, sweep_jobs
 
 
@@ -187,6 +188,7 @@ def test_changes_are_gathered(filled) -> None:
 def test_pages_in_every_order_hold_each_job_once(filled, monkeypatch, few, descending, by) -> None:
     """Whether all that a filter finds are sorted, or the order's index is gone along."""
     monkeypatch.setattr("buildarena_store.jobs.pages.MAX_SORTED", few)
+    monkeypatch.setattr("buildarena_store.jobs.filters.MAX_SORTED", few)
     store = filled.store
     with store.database.transaction() as connection:
         external = {"name": "x", "provider": "external"}

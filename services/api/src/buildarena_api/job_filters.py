@@ -17,7 +17,7 @@ from buildarena_benchmark import ValidationIssue
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_pipeline.catalog.models import ModelRegistry
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store.jobs.pages import JobFilter
+from buildarena_store.jobs.filters import JobFilter
 
 SEARCHED: Final[Mapping[str, int]] = {
     "text": 10,

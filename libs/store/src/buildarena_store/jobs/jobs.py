@@ -13,8 +13,9 @@ from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
 from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
+from buildarena_store.jobs.filters import JobFilter, distinct_values
 from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, JobKey, NewJob
-from buildarena_store.jobs.pages import JobFilter, Order, SortValue, distinct_values, read_page
+from buildarena_store.jobs.pages import Order, SortValue, read_page
 from buildarena_store.jobs.summaries import JobSummary, summarise
 from buildarena_store.jobs.transitions import REOPENED, transition
 from buildarena_store.rows import bound_texts, columns_of, rows_of, value_of

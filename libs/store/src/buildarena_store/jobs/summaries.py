@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, func, select
 
-from buildarena_store.jobs.pages import JobFilter, conditions_of
+from buildarena_store.jobs.filters import JobFilter, conditions_of
 from buildarena_store.tables import jobs
 
 MAX_COUNTED: Final = 100_000

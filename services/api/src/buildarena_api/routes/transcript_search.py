@@ -13,7 +13,7 @@ from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.job_filters import require_known
 from buildarena_api.schemas import AnyOutcome
 from buildarena_benchmark import ValidationIssue
-from buildarena_store.jobs.pages import JobFilter
+from buildarena_store.jobs.filters import JobFilter
 from buildarena_store.jobs.transcript_search import TranscriptFilter
 
 SHARED: Final = ("task", "model", "seed", "outcome", "turn", "where")
