@@ -1,12 +1,13 @@
 """Measures on how many tasks a board separates a strong, a middling and a weak model.
 
 All build as the expert does; the weak one forgets some of the steps in every job, the middling one
-in every second. Each plays a number of jobs of every task, and is ranked as a service ranks it.
+in every second. Each plays a number of jobs of every task, and is ranked as a service ranks it: on
+the board of each category, and on the board of all.
 """
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import BoardQuery, TrackBoard
 
 BAR = 12
-"""Tasks on which the ranks of all three differ."""
+"""Tasks on which the ranks of all three differ, each on the board of its category."""
 
 
 def main() -> int:
@@ -44,23 +45,40 @@ def main() -> int:
         sys.stdout.write(f"{name}: tried\n")
         sys.stdout.flush()
     # What a board claims of one task hangs on how many tasks it has.
-    rows = _rows(ranked, list(tasks))
+    categories = {task.category for task in tasks.values()}
+    scopes = [[n for n, t in tasks.items() if t.category == of] for of in sorted(categories)]
+    rows = [row for names in scopes for row in _rows(ranked, names)]
     for row in rows:
         sys.stdout.write(f"{row['task']:14s} {row['ranks']}  {row['success']}\n")
-    separated = sum(len(set(row["ranks"].values())) == len(APPRENTICES) for row in rows)
-    ends = sum(row["ranks"]["strong"] < row["ranks"]["weak"] for row in rows)
+    separated, ends = _separated(rows)
+    together, ends_together = _separated(_rows(ranked, list(tasks)))
     sys.stdout.write(
-        f"all three ranks differ on {separated} of {len(rows)} tasks (bar {BAR}), "
-        f"the strong and the weak on {ends}\n"
+        f"by category all three ranks differ on {separated} of {len(rows)} tasks (bar {BAR}), "
+        f"the strong and the weak on {ends}; on one board of all on {together} and "
+        f"{ends_together}\n"
     )
-    figures = {"jobs": options.jobs, "worlds": options.worlds, "separated": separated, "rows": rows}
+    figures: dict[str, Any] = {
+        "jobs": options.jobs,
+        "worlds": options.worlds,
+        "separated": separated,
+    }
+    figures |= {"separated_on_one_board": together, "rows": rows}
     keep(figures, options.json)
     return int(separated < BAR)
 
 
+def _separated(rows: Sequence[Mapping[str, Any]]) -> tuple[int, int]:
+    """On how many tasks all ranks differ, and on how many the strong one's and the weak one's."""
+    return (
+        sum(len(set(row["ranks"].values())) == len(APPRENTICES) for row in rows),
+        sum(row["ranks"]["strong"] < row["ranks"]["weak"] for row in rows),
+    )
+
+
 def _rows(ranked: TrackBoard, names: Sequence[str]) -> list[dict[str, Any]]:
     """Ranks, shares of successes and mean indicators on some tasks."""
-    boards = {board.task: board for board in ranked.board(BoardQuery()).tasks}
+    query = BoardQuery(tasks=frozenset(names), overall=frozenset(names))
+    boards = {board.task: board for board in ranked.board(query).tasks}
     found = []
     for name in names:
         rows = {row.cell.model: row for row in boards[name].rows}
