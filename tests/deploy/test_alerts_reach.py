@@ -2,15 +2,13 @@
 
 import re
 import shlex
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import httpx
-import psutil
 import pytest
 from support.documents.runbook import entry
 from support.servers.prometheus import (
@@ -21,7 +19,7 @@ from support.servers.prometheus import (
     prometheus,
     target_says,
 )
-from support.servers.stacks import finished, running_stack, wait_until
+from support.servers.stacks import finished, hung, kill, running_stack, wait_until
 
 from buildarena_cli.local.stack import Stack
 
@@ -79,30 +77,6 @@ class Operator:
             words, env=environment, capture_output=True, text=True, timeout=60, check=False
         )
         return done.stdout + done.stderr
-
-    def restarts(self, name: str) -> None:
-        """Ends a process with its children; who watches over it starts it again."""
-        for process in self._processes(name):
-            process.kill()
-
-    @contextmanager
-    def hung(self, name: str) -> Iterator[None]:
-        """A process that takes connections and does nothing."""
-        stopped = self._processes(name)
-        for process in stopped:
-            process.suspend()
-        try:
-            yield
-        finally:
-            for process in stopped:
-                if process.is_running():
-                    process.send_signal(signal.SIGCONT)
-
-    def _processes(self, name: str) -> list[psutil.Process]:
-        (managed,) = [each for each in self.stack.supervisor.managed if each.name == name]
-        assert managed.process is not None
-        first = psutil.Process(managed.process.pid)
-        return [first, *first.children(recursive=True)]
 
 
 @pytest.fixture(scope="module")
@@ -164,28 +138,28 @@ def test_a_budget_that_is_used_up(operator) -> None:
 
 def test_a_broker_that_hangs(operator) -> None:
     alert = "BuildArenaBrokerDown"
-    with operator.hung("valkey"):
+    with hung(operator.stack, "valkey"):
         operator.is_told(alert)
         assert re.search(r"!! +broker ", operator.doctor())
-        operator.restarts("valkey")
+        kill(operator.stack, "valkey")
     operator.is_relieved(alert)
 
 
 def test_a_database_that_hangs(operator) -> None:
     alert = "BuildArenaDatabaseDown"
-    with operator.hung("postgres"):
+    with hung(operator.stack, "postgres"):
         operator.is_told(alert)
         assert "has not answered for" in operator.does(alert, "Look", "curl URL")
         assert re.search(r"!! +database +has not answered for", operator.doctor())
-        operator.restarts("postgres")
+        kill(operator.stack, "postgres")
     operator.is_relieved(alert)
 
 
 def test_an_api_that_hangs(operator) -> None:
     alert = "BuildArenaApiDown"
-    with operator.hung("api"):
+    with hung(operator.stack, "api"):
         operator.is_told(alert)
-        operator.restarts("api")
+        kill(operator.stack, "api")
     operator.is_relieved(alert)
     assert "200 OK" in operator.does(alert, "Look", "curl -i")
 
@@ -209,7 +183,7 @@ def test_workers_that_are_killed_again_and_again(operator) -> None:
     """In containers each has the number of the one before; their names differ all the same."""
     for _ in range(4):
         before = {each["id"] for each in _workers(operator)}
-        operator.restarts("construct worker")
+        kill(operator.stack, "construct worker")
         wait_until(
             lambda: {each["id"] for each in _workers(operator)} - before,  # noqa: B023
             WITHIN_S,

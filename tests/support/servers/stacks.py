@@ -1,9 +1,10 @@
 """Running stacks for end-to-end tests."""
 
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +69,36 @@ def _words(process: psutil.Process) -> str:
         return " ".join(process.cmdline())
     except psutil.Error:
         return ""
+
+
+def processes_of(stack: Stack, name: str) -> list[psutil.Process]:
+    """A process of a stack with its children, by the name that its supervisor has for it."""
+    (managed,) = [each for each in stack.supervisor.managed if each.name == name]
+    assert managed.process is not None
+    first = psutil.Process(managed.process.pid)
+    return [first, *first.children(recursive=True)]
+
+
+def kill(stack: Stack, name: str) -> None:
+    """Ends a process with its children; who watches over it starts it again."""
+    with suppress(psutil.NoSuchProcess):
+        for process in processes_of(stack, name):
+            with suppress(psutil.NoSuchProcess):
+                process.kill()
+
+
+@contextmanager
+def hung(stack: Stack, name: str) -> Iterator[None]:
+    """A process that takes connections and does nothing."""
+    stopped = processes_of(stack, name)
+    for process in stopped:
+        process.suspend()
+    try:
+        yield
+    finally:
+        for process in stopped:
+            if process.is_running():
+                process.send_signal(signal.SIGCONT)
 
 
 def finished(client: httpx.Client, sweep_id: str, within_s: float = 180) -> dict[str, Any]:
