@@ -103,7 +103,10 @@ def _check(context: Context, job: Job) -> None:
     presses = None if record.controls is None else [KeyPress(**one) for one in record.controls]
     ours = our_score(task, machine, controls=presses)
     assert job.success == ours.success
-    assert job.indicator == pytest.approx(ours.indicator, rel=NEAR)
+    # A log does not tell which joints hold: what debris carries counts in the game.
+    on_debris = ours.metrics.get("load_on_debris")
+    told = ours.indicator if on_debris is None else on_debris
+    assert job.indicator == pytest.approx(told, rel=NEAR)
     assert job.manifest is not None
     simulator = job.manifest["simulator"]
     assert simulator["simulation"] == "1.75-23370-1.4"
