@@ -33,6 +33,7 @@ MESSAGE: Final = pa.struct(
         ("name", pa.string()),
         ("tool_calls", pa.list_(CALL)),
         ("tool_call_id", pa.string()),
+        ("machine", pa.string()),
     ]
 )
 _TEXT, _WHOLE, _REAL, _YES = pa.string(), pa.int64(), pa.float64(), pa.bool_()
@@ -65,8 +66,9 @@ JOBS: Final[Sequence[Column]] = (
     Column(
         "messages",
         pa.list_(MESSAGE),
-        "The session as a chat, in the order in which things were said: first the task, then each "
-        "reply (`name` is who spoke) with its tool calls and their results. `arguments` is JSON.",
+        "The session as a chat, in the order in which things were said: what was told, each reply "
+        "with its tool calls, and their results. `name` is the role that speaks, or is told "
+        "something; `machine` the sub-structure that a reply's calls are for; `arguments` JSON.",
     ),
     Column("tools", _TEXT, "JSON: the tools as definitions of functions, as `tools=` takes them."),
     Column("machine", _TEXT, "JSON: the machine document, byte for byte as it is kept."),

@@ -28,9 +28,13 @@ class Journal:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("a+b")
-            self._begin(dict(plan))
         except OSError as error:
             raise CommandError(f"{path} can't be written: {error.strerror}") from error
+        try:
+            self._begin(dict(plan))
+        except BaseException:
+            self._file.close()
+            raise
 
     def __enter__(self) -> Self:
         return self
