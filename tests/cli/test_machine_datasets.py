@@ -208,7 +208,7 @@ def test_a_machine_that_comes_out_different_ends_the_making(tmp_path, monkeypatc
 
 
 def tampered(name: str, row: dict) -> None:
-    """One change of a row; the last two are those of somebody who knows how rows are made."""
+    """One change of a row."""
     calls = json.loads(row["actions"])
     match name:
         case "indicator":
@@ -221,6 +221,8 @@ def tampered(name: str, row: dict) -> None:
             row["actions"] = json.dumps(calls[:-1])
         case "nonsense":
             row["actions"] = '{"tool": "start"}'
+        case "simulator":
+            row["simulator"] = "abacus"
         case "split":
             row["split"] = "test"
         case "canary":
@@ -230,7 +232,16 @@ def tampered(name: str, row: dict) -> None:
 def test_verify_finds_every_row_that_was_tampered_with(made, tmp_path):
     (folder := tmp_path / "bad").mkdir()
     training = [row for row in rows(made) if row["split"] == "train"]
-    names = ("indicator", "outcome", "trajectory", "actions", "nonsense", "split", "canary")
+    names = (
+        "indicator",
+        "outcome",
+        "trajectory",
+        "actions",
+        "nonsense",
+        "simulator",
+        "split",
+        "canary",
+    )
     assert len(training) > len(names)
     for name, row in zip(names, training, strict=False):
         tampered(name, row)

@@ -32,10 +32,10 @@ def chat(
         of that the statement as the user's; then the reply as the assistant's, and each tool's
         answer.
     """
-    told = {prompt["turn"]: prompt for prompt in prompts}
-    messages = [] if told or statement is None else [_message("user", statement)]
+    prompt_of = {prompt["turn"]: prompt for prompt in prompts}
+    messages = [] if prompt_of or statement is None else [_message("user", statement)]
     for turn in turns:
-        messages += _told(told.get(turn["index"]), turn["role"])
+        messages += _told(prompt_of.get(turn["index"]), turn["role"])
         calls = [
             (f"call_{turn['index']}_{number}", action)
             for number, action in enumerate(turn["actions"])

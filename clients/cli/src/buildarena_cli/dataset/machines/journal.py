@@ -57,12 +57,12 @@ class Journal:
 
     def _require_same(self, plan: dict[str, Any], line: bytes) -> None:
         try:
-            kept = json.loads(line)
+            stored = json.loads(line)
         except ValueError:
-            kept = None
-        if not isinstance(kept, dict):
+            stored = None
+        if not isinstance(stored, dict):
             raise CommandError(f"{self.path} is no journal of a dataset: move it away")
-        others = [f"{name} {kept.get(name)}" for name in plan if kept.get(name) != plan[name]]
+        others = [f"{name} {stored.get(name)}" for name in plan if stored.get(name) != plan[name]]
         if others:
             raise CommandError(
                 f"{self.path} has an interrupted dataset with {', '.join(others)}: make it with "

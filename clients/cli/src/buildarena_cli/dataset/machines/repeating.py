@@ -18,6 +18,7 @@ from buildarena_cli.dataset.machines.crew import Crew
 from buildarena_cli.dataset.machines.drawing import Calls
 from buildarena_cli.dataset.machines.trying import Repetition, Row, versions_here
 from buildarena_cli.errors import CommandError
+from buildarena_simulation import ENGINES
 
 LONGEST: Final = 60
 """Characters of a value in a message."""
@@ -52,6 +53,8 @@ def _begun(row: Row, crew: Crew, *, simulate: bool) -> Future[Any] | list[str]:
     if calls is None:
         return ["actions are no list of calls"]
     if simulate:
+        if row["simulator"] not in ENGINES:
+            return [f"there is no engine {row['simulator']!r}"]
         here = versions_here(row["simulator"])
         others = [
             f"{name} is {row[name]}, here {here[name]}" for name in here if row[name] != here[name]
@@ -79,14 +82,14 @@ def _calls(text: str) -> Calls | None:
 def _checked(row: Row, begun: Future[Any] | list[str]) -> Checked:
     if isinstance(begun, list):
         return row, begun
-    again = begun.result()
-    if again is None:
+    made = begun.result()
+    if made is None:
         return row, ["the process that tried it ended"]
-    if isinstance(again, str):
-        return row, [again]
+    if isinstance(made, str):
+        return row, [made]
     return row, [
         f"{name} is {_short(row[name])}, made again {_short(value)}"
-        for name, value in again.items()
+        for name, value in made.items()
         if row[name] != value
     ]
 
