@@ -76,6 +76,9 @@ def test_it_loads_with_its_splits_and_no_two_machines_are_alike(made, tmp_path, 
         assert row["id"] == row["parts_sha256"][: len(row["id"])]
     assert {row["outcome"] for row in every} == {"success", "unsuccessful"}
     assert {row["maker"] for row in every} == set(MAKERS)
+    for row in every:
+        assert (row["parent"] is not None) == (row["maker"] == "edited")
+        assert row["parent"] != row["parts_sha256"]
 
 
 def test_the_card_counts_what_is_there(made):
@@ -175,6 +178,13 @@ def test_a_full_folder_stays_as_it_is(made):
     assert done.returncode == 1
     assert "is not empty (" in done.stderr
     assert contents(made) == before
+
+
+def test_two_processes_do_not_make_one_dataset(tmp_path):
+    plan = Plan(seed=3, tasks=TASKS, simulator="mujoco")
+    with Journal(tmp_path / ".out.rows.jsonl", plan.as_document()):
+        done = make(tmp_path / "out")
+    assert (done.returncode, "another process makes this dataset" in done.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(
@@ -300,6 +310,8 @@ def test_no_design_is_made_from_in_two_splits():
 
 def test_the_papers_tasks_are_among_those_that_take_turns():
     assert set(paper_tasks()) <= set(drawable_tasks()) == set(cycle_of(drawable_tasks()))
+    page = Path(__file__).parents[2] / "docs/datasets.md"
+    assert f"for the {len(drawable_tasks())} built-in tasks" in page.read_text()
 
 
 @pytest.mark.parametrize("task", drawable_tasks())

@@ -151,7 +151,9 @@ def drawn(task: Task, draw: Draw) -> tuple[str, Drawn, Machine] | None:
         maker = str(draw.choice(names, p=shares))
         made = MAKERS[maker][0](task.name, draw)
         machine = built(task, made.genome.as_calls())
-        if machine is not None and broken_constraint(task, machine) is None:
+        if machine is None or broken_constraint(task, machine) is not None:
+            continue
+        if made.parent is None or parts_hash(machine.to_document()) != made.parent:
             return maker, made, machine
     return None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -20,7 +21,7 @@ class Journal:
         plan: What the rows follow from, JSON values.
 
     Raises:
-        CommandError: The file is of another plan, or can't be read or written.
+        CommandError: The file is of another plan or in use, or can't be read or written.
     """
 
     def __init__(self, path: Path, plan: Mapping[str, Any]) -> None:
@@ -31,6 +32,7 @@ class Journal:
         except OSError as error:
             raise CommandError(f"{path} can't be written: {error.strerror}") from error
         try:
+            self._lock()
             self._begin(dict(plan))
         except BaseException:
             self._file.close()
@@ -41,6 +43,14 @@ class Journal:
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
+
+    def _lock(self) -> None:
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise CommandError(
+                f"another process makes this dataset: it writes {self.path}"
+            ) from error
 
     def _begin(self, plan: dict[str, Any]) -> None:
         self._file.seek(0)
