@@ -311,7 +311,7 @@ def test_no_design_is_made_from_in_two_splits():
 def test_the_papers_tasks_are_among_those_that_take_turns():
     assert set(paper_tasks()) <= set(drawable_tasks()) == set(cycle_of(drawable_tasks()))
     page = Path(__file__).parents[2] / "docs/datasets.md"
-    assert f"for the {len(drawable_tasks())} built-in tasks" in page.read_text()
+    assert f"for {len(drawable_tasks())} of the built-in tasks" in page.read_text()
 
 
 @pytest.mark.parametrize("task", drawable_tasks())
