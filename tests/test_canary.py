@@ -1,5 +1,6 @@
 """Benchmark data can be recognised in a corpus, and documents hold no whole solution."""
 
+import json
 import re
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from support.documents.what_a_model_sees import BEGINNING, LISTED, PAGE
 
 from buildarena_benchmark import CANARY, builtin_tasks
 from buildarena_pipeline.agents.briefing import briefing
+from buildarena_worker.builtin.designs import DESIGNS
 
 ROOT = Path(__file__).parents[1]
 NUMBER = CANARY.rpartition(" ")[2]
@@ -18,6 +20,15 @@ SOURCES = [
     ROOT / "integrations/gymnasium/src/buildarena_gymnasium/machines.json",
     ROOT / "docs/expert.md",
     PAGE,
+]
+MAX_TOLD = 0.5
+"""The greatest share of a solution's calls that a document may have."""
+DOCUMENTS = [
+    page
+    for pattern in ("*.md", "*.ipynb")
+    for folder in ("", "docs", "libs", "services", "clients", "integrations", "examples", "deploy")
+    for page in sorted((ROOT / folder).glob(f"**/{pattern}" if folder else pattern))
+    if not {"node_modules", "dist", ".venv"} & set(page.parts)
 ]
 STEP = re.compile(r"^\W*(\d+\. )?(attach_block_to|connect_blocks)\b")
 
@@ -34,7 +45,67 @@ def test_no_model_reads_the_canary(task) -> None:
     assert NUMBER not in briefing(task)
 
 
-@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda path: path.name)
+@pytest.fixture(scope="module")
+def solutions() -> dict[str, list[set[str]]]:
+    """The expert's calls for each task, each in the spellings that documents and logs have."""
+    spelled = {}
+    for task, make in DESIGNS.items():
+        design = make(0)
+        actions = [action for part in design.parts.values() for action in part.actions]
+        calls = {json.dumps(arguments): (name, dict(arguments)) for name, arguments in actions}
+        spelled[task] = [spellings(*call) for call in calls.values()]
+    return spelled
+
+
+def spellings(name: str, arguments: dict) -> set[str]:
+    values = [value for value in arguments.values() if value]
+    quoted = json.dumps({"tool": name, "arguments": arguments})
+    return {
+        bare(f"{name}: {', '.join(map(str, values))}"),
+        bare(f"{name} {arguments}"),
+        bare(f"{name}({json.dumps(values)[1:-1]})"),
+        bare(quoted),
+    }
+
+
+def bare(line: str) -> str:
+    """A line without what lists, blocks, logs and notebooks put around it."""
+    return re.sub(
+        r"[^\w:.-]+|\\n", " ", re.sub(r"^\W*(\d+\.\s)?(\w+\.(?=\w+\())?", "", line)
+    ).strip()
+
+
+def told_share(text: str, calls: list[set[str]]) -> float:
+    """The share of a solution's calls that a text has on lines of their own."""
+    lines = {bare(line) for line in text.splitlines()}
+    return sum(not lines.isdisjoint(call) for call in calls) / len(calls)
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_document_tells_most_of_a_solution(page, solutions) -> None:
+    text = page.read_text(encoding="utf-8")
+    told = {task: told_share(text, calls) for task, calls in solutions.items()}
+    assert not {task: share for task, share in told.items() if share > MAX_TOLD}
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        lambda n, name, given: f"{n}. {name}: {', '.join(str(v) for v in given.values() if v)}",
+        lambda _, name, given: f"    {name} {given}",
+        lambda _, name, given: f"machine.{name}{tuple(v for v in given.values() if v)}".replace(
+            "'", '"'
+        ),
+        lambda _, name, given: "- " + json.dumps({"tool": name, "arguments": given}),
+    ],
+)
+def test_a_page_with_a_solution_would_be_found(form, solutions) -> None:
+    (part,) = DESIGNS["support-1"](0).parts.values()
+    page = "\n".join(form(n, name, dict(given)) for n, (name, given) in enumerate(part.actions, 1))
+    assert told_share(page, solutions["support-1"]) > MAX_TOLD
+
+
+@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
 def test_no_document_holds_a_whole_solution(page) -> None:
     steps = 0
     for line in page.read_text(encoding="utf-8").splitlines():

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from scenarios.hunt.confirming import Confirmed
-from scenarios.hunt.genome import Genome
-from scenarios.hunt.kinds import KINDS, kind_of
 from scenarios.hunt.trial import Finding, worth
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_environment.variation.genome import Genome
+from buildarena_environment.variation.kinds import KINDS, kind_of
 from buildarena_simulation import SIMULATION_VERSION
 
 BEST: Final = 10

@@ -13,12 +13,12 @@ from typing import Final
 
 from scenarios.hunt.confirming import Confirmed, Order, confirmed
 from scenarios.hunt.gallery import Gallery, best_of, line_of, ranked
-from scenarios.hunt.kinds import kind_of
 from scenarios.hunt.search import Crew, TaskSearch, hunted
 from scenarios.hunt.seeds import seeds_of
 from scenarios.hunt.trial import Finding
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_environment.variation.kinds import kind_of
 
 _SEARCHING: Final = 0.75
 """Share of the time that is spent searching; the rest is for confirming."""

@@ -7,10 +7,10 @@ from typing import Final, Self, TypeVar
 import numpy as np
 from ribs.archives import GridArchive
 from scenarios.hunt.breeding import Child, made
-from scenarios.hunt.genome import Genome
 from scenarios.hunt.trial import CELLS, RANGES, Finding, Scorer
 
 from buildarena_benchmark import builtin_tasks, score
+from buildarena_environment.variation.genome import Genome
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

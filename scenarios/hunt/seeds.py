@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from scenarios.hunt.genome import Genome, grown
-from scenarios.hunt.kinds import ALIKE, kind_of
-from support.machines.expert_calls import control_of
-
 from buildarena_benchmark import builtin_tasks
+from buildarena_environment.variation.genome import Genome, grown
+from buildarena_environment.variation.kinds import ALIKE, kind_of
 from buildarena_geometry import Machine
 from buildarena_worker.builtin.designs import DESIGNS
+from buildarena_worker.builtin.designs.calls import control_of
 
 DATA: Final = Path(__file__).parents[2] / "tests" / "data"
 EXPLOITS: Final = DATA / "exploits"

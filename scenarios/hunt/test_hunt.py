@@ -9,10 +9,6 @@ from scenarios.hunt import run as hunt
 from scenarios.hunt.confirming import Order, confirmed
 from scenarios.hunt.evidence import Evidence
 from scenarios.hunt.gallery import Gallery
-from scenarios.hunt.genome import Genome, grown
-from scenarios.hunt.kinds import kind_of
-from scenarios.hunt.mutation import crossed, mutated
-from scenarios.hunt.programs import IDLE
 from scenarios.hunt.search import Crew, TaskSearch
 from scenarios.hunt.seeds import expert_genome, exploits, seeds_of
 from scenarios.hunt.suspicion import suspicions
@@ -22,6 +18,10 @@ from support.machines.drafts import KeyedDraft
 from support.machines.headroom import drafted
 
 from buildarena_benchmark import builtin_tasks, score
+from buildarena_environment.variation.genome import Genome, grown
+from buildarena_environment.variation.kinds import kind_of
+from buildarena_environment.variation.mutation import crossed, mutated
+from buildarena_environment.variation.programs import IDLE
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs.couriers import courier

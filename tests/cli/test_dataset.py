@@ -374,13 +374,13 @@ def made_up(number: int) -> Fetched:
 def test_rows_are_written_as_they_come(tmp_path, monkeypatch):
     monkeypatch.setattr(writing, "GROUP_BYTES", 1_000_000)
     held: list[int] = []
-    add = writing._Table.add
+    add = writing.Table.add
 
     def counted(table, row):
         add(table, row)
         held.append(len(table._rows))
 
-    monkeypatch.setattr(writing._Table, "add", counted)
+    monkeypatch.setattr(writing.Table, "add", counted)
     counts = writing.write_dataset(map(made_up, range(50)), tmp_path / "out", licence="mit")
     assert counts.jobs == 50
     assert max(held) < 10

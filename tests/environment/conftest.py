@@ -6,10 +6,11 @@ import json
 from typing import Any
 
 import pytest
-from support.machines.expert_calls import DATA, Call, played
+from support.machines.expert_calls import DATA, played
 
 from buildarena_environment import Environment
 from buildarena_geometry import Machine
+from buildarena_worker.builtin.designs.calls import Call
 
 
 @pytest.fixture(scope="session")

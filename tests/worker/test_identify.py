@@ -7,7 +7,7 @@ import os
 from dataclasses import replace
 
 import pytest
-from support.machines.expert_calls import calls_with, measured_for, played
+from support.machines.expert_calls import measured_for, played
 from support.stages import work
 
 from buildarena_benchmark import builtin_tasks
@@ -22,6 +22,7 @@ from buildarena_simulation import read_trajectory
 from buildarena_store import Job
 from buildarena_worker.builtin import expert
 from buildarena_worker.builtin.designs import risers
+from buildarena_worker.builtin.designs.calls import calls_with
 from buildarena_worker.builtin.designs.risers import riser
 from buildarena_worker.wiring import verification_runner
 

@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_environment import ASSEMBLY, MAIN, Environment
+from buildarena_environment import Environment
 from buildarena_environment.trials import score_text
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs import DESIGNS
+from buildarena_worker.builtin.designs.calls import Call, calls_with, control_of
 from buildarena_worker.builtin.designs.design import Design, Seen
 from buildarena_worker.builtin.reading import figures_of
 
@@ -22,33 +23,12 @@ ROOT = Path(__file__).parents[3]
 DATA = ROOT / "tests/data/expert_calls.json"
 REFERENCES = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/references.json"
 
-Call = dict[str, Any]
-
 
 def calls_of(task: str, seed: int = 0) -> list[Call]:
-    """What builds and drives the expert's machine, call by call."""
+    """As the library's, with what a design that measures its world finds there."""
     design = DESIGNS[task](seed)
     answer = measured_for(design, task, seed) if design.steer else design.control or {}
     return calls_with(design, answer)
-
-
-def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
-    """What builds a design, and does what its controller says."""
-    calls = [
-        call(name if design.assembly else MAIN, *action)
-        for name, part in design.parts.items()
-        for action in part.actions
-    ]
-    calls += [call(ASSEMBLY, *action) for action in design.assembly]
-    whole = ASSEMBLY if design.assembly else MAIN
-    calls += [call(whole, *action) for action in control_of(answer)]
-    if design.program:
-        calls.append(call(whole, "set_controller", {"program": design.program}))
-    return calls
-
-
-def call(machine: str, tool: str, arguments: Any) -> Call:
-    return {"machine": machine, "tool": tool, "arguments": dict(arguments)}
 
 
 def measured_for(design: Design, task: str, seed: int, engine: str = "mujoco") -> Mapping[str, Any]:
@@ -85,17 +65,6 @@ def built(design: Design, machine: Machine) -> Machine:
         if not outcome.ok:
             raise ValueError(outcome.text)
     return machine
-
-
-def control_of(answer: Mapping[str, Any]) -> list[tuple[str, dict[str, Any]]]:
-    actions: list[tuple[str, dict[str, Any]]] = []
-    for bound in answer.get("control_config", ()):
-        for number, key in enumerate(bound["keys"]):
-            tool = "add_control_key" if number else "change_control_key"
-            told = {"block_id": bound["block"], "action": bound["action"], "new_key": key}
-            actions.append((tool, told))
-    pressed = answer.get("control_sequence", ())
-    return actions + [("add_control_sequence", dict(press)) for press in pressed]
 
 
 def played(environment: Environment, calls: list[Call]) -> Environment:

@@ -41,6 +41,7 @@ COMMANDS: Final[Mapping[str, Entry]] = {
     ),
     "export": Entry("exports", "export", "Write the leaderboard to a file, or jobs as a dataset."),
     "audit": Entry("leaderboard", "audit", "Replay and simulate a model's results again."),
+    "dataset": Entry("datasets", "app", "Make and verify datasets of machines, without a service."),
     "task": Entry("tasks", "app", "Look at tasks, and add your own."),
     "model": Entry("models", "app", "Look at models."),
     "machine": Entry("machine", "app", "Simulate and draw machines on this computer."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import yaml
@@ -24,6 +24,22 @@ SIZE_NAMES: Final = ("n<1K", "1K<n<10K", "10K<n<100K", "100K<n<1M", "1M<n<10M")
 
 def card(counts: Counts) -> str:
     """The card of a dataset with these counts; equal datasets have equal ones."""
+    return rendered(
+        "card.md.j2",
+        _front_matter(counts),
+        counts=counts,
+        canary=CANARY,
+        outcomes=sorted(counts.outcomes.items()),
+        cells=sorted(counts.cells.items()),
+        licences=sorted(counts.licences.items()),
+        jobs=column_rows(JOBS),
+        actions=column_rows(ACTIONS),
+        flags=known_flags().values(),
+    )
+
+
+def rendered(template: str, front: Mapping[str, Any], **values: Any) -> str:
+    """A card: what the `datasets` library reads first, and a template's text."""
     environment = Environment(
         loader=PackageLoader("buildarena_cli.dataset"),
         autoescape=False,  # noqa: S701 - Markdown, whose values go through `escape`
@@ -33,29 +49,22 @@ def card(counts: Counts) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    template = environment.get_template("card.md.j2")
-    text = template.render(
-        counts=counts,
-        canary=CANARY,
-        outcomes=sorted(counts.outcomes.items()),
-        cells=sorted(counts.cells.items()),
-        licences=sorted(counts.licences.items()),
-        jobs=_column_rows(JOBS),
-        actions=_column_rows(ACTIONS),
-        flags=known_flags().values(),
-        code=Markup,
-    )
-    return f"---\n{_front_matter(counts)}---\n\n{text}"
+    text = environment.get_template(template).render(code=Markup, **values)
+    return f"---\n{yaml.safe_dump(dict(front), sort_keys=False, allow_unicode=True)}---\n\n{text}"
 
 
-def _front_matter(counts: Counts) -> str:
+def size_category(rows: int) -> str:
+    """What the hub calls a dataset of so many rows."""
+    return SIZE_NAMES[sum(rows >= bound for bound in SIZES)]
+
+
+def _front_matter(counts: Counts) -> dict[str, Any]:
     licences = sorted(counts.licences)
-    size = sum(counts.jobs >= bound for bound in SIZES)
-    facts: dict[str, Any] = {
+    return {
         "license": licences[0] if len(licences) == 1 else licences,
         "language": ["en"],
         "pretty_name": "Machines built by models in BuildArena",
-        "size_categories": [SIZE_NAMES[size]],
+        "size_categories": [size_category(counts.jobs)],
         "task_categories": ["text-generation"],
         "tags": ["buildarena", "tool-use", "agents", "engineering", "physics"],
         "configs": [
@@ -67,7 +76,6 @@ def _front_matter(counts: Counts) -> str:
             for name, file in FILES.items()
         ],
     }
-    return yaml.safe_dump(facts, sort_keys=False, allow_unicode=True)
 
 
 def _escaped(value: Any) -> Any:
@@ -75,7 +83,8 @@ def _escaped(value: Any) -> Any:
     return markdown_cell(value) if type(value) is str else value
 
 
-def _column_rows(columns: Sequence[Column]) -> list[tuple[str, str, str]]:
+def column_rows(columns: Sequence[Column]) -> list[tuple[str, str, str]]:
+    """Name, type and meaning of each column, for a card."""
     return [(column.name, _type(column.type), column.meaning) for column in columns]
 
 

@@ -33,6 +33,7 @@ MESSAGE: Final = pa.struct(
         ("name", pa.string()),
         ("tool_calls", pa.list_(CALL)),
         ("tool_call_id", pa.string()),
+        ("machine", pa.string()),
     ]
 )
 _TEXT, _WHOLE, _REAL, _YES = pa.string(), pa.int64(), pa.float64(), pa.bool_()
@@ -65,8 +66,9 @@ JOBS: Final[Sequence[Column]] = (
     Column(
         "messages",
         pa.list_(MESSAGE),
-        "The session as a chat, in the order in which things were said: first the task, then each "
-        "reply (`name` is who spoke) with its tool calls and their results. `arguments` is JSON.",
+        "The session as a chat, in the order in which things were said: what was told, each reply "
+        "with its tool calls, and their results. `name` is the role that speaks, or is told "
+        "something; `machine` the sub-structure that a reply's calls are for; `arguments` JSON.",
     ),
     Column("tools", _TEXT, "JSON: the tools as definitions of functions, as `tools=` takes them."),
     Column("machine", _TEXT, "JSON: the machine document, byte for byte as it is kept."),
@@ -116,6 +118,65 @@ ACTIONS: Final[Sequence[Column]] = (
     Column("accepted", _YES, "Whether it was carried out."),
     Column("refusal", _TEXT, "Refusal class, if it was refused."),
     Column("feedback", _TEXT, "What was read of a refusal; that of accepted ones is in `jobs`."),
+)
+
+MACHINES: Final[Sequence[Column]] = (
+    Column("id", _TEXT, "The machine: the beginning of `parts_sha256`."),
+    Column("task", _TEXT, "Name of the task that it was tried in."),
+    Column("task_version", _TEXT, "Hash of everything in the task that can change a score."),
+    Column("kind", _TEXT, "What sort of machine the task asks for; a split has whole kinds."),
+    Column("split", _TEXT, "train, validation or test, as the file is called."),
+    Column("seed", _WHOLE, "Seed of the dataset, which draws everything."),
+    Column("number", _WHOLE, "Place of the machine in the dataset, from 0, over all splits."),
+    Column("maker", _TEXT, "What made it; the table below says how."),
+    Column(
+        "parent",
+        _TEXT,
+        "`parts_sha256` of the design's machine that it was made from; null where it is that "
+        "machine itself, or was drawn from nothing.",
+    ),
+    Column(
+        "actions",
+        _TEXT,
+        "JSON: the accepted tool calls that build it, in order, each with `machine`, `tool` and "
+        "`arguments`, as `Environment.step` takes them.",
+    ),
+    Column("blocks", _WHOLE, "Its blocks."),
+    Column("connectors", _WHOLE, "Its braces, winches and springs."),
+    Column("mass", _REAL, "Its mass, mass units."),
+    Column(
+        "parts_sha256",
+        _TEXT,
+        "SHA-256 of the machine document without its logs, keys sorted and without spaces; no two "
+        "rows have the same.",
+    ),
+    Column("simulator", _TEXT, "What tried it, from the task's exact start."),
+    Column("simulator_version", _TEXT, "Version of the engine's library."),
+    Column("simulation_version", _TEXT, "Version of what is simulated."),
+    Column("scorer_version", _WHOLE, "Version of the scorers."),
+    Column("geometry_version", _TEXT, "Version of the geometry library."),
+    Column("processor", _TEXT, "JSON: what of the computer can change a trial's last bits."),
+    Column("outcome", _TEXT, "`success` or `unsuccessful`, by the task's criterion alone."),
+    Column("reason", _TEXT, "Why the simulator refused the machine; null where it simulated it."),
+    Column("flags", pa.list_(_TEXT), "Remarks on the score."),
+    Column("disqualified", _YES, "Whether a flag makes it a failure in our rankings."),
+    Column("indicator", _REAL, "The task's figure: load, distance, height or thrust to weight."),
+    Column("indicator_name", _TEXT, "What the figure is."),
+    Column("indicator_unit", _TEXT, "Its unit; `1` for a ratio."),
+    Column(
+        "score",
+        _REAL,
+        "The figure as a share of the built-in expert's, from 0, and 0 for a disqualified "
+        "machine: the reward `indicator` of an episode.",
+    ),
+    Column(
+        "trajectory_sha256",
+        _TEXT,
+        "SHA-256 of the trial's trajectory up to the moment that decided it; null without one.",
+    ),
+    Column("retried", _YES, "Whether it was simulated once more before this was published."),
+    Column("license", _TEXT, "Licence of the row."),
+    Column("canary", _TEXT, "The same in every row: a corpus that has it holds benchmark data."),
 )
 
 

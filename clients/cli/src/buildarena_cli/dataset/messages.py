@@ -15,19 +15,27 @@ def compact(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
 
 
-def chat(statement: str | None, turns: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def chat(
+    statement: str | None,
+    turns: Iterable[Mapping[str, Any]],
+    prompts: Iterable[Mapping[str, Any]] = (),
+) -> list[dict[str, Any]]:
     """A session as messages.
 
     Args:
         statement: What was to be built; None where it is not known any more.
         turns: The transcript's.
+        prompts: What the session told its roles, as the service answers; none of an agent's.
 
     Returns:
-        The task as the user's message; then for each turn the reply as the assistant's, and each
-        tool's answer.
+        What was told before each turn as the system's and the user's, or where nothing is known
+        of that the statement as the user's; then the reply as the assistant's, and each tool's
+        answer.
     """
-    messages = [] if statement is None else [_message("user", statement)]
+    prompt_of = {prompt["turn"]: prompt for prompt in prompts}
+    messages = [] if prompt_of or statement is None else [_message("user", statement)]
     for turn in turns:
+        messages += _told(prompt_of.get(turn["index"]), turn["role"])
         calls = [
             (f"call_{turn['index']}_{number}", action)
             for number, action in enumerate(turn["actions"])
@@ -36,13 +44,26 @@ def chat(statement: str | None, turns: Iterable[Mapping[str, Any]]) -> list[dict
             {"id": id_, "type": "function", "function": _function(action)} for id_, action in calls
         ]
         messages.append(
-            _message("assistant", turn["text"], name=turn["role"], tool_calls=asked or None)
+            _message(
+                "assistant",
+                turn["text"],
+                name=turn["role"],
+                tool_calls=asked or None,
+                machine=turn.get("sub_structure"),
+            )
         )
         messages += [
             _message("tool", action["feedback"], name=action["name"], tool_call_id=id_)
             for id_, action in calls
         ]
     return messages
+
+
+def _told(prompt: Mapping[str, Any] | None, role: str) -> list[dict[str, Any]]:
+    if prompt is None:
+        return []
+    system = [] if prompt["system"] is None else [_message("system", prompt["system"], name=role)]
+    return system + [_message("user", text, name=role) for text in prompt["user"]]
 
 
 def tools() -> str:
@@ -58,6 +79,7 @@ def _message(
     name: str | None = None,
     tool_calls: list[dict[str, Any]] | None = None,
     tool_call_id: str | None = None,
+    machine: str | None = None,
 ) -> dict[str, Any]:
     return {
         "role": role,
@@ -65,6 +87,7 @@ def _message(
         "name": name,
         "tool_calls": tool_calls,
         "tool_call_id": tool_call_id,
+        "machine": machine,
     }
 
 

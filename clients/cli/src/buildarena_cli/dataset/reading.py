@@ -64,12 +64,14 @@ class Fetched:
         task: The task in the job's version; None where the service has it no more.
         machine: Its machine document, as it is stored.
         transcript: Its transcript.
+        prompts: What its session told its roles; empty where that is not known.
     """
 
     job: Mapping[str, Any]
     task: Mapping[str, Any] | None
     machine: bytes | None
     transcript: bytes | None
+    prompts: Sequence[Mapping[str, Any]] = ()
 
 
 class Reader:
@@ -156,11 +158,13 @@ class Reader:
         machine = ask(self._client, at("jobs", job_id, "machine")) if "machine" in hashes else None
         if machine is not None and sha256(machine).hexdigest() != hashes["machine"]:
             raise CommandError(f"the machine of {job_id} arrived damaged: its hash differs")
+        prompts = ask(self._client, at("jobs", job_id, "prompts"))
         return Fetched(
             job=job,
             task=self._task(job["task"], job["task_version"]),
             machine=machine,
             transcript=ask(self._client, at("jobs", job_id, "transcript")),
+            prompts=() if prompts is None else json.loads(prompts)["prompts"],
         )
 
     def _task(self, name: str, version: str) -> Mapping[str, Any] | None:

@@ -80,7 +80,7 @@ def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         "simulator": track.get("simulator"),
         "disqualified": is_disqualified(job["flags"] or ()),
         "metrics": None if job["metrics"] is None else compact(job["metrics"]),
-        "messages": chat(_first_words(fetched.task, track), turns),
+        "messages": chat(_first_words(fetched.task, track), turns, fetched.prompts),
         "tools": tools,
         "machine": None if fetched.machine is None else fetched.machine.decode(),
         "machine_sha256": job["artifacts"].get("machine"),

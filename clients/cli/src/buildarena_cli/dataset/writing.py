@@ -38,10 +38,10 @@ def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Cou
         CommandError: There are no jobs, or the folder can't be written.
     """
     definitions, counts = tools(), Counts()
-    with _new_folder(out) as folder:
+    with new_folder(out) as folder:
         with (
-            _Table(folder / FILES["jobs"], JOBS) as jobs,
-            _Table(folder / FILES["actions"], ACTIONS) as actions,
+            Table(folder / FILES["jobs"], JOBS) as jobs,
+            Table(folder / FILES["actions"], ACTIONS) as actions,
         ):
             for job in fetched:
                 rows = rows_of(job, tools=definitions, licence=licence)
@@ -72,7 +72,7 @@ def check_place(out: Path) -> None:
         raise CommandError(f"{out} is not empty ({named}): name a new folder")
 
 
-class _Table:
+class Table:
     """A Parquet file that gets row groups as they come."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
@@ -113,7 +113,7 @@ def _size(value: Any) -> int:
 
 
 @contextlib.contextmanager
-def _new_folder(out: Path) -> Iterator[Path]:
+def new_folder(out: Path) -> Iterator[Path]:
     """A folder beside a place that takes it in the end; nothing stays of one that broke off."""
     out = out.resolve()
     check_place(out)

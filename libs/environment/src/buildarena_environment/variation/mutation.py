@@ -6,15 +6,18 @@ from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
-from scenarios.hunt.genome import Actions, Genome, act, grown, replayed
-from scenarios.hunt.programs import changed
+from numpy.typing import NDArray
 
+from buildarena_environment.variation.genome import Actions, Genome, act, grown, replayed
+from buildarena_environment.variation.programs import changed
 from buildarena_geometry import Block, Machine
 
 Draw = np.random.Generator
 Mutation = Callable[[Machine, str, Draw], Actions]
 
 WOOD, WHEEL, CANNON, TORCH = "Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch"
+START: Final = MappingProxyType({"op": "start", "params": {}, "makes": "1"})
+"""What every machine begins with."""
 _COMMON: Final = (0.4, 0.3, 0.1, 0.1, 0.05, 0.05)
 _MODULES: Final[Mapping[str, tuple[tuple[str, ...], tuple[float, ...]]]] = MappingProxyType(
     {
@@ -69,6 +72,17 @@ def mutated(genome: Genome, category: str, draw: Draw) -> Genome:
             logs = {**genome.sub_structures, which: log}
             genome = replace(genome, sub_structures=logs)
     return grown(genome)[1]
+
+
+def heaped(category: str, draw: Draw) -> Genome:
+    """Parts on faces of one another, wherever there is room; what is powered gets keys."""
+    machine, log = replayed([dict(START)])
+    for _ in range(int(draw.integers(6, 25))):
+        log += _add_block(machine, category, draw)
+    if _bind in dict(_GROWTHS[category]):
+        for _ in range(int(draw.integers(1, 4))):
+            log += _bind(machine, category, draw)
+    return Genome(actions=log)
 
 
 def crossed(first: Genome, second: Genome, draw: Draw) -> Genome:
@@ -188,7 +202,7 @@ def _add_row(machine: Machine, category: str, draw: Draw) -> Actions:
     return made
 
 
-def _face_towards(block: Block, way: np.ndarray) -> str | None:
+def _face_towards(block: Block, way: NDArray[np.float64]) -> str | None:
     for face in block.module.faces:
         if float(np.array(block.face_normal(face.label)) @ way) > 0.999:
             return str(face.label)

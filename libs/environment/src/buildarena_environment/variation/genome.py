@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final, Self
 
+from buildarena_environment.tools import ASSEMBLY, MAIN
 from buildarena_geometry import Accepted, Machine, simulated_modules
 
 Action = dict[str, Any]
@@ -48,6 +49,26 @@ class Genome:
             "sub_structures": {name: _plain(log) for name, log in self.sub_structures.items()},
             "actions": _plain(self.actions),
         }
+
+    @classmethod
+    def from_calls(cls, calls: Iterable[Mapping[str, Any]]) -> Self:
+        """A genome of what one who builds alone calls: `machine`, `tool` and `arguments`."""
+        logs: dict[str, Actions] = {}
+        for call in calls:
+            action = {"op": call["tool"], "params": dict(call["arguments"])}
+            logs.setdefault(call["machine"], []).append(action)
+        whole = ASSEMBLY if ASSEMBLY in logs else MAIN
+        actions = logs.pop(whole, [])
+        return cls(actions=actions, sub_structures=logs)
+
+    def as_calls(self) -> list[dict[str, Any]]:
+        """What `from_calls` reads; a workbench that is called so builds it. No programs."""
+        whole = ASSEMBLY if self.sub_structures else MAIN
+        return [
+            {"machine": name, "tool": action["op"], "arguments": action["params"]}
+            for name, log in [*self.sub_structures.items(), (whole, self.actions)]
+            for action in log
+        ]
 
     @property
     def key(self) -> str:
