@@ -96,6 +96,7 @@ def test_the_card_counts_what_is_there(made):
         assert f"| {split_of(task)} | {task} | {counts}" in text
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_the_code_of_the_card_runs(made, tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
@@ -130,6 +131,7 @@ def resumed_at(monkeypatch) -> list[int]:
     return asked
 
 
+@pytest.mark.slow
 def test_what_was_interrupted_is_resumed(made, tmp_path, monkeypatch, resumed_at):
     out, journal = tmp_path / "out", tmp_path / ".out.rows.jsonl"
     add = Journal.add
@@ -314,6 +316,7 @@ def test_the_papers_tasks_are_among_those_that_take_turns():
     assert f"for {len(drawable_tasks())} of the built-in tasks" in page.read_text()
 
 
+@pytest.mark.samples(6)
 @pytest.mark.parametrize("task", drawable_tasks())
 def test_a_genome_of_calls_calls_the_same(task):
     calls = drawing.design_calls(task, 1)
