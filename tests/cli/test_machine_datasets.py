@@ -32,6 +32,7 @@ from buildarena_cli.dataset.machines.trying import SPLITS, split_of
 from buildarena_environment import Environment
 from buildarena_environment.variation.genome import Genome
 
+pytestmark = pytest.mark.xdist_group("machine datasets")
 TASKS = ("support-1", "throw-1", "lift-1")
 COUNT = 24
 WORDS = ("--count", str(COUNT), "--seed", "3", *(w for task in TASKS for w in ("--task", task)))
