@@ -18,6 +18,7 @@ sys.path.insert(0, str(ROOT / "examples/learning/grpo"))
 
 jax = pytest.importorskip("jax")
 
+import training  # noqa: E402
 from chat_server import answered  # noqa: E402
 from languages import ACCEPTED, ENDS, LANGUAGES, REFUSED, SUBMIT, Call, Said  # noqa: E402
 from network import Writer, ignorant, log_probabilities, mask, of_conversations  # noqa: E402
@@ -34,7 +35,7 @@ from optimisation import (  # noqa: E402
     stepped,
 )
 from rollouts import player  # noqa: E402
-from training import Setting, begun, train  # noqa: E402
+from training import Setting  # noqa: E402
 
 BRIDGES, BALANCING = LANGUAGES["support-1"], LANGUAGES["balance-1"]
 
@@ -189,29 +190,38 @@ def test_a_policy_learns_what_a_toy_rewards() -> None:
     assert np.mean(means[-3:]) > 0.7
 
 
+@pytest.fixture
+def few_tests(monkeypatch):
+    monkeypatch.setattr(training, "HELD_OUT", (101,))
+    monkeypatch.setattr(training, "TESTS", 1)
+
+
+def trained(setting: Setting, folder: Path) -> tuple[int, dict]:
+    """How many updates there were before, and the run."""
+    language = LANGUAGES[setting.task]
+    run, learner = training.begun(setting, language, folder)
+    before = len(run.updates)
+    starts = [*training.TRAINED_ON, *training.HELD_OUT]
+    writer = Writer(language, learner.weights)
+    with player(writer, start_seeds=starts, simulator="mujoco", processes=1) as players:
+        asyncio.run(training.train(players, learner, run, folder))
+    return before, asdict(run)
+
+
+@pytest.mark.usefixtures("few_tests")
 @pytest.mark.parametrize("task", LANGUAGES)
 def test_two_updates_through_verifiers_repeat_and_go_on_where_they_were(task, tmp_path) -> None:
-    language = LANGUAGES[task]
-    whole = Setting(task=task, seed=4, updates=2, groups=1, rollouts=3, simulator="mujoco")
-
-    def trained(folder: Path, updates: int):
-        run, learner = begun(replace(whole, updates=updates), language, folder)
-        before = len(run.updates)
-        writer = Writer(language, learner.weights)
-        starts = [*range(1, 9), *range(101, 109)]
-        with player(writer, start_seeds=starts, simulator="mujoco", processes=1) as players:
-            asyncio.run(train(players, learner, run, folder))
-        return before, asdict(run)
-
-    _, at_once = trained(tmp_path / "at once", 2)
+    setting = Setting(task=task, seed=4, updates=2, groups=1, rollouts=3, simulator="mujoco")
+    _, at_once = trained(setting, tmp_path / "at once")
     assert [row["number"] for row in at_once["updates"]] == [1, 2]
     assert set(at_once["tests"]) == {"before", "after"}
-    assert all(row["mean"] >= 0 for row in at_once["updates"])
+    assert at_once["best"]["written"].endswith(SUBMIT)
+    assert task == "support-1" or at_once["best"]["reward"] > 0
     part = tmp_path / "in parts"
-    trained(part, 1)
-    before, in_parts = trained(part, 2)
+    trained(replace(setting, updates=1), part)
+    before, in_parts = trained(setting, part)
     assert before == 1
-    assert in_parts["updates"] == at_once["updates"]
-    assert in_parts["tests"] == at_once["tests"]
+    for name in ("updates", "tests", "best"):
+        assert in_parts[name] == at_once[name]
     with pytest.raises(ValueError, match="another setting"):
-        begun(replace(whole, seed=5, updates=2), language, part)
+        training.begun(replace(setting, seed=5), LANGUAGES[task], part)
