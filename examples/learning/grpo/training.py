@@ -6,6 +6,7 @@ import argparse
 import asyncio
 import json
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final
@@ -129,14 +130,17 @@ async def train(players: Player, learner: Learner, run: Run, out: Path) -> None:
 
 
 def kept(run: Run, learner: Learner, out: Path) -> None:
-    """Writes run and weights, each whole or not at all."""
+    """Writes run and weights, each whole or not at all.
+
+    The weights come last and say how many updates they have: a run is never behind them.
+    """
     out.mkdir(parents=True, exist_ok=True)
+    (out / "run.json.part").write_text(json.dumps(asdict(run), indent=1) + "\n", encoding="utf-8")
+    (out / "run.json.part").replace(out / "run.json")
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(learner)]
     with (out / "learner.npz.part").open("wb") as file:
         np.savez(file, *leaves, updates=len(run.updates))
     (out / "learner.npz.part").replace(out / "learner.npz")
-    (out / "run.json.part").write_text(json.dumps(asdict(run), indent=1) + "\n", encoding="utf-8")
-    (out / "run.json.part").replace(out / "run.json")
 
 
 def begun(setting: Setting, language: Language, out: Path) -> tuple[Run, Learner]:
@@ -146,7 +150,7 @@ def begun(setting: Setting, language: Language, out: Path) -> tuple[Run, Learner
         ValueError: The one in the folder has another setting; its updates may become more.
     """
     learner = Learner.beginning(ignorant(language, setting.seed))
-    if not (out / "run.json").exists():
+    if not (out / "learner.npz").exists():
         return Run(setting=setting), learner
     told = json.loads((out / "run.json").read_text(encoding="utf-8"))
     if {**told["setting"], "updates": setting.updates} != asdict(setting):
@@ -163,28 +167,36 @@ def main(description: str | None) -> None:
     """Trains as the command line says, and writes into a folder."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--task", choices=LANGUAGES, required=True)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--updates", type=int, default=40)
-    parser.add_argument("--groups", type=int, default=2)
-    parser.add_argument("--rollouts", type=int, default=16, help="of a group")
+    parser.add_argument("--seed", type=at_least(0), default=0)
+    parser.add_argument("--updates", type=at_least(1), default=40)
+    parser.add_argument("--groups", type=at_least(1), default=2, help="of an update")
+    parser.add_argument("--rollouts", type=at_least(2), default=16, help="of a group")
     parser.add_argument("--simulator", choices=sorted(ENGINES), default="mujoco")
-    parser.add_argument("--processes", type=int, default=1, help="that try machines")
+    parser.add_argument("--processes", type=at_least(1), default=1, help="that try machines")
     parser.add_argument("--out", type=Path, required=True)
-    options = parser.parse_args()
-    language = LANGUAGES[options.task]
-    setting = Setting(
-        task=options.task,
-        seed=options.seed,
-        updates=options.updates,
-        groups=options.groups,
-        rollouts=options.rollouts,
-        simulator=options.simulator,
-    )
-    run, learner = begun(setting, language, options.out)
+    options = vars(parser.parse_args())
+    out, processes = options.pop("out"), options.pop("processes")
+    setting = Setting(**options)
+    language = LANGUAGES[setting.task]
+    try:
+        run, learner = begun(setting, language, out)
+    except ValueError as error:
+        parser.error(str(error))
     with player(
         Writer(language, learner.weights),
         start_seeds=[*TRAINED_ON, *HELD_OUT],
-        simulator=options.simulator,
-        processes=options.processes,
+        simulator=setting.simulator,
+        processes=processes,
     ) as players:
-        asyncio.run(train(players, learner, run, options.out))
+        asyncio.run(train(players, learner, run, out))
+
+
+def at_least(least: int) -> Callable[[str], int]:
+    """What reads a whole number of the command line."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is no whole number from {least} on")
+        return int(text)
+
+    return read
