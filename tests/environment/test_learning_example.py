@@ -148,6 +148,6 @@ def test_the_best_message_earns_what_its_run_says(kept, languages) -> None:
     assert any(earned(start) == pytest.approx(run["best"]["reward"]) for start in range(1, 9))
 
 
-def test_there_are_two_seeds_of_each_task() -> None:
+def test_there_are_runs_of_each_task() -> None:
     tasks = [kept.name.split(".")[0] for kept in RUNS]
-    assert {task: tasks.count(task) for task in tasks} == {"balance-1": 2, "support-1": 2}
+    assert set(tasks) == {"balance-1", "support-1"}

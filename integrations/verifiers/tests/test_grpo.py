@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import json
 import sys
@@ -190,6 +191,14 @@ def test_a_policy_learns_what_a_toy_rewards() -> None:
     assert np.mean(means[-3:]) > 0.7
 
 
+@pytest.mark.parametrize("text", ["1", "-2", "two", "2.5"])
+def test_groups_that_teach_nothing_are_refused(text) -> None:
+    read = training.at_least(2)
+    assert read("2") == 2
+    with pytest.raises(argparse.ArgumentTypeError, match=f"'{text}' is no whole number from 2 on"):
+        read(text)
+
+
 @pytest.fixture
 def few_tests(monkeypatch):
     monkeypatch.setattr(training, "HELD_OUT", (101,))
@@ -219,6 +228,10 @@ def test_two_updates_through_verifiers_repeat_and_go_on_where_they_were(task, tm
     assert task == "support-1" or at_once["best"]["reward"] > 0
     part = tmp_path / "in parts"
     trained(replace(setting, updates=1), part)
+    # Interrupted between the two files: the second update's row is there, its weights are not.
+    stored = json.loads((part / "run.json").read_text())
+    stored["updates"].append(at_once["updates"][1])
+    (part / "run.json").write_text(json.dumps(stored))
     before, in_parts = trained(setting, part)
     assert before == 1
     for name in ("updates", "tests", "best"):
