@@ -123,7 +123,7 @@ def test_the_curves_of_messages_rise(kept) -> None:
     means = [row["mean"] for row in run["updates"]]
     assert len(means) == run["setting"]["updates"]
     tenth = max(1, len(means) // 10)
-    assert np.mean(means[-tenth:]) > 4 * np.mean(means[:tenth])
+    assert np.mean(means[-tenth:]) > max(0.3, 4 * np.mean(means[:tenth]))
     assert run["tests"]["after"]["mean"] > 4 * run["tests"]["before"]["mean"]
 
 
@@ -148,6 +148,6 @@ def test_the_best_message_earns_what_its_run_says(kept, languages) -> None:
     assert any(earned(start) == pytest.approx(run["best"]["reward"]) for start in range(1, 9))
 
 
-def test_there_are_runs_of_each_task() -> None:
+def test_there_are_two_seeds_of_each_task() -> None:
     tasks = [kept.name.split(".")[0] for kept in RUNS]
-    assert set(tasks) == {"balance-1", "support-1"}
+    assert {task: tasks.count(task) for task in tasks} == {"balance-1": 2, "support-1": 2}
