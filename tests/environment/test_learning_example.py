@@ -103,3 +103,51 @@ def test_the_curve_is_of_rewards_that_rise() -> None:
     assert rows[-1]["minutes"] < 60
     assert rows[0]["best"] < 1.0 < rows[-1]["best"]
     assert np.mean([row["mean"] for row in rows[-5:]]) > 3 * rows[0]["mean"]
+
+
+@pytest.fixture
+def languages(monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLE / "grpo"))
+    import languages
+
+    yield languages.LANGUAGES
+    sys.modules.pop("languages", None)
+
+
+RUNS = sorted(KEPT.glob("*.seed-*.json"))
+
+
+@pytest.mark.parametrize("kept", RUNS, ids=lambda kept: kept.stem)
+def test_the_curves_of_messages_rise(kept) -> None:
+    run = json.loads(kept.read_text())
+    means = [row["mean"] for row in run["updates"]]
+    assert len(means) == run["setting"]["updates"]
+    tenth = max(1, len(means) // 10)
+    assert np.mean(means[-tenth:]) > max(0.3, 4 * np.mean(means[:tenth]))
+    assert run["tests"]["after"]["mean"] > 4 * run["tests"]["before"]["mean"]
+
+
+@pytest.mark.parametrize("kept", RUNS, ids=lambda kept: kept.stem)
+def test_the_best_message_earns_what_its_run_says(kept, languages) -> None:
+    run = json.loads(kept.read_text())
+    setting = run["setting"]
+    pytest.importorskip(setting["simulator"])
+    language = languages[setting["task"]]
+    calls = [*language.opening, *language.calls(run["best"]["written"].split(" "))]
+
+    def earned(start: int) -> float:
+        environment = Environment(
+            setting["task"], setting["simulator"], seed=start, rewards={"indicator": 1.0}
+        )
+        for made in calls[:-1]:
+            environment.step(made.tool, dict(made.arguments))
+        environment.submit()
+        return environment.reward
+
+    # It was the best from one of the starts that the run was trained on.
+    assert any(earned(start) == pytest.approx(run["best"]["reward"]) for start in range(1, 9))
+
+
+def test_there_are_two_seeds_of_each_task() -> None:
+    tasks = [kept.name.split(".")[0] for kept in RUNS]
+    assert {task: tasks.count(task) for task in tasks} == {"balance-1": 2, "support-1": 2}

@@ -225,6 +225,24 @@ def test_whatever_a_model_calls_is_answered() -> None:
     assert trace.metrics["refused"] == 6
 
 
+def test_trials_that_end_when_they_are_decided_earn_the_same(scripts) -> None:
+    weak = without(scripts["support-1"], *range(9, len(scripts["support-1"])))
+    found = []
+    for until_decided in (False, True):
+        environment = load_environment(
+            "support-1", "mujoco", rewards={"indicator": 1.0}, until_decided=until_decided
+        )
+        with serving({"support-1": [several(weak)]}) as stand_in:
+            (trace,) = played(environment, stand_in.url)
+        found.append((trace.reward, record(trace)["score"]))
+    (reward, whole), (same_reward, decided) = found
+    assert 0 < reward == same_reward
+    for name in ("success", "indicator", "flags"):
+        assert decided[name] == whole[name]
+    lowest = "lowest_cargo_height"
+    assert decided["metrics"][lowest] > whole["metrics"][lowest]
+
+
 def test_another_harness_is_told_that_it_has_no_tools() -> None:
     config = load_environment("lift-1").config
     agent = vf.AgentConfig(runtime=vf.SubprocessConfig(), harness={"id": "null"})

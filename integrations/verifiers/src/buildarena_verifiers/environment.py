@@ -39,11 +39,9 @@ class BuildEnv(vf.Env[BuildEnvConfig]):
         await asyncio.to_thread(RUNNERS.release, *self._trials)
 
     @property
-    def _trials(self) -> tuple[int | None, float]:
+    def _trials(self) -> tuple[int | None, float, bool]:
         config = self.config.taskset.task
-        if not isinstance(config, BuildTaskConfig):
-            config = BuildTaskConfig()
-        return config.processes, config.trial_timeout_s
+        return (config if isinstance(config, BuildTaskConfig) else BuildTaskConfig()).trials
 
 
 def load_environment(
@@ -53,6 +51,7 @@ def load_environment(
     rewards: Mapping[str, float] | None = None,
     processes: int | None = None,
     trial_timeout_s: float = 600.0,
+    until_decided: bool = False,
     **episodes: Any,
 ) -> BuildEnv:
     """The environment, for programs that don't write a configuration.
@@ -63,6 +62,7 @@ def load_environment(
         rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
         processes: Processes that try machines; by default one for each core.
         trial_timeout_s: Seconds after which a trial is broken off.
+        until_decided: Ends trials when they are decided, as in `BuildTaskConfig`.
         episodes: `rounds`, `steps` and `start_seeds`, as in `BuildTasksetConfig`.
 
     Raises:
@@ -78,6 +78,7 @@ def load_environment(
         task=BuildTaskConfig(
             processes=processes,
             trial_timeout_s=trial_timeout_s,
+            until_decided=until_decided,
             rewards={} if rewards is None else _weights(rewards),
         ),
     )

@@ -44,10 +44,18 @@ class BuildTaskConfig(vf.TaskConfig):
         processes: Processes that try machines, for all rollouts of a program together; None for
             one for each core that it may use.
         trial_timeout_s: Seconds after which a trial is broken off.
+        until_decided: Ends trials when they are decided: rewards and flags are those of the whole
+            trial, other metrics of what was seen until then.
     """
 
     processes: int | None = Field(None, ge=1)
     trial_timeout_s: float = Field(600.0, gt=0)
+    until_decided: bool = False
+
+    @property
+    def trials(self) -> tuple[int | None, float, bool]:
+        """What `RUNNERS` is asked for."""
+        return self.processes, self.trial_timeout_s, not self.until_decided
 
 
 class BuildTasksetConfig(vf.TasksetConfig):
@@ -94,8 +102,7 @@ class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
                 f"the harness {getattr(harness, 'id', None)!r} has no building tools: choose "
                 "buildarena_verifiers"
             )
-        config = self.config
-        runner = RUNNERS.get(config.processes, config.trial_timeout_s)
+        runner = RUNNERS.get(*self.config.trials)
         environment = _environment(self.data, tries=runner.pool.try_machine)
         trace.state._seat = Seat(environment, runner)  # noqa: SLF001 - private to serialization
 

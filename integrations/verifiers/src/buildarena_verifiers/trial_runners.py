@@ -13,6 +13,8 @@ from typing import TypeVar
 from buildarena_environment import TrialPool
 
 T = TypeVar("T")
+Asked = tuple[int | None, float, bool]
+"""How many processes, the seconds of a trial, whether trials are whole."""
 
 
 class TrialRunner:
@@ -21,10 +23,11 @@ class TrialRunner:
     Args:
         processes: How many; None for one for each core that this process may use.
         timeout_s: Seconds after which a trial is broken off.
+        whole: False ends each trial when it is decided, see `buildarena_environment.try_machine`.
     """
 
-    def __init__(self, processes: int | None, timeout_s: float) -> None:
-        self.pool = TrialPool(processes, timeout_s=timeout_s)
+    def __init__(self, processes: int | None, timeout_s: float, whole: bool) -> None:
+        self.pool = TrialPool(processes, timeout_s=timeout_s, whole=whole)
         self._threads = ThreadPoolExecutor(
             len(self.pool.processes), thread_name_prefix="rollouts wait"
         )
@@ -45,24 +48,24 @@ class TrialRunners:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._runners: dict[tuple[int, int | None, float], TrialRunner] = {}
-        self._holders: dict[tuple[int, int | None, float], int] = {}
+        self._runners: dict[tuple[int, Asked], TrialRunner] = {}
+        self._holders: dict[tuple[int, Asked], int] = {}
 
-    def get(self, processes: int | None, timeout_s: float) -> TrialRunner:
+    def get(self, *asked: *Asked) -> TrialRunner:
         """The runner of this kind; made when it is first asked for."""
         with self._lock:
-            return self._got(processes, timeout_s)
+            return self._got(asked)
 
-    def hold(self, processes: int | None, timeout_s: float) -> None:
+    def hold(self, *asked: *Asked) -> None:
         """Keeps a runner until as many releases."""
-        key = _key(processes, timeout_s)
+        key = _key(asked)
         with self._lock:
-            self._got(processes, timeout_s)
+            self._got(asked)
             self._holders[key] = self._holders.get(key, 0) + 1
 
-    def release(self, processes: int | None, timeout_s: float) -> None:
+    def release(self, *asked: *Asked) -> None:
         """Ends a runner's processes when its last holder releases it."""
-        key = _key(processes, timeout_s)
+        key = _key(asked)
         with self._lock:
             self._holders[key] = self._holders.get(key, 1) - 1
             unused = self._runners.pop(key, None) if self._holders[key] <= 0 else None
@@ -79,16 +82,16 @@ class TrialRunners:
         for runner in unused:
             runner.close()
 
-    def _got(self, processes: int | None, timeout_s: float) -> TrialRunner:
-        key = _key(processes, timeout_s)
+    def _got(self, asked: Asked) -> TrialRunner:
+        key = _key(asked)
         if key not in self._runners:
-            self._runners[key] = TrialRunner(processes, timeout_s)
+            self._runners[key] = TrialRunner(*asked)
         return self._runners[key]
 
 
-def _key(processes: int | None, timeout_s: float) -> tuple[int, int | None, float]:
+def _key(asked: Asked) -> tuple[int, Asked]:
     # A forked program must not talk to its parent's processes.
-    return os.getpid(), processes, timeout_s
+    return os.getpid(), asked
 
 
 RUNNERS = TrialRunners()
