@@ -110,6 +110,19 @@ def test_short_gaps_are_filled_in_a_straight_line(gone) -> None:
     )
 
 
+def test_what_is_missing_at_the_end_goes_on_as_it_went() -> None:
+    def rising(i, n):
+        x, y, z = still(i, n)
+        return (x, y + 150.0 * n / 100, z)
+
+    game = played(MACHINE, SHORT, path=rising)
+    found = trajectory_of(without(game, {192, 196, 200}), MACHINE, SHORT, game="1", mod="2")
+    whole = trajectory(game)
+    assert whole.positions[-1, 0, 2] - whole.positions[-4, 0, 2] > 10
+    assert np.abs(found.positions - whole.positions).max() < 1e-2
+    assert (found.pieces == whole.pieces).all()
+
+
 @pytest.mark.parametrize(
     ("gone", "says"),
     [

@@ -26,7 +26,13 @@ READABLE: Final = (1, LINE_VERSION)
 """Versions of the lines that are read; those of the first do not say which level was open."""
 
 LONGEST_GAP_S: Final = 0.2
-"""From one known sample to the next; what lies between is filled in linearly."""
+"""From one known sample to the next; what lies between is filled in linearly.
+
+What is missing at the end goes on as it went: a rocket that still rises would end too low.
+"""
+
+_POSITION: Final = slice(1, 4)
+"""Of the six figures of a sample."""
 
 LATEST_START_S: Final = 0.4
 """How late the first sample may be, where it shows that the trial began as it should."""
@@ -141,6 +147,11 @@ def filled(
             )
         for component in range(1, reported.shape[2]):
             whole[:, column, component] = np.interp(rows, seen, reported[seen, column, component])
+        if len(seen) > 1:
+            before, last = reported[seen[-2:], column, _POSITION]
+            speed = (last - before) / (seen[-1] - seen[-2])
+            lacking = rows[seen[-1] + 1 :]
+            whole[lacking, column, _POSITION] += np.outer(lacking - seen[-1], speed)
     return whole, longest
 
 
