@@ -70,6 +70,7 @@ def test_what_does_not_look_follows_no_line(engine, left, right) -> None:
     assert result.indicator == 0 or not spins
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_goes_round_the_other_way_has_followed_nothing(engine) -> None:
@@ -215,6 +216,7 @@ def test_the_time_ends_once_all_but_one_stretch_are_followed() -> None:
     assert stopped.metrics["all_followed_s"] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "stricter",
     [{"max_distance": 0.05}, {"stretches": 100, "min_stretches": 95, "all_stretches": 99}],

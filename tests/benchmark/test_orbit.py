@@ -110,6 +110,7 @@ def test_what_comes_down_on_its_way_ends_it() -> None:
     assert 0 < result.metrics["cycles"] < 1
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_comes_back_softly(engine) -> None:

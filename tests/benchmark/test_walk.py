@@ -233,6 +233,7 @@ def test_each_threshold_ends_a_walk(stricter) -> None:
     assert (result.success, result.flags) == (False, ("not_walked",))
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_corner_must_be_walked_to_and_round(engine) -> None:

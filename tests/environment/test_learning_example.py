@@ -127,6 +127,7 @@ def test_the_curves_of_messages_rise(kept) -> None:
     assert run["tests"]["after"]["mean"] > 4 * run["tests"]["before"]["mean"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", RUNS, ids=lambda kept: kept.stem)
 def test_the_best_message_earns_what_its_run_says(kept, languages) -> None:
     run = json.loads(kept.read_text())

@@ -15,6 +15,7 @@ from buildarena_simulation import simulate
 SEEDS = range(40 if LONG else 3)
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, seed) -> None:

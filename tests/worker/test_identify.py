@@ -45,6 +45,7 @@ def verdict(context: Context, job: Job) -> str | None:
     return context.store.verifications.get(check).verdict
 
 
+@pytest.mark.slow
 @pytest.mark.samples(1)
 @pytest.mark.parametrize("workflow", ["five-role", "builder"])
 def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
