@@ -33,6 +33,7 @@ class Fault:
         at_min: When it begins, minutes of the hour.
         lasts_min: How long it lasts.
         alert: What operators must hear; None where the service mends itself unheard.
+        over_min: How long after its end the alert may last; None where it looks back for long.
         during: The fault, for as long as this is open.
     """
 
@@ -40,6 +41,7 @@ class Fault:
     at_min: float
     lasts_min: float
     alert: str | None
+    over_min: float | None = 6.0
     during: Callable[[Stack], AbstractContextManager[None]]
 
 
@@ -147,6 +149,7 @@ FAULTS: Final = (
         at_min=9,
         lasts_min=8,
         alert="WorkersLost",
+        over_min=None,  # an hour back
         during=killed("construct worker", times=6),
     ),
     Fault(

@@ -31,8 +31,6 @@ from buildarena_store import Database
 
 HOUR_MIN: Final = 60.0
 DISK: Final = "4g"
-GRACE_MIN: Final = 6.0
-"""How long after a fault its alert may take to be over."""
 TASK: Final = "lift-1"
 MODELS: Final = ("builtin/random", "builtin/expert")
 ENDED_S: Final = 1800.0
@@ -76,19 +74,16 @@ class Day:
         """Submits jobs little by little over the plan; the ids of their sweeps."""
         found = []
         last = max(fault.at_min for fault in self.faults)
+        seeds = jobs // len(MODELS)
         for wave in range(waves):
             self.sleep_until(wave * last / waves)
-            found.append(self._submitted(wave, jobs // waves))
+            own = range(seeds * wave // waves, seeds * (wave + 1) // waves)
+            found.append(self._submitted(wave, own))
         return found
 
-    def _submitted(self, wave: int, jobs: int) -> str:
+    def _submitted(self, wave: int, seeds: range) -> str:
         spec = {"tasks": [TASK], "simulator": ENGINE, "worlds": 0, "name": f"wave {wave}"}
-        first = 1000 * wave
-        body = {
-            **spec,
-            "models": list(MODELS),
-            "seeds": list(range(first, first + jobs // len(MODELS))),
-        }
+        body = {**spec, "models": list(MODELS), "seeds": list(seeds)}
 
         def submit() -> str | None:
             try:
@@ -133,9 +128,8 @@ class Day:
         ]
         after = told[0]["from_min"] - begun if told else None
         over = [row["to_min"] for row in told if "to_min" in row]
-        right = fault.alert is None or (
-            bool(told) and bool(over) and max(over) <= ended + GRACE_MIN
-        )
+        mended = fault.over_min is None or (bool(over) and max(over) <= ended + fault.over_min)
+        right = fault.alert is None or (bool(told) and mended)
         return {
             "fault": fault.name,
             "from_min": round(begun, 1),
@@ -215,8 +209,9 @@ def day(
 
 def _wait_for_silence(lived: Day) -> None:
     """Until the alerts that faults ask for are over, or have gone on for too long."""
-    asked = {fault.alert for fault in lived.faults} - {None}
-    until = max(end for _, end in lived.spans.values()) + GRACE_MIN
+    mending = [(fault, fault.over_min) for fault in lived.faults if fault.over_min is not None]
+    asked = {fault.alert for fault, _ in mending}
+    until = max(lived.spans[fault.name][1] + over_min for fault, over_min in mending)
     while lived.minutes() < until:
         if all("to_min" in row for row in lived.heard() if row["alert"] in asked):
             return
