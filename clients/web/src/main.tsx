@@ -12,12 +12,10 @@ import { wakeWithService } from "./api/waking";
 import { fetchWhenIdle, router } from "./router";
 import { theme } from "./theme";
 
-/** A page whose script is there by then is painted together with its frame; else the frame comes first. */
-const SOON_MS = 150;
-
 wakeWithService(queries);
 fetchWhenIdle();
-await Promise.race([router.load(), new Promise((resolve) => setTimeout(resolve, SOON_MS))]);
+// The page's script and figures are asked for while its frame is made; what fails is told by the page.
+router.load().catch(console.error);
 
 const root = document.getElementById("root");
 if (root !== null) {
