@@ -61,8 +61,9 @@ def main() -> int:
         "jobs": options.jobs,
         "worlds": options.worlds,
         "separated": separated,
+        "separated_on_one_board": together,
+        "rows": rows,
     }
-    figures |= {"separated_on_one_board": together, "rows": rows}
     keep(figures, options.json)
     return int(separated < BAR)
 

@@ -5,11 +5,14 @@ import math
 import os
 import random
 import signal
+import subprocess
+import sys
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Self
 
 import psutil
@@ -23,7 +26,27 @@ VICTIMS = ("construct worker", "mujoco worker", "api", "valkey", "postgres")
 WORKERS = ("construct worker", "mujoco worker")
 QUEUES = ("construct", "simulate.mujoco")
 
+SKEWED = Path(__file__).with_name("skewed.py")
+SKEW_HOURS = "3"
+
 log = structlog.get_logger(__name__)
+
+
+@contextlib.contextmanager
+def skewed_worker(environment: dict[str, str], log: Path, *words: str) -> Iterator[None]:
+    """A further worker, whose clock is hours ahead."""
+    with log.open("ab") as stream:
+        process = subprocess.Popen(
+            [sys.executable, str(SKEWED), SKEW_HOURS, *words],
+            env=environment,
+            stdout=stream,
+            stderr=stream,
+        )
+        try:
+            yield
+        finally:
+            process.terminate()
+            process.wait(timeout=30)
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from pathlib import Path
 import httpx
 import pytest
 from scenarios.chaos.accounts import audited, pick_ups, wrongs
-from scenarios.chaos.faults import VICTIMS, Fire
+from scenarios.chaos.faults import VICTIMS, Fire, skewed_worker
 from sqlalchemy.exc import OperationalError
 from support.long_tests import LONG
 from support.servers.stacks import running_stack, wait_until
@@ -28,7 +28,6 @@ from buildarena_cli.local.stack import Stack
 from buildarena_simulation import simulate
 from buildarena_store import Database
 
-HERE = Path(__file__).parent
 JOBS = int(os.environ.get("CHAOS_JOBS", "80" if LONG else "12"))
 EVERY_S = float(os.environ.get("CHAOS_EVERY_S", "2.5"))
 STRIKES = math.inf if LONG or "CHAOS_JOBS" in os.environ else len(VICTIMS)
@@ -36,25 +35,7 @@ STRIKES = math.inf if LONG or "CHAOS_JOBS" in os.environ else len(VICTIMS)
 LEASE_S = float(os.environ.get("CHAOS_LEASE_S", "3"))
 SEED = os.environ.get("CHAOS_SEED", "1")
 TASK, ENGINE = "lift-1", "mujoco"
-SKEW_HOURS = "3"
 BAR_S = 30
-
-
-@contextmanager
-def skewed_worker(environment: dict[str, str], log: Path, *words: str) -> Iterator[None]:
-    """A further worker, whose clock is hours ahead."""
-    with log.open("ab") as stream:
-        process = subprocess.Popen(
-            [sys.executable, str(HERE / "skewed.py"), SKEW_HOURS, *words],
-            env=environment,
-            stdout=stream,
-            stderr=stream,
-        )
-        try:
-            yield
-        finally:
-            process.terminate()
-            process.wait(timeout=30)
 
 
 @pytest.fixture

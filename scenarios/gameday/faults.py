@@ -5,22 +5,21 @@ import shutil
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from scenarios.chaos import skewed
+from scenarios.chaos.faults import skewed_worker
 from support.servers.flaky_proxy import flaky_proxy
-from support.servers.stacks import hung, kill
+from support.servers.stacks import hung, kill, without_store
 
 from buildarena_cli.local.stack import Stack
 
 ENGINE: Final = "mujoco"
 RESERVED_BYTES: Final = 256 * 2**20
 """What a full disk has left."""
-CLOCK_AHEAD_H: Final = "3"
 SLOW_S: Final = 2.0
 
 
@@ -62,9 +61,11 @@ def killed(
 
         thread = threading.Thread(target=strike)
         thread.start()
-        yield
-        over.set()
-        thread.join()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
 
     return during
 
@@ -72,20 +73,6 @@ def killed(
 def hanging(name: str) -> Callable[[Stack], AbstractContextManager[None]]:
     """A process that takes connections and does nothing."""
     return lambda stack: hung(stack, name)
-
-
-@contextmanager
-def without_store(stack: Stack) -> Iterator[None]:
-    """The store of artifacts takes nothing: a file stands in its place."""
-    folder = stack.settings.artifact_folder.absolute()
-    aside = folder.with_name("aside")
-    folder.rename(aside)
-    folder.write_text("in the way")
-    try:
-        yield
-    finally:
-        folder.unlink()
-        aside.rename(folder)
 
 
 @contextmanager
@@ -101,12 +88,9 @@ def full_disk(stack: Stack) -> Iterator[None]:
         filler.unlink()
 
 
-@contextmanager
-def wrong_clock(stack: Stack) -> Iterator[None]:
+def wrong_clock(stack: Stack) -> AbstractContextManager[None]:
     """A further worker whose clock is hours ahead."""
-    words = [sys.executable, str(skewed.__file__), CLOCK_AHEAD_H, "buildarena_worker"]
-    with _process(stack, words, stack.environment):
-        yield
+    return skewed_worker(stack.environment, stack.logs / "gameday.log", "buildarena_worker")
 
 
 @contextmanager
@@ -116,19 +100,15 @@ def slow_network(stack: Stack) -> Iterator[None]:
     with flaky_proxy(stack.url) as proxy:
         proxy.delay_s, proxy.swallow_answers, proxy.silent = SLOW_S, 10, 2
         words = ["-m", "buildarena_simworker", "--simulator", ENGINE, "--api", proxy.url]
-        with _process(stack, [sys.executable, *words], ours):
-            yield
-
-
-@contextmanager
-def _process(stack: Stack, words: Sequence[str], environment: dict[str, str]) -> Iterator[None]:
-    with (stack.logs / "gameday.log").open("ab") as log:
-        process = subprocess.Popen(words, env=environment, stdout=log, stderr=log, cwd="/")
-        try:
-            yield
-        finally:
-            process.terminate()
-            process.wait(timeout=60)
+        with (stack.logs / "gameday.log").open("ab") as log:
+            process = subprocess.Popen(
+                [sys.executable, *words], env=ours, stdout=log, stderr=log, cwd="/"
+            )
+            try:
+                yield
+            finally:
+                process.terminate()
+                process.wait(timeout=60)
 
 
 @contextmanager

@@ -19,7 +19,7 @@ from support.servers.prometheus import (
     prometheus,
     target_says,
 )
-from support.servers.stacks import finished, hung, kill, running_stack, wait_until
+from support.servers.stacks import finished, hung, kill, running_stack, wait_until, without_store
 
 from buildarena_cli.local.stack import Stack
 
@@ -166,16 +166,9 @@ def test_an_api_that_hangs(operator) -> None:
 
 def test_a_store_that_takes_nothing(operator) -> None:
     alert = "BuildArenaArtifactStoreDown"
-    folder = operator.stack.settings.artifact_folder.absolute()
-    aside = folder.with_name("aside")
-    folder.rename(aside)
-    folder.write_text("in the way")
-    try:
+    with without_store(operator.stack):
         operator.is_told(alert)
         assert re.search(r"!! +artifacts ", operator.doctor())
-    finally:
-        folder.unlink()
-        aside.rename(folder)
     operator.is_relieved(alert)
 
 

@@ -101,6 +101,20 @@ def hung(stack: Stack, name: str) -> Iterator[None]:
                 process.send_signal(signal.SIGCONT)
 
 
+@contextmanager
+def without_store(stack: Stack) -> Iterator[None]:
+    """The store of artifacts takes nothing: a file stands in its place."""
+    folder = stack.settings.artifact_folder.absolute()
+    aside = folder.with_name("aside")
+    folder.rename(aside)
+    folder.write_text("in the way")
+    try:
+        yield
+    finally:
+        folder.unlink()
+        aside.rename(folder)
+
+
 def finished(client: httpx.Client, sweep_id: str, within_s: float = 180) -> dict[str, Any]:
     """The sweep, once every job has ended."""
 
