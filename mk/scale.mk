@@ -14,3 +14,8 @@ bench-heartbeats: $(STAMP) ## What heartbeats cost Postgres, for one worker and 
 
 bench-idle: $(STAMP) ## What each process of a service costs while there is nothing to do; five minutes
 	@$(TEST_PYTHON) -m benchmarks.idle.bench_idle --json .buildarena/bench-idle.json
+
+.PHONY: bench-histories
+
+bench-histories: $(STAMP) ## Packing of old jobs in a database with 10,000,000 rows; JSON in .buildarena/
+	@$(TEST_PYTHON) -m benchmarks.scale.bench_histories --json .buildarena/bench-histories.json

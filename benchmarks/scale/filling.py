@@ -39,7 +39,7 @@ def fill(database: Database, amount: Amount) -> None:
         connection.execute(text("SET synchronous_commit = off"))
         connection.execute(text("SET maintenance_work_mem = '256MB'"))
         _name_tasks(connection)
-        with _without_indexes(connection, ("jobs", "sweep_jobs", "attempts", "board_changes")):
+        with without_indexes(connection, ("jobs", "sweep_jobs", "attempts", "board_changes")):
             _jobs(connection, "ended", amount.ended, amount.models)
             _jobs(connection, "queued", amount.queued, amount.models)
             _ended(connection)
@@ -64,7 +64,7 @@ def _name_tasks(connection: Connection) -> None:
 
 
 @contextmanager
-def _without_indexes(connection: Connection, tables: tuple[str, ...]) -> Iterator[None]:
+def without_indexes(connection: Connection, tables: tuple[str, ...]) -> Iterator[None]:
     """Takes indexes away that no constraint needs, and makes them again at the end."""
     found = connection.execute(
         text(

@@ -32,7 +32,7 @@ GIVEN_UP_THERE = {
     "tcp_user_timeout": 20_000,
 }
 """When the server does: a machine that is gone holds the locks of its transactions until then."""
-SCHEMA = "2026_11_26_told"
+SCHEMA = "2026_11_26_members"
 """The newest revision of the migrations: what this code was written for. Said here, so that a
 process that starts need not read them all."""
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns

@@ -10,6 +10,7 @@ from sqlalchemy import (
     ARRAY,
     BindParameter,
     Column,
+    ColumnClause,
     Table,
     Text,
     bindparam,
@@ -43,7 +44,9 @@ def bound_texts(values: Sequence[str]) -> BindParameter[Sequence[str]]:
     return bindparam(None, list(values), ARRAY(Text))
 
 
-def rows_of(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column[Any]]) -> TableValuedAlias:
+def rows_of(
+    rows: Sequence[Mapping[str, Any]], columns: Sequence[ColumnClause[Any]]
+) -> TableValuedAlias:
     """Rows as a table to select from, sent as one JSON text.
 
     Args:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
+from functools import cached_property
 from typing import Any
 
 from buildarena_store.ids import content_hash
@@ -23,7 +24,7 @@ def configuration_hash(model_config: Mapping[str, Any], limits: Mapping[str, Any
     return content_hash({**model_config, "limits": dict(limits)} if limits else model_config)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class JobKey:
     """What makes a job unique; two submissions with equal keys are one job.
 
@@ -41,7 +42,7 @@ class JobKey:
     track: str
     seed: int
 
-    @property
+    @cached_property
     def job_id(self) -> str:
         """The job's id, derived from the key: the same job has the same id everywhere."""
         key = [self.task, self.task_version, self.model_hash, self.track, self.seed]

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from random import SystemRandom
-from typing import Any, Final
+from typing import Any
 
 from sqlalchemy import ColumnElement, Connection, any_, exists, func, select, text, update
-from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import UnknownIdError
+from buildarena_store.jobs.adding import add_jobs
 from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_store.jobs.filters import JobFilter, distinct_values
 from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, JobKey, NewJob
 from buildarena_store.jobs.pages import Order, SortValue, read_page
 from buildarena_store.jobs.summaries import JobSummary, summarise
 from buildarena_store.jobs.transitions import REOPENED, transition
-from buildarena_store.rows import bound_texts, columns_of, rows_of, value_of
-from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, Outcome, Stage
+from buildarena_store.rows import bound_texts, columns_of, value_of
+from buildarena_store.states import AttemptResult, JobState, Outcome
 from buildarena_store.tables import artifacts, attempts, job_artifacts, jobs
 
 
@@ -38,16 +37,10 @@ class Jobs:
         Returns:
             How many were added or opened again.
         """
-        rows = [_new_row(job) for job in new]
-        columns = [jobs.c[name] for name in rows[0]]
-        # One JSON text instead of a bound value for each column of each row: ten times as fast.
-        given = rows_of(rows, columns)
-        statement = insert(jobs).from_select([column.name for column in columns], select(given))
-        inserted = connection.execute(statement.on_conflict_do_nothing().returning(jobs.c.id))
-        ids = list(inserted.scalars())
-        events.record_jobs(connection, ids, JobState.QUEUED, {"stage": Stage.CONSTRUCT})
-        if len(ids) < len(rows):
-            ids += self._reopen([row["id"] for row in rows], new[0], connection)
+        wanted = [job.key.job_id for job in new]
+        ids = add_jobs(new, wanted, connection=connection)
+        if len(ids) < len(new):
+            ids += self._reopen(wanted, new[0], connection)
         return len(ids)
 
     def _reopen(self, ids: Sequence[str], wanted: NewJob, connection: Connection) -> list[str]:
@@ -242,30 +235,3 @@ class Jobs:
             **REOPENED,
             **values,
         )
-
-
-DRAWS: Final = 2**53
-"""Draws are below: JSON holds them as they are."""
-
-
-def _new_row(job: NewJob) -> dict[str, Any]:
-    key = job.key
-    return {
-        "id": key.job_id,
-        "task": key.task,
-        "task_version": key.task_version,
-        "model": job.model,
-        "model_hash": key.model_hash,
-        "model_config": dict(job.model_config),
-        "track": key.track,
-        "track_config": dict(job.track_config),
-        "seed": key.seed,
-        "draw": SystemRandom().randrange(DRAWS),
-        "limits": dict(job.limits),
-        "owner": job.owner,
-        "payer": job.payer,
-        "traceparent": job.traceparent,
-        "stage": Stage.CONSTRUCT,
-        "queue": CONSTRUCT_QUEUE,
-        "state": JobState.QUEUED,
-    }
