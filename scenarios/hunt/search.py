@@ -81,19 +81,23 @@ class TaskSearch:
                 self._archive.add_single(held, finding.objective, np.array(finding.measures))
 
     def begin(self, crew: Crew, seeds: Sequence[Genome]) -> None:
-        """Tries the genomes that the search starts from."""
+        """Tries the genomes that the search starts from.
+
+        Raises:
+            ValueError: None of them builds a machine that may be tried.
+        """
         children = [
             Child(task=self.task, parents=(g,), seed=(0,), scorer=self._scorer, changed=False)
             for g in seeds
         ]
         self.trials += len(children)
         self.add(crew.all(made, children))
+        if not self.elites:
+            raise ValueError(f"{self.task}: no seed builds a machine that may be tried")
 
     def advance(self, crew: Crew, batch: int = BATCH) -> None:
         """One generation."""
         elites = self.elites
-        if not elites:
-            raise ValueError(f"{self.task}: no seed builds a machine that may be tried")
         draw = np.random.default_rng((self._seed, self._number, self.generation))
         children = []
         for k in range(batch):

@@ -58,11 +58,14 @@ def exploits(folder: Path = EXPLOITS) -> list[Exploit]:
 def seeds_of(task_name: str) -> list[Genome]:
     """Genomes to start from: all that suit the task's kind and number of sub-structures.
 
-    Where no machine of the task's family is stored, the expert's are among them, of all tasks of
-    its kind that have none either. Some kinds begin with the machines of another, too.
+    The expert's machine is among them, and where none of the task's family is stored, those for
+    all tasks of its kind that have none either. Some kinds begin with the machines of another, too.
     """
-    whole = builtin_tasks()[task_name].constraints.min_sub_structures < 2
+    task = builtin_tasks()[task_name]
+    whole = task.constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
+    if whole and task.beginning is None and task_name in DESIGNS:
+        found.append(expert_genome(task_name))
     stored = list(_stored())
     families = {_family(other) for other, _ in stored}
     if _family(task_name) not in families:
@@ -70,7 +73,9 @@ def seeds_of(task_name: str) -> list[Genome]:
         found += [
             expert_genome(name)
             for name in alike
-            if _family(name) not in families and builtin_tasks()[name].beginning is None
+            if _family(name) not in families
+            and name != task_name
+            and builtin_tasks()[name].beginning is None
         ]
     kind = kind_of(task_name)
     for other, genome in stored:

@@ -17,7 +17,7 @@ from support.machines.boulders import car_with_boulder
 from support.machines.drafts import KeyedDraft
 from support.machines.headroom import drafted
 
-from buildarena_benchmark import builtin_tasks, score
+from buildarena_benchmark import broken_constraint, builtin_tasks, score
 from buildarena_environment.variation.genome import Genome, grown
 from buildarena_environment.variation.kinds import kind_of
 from buildarena_environment.variation.mutation import crossed, mutated
@@ -204,6 +204,12 @@ def test_wrong_options_are_named(arguments, says, capsys) -> None:
     with pytest.raises(SystemExit):
         hunt.main(arguments)
     assert says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", builtin_tasks())
+def test_every_task_has_seeds_that_may_be_tried(name) -> None:
+    task = builtin_tasks()[name]
+    assert any(broken_constraint(task, grown(seed)[0]) is None for seed in seeds_of(name))
 
 
 @pytest.mark.samples(4)
