@@ -56,7 +56,9 @@ test: $(STAMP)
 	@set -o pipefail; $(BIN)/lint-imports | tail -n 3
 	@$(RUN_TESTS) -m "not slow" $(lastword $(PACKAGE_CODE))
 else
-test: check check-web-if-it-can-be ## Lints, types, import rules and tests; PACKAGE=libs/geometry: those of one package
+# Types of Python and of the dashboard are each the work of one processor, side by side.
+test: $(STAMP) ## Lints, types, import rules and tests; PACKAGE=libs/geometry: those of one package
+	@$(MAKE) --no-print-directory -j2 --output-sync=target check check-web-if-it-can-be
 	@echo "== 6/6 tests, $(WORKERS) at once (left out: make test-slow, test-long, chaos, peer and bench-*)"
 	@$(RUN_TESTS) -m "not slow"
 endif

@@ -67,6 +67,7 @@ def test_the_search_finds_a_planted_hole_and_its_checks_name_it() -> None:
     assert not closed.success
 
 
+@pytest.mark.slow
 def test_a_search_with_the_same_seed_is_the_same_whoever_does_the_work() -> None:
     def elites(workers: int) -> list[dict[str, object]]:
         search = TaskSearch("lift-1", seed=5)
@@ -227,6 +228,7 @@ def test_machines_of_every_scorer_and_kind_can_be_hunted(task) -> None:
     assert finding is None or finding.objective >= -1.0
 
 
+@pytest.mark.slow
 def test_checks_name_a_program_that_looks_at_nothing() -> None:
     expert = expert_genome("balance-1")
     honest = tried("balance-1", expert)

@@ -140,6 +140,7 @@ def test_a_drive_of_twenty_seconds_is_verified(context, served) -> None:
     assert report.verdict == "verified", report
 
 
+@pytest.mark.slow
 def test_a_page_that_is_gone_ends_the_drive_with_what_there_is(context, served) -> None:
     text = TASK.read_text("utf-8")
     task = parse_custom_task(text, origin="test")
@@ -169,6 +170,7 @@ def refusal(url: str, **hello: object) -> tuple[int, str]:
         return problem["status"], problem["detail"]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_driven_is_refused_in_words(context, served) -> None:
     status, detail = refusal(served, task="support-9")
     assert (status, "support-1" in detail or "support-9" in detail) == (422, True)
@@ -181,6 +183,7 @@ def test_what_cannot_be_driven_is_refused_in_words(context, served) -> None:
     assert not context.store.jobs.page(limit=10)
 
 
+@pytest.mark.slow
 def test_a_key_is_asked_for_and_drives_are_bounded(context) -> None:
     with changed(context, **WITH_KEYS) as own, live_api(own) as url:
         assert refusal(url) == (401, "an API key is needed: send `Authorization: Bearer KEY`")

@@ -53,6 +53,7 @@ def test_verdicts_that_logs_do_not_bear_out_are_marked(api) -> None:
     assert (row["verdict"], row["stated"]) == ("not_seen", "confirmed")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "data", [b"", b"PK", repacked(packed("doctor"), lambda m: m.pop(DOCUMENT))]
 )

@@ -97,7 +97,7 @@ BOMBS = {
 }
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_are_answered_in_words_and_leave_the_process_well(api, name) -> None:
     answer = api.post("/v1/machines/check", content=BOMBS[name]())

@@ -189,6 +189,7 @@ def test_other_rules_have_packages_checked_again_but_words_of_people_stay(people
     after.close()
 
 
+@pytest.mark.slow
 def test_a_season_takes_so_many_a_day_of_one_owner(people) -> None:
     client, ann, bob = people
     client.app.state.seasons = {KNOWN.name: KNOWN.model_copy(update={"attempts_a_day": 2})}
@@ -200,6 +201,7 @@ def test_a_season_takes_so_many_a_day_of_one_owner(people) -> None:
     assert bob.ask("POST", PATH, params=as_entry(), content=b"1").status_code == 201
 
 
+@pytest.mark.slow
 def test_packages_are_checked_once_by_many_and_none_is_lost(people, context) -> None:
     """Four checkers at once; the package of one that was killed meanwhile is not lost."""
     _, ann, bob = people
@@ -251,6 +253,7 @@ def test_too_large_a_package_is_refused_while_it_comes(people, monkeypatch) -> N
     assert ann.ask("POST", PATH, params=as_entry(), content=packed()).status_code == 413
 
 
+@pytest.mark.slow
 def test_packages_are_no_garbage(people, context) -> None:
     _, ann, _ = people
     made = ann.ask("POST", PATH, params=as_entry(), content=packed()).json()

@@ -75,6 +75,7 @@ def test_a_tower_that_topples_onto_the_ball(engine) -> None:
     assert result.indicator < 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_does_nothing_delivers_nothing(engine) -> None:
     result = scored(TASK, drafted(couriers.courier(0), []), engine, None)

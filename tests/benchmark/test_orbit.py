@@ -76,6 +76,7 @@ def test_what_swings_to_and_fro_goes_nowhere() -> None:
     assert (swept(np.zeros((4, 3)), np.zeros(3)) == 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [5.0, 50.0, 300.0])
 def test_circles_over_one_place_are_no_way_round(radius) -> None:
     machine, trial = flown(FASTER_FIRST[0])
@@ -130,6 +131,7 @@ def landed_otherwise(change: Any) -> Any:
     return score(RETURN, machine, change(trial, touch))
 
 
+@pytest.mark.slow
 def test_what_only_hovers_over_the_ground_has_not_landed() -> None:
     def hovers(trial: Trajectory, _: int) -> Trajectory:
         bearing = trial.bearing
@@ -170,6 +172,7 @@ def test_what_comes_off_when_it_lands_is_told() -> None:
     assert list(result.flags) == ["came_apart"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", [ONCE, shorter(RETURN, 12.0)])
 def test_without_a_program_nothing_flies(task) -> None:
     machine = built(catalogue=module_set("all"))

@@ -1,6 +1,7 @@
 """The task catalogue: its tasks, their versions, and errors in a user's own."""
 
 import re
+from importlib import resources
 
 import pytest
 import yaml
@@ -73,6 +74,12 @@ def test_there_are_the_papers_tasks_and_those_of_other_categories(tasks) -> None
         assert (task.category, task.level) == (category, int(level))
         assert set(task.difficulty) == DIMENSIONS
         assert all(1 <= weight <= 3 for weight in task.difficulty.values())
+
+
+def test_built_in_tasks_are_read_as_anybodys_are(tasks) -> None:
+    for name, task in tasks.items():
+        text = resources.files("buildarena_benchmark.tasks") / "catalogue" / f"{name}.yaml"
+        assert load_task(text.read_text(encoding="utf-8")) == task
 
 
 def test_each_task_has_the_papers_scenario() -> None:

@@ -60,6 +60,7 @@ def made(tmp_path_factory) -> Path:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_it_loads_with_its_splits_and_no_two_machines_are_alike(made, tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
@@ -210,6 +211,7 @@ def test_without_designs_nothing_is_made(tmp_path, monkeypatch):
     assert (done.returncode, "install buildarena-worker" in done.stderr) == (1, True)
 
 
+@pytest.mark.slow
 def test_a_machine_that_comes_out_different_ends_the_making(tmp_path, monkeypatch):
     monkeypatch.setattr(making, "repeated", lambda rows, *_: ((row, ["mass"]) for row in rows))
     done = make(tmp_path / "out", "--count", "1", "--processes", "1")
@@ -242,6 +244,7 @@ def tampered(name: str, row: dict) -> None:
             row["canary"] = ""
 
 
+@pytest.mark.slow
 def test_verify_finds_every_row_that_was_tampered_with(made, tmp_path):
     (folder := tmp_path / "bad").mkdir()
     training = [row for row in rows(made) if row["split"] == "train"]
@@ -272,6 +275,7 @@ def test_verify_finds_every_row_that_was_tampered_with(made, tmp_path):
     assert f"number {COUNT}, {twice['id']}: another row has the same machine" in done.stderr
 
 
+@pytest.mark.slow
 def test_verify_passes_what_was_made(made, tmp_path):
     (folder := tmp_path / "few").mkdir()
     for split in SPLITS:

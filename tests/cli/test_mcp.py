@@ -125,6 +125,7 @@ async def side_by_side(connected) -> list[str]:
         return results
 
 
+@pytest.mark.slow
 def test_calls_sent_side_by_side_are_done_in_the_order_sent(stdio) -> None:
     results = asyncio.run(side_by_side(stdio))
     blocks = [result.split(",")[0] for result in results]

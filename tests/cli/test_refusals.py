@@ -17,7 +17,7 @@ def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
         assert word in line
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["up", "demo"])
 def test_a_taken_port(tmp_path, command) -> None:
     with socket.socket() as taken:
@@ -30,7 +30,7 @@ def test_a_taken_port(tmp_path, command) -> None:
     assert named == []
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["up", "demo"])
 def test_an_unwritable_data_folder(tmp_path, command) -> None:
     (tmp_path / "file").write_text("in the way")
@@ -85,7 +85,7 @@ def test_help_names_every_command() -> None:
         assert command in text
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("module", ["buildarena_worker", "buildarena_api"])
 def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) -> None:
     from buildarena_store import Database

@@ -78,7 +78,7 @@ def test_roles_then_migration_by_an_owner_who_is_no_superuser(fresh, tmp_path) -
     assert "second" not in refused.stderr + refused.stdout
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message", "code"),
     [

@@ -173,7 +173,7 @@ def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
         assert ADMIN.encode() not in (site / name).read_bytes()
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ["data/", "jobs/", "site.json", "index.html"])
 def test_a_run_that_breaks_off_leaves_nothing_that_looks_whole(
     url, idle, tmp_path, monkeypatch, place
@@ -249,6 +249,7 @@ def test_a_job_that_changed_is_asked_for_again(url, idle, tmp_path) -> None:
         assert json.loads(index.read_text()) == known
 
 
+@pytest.mark.slow
 def test_a_track_alone_is_a_site(url, idle, context, tmp_path) -> None:
     other = {**IDLE, "simulator": "pybullet", "seeds": [0]}
     submitted(url, other)
@@ -267,6 +268,7 @@ def test_a_track_alone_is_a_site(url, idle, context, tmp_path) -> None:
     assert read(both)["sweeps"] == [idle]
 
 
+@pytest.mark.slow
 def test_jobs_that_have_not_ended_are_told(url, idle, tmp_path) -> None:
     waiting = submitted(url, {**IDLE, "seeds": [3, 4, 5]})
     alone = run_cli(url, "site", waiting, "--out", str(tmp_path / "none"))

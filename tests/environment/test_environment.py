@@ -43,6 +43,7 @@ def test_what_the_expert_builds_is_scored_as_kept(experts) -> None:
         assert kept["score"]["indicator"] == pytest.approx(references()[task], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_an_episode_from_reset_to_reward(bridge_calls) -> None:
     environment = Environment(
         "support-1", simulator="mujoco", rewards={"success": 2.0, "indicator": 1.0}
@@ -153,6 +154,7 @@ def test_shaping_follows_the_machine_and_pays_nothing_for_going_in_circles() -> 
     assert environment.step("fly").reward < grown
 
 
+@pytest.mark.slow
 def test_a_disqualified_trial_earns_nothing(bridge_calls) -> None:
     environment = played(Environment("support-1", rewards=ALL), bridge_calls)
     before = environment.reward
@@ -192,6 +194,7 @@ def test_states_are_values_and_lead_back(bridge_calls) -> None:
     assert Snapshot.from_document(elsewhere.state().as_document()).done
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "copied",
     [copy.deepcopy, lambda state: pickle.loads(pickle.dumps(state))],

@@ -46,6 +46,7 @@ def test_results_come_in_order_whatever_the_number_of_processes(short, bridge) -
     assert alone[-1].indicator == 0.0
 
 
+@pytest.mark.slow
 def test_documents_do_as_well_and_nonsense_is_refused_before_it_is_sent(short, bridge) -> None:
     with Evaluator(short, processes=1) as evaluator:
         found = evaluator.evaluate(bridge.to_document())

@@ -76,7 +76,7 @@ def at_work(context, job_id: str) -> None:
     wait_until(lambda: expires() != first, 20, "it is worked on")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 def test_a_trial_under_way_is_finished(context, worker) -> None:
     job = waiting(context, SECONDS + FEW_BLOCKS)
     with worker(120) as process:

@@ -54,7 +54,7 @@ def test_each_can_be_read_and_a_machine_of_nothing_fails(name) -> None:
     assert failed.indicator < 0.5
 
 
-@pytest.mark.samples(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("name", SOLVED)
 def test_the_experts_design_solves_it(name, engine) -> None:

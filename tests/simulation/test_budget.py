@@ -69,6 +69,7 @@ def test_a_part_of_the_load_is_worth_nothing(engine, tasks, machine) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.slow
 @slow_on_pybullet
 def test_a_bridge_that_bears_the_load_for_a_moment_does_not_carry_it(engine, tasks) -> None:
     task, machine = tasks["budget-1"], hanging_post(1)

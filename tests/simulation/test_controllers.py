@@ -314,7 +314,7 @@ print(sha256(write_trajectory(done)).hexdigest())
     assert there.stdout.strip() == here
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 def test_the_example_drives_to_its_mark_and_stops(engine) -> None:
     task = load_task(EXAMPLE / "to-the-mark.yaml")
     machine = Machine.from_document(json.loads((EXAMPLE / "car.machine.json").read_text()))

@@ -34,7 +34,7 @@ def test_what_the_gaps_floor_bears_is_no_long_bridge(engine, tasks, task, gap, b
     assert result.metrics["load_per_mass"] == 0.0
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @slow_on_pybullet
 @pytest.mark.parametrize(("overlap", "depth"), [(8, 1), (6, 2)])
 def test_debris_that_lies_on_the_floor_takes_nothing_back(engine, tasks, overlap, depth) -> None:
@@ -45,7 +45,7 @@ def test_debris_that_lies_on_the_floor_takes_nothing_back(engine, tasks, overlap
     assert result.flags == ()
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @slow_on_pybullet
 @pytest.mark.parametrize(("task", "gap"), SPANS)
 @pytest.mark.parametrize("height", [3, 4])
@@ -114,7 +114,7 @@ def _arm(*presses: tuple[float, str, float]) -> Machine:
     return drafted(swinging_arm(0), presses)
 
 
-@pytest.mark.samples(2)
+@pytest.mark.slow
 @slow_on_pybullet
 @pytest.mark.parametrize(
     "presses",
@@ -222,6 +222,7 @@ def test_a_mast_that_is_lifted_a_little_holds_no_height(engine, tasks, mast) -> 
     assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.slow
 @slow_on_pybullet
 @pytest.mark.parametrize(
     ("presses", "held_s"),
@@ -312,6 +313,7 @@ def test_a_payload_weighs_what_it_did_when_it_left_the_ground(engine, tasks, beg
 # A load hauled
 
 
+@pytest.mark.slow
 @slow_on_pybullet
 @pytest.mark.parametrize(
     ("pivot", "show"), [("Swivel", "apart"), ("Swivel", "meshing"), ("Swivel", "on the beam")]

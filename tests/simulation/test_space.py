@@ -83,7 +83,7 @@ def rocket(tank: str = "Fuel Barrel Big") -> Machine:
     return bound(machine, thrust="Alpha1")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("tank", "burn_s"), [("Fuel Barrel Big", 40.0), ("Fuel Barrel", 8.0)])
 def test_the_rocket_equation_holds_as_fuel_is_used_up(engine, tank, burn_s) -> None:
     machine = rocket(tank)

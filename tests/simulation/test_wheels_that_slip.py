@@ -103,6 +103,7 @@ def _on_the_rough_road(seed: int, engine: str, duration_s: float) -> tuple[Machi
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 8, 10])
 def test_edges_under_wheels_push_nothing_on(engine, seed) -> None:
     """A vehicle on ridges is no faster than its motors turn its wheels, and falls on none."""
@@ -114,6 +115,7 @@ def test_edges_under_wheels_push_nothing_on(engine, seed) -> None:
     assert 0.6 * rim < speed.max() < 1.05 * rim
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [5, 8])
 def test_the_ground_bears_a_vehicle_on_suspensions_by_its_weight(engine, seed) -> None:
     machine, trajectory = _on_the_rough_road(seed, engine, 1.2)

@@ -1,7 +1,9 @@
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 from support.jobs import claim
 
-from buildarena_store import UnknownIdError
+from buildarena_store import NewJob, UnknownIdError
 from buildarena_store.tables import jobs
 
 
@@ -12,6 +14,29 @@ def test_a_job_with_the_same_key_is_the_same_job(context, new_job, add) -> None:
     assert added == 1
     assert context.store.jobs.get(first).seed == 1
     assert len(context.store.jobs.page(limit=10)) == 2
+
+
+def test_jobs_are_claimed_in_the_order_in_which_they_were_given(context, new_job) -> None:
+    seeds = [3, 1, 4, 15, 9, 2, 6, 5]
+    given = [new_job(seed, model) for model in ("m", "n") for seed in seeds]
+    with context.store.database.transaction() as connection:
+        assert context.store.jobs.add([*given, given[0]], connection=connection) == len(given)
+    claimed = [claim(context).job for _ in given]
+    assert [(job.model, job.seed) for job in claimed] == [(j.model, j.key.seed) for j in given]
+    assert all(job.model_config == {"name": job.model} for job in claimed)
+    assert len({job.draw for job in claimed}) == len(given)
+
+
+def test_sweeps_of_the_same_jobs_may_be_added_at_once(context, new_job) -> None:
+    given = [new_job(seed) for seed in range(200)]
+
+    def add(jobs: list[NewJob]) -> int:
+        with context.store.database.transaction() as connection:
+            return context.store.jobs.add(jobs, connection=connection)
+
+    with ThreadPoolExecutor(4) as threads:
+        added = list(threads.map(add, [given, given[::-1], given[::-1], given]))
+    assert sorted(added) == [0, 0, 0, 200]
 
 
 def test_an_unknown_id_is_named(context) -> None:

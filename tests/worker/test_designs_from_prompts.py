@@ -43,7 +43,7 @@ def another_winch(weight: float, north: float) -> Task:
     return replace(task, statement=statement, scenario=scenario)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", TASKS)
 def test_numbers_in_the_prompt_are_enough_for_a_first_success(name, engine) -> None:

@@ -66,7 +66,7 @@ def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
     assert verdict(context, job) == "verified"
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:

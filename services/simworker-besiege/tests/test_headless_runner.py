@@ -68,7 +68,7 @@ def test_what_needs_the_script_is_refused_with_the_reason(headless, name) -> Non
         headless[1].run(trial_of(task, machine))
 
 
-@pytest.mark.samples(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["crash", "freeze"])
 def test_a_fault_once_is_got_over(headless, fault) -> None:
     rig, simulator = headless

@@ -88,6 +88,7 @@ def test_a_program_senses_and_answers_in_the_game_what_it_does_in_an_engine(to_t
     assert np.abs(there.answers - ours.answers).max() < 0.01
 
 
+@pytest.mark.slow
 def test_the_log_of_a_program_is_a_trajectory_that_can_be_scored_and_stored(to_the_mark) -> None:
     machine, scenario, _, game = to_the_mark
     trajectory = read_back(game, machine, scenario)
@@ -106,6 +107,7 @@ def changed(lines: list[str], kind: str, change) -> list[str]:
     return [*lines[:at], *([] if body is None else [f"{body},{check_sum(body)}"]), *lines[at + 1 :]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "words"),
     [

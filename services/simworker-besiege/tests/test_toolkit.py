@@ -134,7 +134,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.samples(3)
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_once_is_got_over_and_named(simulator, faults, fault) -> None:
     faults(fault)

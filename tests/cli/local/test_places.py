@@ -122,6 +122,7 @@ def test_postgres_gets_its_own_folder_and_nothing_around_it() -> None:
     assert refusal.endswith("Permission denied")
 
 
+@pytest.mark.slow
 def test_data_that_an_older_version_kept_elsewhere_is_found_again() -> None:
     program = (
         SERVERS

@@ -165,8 +165,10 @@ def _names(counted: Mapping[str, Row], tasks: Sequence[str]) -> list[str]:
     return sorted({name for task in tasks for name in counted[task]})
 
 
-def _places(row: Row, complete: Sequence[str]) -> list[int]:
+def _places(row: Row, complete: Sequence[str]) -> slice | list[int]:
     """Where the pairs of complete configurations are among a task's pairs."""
+    if list(row) == complete:
+        return slice(None)
     number = {name: place for place, name in enumerate(row)}
     pairs = {pair: place for place, pair in enumerate(combinations(range(len(row)), 2))}
     return [pairs[number[a], number[b]] for a, b in combinations(complete, 2)]

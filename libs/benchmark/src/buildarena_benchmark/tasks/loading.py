@@ -8,6 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
+import yaml
+
 from buildarena_benchmark.errors import SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.sources import read_model, read_source
@@ -47,6 +49,7 @@ _COURSES: Final = (
     "drive-4",
     "fetch-1",
 )
+_OWN: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @cache
@@ -57,7 +60,9 @@ def builtin_tasks() -> Mapping[str, Task]:
     further = (*_HEADROOM, *_FAMILIES, *_CONTROL, *_THROWING, *_SPACE, *_COURSES)
     for name in (*_PAPER, *_WORKSHOP, *further):
         text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
-        tasks[name] = parse_task(text, origin=f"{name}.yaml")
+        # Ours: read by libyaml, five times as fast as by what strangers' texts are read by.
+        content = yaml.load(text, Loader=_OWN)  # noqa: S506 - makes plain values
+        tasks[name] = task_of(TaskDocument.model_validate(content))
     return MappingProxyType(tasks)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 from functools import cache
+from operator import attrgetter
 from typing import Any, Literal
 from urllib.parse import quote_plus
 
@@ -245,6 +246,10 @@ class ChangePage(_View):
     next_before: int | None = Field(description="Give it as `before` to get the next page")
 
 
+_CELL = tuple(Cell.__dataclass_fields__)
+_VALUES = attrgetter(*_CELL)
+
+
 def board_view(
     board: RankedBoard,
     *,
@@ -271,7 +276,6 @@ def board_view(
 
     def row(ranked: Any, task: str) -> Row:
         cell: Cell = ranked.cell
-        values = {name: getattr(cell, name) for name in Cell.__dataclass_fields__}
         query = f"task={quoted(task)}&model={quoted(cell.model)}"
         one = (
             f"track={quoted(track)}&task_version={quoted(versions[task])}"
@@ -279,7 +283,7 @@ def board_view(
         )
         return Row.model_validate(
             {
-                **values,
+                **dict(zip(_CELL, _VALUES(cell), strict=True)),
                 "rank": ranked.rank,
                 "rank_low": ranked.rank_low,
                 "rank_high": ranked.rank_high,

@@ -1,0 +1,103 @@
+"""Starts and ends the process of the API."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import threading
+from importlib import import_module
+
+from sqlalchemy.exc import OperationalError
+
+from buildarena_api.app import POOL_SIZE, create_app
+from buildarena_api.http.access import check_binding
+from buildarena_api.http.own_pool import POOL_TIMEOUT_S
+from buildarena_api.http.serving import serve
+from buildarena_benchmark.leaderboard import published_overall
+from buildarena_environment.processes import end_with_parent
+from buildarena_pipeline.catalog.models import load_registry
+from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.runtime.context import open_context
+from buildarena_pipeline.runtime.logs import set_up_logs
+from buildarena_pipeline.runtime.settings import load_settings
+from buildarena_pipeline.runtime.tracing import Tracing
+from buildarena_store import SchemaVersionError
+
+MAX_MESSAGE = 3 << 20
+"""Bytes of a socket's message: the first of a drive has a machine."""
+SWITCH_S = 0.0001
+"""How long a thread may keep the interpreter: a light question asks for it some twenty times, and
+waits so long each time while a heavy one is being answered."""
+COLLECTING = (5_000, 10, 30)
+"""How often the garbage collector runs: seldom over what a question of 10,000 jobs has made so far,
+as that takes 0.1 s in which nobody is answered."""
+
+LATER_S = 5.0
+"""After so long what is not needed at first is loaded, so that the first answers are sooner."""
+
+
+def main() -> None:
+    """Serves the API until it is asked to stop."""
+    try:
+        settings = load_settings()
+    except StartupError as error:
+        sys.exit(f"api: {error}")
+    sys.setswitchinterval(SWITCH_S)
+    set_up_logs(settings.log_level)
+    end_with_parent()
+    try:
+        check_binding(settings)
+        tracing = Tracing("api", settings.otlp_endpoint)
+        registry = load_registry(settings.models_file)
+        context = open_context(
+            settings, pool_size=POOL_SIZE, pool_timeout_s=POOL_TIMEOUT_S, name="buildarena-api"
+        )
+        context.store.database.require_schema()
+    except (StartupError, SchemaVersionError, ValueError) as error:
+        sys.exit(f"api: {error}")
+    except OperationalError as error:
+        sys.exit(f"api: the database can't be reached: {error.orig}")
+    app = create_app(context, registry)
+    _settle()
+    try:
+        serve(
+            app,
+            host=settings.host,
+            port=settings.port,
+            log_config=None,
+            access_log=False,
+            timeout_graceful_shutdown=5,
+            ws_max_size=MAX_MESSAGE,
+            ws_per_message_deflate=False,  # poses hardly become smaller
+            proxy_headers=False,  # the application itself reads them, from trusted proxies
+        )
+    finally:
+        context.close()
+        tracing.close()
+
+
+def _settle() -> None:
+    """Takes what the process always has out of the garbage collector's sight.
+
+    Looking through it all takes 0.2 s, in which nobody is answered, and happens whenever a question
+    makes many objects. What the first board would load is loaded before, so that it is part of it;
+    what only comparisons need is loaded later, as that takes as long as the first board.
+    """
+    published_overall()
+    import_module("scipy.optimize")
+    _out_of_sight()
+    gc.set_threshold(*COLLECTING)
+    gc.enable()
+    later = threading.Timer(LATER_S, _load_the_rest)
+    later.daemon = True
+    later.start()
+
+
+def _load_the_rest() -> None:
+    import_module("scipy.stats")
+    _out_of_sight()
+
+
+def _out_of_sight() -> None:
+    gc.collect()
+    gc.freeze()
