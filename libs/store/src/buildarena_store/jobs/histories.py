@@ -35,6 +35,10 @@ NAME: Final = "history"
 GZIP: Final = "application/gzip"
 PACKED: Final[tuple[Table, ...]] = (journal, external_calls, events)
 PAGE: Final = 500
+TOGETHER: Final = 25
+"""Jobs that are packed in one transaction: most of its time would go into asking, job by job."""
+LEVEL: Final = 6
+"""Of gzip: 9 takes twice the time for a hundredth less."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,16 +75,16 @@ class Histories:
             return int(connection.execute(query).scalar_one())
 
     def pack_all(self, older_than: timedelta) -> Iterator[Packing]:
-        """Packs the histories of all jobs that were scored so long ago, one after the other.
+        """Packs the histories of all jobs that were scored so long ago, some at a time.
 
-        Each job is a transaction of its own: broken off anywhere, nothing is lost, and the next
-        call goes on. Jobs that errored keep their rows, as they may be tried again.
+        Some jobs are a transaction: broken off anywhere, nothing is lost, and the next call goes
+        on. Several may pack at once. Jobs that errored keep their rows, as they may be tried again.
 
         Yields:
-            What was done for one job.
+            What was done for some jobs.
 
         Raises:
-            ArtifactStoreError: The store can't be written; the job's rows are untouched.
+            ArtifactStoreError: The store can't be written; these jobs' rows are untouched.
         """
         last = ""
         while True:
@@ -89,29 +93,41 @@ class Histories:
                 ids = list(connection.execute(query.order_by(jobs.c.id).limit(PAGE)).scalars())
             if not ids:
                 return
-            for job_id in ids:
-                done = self._pack(job_id, older_than)
-                if done is not None:
+            for start in range(0, len(ids), TOGETHER):
+                done = self._pack(ids[start : start + TOGETHER], older_than)
+                if done.jobs:
                     yield done
             last = ids[-1]
 
-    def _pack(self, job_id: str, older_than: timedelta) -> Packing | None:
+    def _pack(self, job_ids: Sequence[str], older_than: timedelta) -> Packing:
+        rows = size = 0
         with self._database.transaction() as connection:
-            # Verified or retried meanwhile, it is left alone.
-            mine = select(jobs.c.id).where(jobs.c.id == job_id, *_packable(older_than))
-            if connection.execute(mine.with_for_update()).first() is None:
-                return None
-            parts, rows = [], 0
+            # Verified or retried meanwhile, or being packed by somebody else: left alone.
+            mine = (
+                select(jobs.c.id)
+                .where(jobs.c.id == any_(bound_texts(job_ids)), *_packable(older_than))
+                .order_by(jobs.c.id)
+                .with_for_update(skip_locked=True)
+            )
+            ids = list(connection.execute(mine).scalars())
+            parts: dict[str, list[str]] = {job_id: [] for job_id in ids}
             for table in PACKED:
-                found = connection.execute(_AS_JSON[table], {"job": job_id}).one()
-                parts.append(f'"{table.name}":{found.rows}')
-                rows += found.number
-            data = gzip.compress(f"{{{','.join(parts)}}}".encode(), mtime=0)
-            kept = self._store.put(data, GZIP)
-            attach_artifacts(job_id, {NAME: kept}, connection=connection)
+                found = {
+                    row.job_id: row for row in connection.execute(_AS_JSON[table], {"ids": ids})
+                }
+                for job_id, written in parts.items():
+                    own = found.get(job_id)
+                    written.append(f'"{table.name}":{own.rows if own else "[]"}')
+                    rows += own.number if own else 0
+            for job_id, written in parts.items():
+                packed = gzip.compress(f"{{{','.join(written)}}}".encode(), LEVEL, mtime=0)
+                kept = self._store.put(packed, GZIP)
+                attach_artifacts(job_id, {NAME: kept}, connection=connection)
+                size += kept.size
             for table in PACKED:
-                connection.execute(delete(table).where(table.c.job_id == job_id))
-        return Packing(jobs=1, rows=rows, bytes=kept.size)
+                gone = table.c.job_id == any_(bound_texts(ids))
+                connection.execute(delete(table).where(gone))
+        return Packing(jobs=len(ids), rows=rows, bytes=size)
 
     def unpack(self, job_ids: Sequence[str]) -> int:
         """Puts the rows of packed jobs back; of others nothing changes.
@@ -160,12 +176,12 @@ def _packable(older_than: timedelta) -> tuple[Any, ...]:
     )
 
 
+_KEYS = {table: ", ".join(column.name for column in table.primary_key) for table in PACKED}
 # As `json`, and not `jsonb`: journals keep the order of keys, which replies are replayed with.
 _AS_JSON = {
     table: text(
-        f"SELECT COALESCE(json_agg(row_to_json(t)), '[]')::text AS rows, count(*) AS number "  # noqa: S608 - our own tables' names
-        f"FROM (SELECT * FROM {table.name} WHERE job_id = :job "
-        f"ORDER BY {', '.join(column.name for column in table.primary_key.columns)}) t"
+        f"SELECT job_id, json_agg(row_to_json(t) ORDER BY {_KEYS[table]})::text AS rows, "  # noqa: S608 - our own tables' names
+        f"count(*) AS number FROM {table.name} t WHERE job_id = ANY(:ids) GROUP BY job_id"
     )
     for table in PACKED
 }
