@@ -202,9 +202,11 @@ def test_heartbeats_change_a_narrow_row_and_no_index(context, add, cost) -> None
     add(*range(40))
     held = [claim(context) for _ in range(40)]
     execute(context, "UPDATE jobs SET cost_usd = :cost", {"cost": cost})
-    heartbeats, before, written = 0, changed(context), ask(context, WRITTEN)[0]
+    heartbeats, before, written = 0, changed(context), []
     while heartbeats < 1000 or changed(context)["leases"][0] - before["leases"][0] < heartbeats:
+        begun = ask(context, WRITTEN)[0]
         assert len(context.store.leases.heartbeat(held)) == len(held)
+        written.append((ask(context, WRITTEN)[0] - begun) / len(held))
         heartbeats += len(held)
         assert heartbeats < 10_000, "they are never counted"
     after = changed(context)
@@ -215,7 +217,8 @@ def test_heartbeats_change_a_narrow_row_and_no_index(context, add, cost) -> None
     # A snapshot of somebody else, such as autovacuum's, keeps old versions of rows for a moment:
     # two rounds of forty, for example. With an index on what changes no update would be one.
     assert hot_after - hot_before >= 0.8 * (all_after - all_before)
-    assert (ask(context, WRITTEN)[0] - written) / heartbeats < 900
+    # The log is the server's: tests beside this one write to it, too, but not all the time.
+    assert min(written) < 900
 
 
 def ask(context: Context, query: TextClause, **values: str) -> tuple[int, ...]:

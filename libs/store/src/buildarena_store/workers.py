@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Final
 
-from sqlalchemy import ColumnElement, cast, delete, func, not_, select, tuple_
-from sqlalchemy.dialects.postgresql import insert
+from sqlalchemy import bindparam, cast, delete, func, not_, select, tuple_
+from sqlalchemy.dialects.postgresql import Insert, insert
 from sqlalchemy.types import DateTime, Double
 
 from buildarena_store import events
@@ -106,25 +106,18 @@ class Workers:
         own_time: datetime | None = None,
     ) -> None:
         """Reports that a worker is alive; forgets those that have not reported for an hour."""
-        row = {
+        given = {
+            "id": worker_id,
             "kind": kind,
             "queues": list(queues),
             "host": host,
             "pid": pid,
             "versions": dict(versions),
             "peak_memory_bytes": peak_memory_bytes,
-            "clock_ahead_s": None if own_time is None else _ahead(own_time),
+            "own_time": own_time,
         }
-        statement = insert(workers).values(id=worker_id, **row)
-        with self._database.transaction() as connection:
-            connection.execute(
-                statement.on_conflict_do_update(
-                    index_elements=["id"], set_={**row, "seen_at": events.now}
-                )
-            )
-            connection.execute(
-                delete(workers).where(workers.c.seen_at < events.now - FORGOTTEN_AFTER)
-            )
+        with self._database.statement() as connection:
+            connection.execute(_REPORT, given)
 
     def leave(self, worker_id: str) -> None:
         """Removes a worker that shuts down from the register."""
@@ -216,7 +209,20 @@ class Workers:
             ]
 
 
-def _ahead(own_time: datetime) -> ColumnElement[float]:
-    """Seconds from the database's clock to a process' own."""
-    difference = cast(own_time, DateTime(timezone=True)) - events.now
-    return cast(func.extract("epoch", difference), Double)
+def _report() -> Insert:
+    """Writes a worker's row and forgets silent ones; made once, as every worker says it often."""
+    named = ("id", "kind", "queues", "host", "pid", "versions", "peak_memory_bytes")
+    row: dict[str, Any] = {name: bindparam(name, type_=workers.c[name].type) for name in named}
+    own_time = bindparam("own_time", type_=DateTime(timezone=True))
+    row["clock_ahead_s"] = cast(func.extract("epoch", own_time - events.now), Double)
+    silent = delete(workers).where(
+        workers.c.seen_at < events.now - FORGOTTEN_AFTER, workers.c.id != row["id"]
+    )
+    statement = insert(workers).values(row)
+    renewed = {name: statement.excluded[name] for name in row if name != "id"}
+    return statement.on_conflict_do_update(
+        index_elements=["id"], set_={**renewed, "seen_at": events.now}
+    ).add_cte(silent.cte("forgotten"))
+
+
+_REPORT: Final = _report()

@@ -13,16 +13,11 @@ from datetime import timedelta
 from typing import Any, Final
 
 from sqlalchemy import (
-    Boolean,
     ColumnElement,
     Connection,
     Update,
     and_,
-    case,
     delete,
-    func,
-    literal,
-    literal_column,
     select,
     tuple_,
     update,
@@ -32,10 +27,11 @@ from buildarena_store import events
 from buildarena_store.account_tables import budgets
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
-from buildarena_store.jobs.attempts import Ending, end_attempts, hand_back, move_on
+from buildarena_store.jobs.attempts import Ending, hand_back, move_on
 from buildarena_store.jobs.claiming import CLAIM
 from buildarena_store.jobs.job import Job
-from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, RUNNER, require_fewer_leases
+from buildarena_store.jobs.lost_leases import recover_lost
+from buildarena_store.jobs.misses import require_fewer_leases
 from buildarena_store.rows import value_of
 from buildarena_store.states import AttemptResult, JobState, Outcome, Stage
 from buildarena_store.tables import jobs
@@ -319,49 +315,7 @@ class Leases:
         Returns:
             Ids of the jobs that wait again.
         """
-        # A key of runners counts once, and never ends a job alone.
-        is_runners = func.starts_with(jobs.c.lease_owner, RUNNER)
-        missed_before = and_(is_runners, literal_column(MISSED_BEFORE, Boolean))
-        faults = jobs.c.faults + case((missed_before, 0), else_=1)
-        limit = case((is_runners, max(self.max_faults, MIN_KEYS)), else_=self.max_faults)
-        last = faults >= limit
-        with self._database.transaction() as connection:
-            lost = (
-                select(jobs.c.id)
-                .where(jobs.c.state == JobState.RUNNING, events.now > EXPIRES_AT)
-                .with_for_update(skip_locked=True)
-            )
-            rows = connection.execute(
-                update(jobs)
-                .where(jobs.c.id.in_(lost.scalar_subquery()))
-                .values(
-                    state=case((last, literal(JobState.DONE.value)), else_=JobState.QUEUED.value),
-                    outcome=case((last, literal(Outcome.ERRORED.value)), else_=None),
-                    reason=case((last, literal("lost_worker")), else_=None),
-                    detail=case((last, literal("it lost its workers again and again")), else_=None),
-                    finished_at=case((last, events.now), else_=None),
-                    faults=faults,
-                    lost_requests=jobs.c.lost_requests + case((_IN_SESSION, 1), else_=0),
-                    lease_owner=None,
-                    lease_expires_at=None,
-                    notified_at=None,
-                    available_at=events.now,
-                )
-                .returning(jobs.c.id, jobs.c.state, jobs.c.lease_token, jobs.c.stage)
-            ).all()
-            endings = [
-                Ending(
-                    job_id=row.id,
-                    token=row.lease_token,
-                    state=JobState(row.state),
-                    data={"stage": row.stage, "why": "lost worker"},
-                )
-                for row in rows
-            ]
-            end_attempts(
-                endings, AttemptResult.LOST, "no heartbeat was received", connection=connection
-            )
-        return [row.id for row in rows if row.state == JobState.QUEUED]
+        return recover_lost(self._database, max_faults=self.max_faults)
 
     def forget_ended(self) -> None:
         """Removes what is known of leases that ended an hour ago or earlier."""
@@ -377,21 +331,9 @@ class Leases:
             )
 
 
-# Jobs that a program of 1.0.0rc1 claimed have no row of their own.
-EXPIRES_AT: Final = func.coalesce(
-    select(expiries.c.expires_at)
-    .where(expiries.c.job_id == jobs.c.id, expiries.c.token == jobs.c.lease_token)
-    .scalar_subquery(),
-    jobs.c.lease_expires_at,
-)
-"""When the lease of a running job ends."""
 _BUDGETED = (
     select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
 )
-
-
-# A session has one request open at most, whose reply is lost with its process.
-_IN_SESSION = jobs.c.stage == Stage.CONSTRUCT
 
 
 def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:

@@ -17,7 +17,8 @@ from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.errors import StaleLeaseError
 from buildarena_store.jobs.job import Job
-from buildarena_store.jobs.leases import EXPIRES_AT, Lease, Leases
+from buildarena_store.jobs.leases import Lease, Leases
+from buildarena_store.jobs.lost_leases import EXPIRES_AT
 from buildarena_store.jobs.misses import MIN_KEYS, MISSED_BEFORE, OTHERS_REFUSED, RUNNER
 from buildarena_store.rows import columns_of, value_of
 from buildarena_store.states import AttemptResult, JobState
