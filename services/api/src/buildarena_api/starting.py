@@ -85,7 +85,8 @@ def _settle() -> None:
     """
     published_overall()
     import_module("scipy.optimize")
-    _out_of_sight()
+    gc.collect()
+    gc.freeze()
     gc.set_threshold(*COLLECTING)
     gc.enable()
     later = threading.Timer(LATER_S, _load_the_rest)
@@ -95,9 +96,4 @@ def _settle() -> None:
 
 def _load_the_rest() -> None:
     import_module("scipy.stats")
-    _out_of_sight()
-
-
-def _out_of_sight() -> None:
-    gc.collect()
-    gc.freeze()
+    gc.freeze()  # without a look before, for which everybody would wait
