@@ -1,5 +1,6 @@
 """Histories leave the tables and come back as they were, to the byte."""
 
+from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
 
@@ -62,6 +63,19 @@ def test_packed_rows_are_gone_and_come_back_as_they_were(context, histories) -> 
     assert histories.unpack(ids(context)) == 2
     assert rows(context) == before
     assert histories.unpack(ids(context)) == 0
+    assert rows(context) == before
+
+
+def test_two_that_pack_at_once_share_the_work(context, histories) -> None:
+    before = rows(context)
+
+    def packed(_: int) -> int:
+        return sum(one.jobs for one in histories.pack_all(NOW))
+
+    with ThreadPoolExecutor(2) as threads:
+        assert sum(threads.map(packed, range(2))) == 2
+    assert not any(rows(context).values())
+    assert histories.unpack(ids(context)) == 2
     assert rows(context) == before
 
 
