@@ -7,7 +7,6 @@ room.
 
 import argparse
 import os
-import shutil
 import sys
 import tempfile
 import time
@@ -69,6 +68,16 @@ def vacuum(database: Database) -> float:
     return time.perf_counter() - start
 
 
+def pack(histories: Histories, at_least: int) -> tuple[int, int, int]:
+    """Packs so many jobs, the first by id; returns how many jobs, rows and bytes they were."""
+    jobs = rows = size = 0
+    for one in histories.pack_all(OLD):
+        jobs, rows, size = jobs + one.jobs, rows + one.rows, size + one.bytes
+        if jobs >= at_least:
+            break
+    return jobs, rows, size
+
+
 def measure(folder: Path, *, jobs: int, packed: int, unpacked: int) -> dict[str, Any]:
     """Fills a database, packs, unpacks, and fills the room again."""
     with servers(folder) as settings:
@@ -84,11 +93,7 @@ def measure(folder: Path, *, jobs: int, packed: int, unpacked: int) -> dict[str,
         counted = time.perf_counter() - start
 
         start, cpu = time.perf_counter(), time.process_time()
-        done, rows, size = 0, 0, 0
-        for one in histories.pack_all(OLD):
-            done, rows, size = done + one.jobs, rows + one.rows, size + one.bytes
-            if done >= packed:
-                break
+        done, rows, size = pack(histories, packed)
         packing, used = time.perf_counter() - start, time.process_time() - cpu
 
         with database.statement() as connection:
@@ -96,8 +101,7 @@ def measure(folder: Path, *, jobs: int, packed: int, unpacked: int) -> dict[str,
         start = time.perf_counter()
         back = histories.unpack(names)
         unpacking = time.perf_counter() - start
-        for _ in zip(range(back), histories.pack_all(OLD), strict=False):
-            pass
+        pack(histories, back)
 
         vacuuming = vacuum(database)
         add_rows(database, first=0, jobs=done)
@@ -176,13 +180,12 @@ def main() -> None:
     parser.add_argument("--packed", type=int, default=10_000)
     parser.add_argument("--unpacked", type=int, default=500)
     given = parser.parse_args()
-    folder = Path(tempfile.mkdtemp(prefix="buildarena-bench-"))
-    try:
-        result = measure(folder, jobs=given.jobs, packed=given.packed, unpacked=given.unpacked)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    for name, value in result.items():
-        sys.stdout.write(f"{name:<40} {value}\n")
+    with tempfile.TemporaryDirectory(
+        prefix="buildarena-bench-", ignore_cleanup_errors=True
+    ) as name:
+        result = measure(Path(name), jobs=given.jobs, packed=given.packed, unpacked=given.unpacked)
+    for figure, value in result.items():
+        sys.stdout.write(f"{figure:<40} {value}\n")
     keep(result, given.json)
 
 

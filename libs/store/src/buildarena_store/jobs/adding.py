@@ -28,12 +28,11 @@ _APART: Final = timedelta(microseconds=1)
 _KIND: Final = column("kind", BigInteger)
 
 
-def add_jobs(new: Sequence[NewJob], ids: Sequence[str], *, connection: Connection) -> list[str]:
+def add_jobs(new: Sequence[NewJob], *, connection: Connection) -> list[str]:
     """Adds the jobs that do not exist yet.
 
     Args:
         new: The jobs, the first to be claimed first.
-        ids: Their ids.
         connection: The transaction it is part of.
 
     Returns:
@@ -49,7 +48,7 @@ def add_jobs(new: Sequence[NewJob], ids: Sequence[str], *, connection: Connectio
     draws = SystemRandom()
     single = (
         func.unnest(
-            bound_texts(ids),
+            bound_texts([job.key.job_id for job in new]),
             _numbers([job.key.seed for job in new]),
             _numbers([draws.randrange(DRAWS) for _ in new]),
             _numbers(kind_of),

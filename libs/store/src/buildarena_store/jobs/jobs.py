@@ -37,10 +37,9 @@ class Jobs:
         Returns:
             How many were added or opened again.
         """
-        wanted = [job.key.job_id for job in new]
-        ids = add_jobs(new, wanted, connection=connection)
+        ids = add_jobs(new, connection=connection)
         if len(ids) < len(new):
-            ids += self._reopen(wanted, new[0], connection)
+            ids += self._reopen([job.key.job_id for job in new], new[0], connection)
         return len(ids)
 
     def _reopen(self, ids: Sequence[str], wanted: NewJob, connection: Connection) -> list[str]:
