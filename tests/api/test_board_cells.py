@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from sqlalchemy import delete, event, func, insert, select, update
+from sqlalchemy import JSON, Text, cast, delete, event, func, insert, literal, select, update
 from starlette.testclient import TestClient
 from support.boards.plain_boards import plain_board
 from support.jobs import execute
@@ -15,9 +15,15 @@ from support.servers.live_api import api_client
 from buildarena_api.leaderboard.views import board_view
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.flags import ScoringPolicy
-from buildarena_benchmark.leaderboard import BoardQuery, cost_bins, failure_rows
+from buildarena_benchmark.leaderboard import (
+    BoardQuery,
+    cost_bins,
+    failure_rows,
+    summaries_made_by,
+)
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_store import TrialFilter
+from buildarena_store.boards.kept import keep_summaries
 from buildarena_store.derived_tables import board_cells, board_state
 from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
 
@@ -277,6 +283,52 @@ def test_a_process_that_starts_reads_cells_that_another_made(context, process, m
     # Nothing is left to make: a process that read jobs would fail here.
     monkeypatch.setattr("buildarena_store.boards.cells.tally_jobs", None)
     assert process().get("/v1/leaderboard").content == kept
+
+
+def test_a_process_that_starts_makes_no_summaries(context, process, monkeypatch) -> None:
+    fill(context)
+    kept = {policy: asked(process(), BOARD | {"policy": policy}) for policy in ScoringPolicy}
+    monkeypatch.setattr("buildarena_store.boards.tallying.summarise_tallies", None)
+    for policy, board in kept.items():
+        assert asked(process(), BOARD | {"policy": policy}) == board
+
+
+@pytest.mark.parametrize(
+    "others", ["of another release", "of another snapshot", "of none"], ids=lambda text: text[3:]
+)
+def test_summaries_that_would_be_others_today_are_made_again(context, process, others) -> None:
+    fill(context)
+    process().get("/v1/leaderboard")
+    ours, here = board_cells.c.summarised, board_cells.c.snapshot
+    values = {
+        "of another release": "earlier " + here,
+        "of another snapshot": func.replace(ours, here, "1:1:"),
+        "of none": None,
+    }
+    wrong = select(func.min(cast(board_cells.c.summaries, Text))).scalar_subquery()
+    values = {"summarised": values[others], "summaries": cast(wrong, JSON), "samples": b""}
+    execute(context, update(board_cells).values(**values))
+    for policy in ScoringPolicy:
+        params = BOARD | {"policy": policy}
+        assert asked(process(), params) == expected(context, params)
+    with context.store.database.statement() as connection:
+        today = ours == literal(f"{summaries_made_by()} ") + here
+        kept = connection.execute(select(func.count()).where(today)).scalar_one()
+    assert kept >= len(json.loads(process().get("/v1/leaderboard", params=BOARD).content)["tasks"])
+
+
+def test_summaries_of_a_cell_that_changed_meanwhile_are_not_kept(context) -> None:
+    fill(context)
+    cells = context.store.results.boards.cells
+    ids = [record.id for record in cells.feed(None).cells]
+    (old, *_) = cells.read(ids[:1])
+    execute(context, update(jobs).values(indicator=81.0))
+    cells.feed(None)
+    with context.store.database.transaction() as connection:
+        keep_summaries(connection, old.summarised())
+    ((_, cell),) = cells.summaries(ids[:1], ScoringPolicy.PUBLISHED)
+    assert cell.indicator_best in {81.0, None}
+    assert cell == next(iter(cells.read(ids[:1]))).summary(ScoringPolicy.PUBLISHED)
 
 
 def test_a_change_that_nobody_took_in_is_found_by_the_next_process(context, process) -> None:

@@ -385,7 +385,8 @@ def test_imported_scores_count_when_they_were_verified(archive, elsewhere) -> No
     runner = verification_runner(other)
     assert runner.process_one()
     (changed,) = boards.cells.feed(feed.mark).cells
-    assert sorted(t.unverified for t in changed.tallies if t.scored) == [False]
+    (now,) = boards.cells.read([changed.id])
+    assert sorted(t.unverified for t in now.tallies if t.scored) == [False]
     board = summarise(boards.trials(TrialFilter()))
     assert (board.trials, board.ended, board.imported, board.unverified) == (1, 1, 2, 1)
 

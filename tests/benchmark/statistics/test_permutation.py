@@ -130,7 +130,7 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("trials", [600, 2000])
+@pytest.mark.parametrize("trials", [200, 600, 2000])
 def test_near_trials_together_say_what_each_says(monkeypatch, shape, trials) -> None:
     rng = np.random.default_rng(1)
 

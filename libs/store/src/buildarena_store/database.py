@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import psycopg
 from sqlalchemy import Connection, Engine, create_engine, event, inspect, make_url, text
@@ -32,9 +33,11 @@ GIVEN_UP_THERE = {
     "tcp_user_timeout": 20_000,
 }
 """When the server does: a machine that is gone holds the locks of its transactions until then."""
-SCHEMA = "2026_11_26_members"
+SCHEMA = "2026_11_27_summaries"
 """The newest revision of the migrations: what this code was written for. Said here, so that a
 process that starts need not read them all."""
+AS_THEY_ARE = {"bytes": "as they are"}
+"""Options of a statement whose rows have many bytes, each of which is two as text."""
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
 LOCK_PAUSE_S = 0.2
 
@@ -58,6 +61,17 @@ def ping_after_idling(engine: Engine) -> None:
             engine.dialect.do_ping(connection)
         except engine.dialect.loaded_dbapi.Error as error:
             raise DisconnectionError from error
+
+
+def send_bytes_as_they_are(engine: Engine) -> None:
+    """Has the rows of statements with the options `AS_THEY_ARE` sent in the database's own form."""
+
+    @event.listens_for(engine, "before_cursor_execute")
+    def choose(
+        _connection: Connection, cursor: Any, _text: str, _values: Any, context: Any, _many: bool
+    ) -> None:
+        if "bytes" in context.execution_options:
+            cursor.format = psycopg.pq.Format.BINARY
 
 
 def greet_servers(engine: Engine) -> None:
@@ -126,6 +140,7 @@ class Database:
         )
         greet_servers(self.engine)
         ping_after_idling(self.engine)
+        send_bytes_as_they_are(self.engine)
         self._autocommit = self.engine.execution_options(isolation_level="AUTOCOMMIT")
 
     @contextmanager

@@ -52,6 +52,10 @@ board_cells = Table(
     Column("figures", LargeBinary, nullable=False),
     # Read for boards of a period alone.
     Column("details", LargeBinary, nullable=False, server_default=text("''")),
+    # True as long as `summarised` names who made them, and the row's snapshot.
+    Column("summaries", JSON),
+    Column("samples", LargeBinary, nullable=False, server_default=text("''")),
+    Column("summarised", Text),
     *_snapshot(),
 )
 

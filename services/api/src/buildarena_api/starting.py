@@ -32,8 +32,8 @@ COLLECTING = (5_000, 10, 30)
 """How often the garbage collector runs: seldom over what a question of 10,000 jobs has made so far,
 as that takes 0.1 s in which nobody is answered."""
 
-LATER_S = 5.0
-"""After so long what is not needed at first is loaded, so that the first answers are sooner."""
+LATER_S = 60.0
+"""After so long what is not needed at first is loaded: it takes a second, which a start has not."""
 
 
 def main() -> None:

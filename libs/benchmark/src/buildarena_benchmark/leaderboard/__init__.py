@@ -25,6 +25,7 @@ from buildarena_benchmark.leaderboard.ended_jobs import (
     EndedJob,
 )
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
+from buildarena_benchmark.leaderboard.making import summaries_made_by
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.peers import PeerRow, peer_rows
 from buildarena_benchmark.leaderboard.plot_data import (
@@ -91,6 +92,7 @@ __all__ = [
     "published_overall",
     "published_rows",
     "ranked_board",
+    "summaries_made_by",
     "summarise",
     "summarise_tallies",
     "tallied",

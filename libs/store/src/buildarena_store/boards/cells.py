@@ -11,60 +11,43 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 from sqlalchemy import (
     BigInteger,
-    ColumnElement,
     Connection,
     Text,
-    and_,
     cast,
     delete,
     distinct,
-    exists,
     func,
     select,
     text,
-    tuple_,
     update,
 )
-from sqlalchemy.dialects.postgresql import insert
-from sqlalchemy.types import UserDefinedType
 
-from buildarena_store.boards.packing import (
-    pack_details,
-    pack_tallies,
-    unpack_details,
-    unpack_tallies,
+from buildarena_benchmark.flags import ScoringPolicy
+from buildarena_benchmark.leaderboard import Cell
+from buildarena_store.boards.kept import (
+    FORMAT,
+    Mark,
+    keep_summaries,
+    mark_columns,
+    read_rows,
+    row_of,
+    since,
+    upsert,
 )
 from buildarena_store.boards.tallying import CellRecord, tally_jobs
 from buildarena_store.boards.trials import RANKED, CellId, TrialFilter
 from buildarena_store.database import Database
 from buildarena_store.derived_tables import board_cells, board_state
-from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
 from buildarena_store.tables import board_changes, jobs, tasks
 
-FORMAT: Final = 5
-"""Of rows; programs of different formats may use one database at once."""
 FILL_LOCK: Final = 0x63656C6C73  # "cells": of processes that find none, one makes them
 MAX_STORED_AT_ONCE: Final = 50
 """Cells that are made or read before the next ones, so that memory stays small."""
-
-
-class Mark(NamedTuple):
-    """A snapshot: what had been committed when something was read. Later ones are greater."""
-
-    end: int
-    closed: int
-    snapshot: str
-
-    @staticmethod
-    def of(snapshot: str) -> Mark:
-        """The mark of a snapshot as the database writes it."""
-        _, end, open_ = snapshot.split(":")
-        return Mark(int(end), -len(open_.split(",")) if open_ else 0, snapshot)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +56,8 @@ class CellFeed:
 
     Attributes:
         mark: Give it to read on from here.
-        cells: Cells that changed, or all without their tallies; those with no jobs are gone.
+        cells: Cells that changed, with summaries as far as these were made, or all; none has its
+            tallies, and those with no jobs are gone.
         whole: Whether it is all there is.
         task_versions: How many versions of tasks were ever uploaded.
     """
@@ -107,16 +91,17 @@ class BoardCells:
         state = mark or self._settled()
         with self._reading() as connection:
             now, task_versions, changed = _look(connection, state)
-            fresh = _kept(connection, changed, tallies=True)
+            fresh = read_rows(connection, changed, policies=tuple(ScoringPolicy))
             made = _made(connection, sorted(changed - {record.id for record in fresh}))
-            kept = [] if mark else _kept(connection, None)
+            kept = [] if mark else read_rows(connection, None)
         if made:
+            made = [record.summarised() for record in made]
             self._keep(made, now, settled=True)
         known = {record.id for record in (*fresh, *made)}
         whole = [record for record in kept if record.id not in known and record.jobs]
         return CellFeed(
             mark=now,
-            cells=[*whole, *fresh, *(record.without_details() for record in made)],
+            cells=[*whole, *fresh, *(record.without_tallies() for record in made)],
             whole=mark is None,
             task_versions=task_versions,
         )
@@ -132,13 +117,45 @@ class BoardCells:
         for start in range(0, len(ordered), MAX_STORED_AT_ONCE):
             with self._database.statement() as connection:
                 some = ordered[start : start + MAX_STORED_AT_ONCE]
-                found = _kept(connection, some, tallies=True, details=details, only_fresh=False)
+                found = read_rows(connection, some, tallies=True, details=details, only_fresh=False)
             yield from found
+
+    def summaries(
+        self, ids: Collection[CellId], policy: ScoringPolicy
+    ) -> Iterator[tuple[CellId, Cell]]:
+        """What boards show of cells, as of the last feed or later; cells without jobs have none.
+
+        Those that another release made are made again, and kept.
+
+        Args:
+            ids: Which.
+            policy: How flags are read.
+        """
+        ordered = sorted(ids)
+        for start in range(0, len(ordered), MAX_STORED_AT_ONCE):
+            some = ordered[start : start + MAX_STORED_AT_ONCE]
+            with self._database.statement() as connection:
+                found = read_rows(connection, some, policies=[policy], only_fresh=False)
+            old = [record.id for record in found if record.jobs and not record.summaries]
+            for record in (*found, *(self._summarised(old) if old else ())):
+                if record.summaries:
+                    yield record.id, record.summaries[policy]
 
     def of(self, wanted: TrialFilter) -> list[CellRecord]:
         """Cells of just the jobs that are meant: they are made for this question alone."""
         with self._reading() as connection:
             return tally_jobs(connection, wanted)
+
+    def _summarised(self, ids: Sequence[CellId]) -> list[CellRecord]:
+        """Cells with summaries that are made now, and kept in rows that did not change since."""
+        with self._database.statement() as connection:
+            read = read_rows(connection, ids, tallies=True, only_fresh=False)
+        records = [record.summarised() for record in sorted(read, key=lambda one: one.id)]
+        with self._database.transaction() as connection:
+            connection.execute(text("SET LOCAL synchronous_commit = off"))
+            for record in records:
+                keep_summaries(connection, record)
+        return records
 
     @contextmanager
     def _reading(self) -> Iterator[Connection]:
@@ -167,7 +184,8 @@ class BoardCells:
             mark = Mark.of(str(connection.execute(select(_SNAPSHOT)).scalar_one()))
             names = select(jobs.c.track, jobs.c.task).where(jobs.c.state == JobState.DONE, RANKED)
             for track, task in connection.execute(names.distinct()).all():
-                self._keep(tally_jobs(connection, TrialFilter(track=track, tasks=[task])), mark)
+                made = tally_jobs(connection, TrialFilter(track=track, tasks=[task]))
+                self._keep([record.summarised() for record in made], mark)
         self._keep([], mark, settled=True)
         return mark
 
@@ -184,24 +202,10 @@ class BoardCells:
             connection.execute(text("SET LOCAL synchronous_commit = off"))
             # In one order, so that no two processes wait for each other.
             for record in sorted(records, key=lambda one: one.id):
-                connection.execute(_upsert(board_cells, _row(record, mark)))
+                connection.execute(upsert(board_cells, row_of(record, mark)))
             if settled:
-                row = {"format": FORMAT, "server": _server(connection), **_columns(mark)}
-                connection.execute(_upsert(board_state, row))
-
-
-class _PgSnapshot(UserDefinedType[str]):
-    cache_ok = True
-
-    def get_col_spec(self, **_: Any) -> str:
-        return "pg_snapshot"
-
-
-class _Xid8(UserDefinedType[str]):
-    cache_ok = True
-
-    def get_col_spec(self, **_: Any) -> str:
-        return "xid8"
+                row = {"format": FORMAT, "server": _server(connection), **mark_columns(mark)}
+                connection.execute(upsert(board_state, row))
 
 
 _SNAPSHOT: Final = cast(func.pg_current_snapshot(), Text)
@@ -222,63 +226,12 @@ def _look(connection: Connection, mark: Mark) -> tuple[Mark, int, set[CellId]]:
     key = [board_changes.c[name] for name in CellId._fields]
     changed = (
         select(func.jsonb_agg(distinct(func.jsonb_build_array(*key))))
-        .where(_since(mark.snapshot), board_changes.c.configuration.is_not(None))
+        .where(since(mark.snapshot), board_changes.c.configuration.is_not(None))
         .scalar_subquery()
     )
     uploaded = select(func.count()).select_from(tasks).scalar_subquery()
     snapshot, task_versions, found = connection.execute(select(_SNAPSHOT, uploaded, changed)).one()
     return Mark.of(str(snapshot)), int(task_versions), {CellId(*one) for one in found or ()}
-
-
-def _since(snapshot: Any) -> ColumnElement[bool]:
-    """Changes by transactions that a snapshot did not see."""
-    given = cast(snapshot, _PgSnapshot)
-    transaction = cast(cast(board_changes.c.transaction, Text), _Xid8)
-    return and_(
-        board_changes.c.transaction >= cast(cast(func.pg_snapshot_xmin(given), Text), BigInteger),
-        ~func.pg_visible_in_snapshot(transaction, given),
-    )
-
-
-def _kept(
-    connection: Connection,
-    ids: Collection[CellId] | None,
-    *,
-    tallies: bool = False,
-    details: bool = False,
-    only_fresh: bool = True,
-) -> list[CellRecord]:
-    """Rows of cells; of some that changed, only those that were made after the change."""
-    key = [board_cells.c[name] for name in CellId._fields]
-    columns = [*key, board_cells.c.model, board_cells.c.decoding, board_cells.c.jobs]
-    columns += [board_cells.c.newest]
-    if tallies:
-        columns += [board_cells.c.tallies, board_cells.c.figures]
-    if details:
-        columns.append(board_cells.c.details)
-    query = select(*columns).where(board_cells.c.format == FORMAT)
-    if ids is not None:
-        if not ids:
-            return []
-        given = [bound_texts(list(values)) for values in zip(*sorted(ids), strict=True)]
-        wanted = func.unnest(*given).table_valued(*CellId._fields).render_derived(name="wanted")
-        query = query.join(wanted, and_(*(a == b for a, b in zip(key, wanted.c, strict=True))))
-        if only_fresh:
-            log = [board_changes.c[name] for name in CellId._fields]
-            same = and_(*(a == b for a, b in zip(log, key, strict=True)))
-            query = query.where(~exists().where(same, _since(board_cells.c.snapshot)))
-    return [
-        CellRecord(
-            id=CellId(row.track, row.task, row.task_version, row.configuration),
-            model=row.model,
-            decoding=row.decoding,
-            jobs=row.jobs,
-            newest=row.newest,
-            tallies=unpack_tallies(row.tallies, row.figures) if tallies else (),
-            details=unpack_details(row.tallies, row.details) if details else (),
-        )
-        for row in connection.execute(query)
-    ]
 
 
 def _made(connection: Connection, ids: Sequence[CellId]) -> list[CellRecord]:
@@ -306,40 +259,3 @@ def _server(connection: Connection) -> str:
     """Which server's transactions the marks count."""
     query = text("SELECT system_identifier::text FROM pg_control_system()")
     return str(connection.execute(query).scalar_one())
-
-
-def _row(record: CellRecord, mark: Mark) -> dict[str, Any]:
-    tallies, figures = pack_tallies(record.tallies)
-    return {
-        "format": FORMAT,
-        **record.id._asdict(),
-        "model": record.model,
-        "decoding": dict(record.decoding),
-        "jobs": record.jobs,
-        "newest": record.newest,
-        "tallies": tallies,
-        "figures": figures,
-        "details": pack_details(record.details),
-        **_columns(mark),
-    }
-
-
-def _columns(mark: Mark) -> dict[str, Any]:
-    return {
-        "snapshot": mark.snapshot,
-        "snapshot_end": mark.end,
-        "snapshot_open": -mark.closed,
-    }
-
-
-def _upsert(table: Any, row: dict[str, Any]) -> Any:
-    """Writes a row unless there is one of a later snapshot."""
-    statement = insert(table).values(row)
-    key = [column.name for column in table.primary_key]
-    new = statement.excluded
-    return statement.on_conflict_do_update(
-        index_elements=key,
-        set_={name: new[name] for name in row if name not in key},
-        where=tuple_(table.c.snapshot_end, -table.c.snapshot_open)
-        <= tuple_(new.snapshot_end, -new.snapshot_open),
-    )

@@ -9,6 +9,7 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from datetime import datetime
+from itertools import accumulate, pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -70,33 +71,26 @@ def pack_tallies(tallies: Sequence[Tally]) -> tuple[list[dict[str, Any]], bytes]
         }
         for tally in tallies
     ]
-    figures = [
-        getattr(tally, name).astype(kind).tobytes()
-        for tally in tallies
-        for name, kind in _FIGURES.items()
-    ]
-    return said, b"".join(figures)
+    return said, _packed(tallies, _FIGURES)
 
 
 def pack_details(details: Sequence[Details]) -> bytes:
     """The details of all tallies of a row."""
-    parts = []
-    for one in details:
-        parts += [getattr(one, name).astype(kind) for name, kind in _DETAILS.items()]
-        parts += [times.astype(_INTEGERS) for _, times in sorted(one.refusals.items())]
-    return b"".join(part.tobytes() for part in parts)
+    refusals = (
+        times.astype(_INTEGERS).tobytes()
+        for one in details
+        for _, times in sorted(one.refusals.items())
+    )
+    return _packed(details, _DETAILS) + b"".join(refusals)
 
 
 def unpack_tallies(said: Sequence[Mapping[str, Any]], figures: bytes) -> list[Tally]:
     """The tallies of a row."""
-    tallies, start = [], 0
-    for one in said:
-        kinds = list(_FIGURES.values())
-        arrays = _arrays(figures, start, one["number"], kinds)
-        start += one["number"] * sum(kind.itemsize for kind in kinds)
+    tallies = []
+    for one, arrays in zip(said, _unpacked(said, figures, _FIGURES), strict=True):
         tallies.append(
             Tally(
-                **dict(zip(_FIGURES, arrays, strict=True)),
+                **arrays,
                 outcome=one["outcome"],
                 reason=one["reason"],
                 success=one["success"],
@@ -118,27 +112,36 @@ def unpack_tallies(said: Sequence[Mapping[str, Any]], figures: bytes) -> list[Ta
 
 def unpack_details(said: Sequence[Mapping[str, Any]], data: bytes) -> list[Details]:
     """The details of a row's tallies."""
-    details, start = [], 0
-    for one in said:
-        classes = sorted(one["refusals"])
-        kinds = [*_DETAILS.values(), *[_INTEGERS] * len(classes)]
-        arrays = list(_arrays(data, start, one["number"], kinds))
-        start += one["number"] * sum(kind.itemsize for kind in kinds)
-        own, refusals = arrays[: len(_DETAILS)], arrays[len(_DETAILS) :]
-        details.append(
-            Details(
-                **dict(zip(_DETAILS, own, strict=True)),
-                refusals=dict(zip(classes, refusals, strict=True)),
-            )
-        )
+    details, start = [], sum(one["number"] for one in said) * _bytes_of_each(_DETAILS)
+    for one, arrays in zip(said, _unpacked(said, data, _DETAILS), strict=True):
+        refusals = {}
+        for name in sorted(one["refusals"]):
+            refusals[name] = np.frombuffer(data, _INTEGERS, one["number"], start).astype(np.int64)
+            start += refusals[name].nbytes
+        details.append(Details(**arrays, refusals=refusals))
     return details
 
 
-def _arrays(
-    data: bytes, start: int, number: int, kinds: Sequence[np.dtype[Any]]
-) -> Iterator[NDArray[Any]]:
-    """Arrays of a number of values each, one after another."""
-    for kind in kinds:
-        values = np.frombuffer(data, kind, number, start)
-        yield values.astype(np.float64 if kind == _FLOATS else np.int64)
-        start += number * kind.itemsize
+def _packed(parts: Sequence[Tally | Details], kinds: Mapping[str, np.dtype[Any]]) -> bytes:
+    """Their arrays, one field after another, so that those of a row are read at once."""
+    return b"".join(
+        getattr(part, name).astype(kind).tobytes() for name, kind in kinds.items() for part in parts
+    )
+
+
+def _unpacked(
+    said: Sequence[Mapping[str, Any]], data: bytes, kinds: Mapping[str, np.dtype[Any]]
+) -> Iterator[dict[str, NDArray[Any]]]:
+    """The arrays of each part."""
+    ends = list(accumulate((one["number"] for one in said), initial=0))
+    columns, start = {}, 0
+    for name, kind in kinds.items():
+        values = np.frombuffer(data, kind, ends[-1], start)
+        columns[name] = values.astype(np.float64 if kind == _FLOATS else np.int64)
+        start += values.nbytes
+    for begin, end in pairwise(ends):
+        yield {name: values[begin:end] for name, values in columns.items()}
+
+
+def _bytes_of_each(kinds: Mapping[str, np.dtype[Any]]) -> int:
+    return sum(kind.itemsize for kind in kinds.values())

@@ -8,7 +8,7 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any, Final
 
@@ -30,16 +30,21 @@ from sqlalchemy import (
     select,
 )
 
+from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
     ROBUST_INDICATOR,
     ROBUSTNESS,
     UNKNOWN_TOKENS,
+    Cell,
+    CellName,
     Details,
     Tally,
+    summarise_tallies,
     tally_between,
 )
 from buildarena_store.boards.packing import floats, integers
 from buildarena_store.boards.trials import COUNTS, CellId, TrialFilter, decoding_of, published
+from buildarena_store.database import AS_THEY_ARE
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import EXTERNAL_PROVIDER
 from buildarena_store.tables import jobs
@@ -58,6 +63,8 @@ class CellRecord:
         tallies: What its figures are made of.
         details: Of each tally, what its totals are made of; not read with others than those of a
             period.
+        summaries: What boards show of it, as far as it was made.
+        snapshot: When its row was so, in the database's words; empty of one that is not a row's.
     """
 
     id: CellId
@@ -67,14 +74,32 @@ class CellRecord:
     newest: datetime | None
     tallies: Sequence[Tally]
     details: Sequence[Details] = ()
+    summaries: Mapping[ScoringPolicy, Cell] = field(default_factory=dict)
+    snapshot: str = ""
+
+    @property
+    def name(self) -> CellName:
+        """Whose trials it has."""
+        return CellName(
+            task=self.id.task,
+            model=self.model,
+            configuration=self.id.configuration,
+            decoding=self.decoding,
+        )
+
+    def summary(self, policy: ScoringPolicy) -> Cell:
+        """What boards show of it; made of its tallies."""
+        return summarise_tallies(self.name, self.tallies, policy=policy)
+
+    def summarised(self) -> CellRecord:
+        """The same with its summaries, if it has jobs."""
+        if not self.jobs:
+            return self
+        return replace(self, summaries={policy: self.summary(policy) for policy in ScoringPolicy})
 
     def without_tallies(self) -> CellRecord:
         """The same without what takes memory."""
         return replace(self, tallies=(), details=())
-
-    def without_details(self) -> CellRecord:
-        """The same without what only periods are made of."""
-        return replace(self, details=())
 
     def between(self, since: datetime | None, until: datetime | None) -> CellRecord:
         """The same of the jobs that ended in a period; needs the details."""
@@ -109,7 +134,7 @@ def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
     indicators = _bytes_of(func.float8send(exact)).label("indicators")
     figures: list[Any] = [*_GROUPS, indicators, *_EACH]
     query = select(*figures).where(*wanted.conditions()).group_by(*_GROUPS)
-    for row in connection.execute(query):
+    for row in connection.execute(query, execution_options=AS_THEY_ARE):
         found.setdefault(_id_of(row), []).append(row)
     samples = [rows[0].sample for rows in found.values()]
     configs = {row.id: row for row in connection.execute(_configs(samples))}

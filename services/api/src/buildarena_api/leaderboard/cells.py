@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Final, Protocol
-
-from cachetools import LRUCache
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
@@ -15,18 +13,13 @@ from buildarena_benchmark.leaderboard import (
     Cell,
     CellHead,
     CellKey,
-    CellName,
     ChosenCells,
     Tally,
     TestCache,
     choose_cells,
     ranked_board,
-    summarise_tallies,
 )
 from buildarena_store import BoardCells, CellId, CellRecord, Mark, TrialFilter
-
-MAX_CACHED_TALLIES: Final = 64
-"""Cells that just changed, whose tallies need not be read again."""
 
 Weights = Mapping[str, Mapping[str, int]]
 
@@ -63,7 +56,6 @@ class Cells:
         self._weights: Weights = {}
         self._heads: dict[str, dict[CellKey, CellRecord]] = {}
         self._summaries: dict[tuple[CellId, ScoringPolicy], Cell] = {}
-        self._changed: LRUCache[CellId, Sequence[Tally]] = LRUCache(MAX_CACHED_TALLIES)
         self._generations: dict[str, int] = {}
         self._tests = TestCache()
 
@@ -124,34 +116,22 @@ class Cells:
     def summaries(self, ids: Sequence[CellId], policy: ScoringPolicy) -> dict[CellId, Cell]:
         """Summaries of whole cells; those that are not known are made."""
         missing = [id_ for id_ in ids if (id_, policy) not in self._summaries]
-        unread = []
-        for id_ in missing:
-            tallies = self._changed.get(id_)
-            if tallies is None:
-                unread.append(id_)
-            else:
-                self._summaries[id_, policy] = self._summary(id_, tallies, policy)
-        for record in self._store.read(unread):
-            self._summaries[record.id, policy] = self._summary(record.id, record.tallies, policy)
+        for id_, cell in self._store.summaries(missing, policy):
+            self._summaries[id_, policy] = cell
         return {
             id_: self._summaries[id_, policy] for id_ in ids if (id_, policy) in self._summaries
         }
 
-    def _summary(self, id_: CellId, tallies: Sequence[Tally], policy: ScoringPolicy) -> Cell:
-        head = self._heads[id_.track][id_[1:]]
-        return summarise_tallies(_name(head), tallies, policy=policy)
-
     def _take(self, record: CellRecord) -> None:
         id_, heads = record.id, self._heads.setdefault(record.id.track, {})
         for policy in ScoringPolicy:
-            self._summaries.pop((id_, policy), None)
-        self._changed.pop(id_, None)
+            asked_for = self._summaries.pop((id_, policy), None)
+            if asked_for is not None and policy in record.summaries:
+                self._summaries[id_, policy] = record.summaries[policy]
         if record.jobs:
-            heads[id_[1:]] = record.without_tallies()
+            heads[id_[1:]] = replace(record, summaries={})
         else:
             heads.pop(id_[1:], None)
-        if record.tallies:
-            self._changed[id_] = record.tallies
 
 
 @dataclass(slots=True, kw_only=True)
@@ -222,9 +202,7 @@ class Shown:
         if not self.asked.is_partial:
             return self._summaries.get(id_)
         record = self._part().get(id_)
-        if record is None:
-            return None
-        return summarise_tallies(_name(record), record.tallies, policy=policy)
+        return None if record is None else record.summary(policy)
 
     def _part(self) -> Mapping[CellId, CellRecord]:
         """Cells of just the jobs that were asked for."""
@@ -239,12 +217,3 @@ class Shown:
                 records = self.store.of(wanted)
             self._made = {record.id: record for record in records}
         return self._made
-
-
-def _name(record: CellRecord) -> CellName:
-    return CellName(
-        task=record.id.task,
-        model=record.model,
-        configuration=record.id.configuration,
-        decoding=record.decoding,
-    )
