@@ -42,6 +42,7 @@ from buildarena_benchmark.leaderboard.published import (
 )
 from buildarena_benchmark.leaderboard.standings import TestCache
 from buildarena_benchmark.leaderboard.tallies import (
+    DETAILS,
     UNKNOWN_TOKENS,
     Details,
     Tally,
@@ -53,6 +54,7 @@ from buildarena_benchmark.leaderboard.verdict import Verdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
+    "DETAILS",
     "ROBUSTNESS",
     "ROBUST_INDICATOR",
     "SCORED",

@@ -227,7 +227,7 @@ def summarise_tallies(
         reasons=_counts((tally.reason, tally.number) for tally in counted if tally.reason),
         refusals=_counts(item for tally in counted for item in tally.refusals.items()),
         newest=max((tally.newest for tally in tallies if tally.newest), default=None),
-        sample=Sample.of(figures),
+        sample=Sample.of_sorted(figures),
         figures_hash=blake2b(figures.tobytes(), digest_size=16).digest(),
     )
 

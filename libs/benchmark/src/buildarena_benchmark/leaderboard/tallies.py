@@ -20,7 +20,17 @@ Integers = NDArray[np.int64]
 UNKNOWN_TOKENS: Final = -1
 """An unknown number of tokens, requests or parts, in arrays."""
 EPOCH: Final = datetime(2000, 1, 1, tzinfo=UTC)
-"""From when `Details.finished_us` counts."""
+"""From when microseconds are counted."""
+DETAILS: Final = (
+    "finished_us",
+    "input_tokens",
+    "requests",
+    "parts",
+    "actions",
+    "refused_actions",
+)
+"""Of each trial: when it ended, in microseconds after `EPOCH`, tokens sent, model requests, parts
+of its machine (-1 where unknown), actions, refused ones included, and these."""
 _MICROSECOND: Final = timedelta(microseconds=1)
 
 
@@ -100,60 +110,53 @@ class Details:
     """What each trial of a tally adds to its totals, so that those of a period can be had.
 
     Attributes:
-        finished_us: (N,) int64, when it ended, in microseconds after `EPOCH`.
-        requests: (N,) int64, model requests; -1 where unknown.
-        input_tokens: (N,) int64, tokens sent; -1 where unknown.
-        parts: (N,) int64, parts of its machine; -1 where unknown.
-        actions: (N,) int64, actions, refused ones included.
-        refused_actions: (N,) int64, refused actions.
+        columns: (6, N) int64, a row for each of `DETAILS`, a column for each trial.
         refusals: (N,) int64 for each refusal class: refused actions.
     """
 
-    finished_us: Integers
-    requests: Integers
-    input_tokens: Integers
-    parts: Integers
-    actions: Integers
-    refused_actions: Integers
+    columns: Integers
     refusals: Mapping[str, Integers]
+
+    def between(self, since: datetime | None, until: datetime | None) -> NDArray[np.bool_]:
+        """(N,) bool: which trials ended at `since` or later and before `until`."""
+        finished_us = self.columns[0]
+        inside = np.ones(len(finished_us), bool)
+        if since is not None:
+            inside &= finished_us >= (since - EPOCH) // _MICROSECOND
+        if until is not None:
+            inside &= finished_us < (until - EPOCH) // _MICROSECOND
+        return inside
 
     def inside(self, chosen: NDArray[np.bool_]) -> Details:
         """The same of some of the trials, (N,) bool."""
         return Details(
-            finished_us=self.finished_us[chosen],
-            requests=self.requests[chosen],
-            input_tokens=self.input_tokens[chosen],
-            parts=self.parts[chosen],
-            actions=self.actions[chosen],
-            refused_actions=self.refused_actions[chosen],
+            columns=self.columns[:, chosen],
             refusals={name: times[chosen] for name, times in self.refusals.items()},
         )
 
     def totals(self) -> dict[str, Any]:
         """What they come to, as fields of a `Tally`."""
-        last = None
-        if len(self.finished_us):
-            last = EPOCH + int(self.finished_us.max()) * _MICROSECOND
-        return {
-            "requests": total_of(self.requests),
-            "input_tokens": total_of(self.input_tokens),
-            "parts": total_of(self.parts),
-            "actions": int(self.actions.sum()),
-            "refused_actions": int(self.refused_actions.sum()),
-            "refusals": {name: int(times.sum()) for name, times in self.refusals.items()},
-            "newest": last,
-        }
+        finished_us, counts = self.columns[0], self.columns[1:]
+        known = counts != UNKNOWN_TOKENS
+        sums = [
+            Total(known=number, sum=amount)
+            for number, amount in zip(
+                known.sum(axis=1).tolist(), (counts * known).sum(axis=1).tolist(), strict=True
+            )
+        ]
+        found: dict[str, Any] = dict(zip(DETAILS[1:], sums, strict=True))
+        for name in ("actions", "refused_actions"):
+            found[name] = found[name].sum
+        refusals = {name: int(times.sum()) for name, times in self.refusals.items()}
+        last = EPOCH + int(finished_us.max()) * _MICROSECOND if len(finished_us) else None
+        return {**found, "refusals": refusals, "newest": last}
 
 
 def tally_between(
     tally: Tally, details: Details, since: datetime | None, until: datetime | None
 ) -> Tally:
     """The same of the trials that ended in a period: at `since` or later and before `until`."""
-    inside = np.ones(tally.number, bool)
-    if since is not None:
-        inside &= details.finished_us >= (since - EPOCH) // _MICROSECOND
-    if until is not None:
-        inside &= details.finished_us < (until - EPOCH) // _MICROSECOND
+    inside = details.between(since, until)
     if inside.all():
         return tally
     totals = details.inside(inside).totals()

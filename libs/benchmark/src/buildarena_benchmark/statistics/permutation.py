@@ -56,7 +56,11 @@ class Sample:
     @staticmethod
     def of(trials: Floats) -> Sample:
         """The sample of trials, (N, 2) float64: success, or its share, and indicator."""
-        ordered = trials[np.lexsort(trials.T)]
+        return Sample.of_sorted(trials[np.lexsort(trials.T)])
+
+    @staticmethod
+    def of_sorted(ordered: Floats) -> Sample:
+        """The same of trials that are sorted by their indicators, equal ones by their success."""
         first = np.ones(len(ordered), bool)
         first[1:] = np.any(ordered[1:] != ordered[:-1], axis=1)
         times = np.diff(np.append(np.flatnonzero(first), len(ordered))).astype(np.float64)

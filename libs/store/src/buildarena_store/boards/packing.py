@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.leaderboard import Details, Tally, Total
+from buildarena_benchmark.leaderboard import DETAILS, Details, Tally, Total
 
 _FLOATS: Final[np.dtype[Any]] = np.dtype(">f8")
 _INTEGERS: Final[np.dtype[Any]] = np.dtype(">i8")
@@ -27,16 +27,7 @@ _FIGURES: Final = {
     "costs_usd": _FLOATS,
     "output_tokens": _INTEGERS,
 }
-"""Fields of a tally that are arrays, in the order in which they are kept."""
-_DETAILS: Final = {
-    "finished_us": _INTEGERS,
-    "input_tokens": _INTEGERS,
-    "requests": _INTEGERS,
-    "parts": _INTEGERS,
-    "actions": _INTEGERS,
-    "refused_actions": _INTEGERS,
-}
-"""The same of details; refusals follow, in the order of the classes that the tally names."""
+"""Fields of a tally that are arrays, in the order in which they are kept, each of all tallies."""
 
 
 def floats(data: bytes) -> NDArray[np.float64]:
@@ -71,23 +62,26 @@ def pack_tallies(tallies: Sequence[Tally]) -> tuple[list[dict[str, Any]], bytes]
         }
         for tally in tallies
     ]
-    return said, _packed(tallies, _FIGURES)
+    figures = (
+        getattr(tally, name).astype(kind).tobytes()
+        for name, kind in _FIGURES.items()
+        for tally in tallies
+    )
+    return said, b"".join(figures)
 
 
 def pack_details(details: Sequence[Details]) -> bytes:
-    """The details of all tallies of a row."""
-    refusals = (
-        times.astype(_INTEGERS).tobytes()
-        for one in details
-        for _, times in sorted(one.refusals.items())
-    )
-    return _packed(details, _DETAILS) + b"".join(refusals)
+    """The details of all tallies of a row; refusals last, in the order of the tally's classes."""
+    columns = [one.columns for one in details] or [np.zeros((len(DETAILS), 0), np.int64)]
+    refusals = [times for one in details for _, times in sorted(one.refusals.items())]
+    arrays = [np.concatenate(columns, axis=1), *refusals]
+    return b"".join(array.astype(_INTEGERS).tobytes() for array in arrays)
 
 
 def unpack_tallies(said: Sequence[Mapping[str, Any]], figures: bytes) -> list[Tally]:
     """The tallies of a row."""
     tallies = []
-    for one, arrays in zip(said, _unpacked(said, figures, _FIGURES), strict=True):
+    for one, arrays in zip(said, _unpacked(said, figures), strict=True):
         tallies.append(
             Tally(
                 **arrays,
@@ -112,36 +106,33 @@ def unpack_tallies(said: Sequence[Mapping[str, Any]], figures: bytes) -> list[Ta
 
 def unpack_details(said: Sequence[Mapping[str, Any]], data: bytes) -> list[Details]:
     """The details of a row's tallies."""
-    details, start = [], sum(one["number"] for one in said) * _bytes_of_each(_DETAILS)
-    for one, arrays in zip(said, _unpacked(said, data, _DETAILS), strict=True):
+    ends = _ends(said)
+    columns = np.frombuffer(data, _INTEGERS, len(DETAILS) * ends[-1]).astype(np.int64)
+    details, start = [], columns.nbytes
+    for one, (begin, end) in zip(said, pairwise(ends), strict=True):
         refusals = {}
         for name in sorted(one["refusals"]):
             refusals[name] = np.frombuffer(data, _INTEGERS, one["number"], start).astype(np.int64)
             start += refusals[name].nbytes
-        details.append(Details(**arrays, refusals=refusals))
+        own = columns.reshape(len(DETAILS), -1)[:, begin:end]
+        details.append(Details(columns=own, refusals=refusals))
     return details
 
 
-def _packed(parts: Sequence[Tally | Details], kinds: Mapping[str, np.dtype[Any]]) -> bytes:
-    """Their arrays, one field after another, so that those of a row are read at once."""
-    return b"".join(
-        getattr(part, name).astype(kind).tobytes() for name, kind in kinds.items() for part in parts
-    )
+def _ends(said: Sequence[Mapping[str, Any]]) -> list[int]:
+    """Where each tally's trials begin among a row's, and where the last one's end."""
+    return list(accumulate((one["number"] for one in said), initial=0))
 
 
 def _unpacked(
-    said: Sequence[Mapping[str, Any]], data: bytes, kinds: Mapping[str, np.dtype[Any]]
+    said: Sequence[Mapping[str, Any]], figures: bytes
 ) -> Iterator[dict[str, NDArray[Any]]]:
-    """The arrays of each part."""
-    ends = list(accumulate((one["number"] for one in said), initial=0))
+    """The arrays of each tally."""
+    ends = _ends(said)
     columns, start = {}, 0
-    for name, kind in kinds.items():
-        values = np.frombuffer(data, kind, ends[-1], start)
+    for name, kind in _FIGURES.items():
+        values = np.frombuffer(figures, kind, ends[-1], start)
         columns[name] = values.astype(np.float64 if kind == _FLOATS else np.int64)
         start += values.nbytes
     for begin, end in pairwise(ends):
         yield {name: values[begin:end] for name, values in columns.items()}
-
-
-def _bytes_of_each(kinds: Mapping[str, np.dtype[Any]]) -> int:
-    return sum(kind.itemsize for kind in kinds.values())

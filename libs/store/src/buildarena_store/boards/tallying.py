@@ -32,6 +32,7 @@ from sqlalchemy import (
 
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
+    DETAILS,
     ROBUST_INDICATOR,
     ROBUSTNESS,
     UNKNOWN_TOKENS,
@@ -195,7 +196,7 @@ _EACH: Final = [
     _bytes_of(func.float8send(cast(jobs.c.cost_usd, Double))).label("costs"),
     _bytes_of(func.int8send(jobs.c.output_tokens)).label("output_tokens"),
     _bytes_of(func.timestamptz_send(func.coalesce(jobs.c.finished_at, jobs.c.created_at))).label(
-        "finished"
+        "finished_us"
     ),
     _bytes_of(func.int8send(jobs.c.requests)).label("requests"),
     _bytes_of(func.int8send(jobs.c.input_tokens)).label("input_tokens"),
@@ -224,17 +225,11 @@ def _configs(ids: Sequence[str]) -> Any:
 
 
 def _details_of(row: Row[Any]) -> Details:
-    # What an external agent used is unknown, which is not nothing.
-    unknown = np.full(row.number, UNKNOWN_TOKENS)
-    return Details(
-        finished_us=integers(row.finished),
-        requests=unknown if row.external else integers(row.requests),
-        input_tokens=unknown if row.external else integers(row.input_tokens),
-        parts=integers(row.parts),
-        actions=integers(row.actions),
-        refused_actions=integers(row.refused_actions),
-        refusals=_refusals(row.refusals.split("\n")),
-    )
+    details = np.stack([integers(getattr(row, name)) for name in DETAILS])
+    if row.external:
+        # What an external agent used is unknown, which is not nothing.
+        details[[DETAILS.index("requests"), DETAILS.index("input_tokens")]] = UNKNOWN_TOKENS
+    return Details(columns=details, refusals=_refusals(row.refusals.split("\n")))
 
 
 def _refusals(texts: Sequence[str]) -> dict[str, NDArray[np.int64]]:
