@@ -2,6 +2,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from sqlalchemy import event
+
 from buildarena_cli.local import free_port
 from buildarena_pipeline.broker.queues import MAX_WAITING, Queues
 from buildarena_pipeline.catalog.specs import SweepSpec
@@ -65,6 +67,34 @@ def test_a_dead_workers_job_waits_again(context, submissions) -> None:
     drain(context)
     reap(context)
     assert context.store.jobs.get(lease.job.id).state == "queued"
+    assert context.queues.waiting("construct") == 1
+
+
+def test_a_run_with_nothing_to_do_costs_one_statement(context, submissions) -> None:
+    reaper, statements = Reaper(context), []
+    reaper.reap()  # the first one of some does what is seldom done
+    engine = context.store.database.engine
+    listen = ("before_cursor_execute", lambda *args: statements.append(args[2]))
+    event.listen(engine, *listen)
+    reaper.reap()
+    event.remove(engine, *listen)
+    assert len(statements) == 1
+    # What comes later is found by any run.
+    submit(context, submissions, 1)
+    lease = context.store.leases.claim("construct", owner="dead")
+    assert context.store.waiting.is_quiet()
+    with context.store.database.transaction() as connection:
+        connection.exec_driver_sql("UPDATE leases SET expires_at = now() - interval '1 s'")
+    drain(context)
+    reaper.reap()
+    assert context.store.jobs.get(lease.job.id).state == "queued"
+    assert context.queues.settle()
+    assert context.queues.waiting("construct") == 1
+    drain(context)
+    with context.store.database.transaction() as connection:
+        connection.exec_driver_sql("UPDATE jobs SET notified_at = NULL")
+    reaper.reap()
+    assert context.queues.settle()
     assert context.queues.waiting("construct") == 1
 
 

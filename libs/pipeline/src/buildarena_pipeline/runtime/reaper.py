@@ -63,7 +63,10 @@ class Reaper:
             log.exception("reaper_failed")
 
     def reap(self) -> None:
-        """Runs once, unless another process is at it."""
+        """Runs once, unless another process is at it, or there is nothing to do."""
+        run, self._runs = self._runs, self._runs + 1
+        if run % SELDOM_EVERY and self._context.store.waiting.is_quiet():
+            return
         with self._context.store.database.engine.connect() as connection:
             lock = text("SELECT pg_try_advisory_xact_lock(:key)")
             if not connection.execute(lock, {"key": REAPER_LOCK}).scalar_one():
@@ -73,11 +76,10 @@ class Reaper:
                 log.info("recovered", jobs=recovered)
             for queue in self._context.store.waiting.queues():
                 self._notify(queue)
-            if self._runs % SELDOM_EVERY == 0:
+            if run % SELDOM_EVERY == 0:
                 self._do_seldom()
-            if self._runs % FORGETS_EVERY == 0:
+            if run % FORGETS_EVERY == 0:
                 self._context.store.leases.forget_ended()
-            self._runs += 1
 
     def _do_seldom(self) -> None:
         store = self._context.store

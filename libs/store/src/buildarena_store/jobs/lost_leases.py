@@ -23,7 +23,7 @@ EXPIRES_AT: Final = func.coalesce(
 )
 """When the lease of a running job ends."""
 _LOST = select(jobs.c.id).where(jobs.c.state == JobState.RUNNING, events.now > EXPIRES_AT)
-_ANY_LOST = select(_LOST.exists())
+ANY_LOST: Final = _LOST.exists()
 # A session has one request open at most, whose reply is lost with its process.
 _IN_SESSION = jobs.c.stage == Stage.CONSTRUCT
 
@@ -34,9 +34,9 @@ def recover_lost(database: Database, *, max_faults: int) -> list[str]:
     Returns:
         Ids of the jobs that wait again.
     """
-    # Nearly always there is none, and the reaper asks every second.
+    # Nearly always there is none, and the reaper asks often.
     with database.statement() as connection:
-        if not connection.execute(_ANY_LOST).scalar():
+        if not connection.execute(select(ANY_LOST)).scalar():
             return []
     # A key of runners counts once, and never ends a job alone.
     is_runners = func.starts_with(jobs.c.lease_owner, RUNNER)

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from datetime import timedelta
 
-from sqlalchemy import ColumnElement, Connection, select, update
+from sqlalchemy import ColumnElement, Connection, Text, literal_column, or_, select, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
 from buildarena_store.jobs.claiming import WAITING_QUEUES
+from buildarena_store.jobs.lost_leases import ANY_LOST
 from buildarena_store.states import JobState
 from buildarena_store.tables import jobs
 
 NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
 """Workers are notified again of a queued job whose message may have been lost."""
+# The order is that of the index of waiting jobs, of which the first is enough.
+_ANY_WAITING = (
+    select(jobs.c.queue)
+    .where(jobs.c.state == literal_column(f"'{JobState.QUEUED}'", Text))
+    .order_by(jobs.c.queue)
+    .limit(1)
+    .scalar_subquery()
+    .is_not(None)
+)
 
 
 class WaitingJobs:
@@ -30,6 +40,11 @@ class WaitingJobs:
         """Names of the queues that jobs wait in."""
         with self._database.statement() as connection:
             return list(connection.execute(WAITING_QUEUES).scalars())
+
+    def is_quiet(self) -> bool:
+        """Whether no job waits, and no lease ran out: one statement, for those who ask often."""
+        with self._database.statement() as connection:
+            return not connection.execute(select(or_(ANY_LOST, _ANY_WAITING))).scalar()
 
     def to_notify(self, queue: str, limit: int) -> list[str]:
         """Waiting jobs that no message names, oldest first; they are marked as notified.
