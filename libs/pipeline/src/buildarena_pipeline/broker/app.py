@@ -7,6 +7,7 @@ from typing import Any
 from celery import Celery
 from celery.app.amqp import AMQP
 from kombu.connection import Connection
+from kombu.transport.redis import Transport
 
 from buildarena_pipeline.keepalive import tcp_options
 
@@ -21,6 +22,12 @@ class _Connection(Connection):
         """Connects, however long it takes."""
         pauses = {"interval_start": 1, "interval_step": 1, "interval_max": LONGEST_PAUSE_S}
         return super().ensure_connection(*args, **{**pauses, **options})  # type: ignore[no-untyped-call]
+
+
+class _Transport(Transport):
+    """Waits longer for a message before it asks again: a worker without jobs does little else."""
+
+    brpop_timeout = 5
 
 
 class _Amqp(AMQP):  # type: ignore[misc]
@@ -43,6 +50,7 @@ def celery_app(broker_url: str, *, timeout_s: float = 10.0) -> Celery:
         worker_hijack_root_logger=False,
         worker_send_task_events=False,
         worker_enable_remote_control=False,
+        broker_transport=f"{__name__}:{_Transport.__name__}",
         broker_connection_retry=True,
         broker_connection_retry_on_startup=True,
         broker_connection_max_retries=None,
