@@ -120,7 +120,7 @@ class Packages:
             .values(state=PackageState.CHECKING, claimed_at=func.clock_timestamp())
             .returning(*_COLUMNS)
         )
-        with self._database.transaction() as connection:
+        with self._database.statement() as connection:
             row = connection.execute(statement).first()
         return None if row is None else value_of(StoredPackage, row)
 
