@@ -2,12 +2,15 @@
 
 Runs a whole service whose models answer after a while, and counts what its processes, Postgres and
 Valkey used for the jobs of one sweep. The sizing model (sizing_model.py) multiplies these costs.
+
+Two runs with models of two latencies tell turns from waiting. What is used until the last session
+has ended is compared; what comes after, when trials still run, is each turn's.
 """
 
 import argparse
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +28,8 @@ from buildarena_cli.local.stack import Stack
 PARTS = ("postgres", "valkey", "api", "construct worker", "mujoco worker")
 LEASE_S = 10.0
 IDLE_S = 30.0
+OF_TRIALS = ("mujoco worker cpu_ms", "artifact bytes", "postgres stored bytes")
+"""What does not depend on how long sessions wait; trials go on after the last session."""
 POLL_S = 2.0
 """Rarely: whoever asks uses the service too."""
 SWEEP = {"tasks": ["support-1"], "models": ["standin/expert"], "simulator": "mujoco"}
@@ -33,7 +38,7 @@ SWEEP = {"tasks": ["support-1"], "models": ["standin/expert"], "simulator": "muj
 def main() -> None:
     """Measures and prints JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--jobs", type=int, default=100)
+    parser.add_argument("--jobs", type=int, default=40)
     parser.add_argument("--latencies", type=float, nargs=2, default=(0.5, 4.0))
     parser.add_argument("--json", type=Path)
     given = parser.parse_args()
@@ -49,8 +54,10 @@ def main() -> None:
         )
         settings = {"models_file": models, "sessions_per_worker": given.jobs, "lease_s": LEASE_S}
         with running_stack(folder, **settings) as stack:
-            run(stack, list(range(8)), "warm up")
-            idle = {name: value / IDLE_S for name, value in spent(stack, idling).items()}
+            one_run(stack, list(range(8)), {})
+            before = used(stack)
+            time.sleep(IDLE_S)
+            idle = {name: value / IDLE_S for name, value in _less(used(stack), before).items()}
             runs = []
             for number, latency_s in enumerate(given.latencies):
                 standin.latency_s = latency_s
@@ -58,19 +65,6 @@ def main() -> None:
                 runs.append(one_run(stack, list(range(first, first + given.jobs)), idle))
     figures = {"jobs": given.jobs, "lease_s": LEASE_S, "idle_per_s": idle, **fitted(*runs)}
     tell(figures, given.json)
-
-
-def idling(_: Stack) -> None:
-    """Lets the service stand idle."""
-    time.sleep(IDLE_S)
-
-
-def spent(stack: Stack, act: Callable[[Stack], object]) -> dict[str, float]:
-    """What the service used while something was done."""
-    before = used(stack)
-    act(stack)
-    after = used(stack)
-    return {name: after[name] - before[name] for name in before}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,38 +75,64 @@ class OneRun:
         turns: Model requests of all its jobs.
         jobs: How many jobs.
         session_s: Seconds of all its sessions together.
-        used: What the service used beyond what it uses idle.
+        used: What the service used beyond what it uses idle, until the last session ended.
+        later: The same from then until the last trial ended.
     """
 
     turns: int
     jobs: int
     session_s: float
     used: Mapping[str, float]
+    later: Mapping[str, float]
 
 
 def one_run(stack: Stack, seeds: list[int], idle: Mapping[str, float]) -> OneRun:
     """Runs a sweep whose sessions are all at once, and takes off what an idle service uses."""
-    turns = 0
+    spec = {**SWEEP, "name": f"seeds from {seeds[0]}", "seeds": seeds}
+    times, amounts = [time.monotonic()], [used(stack)]
 
-    def act(stack: Stack) -> None:
-        nonlocal turns
-        turns = run(stack, seeds, f"seeds from {seeds[0]}")
+    def note() -> None:
+        times.append(time.monotonic())
+        amounts.append(used(stack))
 
-    began = time.monotonic()
-    total = spent(stack, act)
-    wall_s = time.monotonic() - began
-    beyond = {name: value - idle[name] * wall_s for name, value in total.items()}
-    return OneRun(turns=turns, jobs=len(seeds), session_s=wall_s * len(seeds), used=beyond)
+    def beyond(place: int) -> dict[str, float]:
+        spent = _less(amounts[place + 1], amounts[place])
+        seconds = times[place + 1] - times[place]
+        return {name: value - idle.get(name, 0.0) * seconds for name, value in spent.items()}
+
+    with httpx.Client(base_url=stack.url, timeout=60) as client:
+        sweep = client.post("/v1/sweeps", json=spec).raise_for_status().json()["id"]
+        while _open_sessions(stack):
+            time.sleep(POLL_S)
+        note()
+        while client.get(f"/v1/sweeps/{sweep}").json()["state"] != "done":
+            time.sleep(POLL_S)
+        note()
+        listed = client.get("/v1/jobs", params={"sweep": sweep, "limit": 1000}).json()["jobs"]
+    return OneRun(
+        turns=sum(int(job["usage"]["requests"]) for job in listed),
+        jobs=len(seeds),
+        session_s=(times[1] - times[0]) * len(seeds),
+        used=beyond(0),
+        later=beyond(1),
+    )
 
 
 def fitted(short: OneRun, long: OneRun) -> dict[str, Any]:
     """Costs of a turn and of a second that a session lasts, from runs of two latencies."""
     by_turn, by_second = {}, {}
+    turns = short.turns + long.turns
+    seconds = long.session_s / long.turns - short.session_s / short.turns
     for name in sorted(short.used):
+        later = short.later[name] + long.later[name]
+        if name in OF_TRIALS:
+            by_second[name] = 0.0
+            by_turn[name] = (short.used[name] + long.used[name] + later) / turns
+            continue
         low, high = short.used[name] / short.turns, long.used[name] / long.turns
-        seconds = long.session_s / long.turns - short.session_s / short.turns
         by_second[name] = max((high - low) / seconds, 0.0)
-        by_turn[name] = low - by_second[name] * short.session_s / short.turns
+        own = low - by_second[name] * short.session_s / short.turns
+        by_turn[name] = max(own, 0.0) + max(later, 0.0) / turns
     return {
         "turns_per_job": round(short.turns / short.jobs, 1),
         "per_turn": by_turn,
@@ -120,15 +140,16 @@ def fitted(short: OneRun, long: OneRun) -> dict[str, Any]:
     }
 
 
-def run(stack: Stack, seeds: list[int], name: str) -> int:
-    """Runs a sweep to its end; the requests that its jobs made."""
-    with httpx.Client(base_url=stack.url, timeout=60) as client:
-        spec = {**SWEEP, "name": name, "seeds": seeds}
-        sweep = client.post("/v1/sweeps", json=spec).raise_for_status().json()["id"]
-        while client.get(f"/v1/sweeps/{sweep}").json()["state"] != "done":
-            time.sleep(POLL_S)
-        listed = client.get("/v1/jobs", params={"sweep": sweep, "limit": 1000}).json()["jobs"]
-    return sum(int(job["usage"]["requests"]) for job in listed)
+def _less(after: Mapping[str, float], before: Mapping[str, float]) -> dict[str, float]:
+    return {name: value - before[name] for name, value in after.items()}
+
+
+def _open_sessions(stack: Stack) -> int:
+    with psycopg.connect(stack.environment["BUILDARENA_DATABASE_URL"]) as database:
+        query = "SELECT count(*) FROM jobs WHERE stage = 'construct' AND state <> 'done'"
+        row = database.execute(query).fetchone()
+    assert row
+    return int(row[0])
 
 
 def used(stack: Stack) -> dict[str, float]:

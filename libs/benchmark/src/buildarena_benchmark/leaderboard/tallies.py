@@ -144,12 +144,12 @@ class Details:
                 known.sum(axis=1).tolist(), (counts * known).sum(axis=1).tolist(), strict=True
             )
         ]
-        found: dict[str, Any] = dict(zip(DETAILS[1:], sums, strict=True))
+        totals: dict[str, Any] = dict(zip(DETAILS[1:], sums, strict=True))
         for name in ("actions", "refused_actions"):
-            found[name] = found[name].sum
+            totals[name] = totals[name].sum
         refusals = {name: int(times.sum()) for name, times in self.refusals.items()}
         last = EPOCH + int(finished_us.max()) * _MICROSECOND if len(finished_us) else None
-        return {**found, "refusals": refusals, "newest": last}
+        return {**totals, "refusals": refusals, "newest": last}
 
 
 def tally_between(
