@@ -23,7 +23,7 @@ from buildarena_benchmark.leaderboard import (
 )
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_store import TrialFilter
-from buildarena_store.boards.kept import keep_summaries
+from buildarena_store.boards.kept import FORMAT, keep_summaries
 from buildarena_store.derived_tables import board_cells, board_state
 from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
 
@@ -363,6 +363,20 @@ def test_cells_of_another_server_are_not_believed(context, process) -> None:
         assert connection.execute(select(func.max(board_changes.c.transaction))).scalar() == 0
     execute(context, update(jobs).values(indicator=78.0))
     assert asked(api, BOARD) == asked(process(), BOARD) == expected(context, BOARD)
+
+
+def test_cells_of_formats_that_no_program_reads_are_removed(context, process) -> None:
+    fill(context)
+    process().get("/v1/leaderboard")
+    formats = {}
+    for earlier in (1, 2):
+        for table in (board_cells, board_state):
+            ours = update(table).where(table.c.format == FORMAT)
+            execute(context, ours.values(format=FORMAT - earlier))
+        assert asked(process(), BOARD) == expected(context, BOARD)
+        with context.store.database.statement() as connection:
+            formats[earlier] = {*connection.execute(select(board_cells.c.format)).scalars()}
+    assert formats == {1: {FORMAT, FORMAT - 1}, 2: {FORMAT, FORMAT - 1}}
 
 
 def test_a_database_that_went_back_in_time_is_read_anew(context, process) -> None:

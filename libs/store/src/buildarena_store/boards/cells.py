@@ -213,8 +213,10 @@ _SNAPSHOT: Final = cast(func.pg_current_snapshot(), Text)
 
 def _forget(connection: Connection) -> None:
     """Forgets cells of another server, and its transactions: their numbers mean nothing here."""
-    connection.execute(delete(board_cells).where(board_cells.c.format == FORMAT))
-    connection.execute(delete(board_state).where(board_state.c.format == FORMAT))
+    for table in (board_cells, board_state):
+        # Programs of the format before may be at work; of earlier ones there are none.
+        theirs = table.c.format == FORMAT - 1
+        connection.execute(delete(table).where(table.c.format <= FORMAT, ~theirs))
     # No transaction of this server that can be seen has such a number.
     begun = cast(cast(func.pg_snapshot_xmax(func.pg_current_snapshot()), Text), BigInteger)
     foreign = update(board_changes).where(board_changes.c.transaction >= begun)

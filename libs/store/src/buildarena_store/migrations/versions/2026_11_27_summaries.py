@@ -8,7 +8,7 @@ down_revision = "2026_11_26_members"
 branch_labels = None
 depends_on = None
 
-FIGURES = ("figures", "details", "samples")
+FIGURES = ("details", "samples")
 
 
 def upgrade() -> None:
@@ -22,7 +22,6 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    for name in ("figures", "details"):
-        op.execute(f"ALTER TABLE board_cells ALTER COLUMN {name} SET STORAGE EXTENDED")
+    op.execute("ALTER TABLE board_cells ALTER COLUMN details SET STORAGE EXTENDED")
     for name in ("summaries", "samples", "summarised"):
         op.drop_column("board_cells", name)
