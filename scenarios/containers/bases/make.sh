@@ -14,7 +14,9 @@ debootstrap --variant=minbase --include=python3,python3-venv,ca-certificates boo
 rm -f "$folder.log"
 # What the host trusts: a network may end TLS at a proxy with a certificate of its own.
 cp /etc/ssl/certs/ca-certificates.crt "$folder/etc/ssl/certs/ca-certificates.crt"
-rm -rf "$folder"/var/cache/apt/* "$folder"/var/lib/apt/lists/* "$folder"/usr/share/doc/* "$folder"/usr/share/man/* \
+# As in Debian's small images, of the documents licences stay.
+find "$folder"/usr/share/doc -type f ! -name copyright -delete
+rm -rf "$folder"/var/cache/apt/* "$folder"/var/lib/apt/lists/* "$folder"/usr/share/man/* \
     "$folder"/usr/share/locale/*
 tar -C "$folder" -c . | "$docker" import \
     -c 'ENV SSL_CERT_FILE=/etc/ssl/certs/ca-certificates.crt PIP_CERT=/etc/ssl/certs/ca-certificates.crt NODE_EXTRA_CA_CERTS=/etc/ssl/certs/ca-certificates.crt' \
