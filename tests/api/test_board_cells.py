@@ -6,11 +6,12 @@ from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from sqlalchemy import JSON, Text, cast, delete, event, func, insert, literal, select, update
+from sqlalchemy import JSON, Text, cast, delete, func, insert, literal, select, update
 from starlette.testclient import TestClient
 from support.boards.plain_boards import plain_board
 from support.jobs import execute
 from support.servers.live_api import api_client
+from support.statements import statements_of
 
 from buildarena_api.leaderboard.views import board_view
 from buildarena_benchmark import builtin_tasks
@@ -407,12 +408,8 @@ def test_a_rest_costs_one_statement(context, process) -> None:
     fill(context)
     api = process()
     api.get("/v1/leaderboard")
-    boards, statements = api.app.state.boards, []
-    engine = context.store.database.engine
-    listen = ("before_cursor_execute", lambda *args: statements.append(args[2]))
-    event.listen(engine, *listen)
-    boards.tracks()
-    event.remove(engine, *listen)
+    with statements_of(context.store.database.engine) as statements:
+        api.app.state.boards.tracks()
     assert len(statements) == 1
     assert "board_changes" in statements[0]
 

@@ -7,12 +7,13 @@ from contextlib import ExitStack, contextmanager
 
 import httpx
 import pytest
-from sqlalchemy import event, text
+from sqlalchemy import text
 from starlette.testclient import TestClient
 from support.clients.tenants import WITH_KEYS, new_tenant
 from support.jobs import execute
 from support.servers.live_api import api_client, changed, live_api
 from support.servers.stacks import wait_until
+from support.statements import statements_of
 
 from buildarena_api.app import all_routes
 from buildarena_api.http.concurrency import MAX_WAITING, ConcurrencyLimit, usual_limits
@@ -313,15 +314,8 @@ INVENTED = {
 @pytest.fixture
 def statements(context):
     """Statements that the API's connections were asked."""
-    asked: list[str] = []
-    engine = context.store.database.engine
-
-    def note(_connection, _cursor, statement, *_) -> None:
-        asked.append(statement)
-
-    event.listen(engine, "before_cursor_execute", note)
-    yield asked
-    event.remove(engine, "before_cursor_execute", note)
+    with statements_of(context.store.database.engine) as asked:
+        yield asked
 
 
 @pytest.mark.samples(3)

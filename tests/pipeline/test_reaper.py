@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sqlalchemy import event
+from support.statements import statements_of
 
 from buildarena_cli.local import free_port
 from buildarena_pipeline.broker.queues import MAX_WAITING, Queues
@@ -71,13 +71,10 @@ def test_a_dead_workers_job_waits_again(context, submissions) -> None:
 
 
 def test_a_run_with_nothing_to_do_costs_one_statement(context, submissions) -> None:
-    reaper, statements = Reaper(context), []
+    reaper = Reaper(context)
     reaper.reap()  # the first one of some does what is seldom done
-    engine = context.store.database.engine
-    listen = ("before_cursor_execute", lambda *args: statements.append(args[2]))
-    event.listen(engine, *listen)
-    reaper.reap()
-    event.remove(engine, *listen)
+    with statements_of(context.store.database.engine) as statements:
+        reaper.reap()
     assert len(statements) == 1
     # What comes later is found by any run.
     submit(context, submissions, 1)

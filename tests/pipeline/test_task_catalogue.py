@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from sqlalchemy import event
+from support.statements import statements_of
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_benchmark import TaskError, builtin_tasks, parse_custom_task
@@ -20,14 +20,8 @@ OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
 @pytest.fixture
 def queries(context):
     """Statements that were sent to the database."""
-    seen: list[str] = []
-
-    def note(*arguments: object) -> None:
-        seen.append(str(arguments[2]))
-
-    event.listen(context.store.database.engine, "before_cursor_execute", note)
-    yield seen
-    event.remove(context.store.database.engine, "before_cursor_execute", note)
+    with statements_of(context.store.database.engine) as seen:
+        yield seen
 
 
 def add(context, text: str) -> str:

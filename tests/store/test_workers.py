@@ -5,7 +5,8 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from sqlalchemy import event, text
+from sqlalchemy import text
+from support.statements import statements_of
 
 from buildarena_pipeline.runtime.worker_process import worker_id
 
@@ -54,10 +55,8 @@ def test_the_register_in_a_few_numbers_reads_no_versions(store, report) -> None:
     report("d", kind="construct", queues=["construct"])
     report("gone")
     silence(store, "gone")
-    statements: list[str] = []
-    engine = store.database.engine
-    event.listen(engine, "before_cursor_execute", lambda *a: statements.append(a[2]))
-    counts = store.workers.counts()
+    with statements_of(store.database.engine) as statements:
+        counts = store.workers.counts()
     assert statements
     assert not any("versions" in statement for statement in statements)
     assert counts.serving == {"simulate.mujoco": 3, "simulate.pybullet": 1, "construct": 1}

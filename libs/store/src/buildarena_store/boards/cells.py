@@ -151,8 +151,7 @@ class BoardCells:
         with self._database.statement() as connection:
             read = read_rows(connection, ids, tallies=True, only_fresh=False)
         records = [record.summarised() for record in sorted(read, key=lambda one: one.id)]
-        with self._database.transaction() as connection:
-            connection.execute(text("SET LOCAL synchronous_commit = off"))
+        with self._keeping() as connection:
             for record in records:
                 keep_summaries(connection, record)
         return records
@@ -163,6 +162,13 @@ class BoardCells:
             connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY"))
             # One plan for any number of cells would be a bad one for few or for many.
             connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
+            yield connection
+
+    @contextmanager
+    def _keeping(self) -> Iterator[Connection]:
+        with self._database.transaction() as connection:
+            # What is lost with the server's memory is made again.
+            connection.execute(text("SET LOCAL synchronous_commit = off"))
             yield connection
 
     def _settled(self) -> Mark:
@@ -197,9 +203,7 @@ class BoardCells:
             mark: When they were so.
             settled: Whether all other cells are kept up to then, too.
         """
-        with self._database.transaction() as connection:
-            # What is lost with the server's memory is made again.
-            connection.execute(text("SET LOCAL synchronous_commit = off"))
+        with self._keeping() as connection:
             # In one order, so that no two processes wait for each other.
             for record in sorted(records, key=lambda one: one.id):
                 connection.execute(upsert(board_cells, row_of(record, mark)))
