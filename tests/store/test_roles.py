@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import product
 
 import pytest
 from sqlalchemy import make_url, text
 from sqlalchemy.exc import IntegrityError, ProgrammingError
 from starlette.testclient import TestClient
+from support.servers.stacks import wait_until
 from support.stages import work
 
 from buildarena_api.app import create_app
@@ -249,6 +251,47 @@ def test_an_owner_who_is_no_superuser_takes_an_older_installation_over(database_
         connection.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
         connection.execute(text(f'DROP ROLE "{make_url(url).username}"'))
     superuser.close()
+
+
+@pytest.fixture
+def owned(context, logins, database_url) -> Iterator[dict[str, str]]:
+    """Logins with the owner's, who has the tables once `make_roles` was called with them."""
+    url = url_of(database_url, OWNER)
+    yield {**logins, OWNER: url}
+    with context.store.database.transaction() as connection:
+        name = make_url(url).username
+        connection.execute(text(f'REASSIGN OWNED BY "{name}" TO current_user'))
+        connection.execute(text(f'DROP OWNED BY "{name}"'))
+        connection.execute(text(f'DROP ROLE "{name}"'))
+
+
+def test_roles_are_made_again_while_others_work(context, owned, database_url) -> None:
+    """As each start of a service does it: none of the tables that others use is waited for."""
+    make_roles(context.store.database, owned)
+    impatient = Database(f"{database_url}?options=-c%20lock_timeout%3D1s")
+    with context.store.database.transaction() as works:
+        works.execute(text(f"LOCK TABLE {', '.join(tables.metadata.tables)} IN ROW SHARE MODE"))
+        make_roles(impatient, owned)
+    impatient.close()
+
+
+def test_an_older_installation_is_taken_over_table_by_table(context, owned) -> None:
+    """Who waits for one table has no other, so that nobody who works with both stops it."""
+    superuser = context.store.database
+    held = text(
+        "SELECT array_agg(held.relation::regclass::text) FILTER (WHERE held.granted) "
+        "FROM pg_locks AS waits JOIN pg_locks AS held USING (pid) "
+        "WHERE waits.relation = 'verifications'::regclass AND NOT waits.granted "
+        "AND held.locktype = 'relation' AND held.mode IN ('AccessExclusiveLock', "
+        "'ShareRowExclusiveLock') HAVING count(*) > 0"
+    )
+    with ThreadPoolExecutor(1) as pool:
+        with superuser.transaction() as works:
+            works.execute(text("LOCK TABLE verifications IN ROW EXCLUSIVE MODE"))
+            made = pool.submit(make_roles, superuser, owned)
+            (others,) = wait_until(lambda: works.execute(held).first(), 30, "it waits")
+        made.result()
+    assert others is None
 
 
 @pytest.mark.parametrize(

@@ -3,20 +3,23 @@
 import json
 import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from alembic import command
 from sqlalchemy import create_engine, text
+from sqlalchemy.exc import OperationalError
+from support.servers.stacks import wait_until
 from support.stages import work
 
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import Budget
 from buildarena_pipeline.runtime.context import Context, open_context
 from buildarena_pipeline.submission.submission import Submissions
-from buildarena_store import ArtifactStore, SweepState
-from buildarena_store.database import Database
+from buildarena_store import ArtifactStore, SweepState, migrating
+from buildarena_store.database import SCHEMA, Database
 from buildarena_store.ids import new_id
 from buildarena_store.jobs.job import JobKey, configuration_hash
 from buildarena_store.migrating import alembic_config
@@ -122,6 +125,32 @@ def test_stopped_sweeps_go_on(upgraded) -> None:
     for name in ("paused", "limited", "finished"):
         progress = upgraded.store.sweeps.progress(sweep_id(name))
         assert progress.done == progress.total, name
+
+
+def test_a_revision_that_meets_who_works_in_another_order_is_begun_again(
+    old_database, monkeypatch
+) -> None:
+    """It has the jobs and waits for the rollouts, whose writer asks for the jobs."""
+    waiting = text("SELECT 1 FROM pg_locks WHERE relation = 'rollouts'::regclass AND NOT granted")
+    database = Database(old_database)
+    command.upgrade(alembic_config(database.url), "2026_11_23_lost_requests")
+
+    def migrate_beside_a_writer() -> str:
+        with ThreadPoolExecutor(1) as pool, database.transaction() as writer:
+            writer.execute(text("SET LOCAL deadlock_timeout = '60s'"))
+            writer.execute(text("LOCK TABLE rollouts IN ROW EXCLUSIVE MODE"))
+            migrated = pool.submit(database.migrate)
+            wait_until(lambda: writer.execute(waiting).first(), 30, "the revision waits")
+            writer.execute(text("LOCK TABLE jobs IN ROW EXCLUSIVE MODE"))
+            writer.commit()
+            return migrated.result()
+
+    with monkeypatch.context() as patched, pytest.raises(OperationalError, match="deadlock"):
+        patched.setattr(migrating, "TRIES", 1)
+        migrate_beside_a_writer()
+    assert database.schema() == "2026_11_23_lost_requests"
+    assert migrate_beside_a_writer() == database.schema() == SCHEMA
+    database.close()
 
 
 def test_jobs_with_limits_move_to_the_ids_that_follow_from_them(old_database, settings) -> None:

@@ -8,8 +8,11 @@ from typing import Final
 from alembic import command
 from alembic.config import Config
 from alembic.script import ScriptDirectory
+from psycopg.errors import DeadlockDetected
+from sqlalchemy.exc import OperationalError
 
 MIGRATIONS: Final = Path(__file__).parent / "migrations"
+TRIES: Final = 5
 
 
 def alembic_config(url: str) -> Config:
@@ -21,8 +24,17 @@ def alembic_config(url: str) -> Config:
 
 
 def migrate_to_newest(url: str) -> None:
-    """Brings a database to the newest revision."""
-    command.upgrade(alembic_config(url), "head")
+    """Brings a database to the newest revision.
+
+    Processes that work meanwhile lock its tables in orders of their own: a revision that met one
+    halfway is undone by the server, and begun again.
+    """
+    for tries_left in reversed(range(TRIES)):
+        try:
+            return command.upgrade(alembic_config(url), "head")
+        except OperationalError as error:
+            if not tries_left or not isinstance(error.orig, DeadlockDetected):
+                raise
 
 
 def known_schemas() -> frozenset[str]:

@@ -49,9 +49,7 @@ def make_roles(database: Database, logins: Mapping[str, str]) -> None:
         for role, (name, password) in accounts.items():
             _make(connection, name, "LOGIN")
             _set_password(connection, name, password)
-            if role == OWNER:
-                _own(connection, name)
-            else:
+            if role != OWNER:
                 _leave_other_groups(connection, name, group_of(role))
                 group = sql.Identifier(group_of(role))
                 _run(connection, "GRANT {} TO {}", group, sql.Identifier(name))
@@ -60,6 +58,8 @@ def make_roles(database: Database, logins: Mapping[str, str]) -> None:
         _run(connection, "REVOKE CREATE ON SCHEMA public FROM PUBLIC")
         for role in ROLES:
             _run(connection, "GRANT CONNECT ON DATABASE {} TO {}", base, _group(role))
+    if OWNER in accounts:
+        _own(database, accounts[OWNER][0])
 
 
 def _group(role: str) -> sql.Identifier:
@@ -117,23 +117,34 @@ def _leave_other_groups(connection: Connection, name: str, group: str) -> None:
             _run(connection, "REVOKE {} FROM {}", sql.Identifier(parent), sql.Identifier(name))
 
 
-def _own(connection: Connection, name: str) -> None:
-    """Hands database, schema and everything in it to the owner."""
-    owner = sql.Identifier(name)
-    base = sql.Identifier(str(connection.execute(text("SELECT current_database()")).scalar()))
-    _run(connection, "ALTER DATABASE {} OWNER TO {}", base, owner)
-    _run(connection, "ALTER SCHEMA public OWNER TO {}", owner)
-    for statement in connection.execute(text(_OWNED)).scalars().all():
-        _run(connection, statement + " OWNER TO {}", owner)
+def _own(database: Database, name: str) -> None:
+    """Hands database, schema and everything in it to the owner, but what is the owner's already.
+
+    One after another: whoever holds one table's lock and waits for the next one's would stop
+    processes that work with both in the other order.
+    """
+    with database.transaction() as connection:
+        found = connection.execute(text(_NOT_OWNED), {"name": name}).scalars().all()
+    for statement in found:
+        with database.statement() as connection:
+            _run(connection, statement + " OWNER TO {}", sql.Identifier(name))
 
 
-_OWNED: Final = """
+_NOT_OWNED: Final = """
+    SELECT format('ALTER DATABASE %I', datname) FROM pg_database
+    WHERE datname = current_database() AND datdba <> to_regrole(quote_ident(:name))
+    UNION ALL
+    SELECT format('ALTER SCHEMA %I', nspname) FROM pg_namespace
+    WHERE nspname = 'public' AND nspowner <> to_regrole(quote_ident(:name))
+    UNION ALL
     SELECT format('ALTER %s public.%I', CASE relkind WHEN 'S' THEN 'SEQUENCE'
         WHEN 'v' THEN 'VIEW' ELSE 'TABLE' END, relname)
     FROM pg_class WHERE relnamespace = 'public'::regnamespace AND relkind IN ('r', 'p', 'v', 'S')
+        AND relowner <> to_regrole(quote_ident(:name))
         AND NOT EXISTS (SELECT FROM pg_depend WHERE classid = 'pg_class'::regclass
             AND objid = pg_class.oid AND deptype IN ('a', 'i') AND relkind = 'S')
     UNION ALL
     SELECT format('ALTER FUNCTION public.%I(%s)', proname, pg_get_function_identity_arguments(oid))
     FROM pg_proc WHERE pronamespace = 'public'::regnamespace
+        AND proowner <> to_regrole(quote_ident(:name))
 """

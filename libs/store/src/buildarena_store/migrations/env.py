@@ -1,7 +1,7 @@
 """Runs the chain against the database that the caller named."""
 
 from alembic import context
-from sqlalchemy import Connection, create_engine, inspect, text
+from sqlalchemy import Connection, NullPool, create_engine, inspect, text
 
 from buildarena_store.tables import metadata
 
@@ -28,15 +28,13 @@ def run() -> None:
         with context.begin_transaction():
             context.run_migrations()
         return
-    engine = create_engine(url)
-    with engine.connect() as connection:
+    with create_engine(url, poolclass=NullPool).connect() as connection:
         context.configure(
             connection=connection, target_metadata=metadata, transaction_per_migration=True
         )
         with context.begin_transaction():
             context.run_migrations()
         note_compatibility(connection)
-    engine.dispose()
 
 
 run()
