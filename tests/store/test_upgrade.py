@@ -145,9 +145,10 @@ def test_a_revision_that_meets_who_works_in_another_order_is_begun_again(
             writer.commit()
             return migrated.result()
 
-    with monkeypatch.context() as patched, pytest.raises(OperationalError, match="deadlock"):
+    with monkeypatch.context() as patched:
         patched.setattr(migrating, "TRIES", 1)
-        migrate_beside_a_writer()
+        with pytest.raises(OperationalError, match="deadlock"):
+            migrate_beside_a_writer()
     assert database.schema() == "2026_11_23_lost_requests"
     assert migrate_beside_a_writer() == database.schema() == SCHEMA
     database.close()

@@ -31,7 +31,8 @@ def migrate_to_newest(url: str) -> None:
     """
     for tries_left in reversed(range(TRIES)):
         try:
-            return command.upgrade(alembic_config(url), "head")
+            command.upgrade(alembic_config(url), "head")
+            break
         except OperationalError as error:
             if not tries_left or not isinstance(error.orig, DeadlockDetected):
                 raise
