@@ -23,7 +23,8 @@ parts)
     # The distribution of this name and, of the others, those that it asks for.
     mapfile -t parts < <("$python" "$recipe/siblings.py" "buildarena-$name")
     [ "${#parts[@]}" -gt 0 ]
-    uv pip install --python "$python" --no-index --find-links /mnt/wheels --no-deps "${parts[@]}"
+    # Not from uv's cache, which takes a wheel of the same version for the same, whatever is in it.
+    uv pip install --no-cache --python "$python" --no-index --find-links /mnt/wheels --no-deps "${parts[@]}"
     # Which also compiles what is loaded, and no more: half of the libraries' sources never are.
     "$python" "$recipe/imports.py"
     ;;
