@@ -1,14 +1,44 @@
 """What containers may do, and where no secret may stand."""
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scenarios.containers.engine import TARGETS, Project
+from scenarios.containers.engine import ROOT, TARGETS, Engine, Project
 from scenarios.containers.service import Service
 
 SHORT = 12
 """Secrets that are shorter could stand somewhere by chance."""
+
+
+OURS_THERE = """
+import hashlib, json, sysconfig
+from pathlib import Path
+site = Path(sysconfig.get_path("purelib"))
+files = site.glob("buildarena*/**/*.py")
+print(json.dumps({str(f.relative_to(site)): hashlib.sha256(f.read_bytes()).hexdigest() for f in files}))
+"""
+
+
+def check_code(engine: Engine) -> dict[str, int]:
+    """Each image has our sources as they stand in the tree; how many files of them, by image."""
+    ours = {
+        str(file.relative_to(source)): hashlib.sha256(file.read_bytes()).hexdigest()
+        for room in ("libs", "services", "clients")
+        for source in (ROOT / room).glob("*/src")
+        for file in source.rglob("*.py")
+    }
+    found = {}
+    for target in (target for target in TARGETS if target != "proxy"):
+        words = ("run", "--rm", "--entrypoint", "python", f"buildarena/{target}:current")
+        there = json.loads(engine.run(*words, "-c", OURS_THERE))
+        other = sorted(name for name, digest in there.items() if ours.get(name) != digest)
+        assert not other, f"{target} has other sources than the tree: {', '.join(other)}"
+        assert {name.partition("/")[0] for name in there} >= {"buildarena_store"}, target
+        found[target] = len(there)
+    return found
 
 
 def check_confinement(project: Project, services: Sequence[str]) -> dict[str, str]:

@@ -31,7 +31,7 @@ from scenarios.containers.engine import (
     require_programs,
     say,
 )
-from scenarios.containers.inspecting import check_confinement, check_no_secrets
+from scenarios.containers.inspecting import check_code, check_confinement, check_no_secrets
 from scenarios.containers.service import Service
 from support.documents.code_blocks import shown_in
 
@@ -147,6 +147,7 @@ def build(run: Run) -> None:
         )
     with run.step("images of this commit"):
         run.figures["build_s"] = run.engine.build(ROOT, "current", run.tag)
+    run.figures["our files"] = check_code(run.engine)
     versions = ("previous", "current")
     if not run.keep:
         names = [f"buildarena/{target}:{version}" for target in TARGETS for version in versions]
