@@ -140,6 +140,11 @@ class Project:
             **{**self.environment, **environment},
         )
 
+    def scale(self, containers: Mapping[str, int]) -> None:
+        """Brings up or takes down containers of services until there are so many of each."""
+        numbers = [f"--scale={service}={number}" for service, number in containers.items()]
+        self.compose("up", "--detach", "--no-build", "--no-recreate", *numbers)
+
     def containers(self, service: str | None = None, *, running: bool = True) -> list[str]:
         filters = ["--filter", f"label=com.docker.compose.project={self.name}"]
         if service:

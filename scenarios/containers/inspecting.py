@@ -17,8 +17,9 @@ OURS_THERE = """
 import hashlib, json, sysconfig
 from pathlib import Path
 site = Path(sysconfig.get_path("purelib"))
+digest = lambda file: hashlib.sha256(file.read_bytes()).hexdigest()
 files = site.glob("buildarena*/**/*.py")
-print(json.dumps({str(f.relative_to(site)): hashlib.sha256(f.read_bytes()).hexdigest() for f in files}))
+print(json.dumps({str(file.relative_to(site)): digest(file) for file in files}))
 """
 
 
