@@ -36,6 +36,9 @@ CONNECTIONS_OF_THREADS = 16
 """Connections of a process of many threads: its sessions keep their replies at the same time, and
 Postgres writes what comes together to its disk at once. All stay open, because a crowd that opens
 and closes further ones pays more for these than for what it writes."""
+SWITCH_S = 0.0005
+"""How long a thread of many may keep the interpreter: a session asks for it after each answer of
+the database, and waits so long each time while another one builds."""
 CONNECTIONS_OF_FORKS = 2
 """Connections that a process with one job at a time keeps; as many again open for a moment."""
 
@@ -88,6 +91,7 @@ class _Runtime:
     def __init__(self, spec: WorkerSpec, settings: Settings) -> None:
         name = f"buildarena-{spec.kind}"
         if spec.pool == THREADS:
+            sys.setswitchinterval(SWITCH_S)
             self.context = open_context(
                 settings, pool_size=CONNECTIONS_OF_THREADS, overflow=0, name=name
             )
