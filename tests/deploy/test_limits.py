@@ -149,7 +149,7 @@ def test_the_broker_hears_when_it_is_to_stop_and_shows_no_password(tmp_path) -> 
     with subprocess.Popen([*valkey["entrypoint"], script], env=environment) as process:
         try:
             client = Redis(unix_socket_path=f"{tmp_path}/socket", password="hard-to-guess")
-            wait_until(lambda: (tmp_path / "socket").exists(), 30, "the broker listens")
+            wait_until((tmp_path / "socket").exists, 30, "the broker listens")
             assert client.config_get("maxmemory-policy") == {"maxmemory-policy": "noeviction"}
             assert client.config_get("maxmemory") == {"maxmemory": str(64 << 20)}
             client.close()
