@@ -11,8 +11,6 @@ from scenarios.containers.service import Service
 
 SHORT = 12
 """Secrets that are shorter could stand somewhere by chance."""
-
-
 OURS_THERE = """
 import hashlib, json, sysconfig
 from pathlib import Path
@@ -21,6 +19,7 @@ digest = lambda file: hashlib.sha256(file.read_bytes()).hexdigest()
 files = site.glob("buildarena*/**/*.py")
 print(json.dumps({str(file.relative_to(site)): digest(file) for file in files}))
 """
+"""What an image's Python is asked: digests of our sources in it."""
 
 
 def check_code(engine: Engine) -> dict[str, int]:

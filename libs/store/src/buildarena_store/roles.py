@@ -132,19 +132,19 @@ def _own(database: Database, name: str) -> None:
 
 _NOT_OWNED: Final = """
     SELECT format('ALTER DATABASE %I', datname) FROM pg_database
-    WHERE datname = current_database() AND datdba <> to_regrole(quote_ident(:name))
+    WHERE datname = current_database() AND pg_get_userbyid(datdba) <> :name
     UNION ALL
     SELECT format('ALTER SCHEMA %I', nspname) FROM pg_namespace
-    WHERE nspname = 'public' AND nspowner <> to_regrole(quote_ident(:name))
+    WHERE nspname = 'public' AND pg_get_userbyid(nspowner) <> :name
     UNION ALL
     SELECT format('ALTER %s public.%I', CASE relkind WHEN 'S' THEN 'SEQUENCE'
         WHEN 'v' THEN 'VIEW' ELSE 'TABLE' END, relname)
     FROM pg_class WHERE relnamespace = 'public'::regnamespace AND relkind IN ('r', 'p', 'v', 'S')
-        AND relowner <> to_regrole(quote_ident(:name))
+        AND pg_get_userbyid(relowner) <> :name
         AND NOT EXISTS (SELECT FROM pg_depend WHERE classid = 'pg_class'::regclass
             AND objid = pg_class.oid AND deptype IN ('a', 'i') AND relkind = 'S')
     UNION ALL
     SELECT format('ALTER FUNCTION public.%I(%s)', proname, pg_get_function_identity_arguments(oid))
     FROM pg_proc WHERE pronamespace = 'public'::regnamespace
-        AND proowner <> to_regrole(quote_ident(:name))
+        AND pg_get_userbyid(proowner) <> :name
 """
