@@ -1,67 +1,41 @@
-"""One Postgres and one Valkey a run, one database per test worker, empty for each test."""
+"""What all tests share: marks, servers on first use, a database per test worker, memory."""
 
 from __future__ import annotations
 
 import gc
 import os
-import shutil
-import tempfile
+import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
+import psutil
 import pytest
-from fastapi.dependencies import models as dependencies
-from redis import Redis
-from sqlalchemy import create_engine, text
 from support import blas_kernels  # noqa: F401 - before numpy is imported
-from support.clients import one_trust  # noqa: F401 - before clients are made
-from support.long_tests import LONG
-from support.player import Player
-from support.servers.databases import empty
+from support.marks import mark_variants
+from support.servers.run_servers import TEMPLATE, RunServers, execute, server_urls
 
-from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import Context, open_context
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.submission.submission import Submissions
-from buildarena_store import Database
+if TYPE_CHECKING:
+    from support.player import Player
 
-TEMPLATE = "buildarena_template"
-SERVERS = pytest.StashKey[ExitStack]()
-VALKEY_DATABASES = 16
-LONGEST = ("tests/web/", "scenarios/chaos/", "tests/e2e/", "tests/cli/local/")
+    from buildarena_pipeline.runtime.context import Context
+    from buildarena_pipeline.runtime.settings import Settings
+    from buildarena_pipeline.submission.submission import Submissions
+
+SERVERS: Final = pytest.StashKey[RunServers]()
+VALKEY_DATABASES: Final = 16
+LONGEST: Final = ("tests/web/", "scenarios/chaos/", "tests/e2e/", "tests/cli/local/")
 """Tests of whole services; at the end of a run one of them would be waited for."""
-REMEMBERED = [known for known in vars(dependencies).values() if hasattr(known, "cache_clear")]
-LEFT_OUT = ("install the Debian packages", "make web")
+LEFT_OUT: Final = ("install the Debian packages", "make web")
+MAX_MEMORY: Final = 700 * 2**20
+"""Bytes of a test worker above which garbage is collected after a module."""
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leaves long variants to `make test-long`, and begins with what takes longest."""
-    _leave_all_but_samples_to_slow(items)
-    if not LONG:
-        left = [item for item in items if item.get_closest_marker("long")]
-        config.hook.pytest_deselected(items=left)
-        items[:] = [item for item in items if not item.get_closest_marker("long")]
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks variants, and begins with what takes longest."""
+    mark_variants(items)
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
-
-
-def _leave_all_but_samples_to_slow(items: list[pytest.Item]) -> None:
-    """Marks as slow what a test of samples has beyond them; they are spread over its variants."""
-    variants: dict[str, list[pytest.Item]] = {}
-    for item in items:
-        if item.get_closest_marker("samples") and not item.get_closest_marker("slow"):
-            variants.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    for group in variants.values():
-        marker = group[0].get_closest_marker("samples")
-        assert marker is not None
-        most = marker.args[0]
-        chosen = {round(number * len(group) / most) for number in range(most)}
-        for number, item in enumerate(group):
-            if number not in chosen:
-                item.add_marker("slow")
 
 
 def pytest_collection_finish() -> None:
@@ -73,75 +47,60 @@ def pytest_collection_finish() -> None:
 def pytest_configure(config: pytest.Config) -> None:
     # What is no test of varied worlds has its machines tried once.
     os.environ.setdefault("BUILDARENA_WORLDS", "0")
-    if hasattr(config, "workerinput") or config.option.collectonly:
-        return
-    with ExitStack() as stack:
-        folder = Path(tempfile.mkdtemp(prefix="buildarena-tests-"))
-        stack.callback(shutil.rmtree, folder, ignore_errors=True)
-        postgres = EmbeddedPostgres(folder / "pg", folder / "pg.log", durable=False)
-        stack.callback(postgres.stop, postgres.start())
-        valkey = EmbeddedValkey(folder / "valkey", folder / "valkey.log")
-        stack.callback(valkey.stop, valkey.start())
-        template = Database(postgres.url.replace("/postgres", f"/{TEMPLATE}"))
-        _execute(postgres.url, f"CREATE DATABASE {TEMPLATE}")
-        template.migrate()
-        template.close()
-        os.environ["TEST_POSTGRES_URL"] = postgres.url
-        os.environ["TEST_VALKEY_URL"] = valkey.url
-        config.stash[SERVERS] = stack.pop_all()
+    if not hasattr(config, "workerinput"):
+        config.stash[SERVERS] = RunServers()
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    stack = config.stash.get(SERVERS, None)
-    if stack is not None:
-        stack.close()
+    if SERVERS in config.stash:
+        config.stash[SERVERS].close()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Any:
-    """Where everything must run, a test that was left out for want of a program has failed."""
+    """In CI, a test that was left out for want of a program has failed."""
     del item, call
     report = yield
     if (
         report.skipped
-        and os.environ.get("BUILDARENA_TEST_ALL")
+        and os.environ.get("CI")
         and any(words in str(report.longrepr) for words in LEFT_OUT)
     ):
         report.outcome = "failed"
     return report
 
 
-def _execute(url: str, statement: str) -> None:
-    engine = create_engine(
-        url.replace("postgresql://", "postgresql+psycopg://"), isolation_level="AUTOCOMMIT"
-    )
-    with engine.connect() as connection:
-        connection.execute(text(statement))
-    engine.dispose()
+@pytest.fixture(autouse=True, scope="module")
+def collected_apps() -> Iterator[None]:
+    """Collects what a module's tests leave: an app refers to itself, so that only this ends it."""
+    yield
+    live_api = sys.modules.get("support.servers.live_api")
+    has_apps = live_api is not None and len(live_api.APPS) > 0
+    if has_apps or psutil.Process().memory_info().rss > MAX_MEMORY:
+        gc.collect()
 
 
 @pytest.fixture(autouse=True)
 def forgotten_apps() -> Iterator[None]:
-    """FastAPI remembers functions of the last thousand apps, and these their apps: gigabytes."""
+    """Clears what FastAPI remembers of a test's apps."""
     yield
-    for cache in REMEMBERED:
-        cache.cache_clear()
-
-
-@pytest.fixture(autouse=True, scope="module")
-def collected_apps() -> Iterator[None]:
-    """An app refers to itself, so that only the collector ends it."""
-    yield
-    gc.collect()
+    if live_api := sys.modules.get("support.servers.live_api"):
+        live_api.forget_apps()
 
 
 @pytest.fixture(scope="session")
-def database_url(worker_id: str) -> Iterator[str]:
+def postgres_url() -> str:
+    """The run's Postgres server."""
+    return server_urls()[0]
+
+
+@pytest.fixture(scope="session")
+def database_url(worker_id: str, postgres_url: str) -> Iterator[str]:
     """A migrated database of this test worker's own."""
-    server, name = os.environ["TEST_POSTGRES_URL"], f"test_{worker_id}"
-    _execute(server, f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
-    yield server.replace("/postgres", f"/{name}")
-    _execute(server, f"DROP DATABASE {name} WITH (FORCE)")
+    name = f"test_{worker_id}"
+    execute(postgres_url, f"CREATE DATABASE {name} TEMPLATE {TEMPLATE}")
+    yield postgres_url.replace("/postgres", f"/{name}")
+    execute(postgres_url, f"DROP DATABASE {name} WITH (FORCE)")
 
 
 @pytest.fixture(scope="session")
@@ -149,12 +108,14 @@ def broker_url(worker_id: str) -> str:
     """A Valkey database of this test worker's own."""
     number = 0 if worker_id == "master" else 1 + int(worker_id.removeprefix("gw"))
     assert number < VALKEY_DATABASES
-    return os.environ["TEST_VALKEY_URL"].removesuffix("/0") + f"/{number}"
+    return server_urls()[1].removesuffix("/0") + f"/{number}"
 
 
 @pytest.fixture
 def settings(database_url: str, broker_url: str, tmp_path: Path) -> Settings:
     """Settings that name the test servers and a folder of this test's own."""
+    from buildarena_pipeline.runtime.settings import Settings
+
     return Settings(
         database_url=database_url, broker_url=broker_url, data=tmp_path / "data", lease_s=2.0
     )
@@ -163,6 +124,11 @@ def settings(database_url: str, broker_url: str, tmp_path: Path) -> Settings:
 @pytest.fixture
 def context(settings: Settings) -> Iterator[Context]:
     """Connections to an empty database and an empty broker."""
+    from redis import Redis
+    from support.servers.databases import empty
+
+    from buildarena_pipeline.runtime.context import open_context
+
     context = open_context(settings)
     empty(context.store.database)
     with Redis.from_url(settings.required_broker_url()) as valkey:
@@ -174,10 +140,15 @@ def context(settings: Settings) -> Iterator[Context]:
 @pytest.fixture(scope="session")
 def play() -> Player:
     """Plays sessions up to their first simulation, without database or simulator."""
+    from support.player import Player
+
     return Player()
 
 
 @pytest.fixture
 def submissions(context: Context) -> Submissions:
     """Submits with the built-in registry."""
+    from buildarena_pipeline.catalog.models import load_registry
+    from buildarena_pipeline.submission.submission import Submissions
+
     return Submissions(context, load_registry())

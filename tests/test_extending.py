@@ -58,7 +58,7 @@ def car(play, tmp_path) -> Path:
     return file
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_scorer_is_one_file(car, tmp_path) -> None:
     environment = installed("A scorer", tmp_path)
     task = tmp_path / "north.yaml"
@@ -79,7 +79,7 @@ def test_a_scorer_is_one_file(car, tmp_path) -> None:
     assert "'support'" in without.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_engine_is_one_module(car, tmp_path) -> None:
     environment = installed("An engine", tmp_path)
     command = ("-m", "buildarena_cli", "machine", "simulate", car, "--task", "transport-1")
@@ -132,7 +132,7 @@ client.close()
 """
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_protocol_is_one_module(endpoint, tmp_path) -> None:
     environment = installed("A provider's protocol", tmp_path)
     file = tmp_path / "models.yaml"

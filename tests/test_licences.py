@@ -20,7 +20,7 @@ def parts() -> dict[str, licences.Part]:
     return {part.name: part for part in licences.parts()}
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_every_pin_is_a_row(parts) -> None:
     for lock in ("requirements.lock", "integrations/inspect/requirements.lock"):
         pins = re.findall(r"^([a-z0-9._-]+)==", (ROOT / lock).read_text(), re.MULTILINE)
@@ -30,7 +30,7 @@ def test_every_pin_is_a_row(parts) -> None:
     assert parts["react"].version == pages["node_modules/react"]["version"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_licences_are_what_packages_say(parts) -> None:
     told = {
         name: (parts[name].licence, parts[name].kind) for name in ("psycopg", "certifi", "numpy")
@@ -43,12 +43,12 @@ def test_licences_are_what_packages_say(parts) -> None:
     assert parts["certifi"].of[0] == "services and clients"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_no_licence_is_unknown(parts) -> None:
     assert [name for name, part in parts.items() if part.licence == licences.UNKNOWN] == []
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_copyleft_is_where_we_know_of_it(parts) -> None:
     """A new one in what the images hold is a decision, and its text goes into them."""
     images = set()
@@ -78,7 +78,7 @@ def test_what_packages_write_is_read_or_unknown(tmp_path, metadata, licence) -> 
     assert licences.licence_of(PathDistribution(folder)) == licence
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_command_prints_a_table_and_json() -> None:
     words = [sys.executable, str(ROOT / "mk/licences.py")]
     table = subprocess.run(words, capture_output=True, text=True, check=True).stdout

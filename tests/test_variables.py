@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 NAME = re.compile(r"\bBUILDARENA_[A-Z0-9]+(?:_[A-Z0-9]+)*\b(?!_)")
 WITHOUT_SETTINGS = {"URL", "KEY", "BLAS_KERNELS", "PARENT_PID"}
 """Read before, or without, a process' settings."""
-OF_TESTS = {"CHROMIUM", "TEST_ALL", "TEST_LONG"}
+OF_TESTS = {"CHROMIUM"}
 SOURCES = [
     *ROOT.glob("libs/*/src/**/*.py"),
     *ROOT.glob("services/*/src/**/*.py"),

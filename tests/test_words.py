@@ -129,7 +129,7 @@ def findings(name: str, text: str) -> list[str]:
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_old_words_do_not_come_back() -> None:
     names = tracked()
     assert len(names) > 300

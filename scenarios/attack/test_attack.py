@@ -8,7 +8,7 @@ import pytest
 from scenarios.attack.arena import Arena, arena
 from scenarios.attack.run import small_disk
 from scenarios.attack.scenarios import SCENARIOS
-from support.long_tests import long
+from support.marks import nightly
 
 SMALL = {
     "jobs": 60,
@@ -40,15 +40,14 @@ def place() -> Iterator[Arena]:
         yield found
 
 
-@pytest.mark.samples(1)
-@pytest.mark.xdist_group("attack")
+@pytest.mark.nightly(keep=1)
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize(
     "name",
     [
-        long(name)
+        nightly(name)
         if name.startswith("killed")
-        else pytest.param(name, marks=() if name in QUICK else pytest.mark.slow)
+        else pytest.param(name, marks=() if name in QUICK else pytest.mark.ci)
         for name in SCENARIOS
     ],
 )

@@ -19,7 +19,6 @@ import pytest
 from scenarios.chaos.accounts import audited, pick_ups, wrongs
 from scenarios.chaos.faults import VICTIMS, Fire, skewed_worker
 from sqlalchemy.exc import OperationalError
-from support.long_tests import LONG
 from support.servers.stacks import running_stack, wait_until
 
 from buildarena_benchmark import builtin_tasks, score
@@ -28,9 +27,9 @@ from buildarena_cli.local.stack import Stack
 from buildarena_simulation import simulate
 from buildarena_store import Database
 
-JOBS = int(os.environ.get("CHAOS_JOBS", "80" if LONG else "12"))
+JOBS = int(os.environ.get("CHAOS_JOBS", "12"))
 EVERY_S = float(os.environ.get("CHAOS_EVERY_S", "2.5"))
-STRIKES = math.inf if LONG or "CHAOS_JOBS" in os.environ else len(VICTIMS)
+STRIKES = math.inf if "CHAOS_JOBS" in os.environ else len(VICTIMS)
 """In `make test` one for each process: a busy machine restarts no more than an idle one."""
 LEASE_S = float(os.environ.get("CHAOS_LEASE_S", "3"))
 SEED = os.environ.get("CHAOS_SEED", "1")
@@ -108,7 +107,7 @@ def started_runner(stack: Stack, words: list[str]) -> subprocess.Popen[bytes]:
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("way", ["database", "api"])
 def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
     rng = random.Random(SEED)

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from support.long_tests import LONG
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import wait_until
 
@@ -21,7 +20,7 @@ from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.submission.submission import Submissions
 
-KILLS = int(os.environ.get("CHAOS_KILLS", "4" if LONG else "2"))
+KILLS = int(os.environ.get("CHAOS_KILLS", "2"))
 LATENCY_S = 0.02
 TASK = "support-2" if KILLS > 2 else "support-1"
 """A session of some two hundred turns has time for many kills, one of fifty for two."""
@@ -48,7 +47,7 @@ def worker(environment: dict[str, str]) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_session_that_is_killed_again_and_again_builds_the_same_machine(
     play, context, settings, tmp_path
 ) -> None:

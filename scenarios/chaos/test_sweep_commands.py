@@ -208,7 +208,7 @@ def work_during(context, contest: Contest, seed: int) -> None:
         time.sleep(0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.timeout(SECONDS * 3 + SLOWEST_S + 120)
 def test_commands_at_once_leave_legal_histories(context) -> None:
     contest = Contest()

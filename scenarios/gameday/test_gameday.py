@@ -35,7 +35,7 @@ def test_the_plan_is_an_hour_of_twelve_faults_whose_names_differ() -> None:
 
 
 @needs_alertmanager
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.timeout(900)
 def test_a_small_game_day(folder) -> None:
     faults = [replace(f, at_min=CHOSEN[f.name]) for f in FAULTS if f.name in CHOSEN]

@@ -31,7 +31,7 @@ def devices() -> set[str]:
     return {file.name for file in Path("/sys/class/net").iterdir()}
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_links_are_slow_and_cut_and_nothing_is_left(how) -> None:
     require_namespaces()

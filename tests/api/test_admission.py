@@ -76,7 +76,7 @@ def status_of(connection: socket.socket) -> int:
     return int(connection.recv(4096).split()[1])
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("secret", [invented, lambda: None, lambda: "x" * 40])
 def test_who_has_no_good_key_is_answered_before_the_body_comes(url, secret) -> None:
     with ExitStack() as stack:

@@ -191,7 +191,7 @@ def test_what_others_forward_is_ignored(context, trusted) -> None:
     assert answer.headers["Location"] == "http://inner:8000/v1/models"
 
 
-@pytest.mark.samples(4)
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize(
     "host", ["a b", "a/b", "evil@host", "a,b", "x" * 300, "[::1", "host:port", "host:999999"]
 )
@@ -207,7 +207,7 @@ def test_without_keys_a_forwarded_host_makes_no_foreign_name_ours(context) -> No
         assert httpx.get(f"{url}/v1/models").status_code == 421
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("trusted", "seen", "least", "most"),
     [

@@ -24,7 +24,7 @@ def boasting() -> bytes:
     return repacked(packed("probe"), damage)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_is_sent_is_judged_stored_once_and_shown(api) -> None:
     data = packed("doctor", "probe", "expert-support-1")
     first, again = (api.post(PATH, content=data) for _ in range(2))
@@ -44,7 +44,7 @@ def test_what_is_sent_is_judged_stored_once_and_shown(api) -> None:
     assert api.get(f"{PATH}/{added['id']}/file").content == data
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_verdicts_that_logs_do_not_bear_out_are_marked(api) -> None:
     done = api.post(PATH, content=boasting()).json()
     assert done["differing"] == 4
@@ -53,9 +53,11 @@ def test_verdicts_that_logs_do_not_bear_out_are_marked(api) -> None:
     assert (row["verdict"], row["stated"]) == ("not_seen", "confirmed")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(
-    "data", [b"", b"PK", repacked(packed("doctor"), lambda m: m.pop(DOCUMENT))]
+    "data",
+    [b"", b"PK", repacked(packed("doctor"), lambda m: m.pop(DOCUMENT))],
+    ids=["empty", "two bytes", "no document"],  # of the package, whose bytes have the time in them
 )
 def test_what_is_no_evidence_is_refused_and_leaves_nothing(api, data) -> None:
     refused = api.post(PATH, content=data)

@@ -97,7 +97,7 @@ BOMBS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_are_answered_in_words_and_leave_the_process_well(api, name) -> None:
     answer = api.post("/v1/machines/check", content=BOMBS[name]())
@@ -175,7 +175,7 @@ def test_others_are_answered_while_a_file_is_read(clients, process) -> None:
         assert {check.result().status_code for check in checks} == {200}
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_process_that_is_killed_while_it_reads_loses_nothing(clients, process, context) -> None:
     mine, _ = clients
     params = {"task": "support-1", "simulator": "mujoco"}
@@ -189,7 +189,7 @@ def test_a_process_that_is_killed_while_it_reads_loses_nothing(clients, process,
     assert len(context.store.jobs.page(limit=10)) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_file_that_takes_too_long_is_refused(api, process, monkeypatch) -> None:
     monkeypatch.setattr(shared_checker()._checker, "_longest_s", 0.3)
     with stopped(process):
@@ -208,7 +208,7 @@ def checker():
     made.close()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_file_that_kills_its_process_is_read_twice_and_no_more(checker) -> None:
     first = checker.ask(["pid"])
     with pytest.raises(CheckFailedError, match="memory"):

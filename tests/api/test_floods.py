@@ -61,7 +61,7 @@ def score_all(context) -> None:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_streams_are_bounded_per_key_and_share_what_they_read(as_key, sweep_id) -> None:
     greedy, other = as_key(), as_key()
     path = f"/v1/sweeps/{sweep_id}/events"
@@ -158,7 +158,7 @@ def test_a_callers_ordinary_requests_take_turns(as_key, sweep_id, context) -> No
         assert {one.result().status_code for one in asked} == {200}
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_equal_verifications_are_one_and_open_ones_are_bounded(
     as_key, context, sweep_id, monkeypatch
 ) -> None:

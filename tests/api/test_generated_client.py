@@ -34,7 +34,7 @@ with AuthenticatedClient(base_url=sys.argv[2], token=sys.argv[3]) as client:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_generated_client_submits_a_job(context, tmp_path) -> None:
     target = tmp_path / "arena"
     words = ["generate", "--path", str(CONTRACT), "--meta", "none", "--output-path", str(target)]

@@ -104,7 +104,7 @@ def test_every_lane_is_one_of_the_limits(weights) -> None:
         assert isinstance(getattr(limits, weighed(weights, path).lane), ConcurrencyLimit)
 
 
-@pytest.mark.samples(5)
+@pytest.mark.nightly(keep=5)
 @pytest.mark.parametrize("limit", LIMITS)
 def test_no_spelling_of_many_rows_is_light(api, weights, submissions, limit) -> None:
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=150))
@@ -318,7 +318,7 @@ def statements(context):
         yield asked
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("kind", ["", "/figures", "/compare", "/agreement", "/manifest"])
 @pytest.mark.parametrize("name", INVENTED)
 @pytest.mark.usefixtures("board")
@@ -377,7 +377,7 @@ def test_nobodys_questions_push_out_anothers_answers() -> None:
     assert len(cache._values) == 8
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.usefixtures("board")
 def test_a_caller_with_many_questions_leaves_the_others_boards(guarded) -> None:
     mine, other = new_tenant(guarded, "mine"), new_tenant(guarded, "other")

@@ -53,7 +53,7 @@ def value(job: dict, sort: str) -> object:
     return job[{"created": "created_at", "finished": "finished_at"}.get(sort, sort)]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_every_order_is_kept_over_pages_of_every_size(api, jobs) -> None:
     assert len(jobs) == 13
     for sort in SORTS:
@@ -162,7 +162,7 @@ def test_ranges_are_numbers(api, bad) -> None:
     assert api.get("/v1/jobs", params={"indicator_min": bad}).status_code == 422
 
 
-@pytest.mark.samples(6)
+@pytest.mark.nightly(keep=6)
 @pytest.mark.parametrize(
     ("text", "count"),
     [
@@ -211,7 +211,7 @@ def test_a_cursor_of_another_order_is_refused(api) -> None:
         assert "another order" in answer.json()["detail"]
 
 
-@pytest.mark.samples(6)
+@pytest.mark.nightly(keep=6)
 @pytest.mark.parametrize(
     ("sort", "wrong"),
     [

@@ -108,7 +108,7 @@ def streaming(context, url: str, job: str, last_id: int = 0) -> Iterator[Stream]
         stream._client.close()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_turns_come_soon_and_once_over_reconnects_and_restarts(api, context) -> None:
     job = submitted(api)
     lease = claimed(context)

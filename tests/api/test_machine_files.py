@@ -115,7 +115,7 @@ HOSTILE = {
 }
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", HOSTILE)
 @pytest.mark.parametrize("ask", [check, attempt])
 def test_hostile_files_are_refused_in_words(api, ask, name) -> None:
@@ -157,7 +157,7 @@ def test_a_machine_that_breaks_a_rule_ends_at_once_and_stays_off_the_board(api) 
     assert board["tracks"] == []
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("field", "value"), [("task", "support-9"), ("simulator", "newton")])
 def test_what_does_not_exist_is_named(api, field, value) -> None:
     answer = attempt(api, document(), **{field: value})

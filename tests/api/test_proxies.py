@@ -11,7 +11,7 @@ from support.servers.stacks import wait_until
 from buildarena_cli.local import free_port
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(("trusted", "counted"), [("", "together"), ("127.0.0.0/8", "apart")])
 def test_forwarded_addresses_count_from_trusted_proxies_only(
     context, settings, trusted, counted

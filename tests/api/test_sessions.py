@@ -196,7 +196,7 @@ def test_nobody_gets_anothers_open_session(guarded) -> None:
     assert opened(ann) == (200, mine)
 
 
-@pytest.mark.samples(12)
+@pytest.mark.nightly(keep=12)
 @pytest.mark.parametrize("task", sorted(builtin_tasks()))
 def test_an_agent_is_told_all_it_needs(api, task) -> None:
     # A task whose worlds are drawn is scored in one at least.
@@ -236,7 +236,7 @@ def test_a_task_with_its_own_modules_lists_those_alone() -> None:
     assert "exactly 2 sub-structures" in text
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("change", "field"),
     [

@@ -57,7 +57,7 @@ def ups(url: str) -> dict[str, float]:
     }
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("part", ["database", "broker"])
 def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part, monkeypatch) -> None:
     with service_behind(context, part, monkeypatch) as (url, proxy):
@@ -90,7 +90,7 @@ def _ask_for_jobs(url: str) -> None:
     httpx.get(f"{url}/v1/jobs", headers={"Authorization": f"Bearer {ADMIN}"}, timeout=40)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_bucket_that_was_always_silent_is_named(context, monkeypatch) -> None:
     credentials = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_REGION")
     for name, value in {**dict.fromkeys(credentials, "test"), "AWS_ALLOW_HTTP": "true"}.items():

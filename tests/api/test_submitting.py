@@ -26,7 +26,7 @@ def test_a_sweep_is_accepted_with_its_progress(api, sweep) -> None:
     assert {job["seed"] for job in jobs} == {0, 1}
 
 
-@pytest.mark.samples(9)
+@pytest.mark.nightly(keep=9)
 @pytest.mark.parametrize(
     ("change", "field", "choice"),
     [

@@ -157,7 +157,7 @@ def test_nobody_pays_after_cancelling(a, b, guarded, context) -> None:
     assert theirs == payer_of(context)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_was_spent_before_a_hand_over_stays_where_it_was_spent(a, b, guarded, context) -> None:
     expert = {"models": ["builtin/expert"]}
     mine, theirs = sweep_of(a, **expert), sweep_of(b, **expert)

@@ -49,7 +49,7 @@ def programmed(api, session: str, program) -> None:
         act(api, session, "add_control_sequence", press)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -> None:
     session = opened(api)
     design, seen = built(api, session), []
@@ -88,7 +88,7 @@ def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -
     assert context.store.verifications.get(check).verdict == "verified"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(api, context) -> None:
     session = opened(api)
     # A draw whose figures are no part of others that an answer may well have.
@@ -129,7 +129,7 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(api, 
     assert api.get(f"/v1/jobs/{session}/trajectory").status_code == 200
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(api, context) -> None:
     session = opened(api)
     programmed(api, session, built(api, session).steer([]))
@@ -175,7 +175,7 @@ def test_a_call_that_only_says_so_is_no_test_trial(api) -> None:
         assert answer.status_code == 409
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_machines_from_files_have_a_world_of_their_own_each_time(api, context) -> None:
     """So that a file is no further test trial of anybody's session."""
     session = opened(api)

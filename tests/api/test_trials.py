@@ -29,7 +29,7 @@ def turned(quaternion, vector) -> np.ndarray:
     return np.array(vector) + w * across + np.cross(axis, across)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_arrow_says_what_parquet_says_and_the_scene_draws_it(api, context, monkeypatch) -> None:
     job = submitted(api)
     work(context)

@@ -58,7 +58,7 @@ def cut_off(path: str, body: bytes, *, chunked: bool) -> bytes:
     return head + b"Content-Length: %d\r\n\r\n" % (len(body) + 1) + body
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("half_close", [False, True])
 @pytest.mark.parametrize("chunked", [False, True])
 def test_a_body_that_was_cut_off_is_never_processed(url, context, chunked, half_close) -> None:

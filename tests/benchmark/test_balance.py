@@ -151,7 +151,7 @@ STANDS: Final = {"short", "third wheel", "tandem", "flat"}
 """Those that stand for good by themselves; the rules alone refuse them."""
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", MACHINES)
 def test_who_does_nothing_does_not_balance(name, engine) -> None:
@@ -166,7 +166,7 @@ def test_who_does_nothing_does_not_balance(name, engine) -> None:
     assert stands or name not in STANDS
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_wheels_that_are_not_two_on_one_level_axle_east_and_west_are_named() -> None:
     for name in ("third wheel", "tandem", "flat", "north-south"):
         machine = MACHINES[name]().machine.with_controller(IDLE)
@@ -174,15 +174,15 @@ def test_wheels_that_are_not_two_on_one_level_axle_east_and_west_are_named() -> 
         assert (result.indicator, result.flags) == (0, ("not_on_two_wheels",)), name
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_stands_because_its_mass_is_low_is_flagged(engine) -> None:
     result = scored(TASKS["balance-1"], short().machine.with_controller(IDLE), engine, None)
     assert (result.success, result.indicator, result.flags) == (False, 0, ("propped",))
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("share", ["1", "0.3", "t % 0.4 < 0.2 and 1 or -1"])
 def test_driving_on_and_shaking_do_not_balance(engine, share) -> None:
@@ -190,7 +190,7 @@ def test_driving_on_and_shaking_do_not_balance(engine, share) -> None:
     assert not scored(TASKS["balance-1"], machine, engine, 1).success
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("seed", [None, 0, 1])
 def test_spinning_in_place_does_not_balance(engine, seed) -> None:
@@ -209,8 +209,8 @@ def test_spinning_in_place_does_not_balance(engine, seed) -> None:
     assert result.indicator < 5
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_wheel_that_comes_off_ends_it(engine) -> None:
     """The same trial, in which a wheel goes on by itself half way."""
@@ -238,7 +238,7 @@ def test_each_threshold_ends_a_balance(stricter) -> None:
     assert result.flags == (() if "max_tilt_deg" in stricter else ("propped",))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_who_keeps_its_place_earns_more_and_who_falls_only_its_time() -> None:
     task = TASKS["balance-2"]
     machine = experts_machine(task)
@@ -251,8 +251,8 @@ def test_who_keeps_its_place_earns_more_and_who_falls_only_its_time() -> None:
     assert fallen.indicator == fallen.metrics["balanced_s"] < 3
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pushes_are_what_makes_the_second_harder(engine) -> None:
     """A program that stands, and takes no notice of its place, falls or drifts when pushed."""

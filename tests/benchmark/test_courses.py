@@ -22,7 +22,7 @@ def tried(name: str, machine: Machine, engine: str = "mujoco") -> Any:
     return scored(builtin_tasks()[name], machine, engine, None)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", COURSES)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_passes(engine, name) -> None:
@@ -37,14 +37,14 @@ def straight(*, track: int = 1, seconds: float = 19.0) -> Machine:
     return drafted(vehicles._vehicle(length=5, track=track, deck=None, presses=presses))
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", ["drive-3", "drive-4"])
 def test_who_never_steers_does_not_get_through(name) -> None:
     """Wider than the gap it stays before that; along the track walls turn it once, not twice."""
     assert not tried(name, straight()).success
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("seed", [1, 3, 2])
 def test_a_car_whose_wheels_bear_in_turns_has_driven(seed) -> None:
     """Large wheels on its rear ones lift these, so that it rocks on the front ones."""
@@ -57,7 +57,7 @@ def test_a_car_whose_wheels_bear_in_turns_has_driven(seed) -> None:
     assert (result.success, result.flags) == (True, ())
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_tower_that_topples_over_the_gates_drives_nothing() -> None:
     """Its mass gets over the first two lines of drive-2, and its wheels turn in the air."""
     draft = KeyedDraft(modules="workshop")
@@ -71,7 +71,7 @@ def test_a_tower_that_topples_over_the_gates_drives_nothing() -> None:
     assert result.indicator == 0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_weight_that_is_let_lie_is_not_fetched() -> None:
     """The crane without keys, and one that only takes hold."""
     for presses in ([], [(0.6, "RightArrow", 0.38)]):
@@ -80,7 +80,7 @@ def test_a_weight_that_is_let_lie_is_not_fetched() -> None:
         assert result.metrics["distance_to_mark"] > 15
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_weight_that_is_dropped_over_the_mark_is_not_put_down() -> None:
     """Let go at the top of its way it falls for itself by more than 3."""
     machine = drafted(

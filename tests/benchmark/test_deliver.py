@@ -33,7 +33,7 @@ def honest(engine: str) -> tuple[Machine, Trajectory]:
     return machine, simulate(machine, TASK.scenario, engine)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", ["deliver-1", "deliver-2", "deliver-3"])
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_delivers(engine, name) -> None:
@@ -46,13 +46,13 @@ def test_the_expert_delivers(engine, name) -> None:
     assert result.indicator == pytest.approx(1 + left, abs=1e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_engines_agree_about_when() -> None:
     times = [score(TASK, *honest(e)).metrics["delivered_s"] for e in FASTER_FIRST]
     assert max(times) < 1.05 * min(times)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_ball_that_is_kicked(engine) -> None:
     """The same car brakes half way, and the ball rolls on over the line."""
@@ -62,7 +62,7 @@ def test_a_ball_that_is_kicked(engine) -> None:
     assert 0.2 < result.indicator < 0.9
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_tower_that_topples_onto_the_ball(engine) -> None:
     """Thirty high, it hits the ball and knocks it away; what lies at the ball afterwards brings it
@@ -75,14 +75,14 @@ def test_a_tower_that_topples_onto_the_ball(engine) -> None:
     assert result.indicator < 0.2
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_does_nothing_delivers_nothing(engine) -> None:
     result = scored(TASK, drafted(couriers.courier(0), []), engine, None)
     assert (result.success, result.indicator, result.flags) == (False, 0.0, ())
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_what_is_too_high_stays_before_the_barrier(engine) -> None:
     high, base = drafted(couriers.courier(0)), "1"

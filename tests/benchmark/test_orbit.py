@@ -52,7 +52,7 @@ def arms_of(trial: Trajectory) -> np.ndarray:
     return trial.positions[:, 0].astype(float) + np.array([0, 0, RADIUS])
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_flies_round(engine) -> None:
     machine, trial = flown(engine)
@@ -76,7 +76,7 @@ def test_what_swings_to_and_fro_goes_nowhere() -> None:
     assert (swept(np.zeros((4, 3)), np.zeros(3)) == 0).all()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("radius", [5.0, 50.0, 300.0])
 def test_circles_over_one_place_are_no_way_round(radius) -> None:
     machine, trial = flown(FASTER_FIRST[0])
@@ -111,8 +111,8 @@ def test_what_comes_down_on_its_way_ends_it() -> None:
     assert 0 < result.metrics["cycles"] < 1
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_comes_back_softly(engine) -> None:
     machine, trial = flown(engine, "orbit-2")
@@ -131,7 +131,7 @@ def landed_otherwise(change: Any) -> Any:
     return score(RETURN, machine, change(trial, touch))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_only_hovers_over_the_ground_has_not_landed() -> None:
     def hovers(trial: Trajectory, _: int) -> Trajectory:
         bearing = trial.bearing
@@ -159,7 +159,7 @@ def test_what_comes_down_hard_or_elsewhere_has_not_come_back() -> None:
         assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_comes_off_when_it_lands_is_told() -> None:
     def loses(trial: Trajectory, touch: int) -> Trajectory:
         assert trial.pieces is not None
@@ -172,7 +172,7 @@ def test_what_comes_off_when_it_lands_is_told() -> None:
     assert list(result.flags) == ["came_apart"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("task", [ONCE, shorter(RETURN, 12.0)])
 def test_without_a_program_nothing_flies(task) -> None:
     machine = built(catalogue=module_set("all"))
@@ -180,7 +180,7 @@ def test_without_a_program_nothing_flies(task) -> None:
     assert (result.success, result.indicator, result.metrics["cycles"]) == (False, 0.0, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("task", [ROUND, RETURN])
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("seed", [1, 2])

@@ -63,7 +63,7 @@ VARIANTS: Final = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("how", VARIANTS)
 def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
@@ -71,7 +71,7 @@ def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
     assert (result.success, result.indicator) == (False, 0.0), result
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
     """It is exactly where it shall be, and nothing of that counts until it is let go."""
@@ -83,8 +83,8 @@ def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
     assert score(lax, *varied("never lets go", engine)).indicator > 2
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
     """It may fall by what is allowed, and no farther."""
@@ -96,8 +96,8 @@ def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
     assert not score(strict, machine, falls).success
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("what", ["cargo", "goal"])
 def test_who_remembers_where_things_were_fails_where_they_are_not(what) -> None:
     """It looks at one of the two only; for the other it takes the exact world's place."""
@@ -118,7 +118,7 @@ def _apart(seed: int, what: str) -> float:
     return math.dist(world.marks[0].center, exact.marks[0].center)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
     """The same arm on a small foot."""
@@ -129,7 +129,7 @@ def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
     assert result.metrics["base_shift"] > 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_parts_that_come_off_end_it(engine) -> None:
     machine, trial = honest(engine)
@@ -141,7 +141,7 @@ def test_parts_that_come_off_end_it(engine) -> None:
     assert result.flags == ("came_apart",)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_machine_that_moves_its_base_is_flagged() -> None:
     machine, trial = honest("mujoco")
     moved = trial.positions.copy()
@@ -171,7 +171,7 @@ def test_a_machine_in_the_cargos_place_is_refused(engine) -> None:
             simulate(machine, TASK.scenario, engine, seed=seed)
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     "stricter",
     [

@@ -54,7 +54,7 @@ def index_of(machine: Machine, module: str) -> int:
     return [block.module.name for block in machine.blocks.values()].index(module)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_throws_five_times_as_far_as_the_best_published(engine) -> None:
     machine, trial = honest(engine)
@@ -78,7 +78,7 @@ def test_the_published_score_is_told_beside_it() -> None:
     assert metrics["parabola"] == pytest.approx(distance * (1 + rise), rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_engines_agree_about_how_far_it_flies() -> None:
     near, far = sorted(score(TASK, *honest(engine)).indicator for engine in FASTER_FIRST)
     assert far < 1.1 * near
@@ -89,7 +89,7 @@ def fails(result: Any, *flags: str) -> None:
     assert set(flags) <= set(result.flags), result
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_throwing_by_collapse(engine, monkeypatch) -> None:
     """The same catapult on a post that breaks while it throws, and a mast that topples over."""
@@ -111,7 +111,7 @@ def _too_few_stays(draft: Draft, beam: list[str], post: list[str], west: str) ->
         draft.connect(beam[5], beam[9], side)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
     """Engines part what overlaps. It hops no higher than this, and whoever does so is refused."""
@@ -125,7 +125,7 @@ def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
     fails(scored(TASK, thrown, engine, None), "unexplained")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_throwing_by_driving(engine) -> None:
     """A car that carries the boulder north and brakes at the line."""
@@ -133,7 +133,7 @@ def test_throwing_by_driving(engine) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_fence_is_cleared_or_not(engine) -> None:
     """The same throw leaves a fence of 3 untouched; one of 40 is what it touches first."""
@@ -163,7 +163,7 @@ FAR, NEAR = 6, 3
 """Seeds whose rings lie at 40.7 and 17.1."""
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("seed", [None, FAR, NEAR])
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_hits_the_ring_wherever_it_lies(engine, seed) -> None:
@@ -173,7 +173,7 @@ def test_the_expert_hits_the_ring_wherever_it_lies(engine, seed) -> None:
     assert result.metrics["miss"] <= RING.scenario.marks[0].radius
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_throws_as_in_the_exact_world_misses_where_the_ring_is_elsewhere(engine) -> None:
     machine = experts_machine(RING)
@@ -189,7 +189,7 @@ STANDING: Final = builtin_tasks()["throw-4"]
 TWO: Final = builtin_tasks()["throw-5"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("task", [STANDING, TWO], ids=lambda task: task.name)
 @pytest.mark.parametrize("seed", [None, 8, 11])
 @pytest.mark.parametrize("engine", FASTER_FIRST)
@@ -202,7 +202,7 @@ def test_the_expert_throws_through_its_rings_however_high_they_stand(engine, see
     assert rings < result.indicator < 2 * rings
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_ring_is_passed_in_the_air_and_with_all_of_the_boulder() -> None:
     """The same flight by rings beside it, so small that it would touch them, and behind its end."""
     machine = experts_machine(STANDING)
@@ -227,7 +227,7 @@ def test_one_ring_of_two_counts_and_is_no_success() -> None:
     assert 1.0 < result.indicator < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_who_throws_as_in_the_exact_world_misses_a_higher_ring() -> None:
     machine = experts_machine(STANDING)
     exact, answers = listened(STANDING, machine, "mujoco")
@@ -317,13 +317,13 @@ def test_what_is_thrown_by_parts_that_fly_along() -> None:
     fails(score(TASK, machine, replace(trial, pieces=pieces)), "not_borne")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_boulder_is_borne_for_a_second_first(engine) -> None:
     fails(scored(TASK, experts([(0.2, "Alpha1", 4.0)]), engine, None), "not_borne")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_lets_it_lie_or_drops_it_throws_nothing(engine) -> None:
     """Nobody presses a key; it lies in no cup."""
@@ -333,7 +333,7 @@ def test_who_lets_it_lie_or_drops_it_throws_nothing(engine) -> None:
     fails(scored(lax(min_distance=0.0), draft.machine, engine, None))
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(
     "stricter",
     [

@@ -54,7 +54,7 @@ def test_a_thousand_blocks_at_one_place_are_no_hang() -> None:
     assert time.process_time() - started < 20
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @given(st.integers(0, 2**32), st.sampled_from(SAMPLES), st.sampled_from(DAMAGES))
 @settings(max_examples=150, deadline=None)
 def test_damaged_files_are_refused_or_go_round_without_a_loss(seed, sample, damage) -> None:

@@ -39,7 +39,7 @@ def in_order_of_time(presses) -> bool:
     return times == sorted(times)
 
 
-@pytest.mark.samples(20)
+@pytest.mark.nightly(keep=20)
 @pytest.mark.parametrize(("found", "export"), EXPORTS)
 def test_keys_and_slider_are_those_of_the_published_script(found, export) -> None:
     machine, presses = found.played(export)

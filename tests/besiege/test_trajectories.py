@@ -258,7 +258,7 @@ def begun(i: int, n: int) -> tuple[float, float, float]:
     return (float(x) + 0.01 * n / 4, float(y), float(z))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("late", [0.24, 0.32, 0.4])
 def test_a_late_start_counts_where_the_first_sample_is_near_where_the_trial_begins(late) -> None:
     gone = set(range(4, round(late * 100), 4))

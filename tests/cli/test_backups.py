@@ -176,7 +176,7 @@ def trajectory_in(place: Path, context: Context) -> tuple[Path, str]:
     return place / "artifacts" / digest[:2] / digest, f"{job.id}/trajectory-0"
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("damage", [lambda data: data[:-1] + b"?", lambda data: data + b"?", None])
 def test_a_damaged_artifact_is_found_and_copied_again(context, place, damage) -> None:
     file, _ = trajectory_in(place, context)

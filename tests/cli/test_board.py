@@ -121,7 +121,7 @@ def test_exports_are_files_of_the_asked_format(url, tmp_path) -> None:
     assert "can't be written" in nowhere.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_report_has_every_section_in_every_format(url, sweep, tmp_path) -> None:
     for ending in (".html", ".md", ".pdf"):
         printed(url, "report", sweep, "--out", str(tmp_path / f"report{ending}"))
@@ -147,7 +147,7 @@ def test_a_report_has_every_section_in_every_format(url, sweep, tmp_path) -> Non
     assert (tmp_path / "report.pdf").read_bytes()[:5] == b"%PDF-"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_closed_loop_beside_single_shots(url, sweep, context, submissions, tmp_path) -> None:
     cell = {"tasks": ["support-2"], "models": ["openai/gpt-5", "xai/grok-4"], "samples": 16}
     spec = SweepSpec.model_validate({**cell, "closed_loop": {"rounds": 5, "analyst": True}})

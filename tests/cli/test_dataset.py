@@ -225,7 +225,7 @@ def test_disqualified_jobs_can_be_left_out(url, context, tmp_path):
     assert names(tmp_path) & {"none", ".none"} == set()
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(
     ("words", "refusal"),
     [

@@ -154,7 +154,7 @@ def test_jobs_are_filtered_by_how_they_ended(url, ids, context) -> None:
     assert len(ids) == 32
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(
     ("words", "says"),
     [

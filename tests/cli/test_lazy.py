@@ -41,7 +41,7 @@ def loaded_by(*words: str, **environment: str) -> set[str]:
     return set(json.loads(done.stderr.rpartition("LOADED")[2]))
 
 
-@pytest.mark.samples(8)
+@pytest.mark.nightly(keep=8)
 @pytest.mark.parametrize("words", [["--help"], *([name, "--help"] for name in COMMANDS)])
 def test_help_loads_no_library_that_it_does_not_need(words) -> None:
     assert loaded_by(*words) & {*HEAVY, "ssl"} == set()

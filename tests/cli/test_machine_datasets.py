@@ -32,7 +32,6 @@ from buildarena_cli.dataset.machines.trying import SPLITS, split_of
 from buildarena_environment import Environment
 from buildarena_environment.variation.genome import Genome
 
-pytestmark = pytest.mark.xdist_group("machine datasets")
 TASKS = ("support-1", "throw-1", "lift-1")
 COUNT = 24
 WORDS = ("--count", str(COUNT), "--seed", "3", *(w for task in TASKS for w in ("--task", task)))
@@ -60,7 +59,7 @@ def made(tmp_path_factory) -> Path:
     return out
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_it_loads_with_its_splits_and_no_two_machines_are_alike(made, tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
@@ -98,7 +97,7 @@ def test_the_card_counts_what_is_there(made):
         assert f"| {split_of(task)} | {task} | {counts}" in text
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_the_code_of_the_card_runs(made, tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
@@ -111,7 +110,7 @@ def test_the_code_of_the_card_runs(made, tmp_path, monkeypatch):
     assert scope["environment"].trials
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_same_seed_is_the_same_bytes_in_any_number_of_processes(made, tmp_path):
     assert make(tmp_path / "two", "--processes", "3").returncode == 0
     assert contents(tmp_path / "two") == contents(made)
@@ -133,7 +132,7 @@ def resumed_at(monkeypatch) -> list[int]:
     return asked
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_was_interrupted_is_resumed(made, tmp_path, monkeypatch, resumed_at):
     out, journal = tmp_path / "out", tmp_path / ".out.rows.jsonl"
     add = Journal.add
@@ -157,7 +156,7 @@ def test_what_was_interrupted_is_resumed(made, tmp_path, monkeypatch, resumed_at
     assert not journal.exists()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_was_killed_is_resumed_and_loses_nothing(made, tmp_path, resumed_at):
     out, journal = tmp_path / "out", tmp_path / ".out.rows.jsonl"
     words = ["dataset", "machines", "--out", str(out), *WORDS, "--processes", "1"]
@@ -211,7 +210,7 @@ def test_without_designs_nothing_is_made(tmp_path, monkeypatch):
     assert (done.returncode, "install buildarena-worker" in done.stderr) == (1, True)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_machine_that_comes_out_different_ends_the_making(tmp_path, monkeypatch):
     monkeypatch.setattr(making, "repeated", lambda rows, *_: ((row, ["mass"]) for row in rows))
     done = make(tmp_path / "out", "--count", "1", "--processes", "1")
@@ -244,7 +243,7 @@ def tampered(name: str, row: dict) -> None:
             row["canary"] = ""
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_verify_finds_every_row_that_was_tampered_with(made, tmp_path):
     (folder := tmp_path / "bad").mkdir()
     training = [row for row in rows(made) if row["split"] == "train"]
@@ -275,7 +274,7 @@ def test_verify_finds_every_row_that_was_tampered_with(made, tmp_path):
     assert f"number {COUNT}, {twice['id']}: another row has the same machine" in done.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_verify_passes_what_was_made(made, tmp_path):
     (folder := tmp_path / "few").mkdir()
     for split in SPLITS:
@@ -321,7 +320,7 @@ def test_the_papers_tasks_are_among_those_that_take_turns():
     assert f"for {len(drawable_tasks())} of the built-in tasks" in page.read_text()
 
 
-@pytest.mark.samples(6)
+@pytest.mark.nightly(keep=6)
 @pytest.mark.parametrize("task", drawable_tasks())
 def test_a_genome_of_calls_calls_the_same(task):
     calls = drawing.design_calls(task, 1)

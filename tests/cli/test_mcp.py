@@ -54,7 +54,7 @@ def stdio(url):
     return stdio_client(StdioServerParameters(command=BUILDARENA, args=["mcp", "--url", url]))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
     result = asyncio.run(play(stdio, lambda: work(context)))
     assert result["outcome"] == "success"
@@ -125,7 +125,7 @@ async def side_by_side(connected) -> list[str]:
         return results
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_calls_sent_side_by_side_are_done_in_the_order_sent(stdio) -> None:
     results = asyncio.run(side_by_side(stdio))
     blocks = [result.split(",")[0] for result in results]

@@ -94,7 +94,7 @@ def test_comparisons_and_exports_are_read_as_asked(url, tmp_path) -> None:
     assert r"\textbf{$\geq$1500.0}" in tex.read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_reports_are_read_as_asked_and_tell_what_flags_say(url, sweep, tmp_path) -> None:
     for ending in ("md", "html", "pdf"):
         printed(url, "report", sweep, "--out", str(tmp_path / f"ours.{ending}"))

@@ -17,7 +17,7 @@ def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
         assert word in line
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("command", ["up", "demo"])
 def test_a_taken_port(tmp_path, command) -> None:
     with socket.socket() as taken:
@@ -30,7 +30,7 @@ def test_a_taken_port(tmp_path, command) -> None:
     assert named == []
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("command", ["up", "demo"])
 def test_an_unwritable_data_folder(tmp_path, command) -> None:
     (tmp_path / "file").write_text("in the way")
@@ -38,7 +38,7 @@ def test_an_unwritable_data_folder(tmp_path, command) -> None:
     assert_refused(done, "can't be written", "choose another with --data")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_data_folder_in_use(tmp_path) -> None:
     import fcntl
 
@@ -59,7 +59,7 @@ def test_a_port_that_is_no_port() -> None:
     assert_refused(done, "BUILDARENA_PORT", "99999")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("text", "code", "says"),
     [("tasks: [", 1, "not valid YAML"), ("- 1", 1, "must be a mapping"), (None, 2, "No such")],
@@ -73,7 +73,7 @@ def test_a_bad_sweep_file(tmp_path, text, code, says) -> None:
     assert says in done.stderr
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("words", [["fly"], ["job"], ["job", "show"], ["leaderboard", "--fast"]])
 def test_wrong_words_end_with_code_2(words) -> None:
     assert piped(*words).returncode == 2
@@ -85,7 +85,7 @@ def test_help_names_every_command() -> None:
         assert command in text
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("module", ["buildarena_worker", "buildarena_api"])
 def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) -> None:
     from buildarena_store import Database

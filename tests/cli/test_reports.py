@@ -85,7 +85,7 @@ class Seen(html.parser.HTMLParser):
         assert attrs is not None
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("rows", "columns"), [(3, 4), (150, 14), (5, 40)])
 def test_a_pdf_holds_every_figure_however_long_and_wide(tmp_path, rows, columns) -> None:
     report = wide_report(rows, columns)

@@ -57,7 +57,7 @@ def who(url: str) -> str:
         database.close()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_roles_then_migration_by_an_owner_who_is_no_superuser(fresh, tmp_path) -> None:
     (owner, owner_url), (api, api_url) = (
         login(tmp_path, fresh, role, "first") for role in ("owner", "api")
@@ -78,7 +78,7 @@ def test_roles_then_migration_by_an_owner_who_is_no_superuser(fresh, tmp_path) -
     assert "second" not in refused.stderr + refused.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("words", "message", "code"),
     [

@@ -73,7 +73,7 @@ def asked(url: str, question: str, sweeps: list[str]) -> httpx.Response:
     return httpx.get(f"{url}{path}?{urlencode(params)}", headers=accept)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     sweeps = [submitted(url, EXPERT), submitted(url, {**IDLE, "seeds": [0, 5]})]
     submitted(url, {**IDLE, "tasks": ["lift-1"], "seeds": [9]})
@@ -173,7 +173,7 @@ def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
         assert ADMIN.encode() not in (site / name).read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("place", ["data/", "jobs/", "site.json", "index.html"])
 def test_a_run_that_breaks_off_leaves_nothing_that_looks_whole(
     url, idle, tmp_path, monkeypatch, place
@@ -210,7 +210,7 @@ def _break(patched, place: str) -> None:
     patched.setattr(Folder, "write", write)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_site_stays_whole_while_it_is_written_again(
     url, idle, context, tmp_path, monkeypatch
 ) -> None:
@@ -236,7 +236,7 @@ def test_a_site_stays_whole_while_it_is_written_again(
     assert (site / "CNAME").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_job_that_changed_is_asked_for_again(url, idle, tmp_path) -> None:
     site = tmp_path / "site"
     printed(url, "site", idle, "--out", str(site))
@@ -249,7 +249,7 @@ def test_a_job_that_changed_is_asked_for_again(url, idle, tmp_path) -> None:
         assert json.loads(index.read_text()) == known
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_track_alone_is_a_site(url, idle, context, tmp_path) -> None:
     other = {**IDLE, "simulator": "pybullet", "seeds": [0]}
     submitted(url, other)
@@ -268,7 +268,7 @@ def test_a_track_alone_is_a_site(url, idle, context, tmp_path) -> None:
     assert read(both)["sweeps"] == [idle]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_jobs_that_have_not_ended_are_told(url, idle, tmp_path) -> None:
     waiting = submitted(url, {**IDLE, "seeds": [3, 4, 5]})
     alone = run_cli(url, "site", waiting, "--out", str(tmp_path / "none"))

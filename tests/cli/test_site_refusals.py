@@ -53,7 +53,7 @@ def test_names_that_nothing_has_are_refused_with_the_choices(refused) -> None:
     assert "no sweep's id begins" in refused(sweep="sweep_00000000")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_large_site_is_not_written_unasked(refused, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr(command, "LARGE_MB", 0)
     assert "--yes writes it all the same" in refused()

@@ -88,7 +88,7 @@ def test_what_the_service_does_not_know_is_reported_with_its_line(url, file) -> 
         assert simulator.startswith(f"{file}:11: simulator: there is no simulator 'unity'; choose")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_dry_run_says_what_the_sweep_could_show(url, file) -> None:
     words = ["sweep", "run", str(file), "--dry-run", "--url", url, "--samples"]
     code, told = on_terminal(120, *words, "64", NO_COLOR="1")

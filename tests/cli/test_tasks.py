@@ -125,7 +125,7 @@ def sweep_of_own(url, context, file) -> str:
     return f"{old} {new}"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_report_tells_of_own_tasks_with_their_own_indicator(url, sweep_of_own, tmp_path) -> None:
     old, new = sweep_of_own.split()
     out = tmp_path / "report.md"

@@ -135,7 +135,7 @@ def test_a_field_that_a_newer_service_adds_does_no_harm() -> None:
     assert list(jobs_frame([newer]).columns) == list(jobs_frame([JOB]).columns)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("kind", ["pandas", "polars"])
 def test_a_services_answers_as_frames(service, kind) -> None:
     client = Client(service.url)

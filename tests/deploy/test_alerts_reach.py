@@ -23,7 +23,7 @@ from support.servers.stacks import finished, hung, kill, running_stack, wait_unt
 
 from buildarena_cli.local.stack import Stack
 
-pytestmark = [needs_alertmanager, pytest.mark.slow, pytest.mark.timeout(600)]
+pytestmark = [needs_alertmanager, pytest.mark.ci, pytest.mark.timeout(600)]
 WITHIN_S = 60.0
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 

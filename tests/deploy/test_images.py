@@ -113,7 +113,7 @@ def test_an_engine_is_only_where_something_is_simulated() -> None:
         assert found == simulated.get(lock.stem, wanted), lock.name
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_nothing_is_trimmed_that_a_source_names() -> None:
     lines = (ROOT / "deploy/docker/trimmed.txt").read_text().splitlines()
     trimmed = {line for line in lines if not line.startswith("#")}

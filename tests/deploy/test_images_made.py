@@ -75,7 +75,7 @@ def make(repository: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_each_image_has_a_bill_of_materials_and_a_statement_of_provenance(repository) -> None:
     done = make(repository)
     assert done.returncode == 0, done.stderr

@@ -75,7 +75,7 @@ def test_each_file_is_valid_by_itself(path) -> None:
         check(document)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @each_overlay
 def test_each_overlay_is_valid_as_a_whole(overlay) -> None:
     documents = rendered(overlay)
@@ -377,7 +377,7 @@ def with_component(tmp_path):
     return render
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @each_overlay
 def test_a_gateway_takes_the_place_of_the_ingress(overlay, with_component) -> None:
     documents = with_component(overlay, "gateway")
@@ -394,7 +394,7 @@ def test_a_gateway_takes_the_place_of_the_ingress(overlay, with_component) -> No
     assert {"kubernetes.io/metadata.name": parent} in spaces
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @each_overlay
 def test_prometheus_operator_finds_each_pod_of_the_api(overlay, with_component) -> None:
     documents = with_component(overlay, "prometheus-operator")
@@ -414,7 +414,7 @@ def test_prometheus_operator_finds_each_pod_of_the_api(overlay, with_component) 
     assert credentials["key"] in {item["key"] for item in secret["items"]}
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @each_overlay
 def test_models_in_the_cluster_can_be_named_and_reached(overlay, with_component, tmp_path) -> None:
     documents = with_component(overlay, "models-in-cluster")

@@ -289,7 +289,7 @@ def pin(tmp_path) -> Callable[..., subprocess.CompletedProcess[str]]:
     return run
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_digests_are_written_wherever_an_image_is_named(pin, tmp_path) -> None:
     for time in ("now", "later"):
         done = pin(AT=time)

@@ -27,7 +27,7 @@ def api(context: Context) -> Iterator[str]:
     own.close()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_prometheus_reads_the_service_and_understands_every_expression(api, tmp_path) -> None:
     with prometheus(tmp_path, api, KEY) as client:
         target_says(client, "up")
@@ -47,7 +47,7 @@ def test_prometheus_reads_the_service_and_understands_every_expression(api, tmp_
         assert [each["value"][1] for each in up.json()["data"]["result"]] == ["1"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_prometheus_without_the_key_is_refused(api, tmp_path) -> None:
     with prometheus(tmp_path, api, "no-such-key-anywhere") as client:
         target_says(client, "401")

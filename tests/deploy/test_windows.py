@@ -152,7 +152,7 @@ def test_the_installer_takes_our_wheels_by_path_and_the_rest_as_tested() -> None
     assert "constraints.txt" in text
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_pip_takes_a_wheel_that_a_constraint_names_by_its_path(tmp_path) -> None:
     """What the installer relies on: also for a package with extras, and for what it needs."""
     for name, needs in (("arena-low", ""), ("arena-top", "Requires-Dist: arena-low==1.0\n")):

@@ -28,8 +28,8 @@ PROJECTS = sorted(
 )
 # Adapters to others' frameworks are installed by whoever uses those.
 ADAPTERS = [path for path in PROJECTS if path.is_relative_to(ROOT / "integrations")]
-ALL_MUST_RUN = bool(os.environ.get("BUILDARENA_TEST_ALL"))
-pytestmark = [pytest.mark.xdist_group("distributions"), pytest.mark.timeout(400)]
+ALL_MUST_RUN = bool(os.environ.get("CI"))
+pytestmark = pytest.mark.timeout(400)
 needs_pages = pytest.mark.skipif(
     not (PAGES / "index.html").is_file(), reason="the dashboard has not been built: make web"
 )
@@ -70,7 +70,7 @@ def installed(dist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(
-    params=["3.11", *(pytest.param(later, marks=pytest.mark.long) for later in ("3.12", "3.13"))]
+    params=["3.11", *(pytest.param(later, marks=pytest.mark.nightly) for later in ("3.12", "3.13"))]
 )
 def interpreter(request: pytest.FixtureRequest) -> str:
     """A Python of a version that we promise; of others than this one, where it is found."""
@@ -98,14 +98,14 @@ def test_every_distribution_has_one_version_and_asks_for_its_siblings_of_the_sam
             assert not re.search(r'^__version__ = "', module.read_text(), re.MULTILINE), module
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_meta_distribution_installs_all_but_adapters(installed) -> None:
     listed = _uv("pip", "list", "--format", "json", "--python", str(installed / "python"))
     ours = {p["name"] for p in json.loads(listed.stdout) if p["name"].startswith("buildarena")}
     assert ours == {project(path)["name"] for path in PROJECTS if path not in ADAPTERS}
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_demo_runs_from_wheels_without_an_environment(dist, interpreter, tmp_path) -> None:
     """As `uvx` runs it: in a temporary environment, by the distribution's own command."""
     found = ["--find-links", str(dist), "--constraints", str(dist / "constraints.txt")]
@@ -118,7 +118,7 @@ def test_a_demo_runs_from_wheels_without_an_environment(dist, interpreter, tmp_p
     assert re.search(r"builtin/expert\*\s+4/4", done.stdout), done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_client_alone_brings_nothing_else(dist, tmp_path) -> None:
     venv = tmp_path / "venv"
     _uv("venv", "--quiet", "--no-project", "--python", sys.executable, str(venv))
@@ -162,7 +162,7 @@ def test_a_new_version_goes_everywhere(tmp_path) -> None:
     assert (refused.returncode, "'next' is no version" in refused.stderr) == (2, True)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_wheels_and_sdists_say_what_they_are(dist) -> None:
     wheels, sdists = sorted(dist.glob("*.whl")), sorted(dist.glob("*.tar.gz"))
     assert len(wheels) == len(sdists) == len(PROJECTS)
@@ -188,7 +188,7 @@ def test_wheels_and_sdists_say_what_they_are(dist) -> None:
         assert not hidden, sdist
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_package_index_would_take_every_distribution(dist) -> None:
     makefile = (ROOT / "mk/dist.mk").read_text()
     (twine,) = re.findall(r"^TWINE := (.+)$", makefile, re.MULTILINE)
@@ -201,7 +201,7 @@ def test_a_package_index_would_take_every_distribution(dist) -> None:
     assert done.stdout.count("PASSED") == len(files) == 2 * len(PROJECTS)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("adapter", ADAPTERS, ids=lambda path: path.parent.name)
 def test_an_adapter_is_installed_by_its_readmes_command(
     dist, adapter, interpreter, tmp_path
@@ -228,7 +228,7 @@ def test_an_adapter_is_installed_by_its_readmes_command(
     assert told.returncode == 0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_clients_types_are_written_when_it_is_built(dist) -> None:
     schemas = "buildarena_client/schemas.py"
     (wheel,) = dist.glob("buildarena_client-*.whl")
@@ -245,7 +245,7 @@ def test_each_licence_is_the_repositorys() -> None:
     assert [p for p in PROJECTS if (p.parent / "LICENSE").read_text() != licence] == []
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @needs_pages
 def test_a_notebook_draws_from_an_empty_environment(installed, tmp_path) -> None:
     code = (
@@ -261,7 +261,7 @@ def test_a_notebook_draws_from_an_empty_environment(installed, tmp_path) -> None
     assert len(shown.stdout) > 100_000
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @needs_pages
 def test_demo_report_and_pages_run_from_an_empty_environment(installed, tmp_path) -> None:
     data = tmp_path / "data"

@@ -11,7 +11,7 @@ from support.servers.stacks import running_stack, wait_until
 SESSIONS = 8
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.timeout(120)
 def test_hanging_sessions_of_one_key_leave_room_for_another_s(tmp_path) -> None:
     for folder in (tmp_path, *tmp_path.parents[:3]):

@@ -19,7 +19,6 @@ SWEEP = {
     "simulator": "mujoco",
 }
 # One process runs the undisturbed sweep once for both tests.
-pytestmark = pytest.mark.xdist_group("road")
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 
 
@@ -70,7 +69,7 @@ def _look_with_the_command_line(url: str, sweep_id: str, job_id: str) -> None:
     assert (unknown.returncode, unknown.stderr.strip()) == (1, f"there is no job {nobodys!r}")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_expert_succeeds_and_the_other_baselines_do_not(undisturbed) -> None:
     outcomes = [job["outcome"] for job in undisturbed]
     assert outcomes.count("success") == 2
@@ -78,7 +77,7 @@ def test_the_expert_succeeds_and_the_other_baselines_do_not(undisturbed) -> None
     assert not {"errored", "cancelled"} & set(outcomes)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_killed_processes_lose_nothing_and_change_no_result(undisturbed, tmp_path) -> None:
     with running_stack(tmp_path) as stack, httpx.Client(base_url=stack.url, timeout=30) as client:
         sweep_id = client.post("/v1/sweeps", json=SWEEP).json()["id"]

@@ -86,7 +86,7 @@ def test_health_says_that_the_store_fails_and_that_it_works_again(
     assert not list((folder / "probe").iterdir())
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("damage", ["damaged", "missing"])
 @pytest.mark.parametrize("name", ["machine", "transcript", "trajectory-0"])
 def test_every_lost_byte_is_noticed(context, submissions, folder, name, damage) -> None:

@@ -217,7 +217,7 @@ def test_what_machines_poll_is_not_traced(context, path) -> None:
     assert one.parent is None
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_runner_s_trial_is_scored_in_its_job_s_trace(context) -> None:
     with recorded() as spans:
         submitted(context)
@@ -228,7 +228,7 @@ def test_a_runner_s_trial_is_scored_in_its_job_s_trace(context) -> None:
     assert_children(request_of(spans, "/v1/jobs"), [one])
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_all_processes_send_one_trace(tmp_path, monkeypatch) -> None:
     sweep = {"tasks": ["support-1"], "models": ["builtin/expert"], "seeds": [0, 1]}
     with collector() as kept:

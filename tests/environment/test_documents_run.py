@@ -13,7 +13,7 @@ README = ROOT / "libs/environment/README.md"
 TRAINING = ROOT / "docs/training.md"
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("document", "blocks"), [(README, 2), (TRAINING, 3)])
 def test_it_runs_word_for_word(document, blocks, tmp_path) -> None:
     assert run_document(document, environment=os.environ, folder=tmp_path) == blocks

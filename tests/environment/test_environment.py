@@ -29,7 +29,7 @@ WOOD = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
 ALL = {"success": 1.0, "indicator": 1.0, "accepted_share": 0.1, "constraint_progress": 0.1}
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_the_expert_builds_is_scored_as_kept(experts) -> None:
     assert json.loads(REFERENCES.read_text()) == references()
     assert list(references()) == list(builtin_tasks())
@@ -43,7 +43,7 @@ def test_what_the_expert_builds_is_scored_as_kept(experts) -> None:
         assert kept["score"]["indicator"] == pytest.approx(references()[task], rel=1e-4)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_episode_from_reset_to_reward(bridge_calls) -> None:
     environment = Environment(
         "support-1", simulator="mujoco", rewards={"success": 2.0, "indicator": 1.0}
@@ -118,7 +118,7 @@ def test_nothing_to_submit_leaves_the_episode_open_until_it_is_ended() -> None:
     assert ended.trial.score.indicator == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_several_rounds_end_with_the_first_success(bridge_calls) -> None:
     environment = Environment("support-1", rounds=3)
     assert "You may submit 3 times" in environment.reset().briefing
@@ -154,7 +154,7 @@ def test_shaping_follows_the_machine_and_pays_nothing_for_going_in_circles() -> 
     assert environment.step("fly").reward < grown
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_disqualified_trial_earns_nothing(bridge_calls) -> None:
     environment = played(Environment("support-1", rewards=ALL), bridge_calls)
     before = environment.reward
@@ -165,7 +165,7 @@ def test_a_disqualified_trial_earns_nothing(bridge_calls) -> None:
     assert environment.reward == pytest.approx(before)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_states_are_values_and_lead_back(bridge_calls) -> None:
     environment = Environment("support-1", rewards=ALL)
     played(environment, bridge_calls[:6])
@@ -194,7 +194,7 @@ def test_states_are_values_and_lead_back(bridge_calls) -> None:
     assert Snapshot.from_document(elsewhere.state().as_document()).done
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "copied",
     [copy.deepcopy, lambda state: pickle.loads(pickle.dumps(state))],
@@ -286,7 +286,7 @@ def test_machines_may_be_tried_elsewhere(bridge_calls) -> None:
     assert submitted.trial.reason == "empty_machine"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_seed_varies_the_start_and_none_does_not(bridge_calls) -> None:
     def indicator(seed) -> float:
         environment = Environment("support-1", seed=seed)

@@ -35,7 +35,7 @@ def variants(bridge: Machine, count: int) -> list[Machine]:
     return [*made[:-1], Machine()]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_results_come_in_order_whatever_the_number_of_processes(short, bridge) -> None:
     machines = variants(bridge, 7)
     with Evaluator(short, processes=1) as one, Evaluator(short, processes=3) as three:
@@ -46,7 +46,7 @@ def test_results_come_in_order_whatever_the_number_of_processes(short, bridge) -
     assert alone[-1].indicator == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_documents_do_as_well_and_nonsense_is_refused_before_it_is_sent(short, bridge) -> None:
     with Evaluator(short, processes=1) as evaluator:
         found = evaluator.evaluate(bridge.to_document())
@@ -57,7 +57,7 @@ def test_documents_do_as_well_and_nonsense_is_refused_before_it_is_sent(short, b
         assert (broken.trial.reason, broken.error) == ("empty_machine", "")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_trajectories_come_along_when_asked_for(short, bridge) -> None:
     with Evaluator(short, processes=1, trajectories=True) as evaluator:
         trajectory = evaluator.evaluate(bridge).trial.trajectory
@@ -124,7 +124,7 @@ def test_environments_and_evaluators_agree(short, bridge) -> None:
         assert environment.submit().trial.score == evaluator.evaluate(bridge).trial.score
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> None:
     task = builtin_tasks()["support-1"]
     weak = bridge.copy()

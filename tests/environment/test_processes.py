@@ -35,7 +35,7 @@ time.sleep(60)
 STALLED = "signal.signal(signal.SIGTERM, lambda *_: None)"
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("how", "child", "within_s"),
     [

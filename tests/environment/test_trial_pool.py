@@ -23,7 +23,7 @@ def children() -> list[psutil.Process]:
     return [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_environments_of_several_tasks_share_it_and_score_as_without(experts) -> None:
     with TrialPool(2) as pool, ThreadPoolExecutor(4) as threads:
         shared = [
@@ -38,7 +38,7 @@ def test_environments_of_several_tasks_share_it_and_score_as_without(experts) ->
     assert [trial.score for trial in found] == [alone[task] for task in TASKS]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_process_that_dies_costs_one_submission_which_can_be_made_again(experts) -> None:
     before = set(children())
     with TrialPool(1) as pool:

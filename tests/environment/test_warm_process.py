@@ -43,7 +43,7 @@ def test_it_outlives_the_thread_that_asked_first(process) -> None:
     assert pids == [process.ask(["pid"])] * 2
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_one_that_dies_is_started_again(process) -> None:
     first = process.ask(["pid"])
     with pytest.raises(ProcessEndedError, match="of work ended with code -9") as raised:

@@ -223,7 +223,7 @@ def test_a_bad_module_is_refused_with_its_place_and_what_belongs_there(tmp_path,
         load_catalogue(module_file(tmp_path, module))
 
 
-@pytest.mark.samples(8)
+@pytest.mark.nightly(keep=8)
 @pytest.mark.parametrize("module", [module for module, _ in BROKEN])
 def test_the_schema_refuses_what_the_library_refuses(module):
     with pytest.raises(jsonschema.ValidationError):

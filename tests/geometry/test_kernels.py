@@ -114,7 +114,7 @@ def _unpinned(package: Path) -> list[str]:
     return wrong
 
 
-@pytest.mark.samples(4)
+@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
 def test_whatever_loads_numpy_pins_the_kernels_first(package) -> None:
     assert _unpinned(package) == []

@@ -44,7 +44,7 @@ def draw_arguments(rng: random.Random, name):
     return arguments
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_hundred_thousand_malformed_calls_raise_nothing_and_break_nothing():
     rng = random.Random(20_260)
     reasons = set()

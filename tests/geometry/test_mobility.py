@@ -48,7 +48,7 @@ def told(machine: Machine) -> tuple[set[str], set[frozenset[str]]]:
     return jointed - set(found.locks), pairs
 
 
-@pytest.mark.samples(8)
+@pytest.mark.nightly(keep=8)
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("seed", range(4))
 def test_it_agrees_with_the_simulator(task, seed):

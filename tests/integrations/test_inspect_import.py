@@ -18,7 +18,7 @@ from buildarena_pipeline.runtime.context import open_context
 from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[2]
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.ci
 ADAPTER = ROOT / "integrations/inspect"
 PYTHON = ROOT / ".venv-integrations/inspect/bin/python"
 README_LINE = re.compile(r"^python -m buildarena_inspect import .*$", re.MULTILINE)
@@ -28,7 +28,7 @@ README_LINE = re.compile(r"^python -m buildarena_inspect import .*$", re.MULTILI
 def logs(tmp_path_factory) -> Path:
     """A log of the adapter's real environment, and the same with made-up scores."""
     if not PYTHON.exists():
-        if os.environ.get("BUILDARENA_TEST_ALL"):
+        if os.environ.get("CI"):
             pytest.fail("the environment of integrations/inspect is not there: make check")
         pytest.skip("the environment of integrations/inspect is not there: make check")
     folder = tmp_path_factory.mktemp("logs")

@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 ADAPTERS = sorted(path.parent.name for path in ROOT.glob("integrations/*/pyproject.toml"))
-ALL_MUST_RUN = bool(os.environ.get("BUILDARENA_TEST_ALL"))
+ALL_MUST_RUN = bool(os.environ.get("CI"))
 
 
 def _writer():
@@ -52,7 +52,7 @@ def test_adapters_are_members_of_no_workspace() -> None:
             assert (folder / source["path"] / "pyproject.toml").is_file(), name
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("adapter", ADAPTERS)
 def test_uv_locks_the_project_and_changes_no_version(adapter, tmp_path) -> None:
     shutil.copy(ROOT / "pyproject.toml", tmp_path)

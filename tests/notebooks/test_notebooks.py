@@ -67,7 +67,7 @@ def test_notebooks_are_kept_without_outputs(file):
     assert not [cell for cell in code if cell.outputs or cell.execution_count is not None]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_bridge_is_built_and_tried(tmp_path):
     done = run(read("bridge"), tmp_path)
     machine, trial, braced = shown(done, "text/html")
@@ -79,7 +79,7 @@ def test_a_bridge_is_built_and_tried(tmp_path):
     assert list(tmp_path.glob("*.html")) == []
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_designs_are_compared(tmp_path):
     done = run(read("designs"), tmp_path)
     lines = re.findall(r"(\d) braces: +([\d.]+)", printed(done))
@@ -89,7 +89,7 @@ def test_designs_are_compared(tmp_path):
     assert "(pybullet)" in shown(done, "text/html")[-1]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_service_is_read(tmp_path, context, monkeypatch):
     with live_api(context) as url:
         httpx.post(f"{url}/v1/sweeps", json=SWEEP).raise_for_status()

@@ -90,7 +90,7 @@ def test_a_page_carries_the_machine_as_it_is(machine):
     assert viewer == pages.SCRIPT.read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @needs_viewer
 def test_a_player_carries_the_trajectory_to_the_bit(trial):
     given = unpacked(Elements(framed(html_of(trial))).scripts["given"])
@@ -165,7 +165,7 @@ def test_text_stands_in_for_html(machine, trial, hostile):
     assert repr(hostile).startswith(HOSTILE)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @needs_viewer
 @pytest.mark.parametrize("mark", [pytest.param(None, marks=needs_pages)])
 def test_a_browser_draws_the_machine_and_plays_the_trial(mark, machine, trial, hostile, tmp_path):

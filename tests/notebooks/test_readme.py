@@ -29,7 +29,7 @@ def test_its_python_runs_as_it_stands(tmp_path, monkeypatch):
     assert (tmp_path / "bridge.html").stat().st_size > 1000
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "change", [("load 959.81", "load 959.82"), ("Refused (", "Accepted ("), ('"F")', '"A")')]
 )

@@ -30,7 +30,7 @@ def url(context, monkeypatch):
         yield url
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("kind", ["pandas", "polars"])
 def test_boards_and_jobs_are_frames(url, kind):
     board, jobs = ba.leaderboard(kind=kind), ba.jobs(url, kind=kind)
@@ -46,7 +46,7 @@ def test_boards_and_jobs_are_frames(url, kind):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_job_s_machine_and_trial_are_those_that_are_kept(url):
     jobs = {job["model"]: job for job in httpx.get(f"{url}/v1/jobs").json()["jobs"]}
     good, empty = jobs["builtin/expert"], jobs["builtin/idle"]
@@ -71,7 +71,7 @@ def test_a_job_s_machine_and_trial_are_those_that_are_kept(url):
             read("../sweeps")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_one_command_shows_a_job_to_somebody_without_a_service(url, tmp_path):
     (good,) = httpx.get(f"{url}/v1/jobs?model=builtin/expert").json()["jobs"]
     file = tmp_path / "shown.html"

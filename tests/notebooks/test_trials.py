@@ -26,7 +26,7 @@ def row(each_side: int) -> ba.Machine:
     return machine
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_a_trial_has_the_score_of_the_libraries(engine):
     machine, task = row(3), builtin_tasks()["support-1"]
@@ -57,7 +57,7 @@ def test_what_a_task_does_not_allow_is_a_failure_that_says_why(machine, words):
     assert "Not tried" in trial._repr_mimebundle_()["text/html"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_many_trials_come_in_the_order_of_the_machines():
     machines = [row(3), ba.Machine(), row(2), row(3)]
     alone = [ba.simulate(machine, "support-1") for machine in machines]

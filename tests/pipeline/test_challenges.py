@@ -334,7 +334,7 @@ def test_organisers_see_ranks_refusals_and_copies(tmp_path: Path) -> None:
 BRIDGES = season_named("first-bridges")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_bridges_are_tried_and_scored() -> None:
     report = checked(bridge_files(), BRIDGES, "agent")
     assert report.passed, report.findings
@@ -345,7 +345,7 @@ def test_bridges_are_tried_and_scored() -> None:
     assert report.score.unknown == ()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_flights_are_flown_and_scored() -> None:
     files = {
         f"{name}.json": json.dumps(experts_machine(builtin_tasks()[name]).to_document()).encode()
@@ -357,7 +357,7 @@ def test_flights_are_flown_and_scored() -> None:
     assert all(0.6 < term.share < 1.0 for term in report.score.terms)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_is_no_bridge_bears_nothing() -> None:
     car = json.dumps(family_car().to_document()).encode()
     score = checked({**bridge_files(), "support-2.json": car}, BRIDGES, "agent").score

@@ -42,7 +42,7 @@ def test_a_handler_ends_the_job(context, run) -> None:
     assert run(finisher(context)).outcome == "unsuccessful"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_lease_lives_as_long_as_its_handler(context, run) -> None:
     def slow(active: ActiveLease) -> None:
         time.sleep(context.settings.lease_s * 1.5)

@@ -194,7 +194,7 @@ def test_the_command_line_reads_its_key_from_a_file(tmp_path, monkeypatch) -> No
         Client("http://127.0.0.1:9")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(
     "words", [["buildarena_api"], ["buildarena_worker"], ["buildarena_simworker", "--simulator"]]
 )

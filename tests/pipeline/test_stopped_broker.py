@@ -44,7 +44,7 @@ def stopped(pid: int) -> Iterator[None]:
         os.kill(pid, signal.SIGCONT)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_requests_stay_quick_and_jobs_flow_again(context, valkey, monkeypatch) -> None:
     # Refusals are held back by up to a second on purpose, which is not what is measured here.
     monkeypatch.setattr(overload, "HELD_S", (0.0, 0.0))
@@ -73,7 +73,7 @@ def test_requests_stay_quick_and_jobs_flow_again(context, valkey, monkeypatch) -
         wait_until(lambda: (own.queues.waiting("construct") or 0) > 20, 20, "jobs flow again")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_every_stop_costs_a_message_one_short_time_out(valkey) -> None:
     url, pid = valkey
     queues, times = Queues(url), []
@@ -89,7 +89,7 @@ def test_every_stop_costs_a_message_one_short_time_out(valkey) -> None:
     assert max(times) < 4 * TIMEOUT_S, times
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_provider_requests_go_on_without_waiting_each(context, valkey) -> None:
     url, pid = valkey
 

@@ -108,7 +108,7 @@ def trusting(context) -> Iterator[str]:
         yield url
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_no_lie_counts(context, url) -> None:
     assert len(LIES) >= 50
     brought: dict[str, tuple[Job, str]] = {}

@@ -130,7 +130,7 @@ def test_a_fault_keeps_its_evidence_and_is_tried_again(context, do_next) -> None
     assert ended(context, job).success is not None
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(
     ("error", "ending"),
     [
@@ -167,7 +167,7 @@ def test_files_are_kept_by_name(context, do_next) -> None:
     assert (context.artifacts.get(kept.hash), kept.media_type) == (b"it went well", "text/plain")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_a_cancelled_trial_is_broken_off(context, do_next) -> None:
     job = waiting(context)
 
@@ -208,7 +208,7 @@ def lease_of_another(context) -> Iterator[None]:
     yield
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_a_driven_car_goes_back_to_its_session_each_time(context, submissions, do_next) -> None:
     job = submitted(context, submissions, task="transport-1")
     for _ in range(3):

@@ -53,7 +53,7 @@ def test_uploads_go_on_where_they_were_cut(context, url) -> None:
     assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("lost", [1, 2, 5])
 def test_lost_answers_do_nothing_twice(context, url, lost) -> None:
     job = waiting(context)
@@ -72,7 +72,7 @@ def test_lost_answers_do_nothing_twice(context, url, lost) -> None:
         assert connection.execute(ends).scalar_one() == 1
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("silent", [1, 3])
 def test_links_that_fall_silent_cost_a_time_out_each(context, url, monkeypatch, silent) -> None:
     monkeypatch.setattr(remote_api, "TIMEOUT_S", 0.4)

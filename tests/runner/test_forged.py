@@ -149,7 +149,7 @@ def refused(context, caller) -> Callable[..., str]:
     ended(context, job)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_trajectories_of_something_else_are_refused(refused) -> None:
     said = {name: refused(make) for name, make in OTHERS.items()}
     assert "'3'" in said["blocks of another machine"]

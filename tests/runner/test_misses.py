@@ -38,7 +38,7 @@ def offered(caller: Caller) -> bool:
     return caller.ask("POST", "/leases", json=caller.about(wait_s=1)).status_code == 200
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("how", ["fault", "hand back", "lost"])
 def test_a_key_that_misses_a_trial_again_and_again_counts_once(context, keys, how) -> None:
     job = waiting(context)
@@ -50,7 +50,7 @@ def test_a_key_that_misses_a_trial_again_and_again_counts_once(context, keys, ho
     assert offered(keys[1])
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("how", ["fault", "hand back", "lost", "never"])
 def test_a_key_waits_for_what_it_missed_and_others_do_not(context, keys, how) -> None:
     waiting(context)
@@ -60,7 +60,7 @@ def test_a_key_waits_for_what_it_missed_and_others_do_not(context, keys, how) ->
     assert offered(keys[1])
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_pause_grows(context, keys) -> None:
     waiting(context)
 

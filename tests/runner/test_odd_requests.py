@@ -11,7 +11,7 @@ from support.servers.live_api import live_api
 from support.servers.runner_rig import Caller, waiting
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_every_answer_is_a_documented_one(context) -> None:
     own = context.settings.model_copy(update={**WITH_KEYS, "require_keys": False, "lease_s": 60.0})
     with live_api(replace(context, settings=own)) as url:

@@ -76,7 +76,7 @@ def at_work(context, job_id: str) -> None:
     wait_until(lambda: expires() != first, 20, "it is worked on")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_trial_under_way_is_finished(context, worker) -> None:
     job = waiting(context, SECONDS + FEW_BLOCKS)
     with worker(120) as process:
@@ -87,8 +87,8 @@ def test_a_trial_under_way_is_finished(context, worker) -> None:
     assert context.store.rollouts.read(job.id)[0].finished_at is not None
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 def test_a_trial_that_takes_too_long_is_handed_back(context, worker) -> None:
     job = waiting(context, ENDLESS + FEW_BLOCKS)
     with worker(3) as process:

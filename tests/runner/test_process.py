@@ -59,7 +59,7 @@ def engines(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
     return [one for one in children if "spawn_main" in " ".join(one.cmdline())]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
     context, url, tmp_path
 ) -> None:

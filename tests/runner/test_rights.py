@@ -43,7 +43,7 @@ def test_a_runner_key_reaches_no_other_route(context, url) -> None:
     assert set(answers.values()) == {403}, answers
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("scope", ["read", "submit", "admin", None])
 def test_no_other_key_is_a_runners(context, url, scope) -> None:
     caller = as_admin(url)

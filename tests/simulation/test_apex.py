@@ -44,7 +44,7 @@ def flyer(hold_s: float, *, arms: int = 3, weak: bool = False) -> Machine:
     return draft.machine
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_honest_flight_counts_by_how_near_it_comes(engine) -> None:
     machine = flyer(1.5)
     first, _ = trial(with_rise(60), machine, engine)
@@ -57,7 +57,7 @@ def test_an_honest_flight_counts_by_how_near_it_comes(engine) -> None:
         assert result.flags == ()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_parts_that_come_off_on_the_way_up_are_told_of(engine) -> None:
     machine = flyer(1.5, weak=True)
     first, _ = trial(with_rise(60), machine, engine)
@@ -65,7 +65,7 @@ def test_parts_that_come_off_on_the_way_up_are_told_of(engine) -> None:
     assert (result.success, result.indicator, result.flags) == (False, 0.0, ("came_apart",))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("length", [6, 10, 14])
 def test_a_lever_that_turns_over_on_the_ground_does_not_count(engine, length) -> None:
     """Its highest point is its length, in whichever world: no number need be known for it."""
@@ -90,7 +90,7 @@ def test_a_lever_that_turns_over_on_the_ground_does_not_count(engine, length) ->
         assert result.metrics["top_s"] > 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("hold_s", [0.1, 0.3])
 def test_who_stays_on_the_ground_has_nothing(engine, hold_s) -> None:
     result, _ = trial(with_rise(60), flyer(hold_s, arms=2), engine)

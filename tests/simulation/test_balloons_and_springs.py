@@ -33,7 +33,7 @@ def _foot(draft: KeyedDraft) -> str:
     return start
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     balloon = draft.attach(_foot(draft), UP, "Balloon")
@@ -50,8 +50,8 @@ def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     assert trajectory.joint_loads[-25:, -1].mean() * 1000 == pytest.approx(net, abs=1.96)
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     start = draft.start()
@@ -84,7 +84,7 @@ def _aloft(load: int) -> tuple[Machine, str]:
     return draft.machine, balloon
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("load", [0, 6, 14])
 def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine, load) -> None:
     machine, balloon = _aloft(load)
@@ -150,7 +150,7 @@ def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine) -> None:
     assert peaks[3] / peaks[0] == pytest.approx(math.exp(-rate * 3 * period), rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_spring_bears_its_load_at_rest(engine) -> None:
     machine, load = _hung(1)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
@@ -162,7 +162,7 @@ def test_a_spring_bears_its_load_at_rest(engine) -> None:
     assert trajectory.bearing.ground[-25:].mean() == pytest.approx(weight, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_springs_between_the_same_faces_are_worth_one(engine) -> None:
     single, load = _hung(1)
     double, other = _hung(2)
@@ -174,7 +174,7 @@ def test_springs_between_the_same_faces_are_worth_one(engine) -> None:
     assert found[1] == pytest.approx(found[0], rel=0.03)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_spring_draws_together_while_its_key_is_held(engine) -> None:
     machine, load = _hung(1, bind=True)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)

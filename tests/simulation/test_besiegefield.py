@@ -41,7 +41,7 @@ def test_the_readme_tells_what_the_expert_solves() -> None:
     assert sorted(told) == SOLVED
 
 
-@pytest.mark.samples(6)
+@pytest.mark.nightly(keep=6)
 @pytest.mark.parametrize("name", LEVELS)
 def test_each_can_be_read_and_a_machine_of_nothing_fails(name) -> None:
     task = level(name)
@@ -54,7 +54,7 @@ def test_each_can_be_read_and_a_machine_of_nothing_fails(name) -> None:
     assert failed.indicator < 0.5
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("name", SOLVED)
 def test_the_experts_design_solves_it(name, engine) -> None:

@@ -96,7 +96,7 @@ def tried(engine: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     return simulated
 
 
-@pytest.mark.samples(9)
+@pytest.mark.nightly(keep=9)
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("at", [(12,), (13,), (12, 20)])
 def test_a_blow_that_finer_steps_do_not_show_breaks_nothing(engine, tried, name, at) -> None:

@@ -1,7 +1,6 @@
 """The family `budget`: what is no light bridge, and bridges that are, also beside the expert's."""
 
 import pytest
-from support.long_tests import slow_on_pybullet
 from support.machines.headroom import drafted, propped_beam
 from support.machines.light_bridges import hanging_post, row, three_pieces, with_ballast
 from support.machines.people.bridges import beam
@@ -15,7 +14,7 @@ from buildarena_worker.builtin.designs.drafting import DOWN
 LOAD = 300.0
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_the_expert_leaves_room_above_it(engine, tasks, seed) -> None:
     machine = drafted(DESIGNS["budget-1"](seed), [])
@@ -25,8 +24,8 @@ def test_the_expert_leaves_room_above_it(engine, tasks, seed) -> None:
     assert result.indicator == pytest.approx(LOAD / machine.mass, abs=1e-5)
 
 
-@pytest.mark.samples(2)
-@slow_on_pybullet
+@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(
     ("columns", "height"), [((0,), 5), ((-2, 2), 5), ((-1, 0, 1), 5), ((-3, 3), 5)]
 )
@@ -39,8 +38,8 @@ def test_what_the_gaps_floor_bears_is_not_carried_by_a_light_bridge(
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.samples(2)
-@slow_on_pybullet
+@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("columns", "height"), [((0,), 4), ((-2, 2), 4), ((-1, 1), 3), ((), 0)])
 def test_a_bridge_that_gives_way_earns_nothing_by_its_debris(
     engine, tasks, columns, height
@@ -50,8 +49,8 @@ def test_a_bridge_that_gives_way_earns_nothing_by_its_debris(
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.samples(1)
-@slow_on_pybullet
+@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(
     "machine",
     [
@@ -69,8 +68,8 @@ def test_a_part_of_the_load_is_worth_nothing(engine, tasks, machine) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 def test_a_bridge_that_bears_the_load_for_a_moment_does_not_carry_it(engine, tasks) -> None:
     task, machine = tasks["budget-1"], hanging_post(1)
     result, _ = trial(task, machine, engine)
@@ -82,7 +81,7 @@ def test_a_bridge_that_bears_the_load_for_a_moment_does_not_carry_it(engine, tas
         assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     "machine",
     [
@@ -101,7 +100,7 @@ def test_an_honest_bridge_is_worth_its_load_over_its_mass(engine, tasks, machine
     assert result.indicator == pytest.approx(LOAD / machine.mass, abs=1e-5)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_more_strength_earns_nothing_and_more_mass_costs(engine, tasks) -> None:
     lean, heavy = drafted(DESIGNS["budget-1"](0), []), with_ballast()
     worth = [trial(tasks["budget-1"], machine, engine)[0].indicator for machine in (lean, heavy)]

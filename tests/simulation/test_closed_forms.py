@@ -118,7 +118,7 @@ def _bending_of_beam(engine: str, cargo_mass: float) -> dict[str, float]:
     return {peak.joint: peak.moment for peak in trajectory.joint_peaks}
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine) -> None:
     load = 120.0
     light, half, full = (_bending_of_beam(engine, mass) for mass in (5.0, load / 2, load))
@@ -181,7 +181,7 @@ def test_a_wheel_rolls_without_slip(engine) -> None:
     assert speed == pytest.approx(WHEEL_SPEED * 1.0, rel=0.02)
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("mass", [5.0, 50.0, 500.0, 1500.0])
 def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine, mass) -> None:
     scenario = Scenario(

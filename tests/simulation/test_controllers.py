@@ -286,7 +286,7 @@ def test_fire_takes_shares(engine) -> None:
     assert rises[2] > rises[0] + 1
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("seed", [None, 5])
 def test_the_same_program_gives_the_same_bytes_in_every_process(engine, seed) -> None:
     task = load_task(EXAMPLE / "to-the-mark.yaml")
@@ -314,7 +314,7 @@ print(sha256(write_trajectory(done)).hexdigest())
     assert there.stdout.strip() == here
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_example_drives_to_its_mark_and_stops(engine) -> None:
     task = load_task(EXAMPLE / "to-the-mark.yaml")
     machine = Machine.from_document(json.loads((EXAMPLE / "car.machine.json").read_text()))

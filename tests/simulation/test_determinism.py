@@ -33,7 +33,7 @@ def _hash_in_new_process(engine: str, name: str, task: str, hash_seed: str) -> s
     return done.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(("name", "task"), [("beam", "support-1"), ("carrier", "transport-2")])
 def test_two_processes_give_the_same_bytes(engine, name, task) -> None:
     first, second = (_hash_in_new_process(engine, name, task, seed) for seed in ("1", "2"))

@@ -39,7 +39,7 @@ def test_a_slider_on_its_side_stays_level_under_a_load_beside_it(engine) -> None
     assert abs(height - height[0]).max() < 0.02
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("weights", [1, 2])
 def test_a_suspension_sags_and_swings_as_its_spring_and_damper_say(engine, weights) -> None:
     rig = Rig()
@@ -135,7 +135,7 @@ def test_a_spinning_block_runs_without_a_key(engine: str, *, flipped: bool) -> N
     assert speed[-20:] == pytest.approx(RPM_100 if flipped else -RPM_100, rel=0.03)
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(("arm", "turns"), [(1, True), (3, False)])
 def test_a_spinning_block_turns_what_its_torque_lifts(
     engine: str, arm: int, *, turns: bool

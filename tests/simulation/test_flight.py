@@ -83,7 +83,7 @@ def _plate(v: np.ndarray) -> np.ndarray:
     return np.array([0.0, 0.0, size])
 
 
-@pytest.mark.samples(11)
+@pytest.mark.nightly(keep=11)
 @pytest.mark.parametrize("attack_deg", [-8.0, 2.0, 5.0, 12.0, 30.0, 90.0])
 @pytest.mark.parametrize("speed", [12.0, 24.0, 45.0])
 def test_a_wing_lifts_and_drags_as_its_law_says(engine, attack_deg, speed) -> None:
@@ -176,7 +176,7 @@ def _lifted(engine: str, module: str, y_axis: Direction, flip: bool) -> float:
     return float(weight - trajectory.bearing.ground[-25:].mean())
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("name", ["Propeller", "Small Propeller"])
 @pytest.mark.parametrize("y_axis", [UP, DOWN])
 def test_blades_on_a_wheel_pull_as_the_published_law_says(engine, name, y_axis) -> None:

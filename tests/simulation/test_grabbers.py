@@ -56,7 +56,7 @@ def _told(trajectory: Trajectory) -> list[tuple[str, str]]:
     return [(event.what, event.held) for event in trajectory.events]
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("mass", [2.0, 50.0, 150.0])
 def test_a_grabber_holds_a_load_against_its_weight(engine, mass) -> None:
     machine, grabber = _stool(bound=False)

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import pytest
-from support.long_tests import long, slow_on_pybullet
 from support.machines.headroom import boom_on_a_base, drafted, propped_beam
 from support.machines.jet_cars import jet_car
 from support.machines.masts import balloons_on_a_mast
@@ -11,6 +10,7 @@ from support.machines.people.bridges import beam
 from support.machines.see_saws import see_saw
 from support.machines.swinging_bars import swinging_bar
 from support.machines.trials import trial
+from support.marks import nightly
 
 from buildarena_benchmark import Task
 from buildarena_geometry import Machine
@@ -21,11 +21,11 @@ from buildarena_worker.builtin.designs.rovers import long_slalom_car, touring_ca
 
 # Support over 30 and 45
 
-SPANS = [("support-4", 30), long("support-5", 45)]
+SPANS = [("support-4", 30), nightly("support-5", 45)]
 
 
-@pytest.mark.samples(1)
-@slow_on_pybullet
+@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("task", "gap"), SPANS)
 @pytest.mark.parametrize("below", [{"places": (0,), "foot": 2}, {"places": (-6, 6)}])
 def test_what_the_gaps_floor_bears_is_no_long_bridge(engine, tasks, task, gap, below) -> None:
@@ -34,8 +34,8 @@ def test_what_the_gaps_floor_bears_is_no_long_bridge(engine, tasks, task, gap, b
     assert result.metrics["load_per_mass"] == 0.0
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("overlap", "depth"), [(8, 1), (6, 2)])
 def test_debris_that_lies_on_the_floor_takes_nothing_back(engine, tasks, overlap, depth) -> None:
     machine = beam(30, overlap=overlap, depth=depth)
@@ -45,8 +45,8 @@ def test_debris_that_lies_on_the_floor_takes_nothing_back(engine, tasks, overlap
     assert result.flags == ()
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("task", "gap"), SPANS)
 @pytest.mark.parametrize("height", [3, 4])
 def test_stilts_that_hang_over_the_floor_add_nothing(engine, tasks, task, gap, height) -> None:
@@ -58,7 +58,7 @@ def test_stilts_that_hang_over_the_floor_add_nothing(engine, tasks, task, gap, h
     assert stilted[0].indicator <= 1.1 * bare[0].indicator
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("task", "gap"), SPANS)
 def test_a_long_bridge_counts_and_tells_its_load_over_its_mass(engine, tasks, task, gap) -> None:
     machine = propped_beam(gap)
@@ -78,8 +78,8 @@ def test_only_the_tasks_that_ask_for_it_tell_the_load_over_the_mass(tasks) -> No
 # A slalom of twelve gates
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 def test_a_car_that_drives_straight_on_passes_no_more_than_one_side(engine, tasks) -> None:
     for turn_s in (0.0, 0.02):
         steered = [(0.8, "RightArrow", turn_s), (1.2, "LeftArrow", turn_s)] if turn_s else []
@@ -89,7 +89,7 @@ def test_a_car_that_drives_straight_on_passes_no_more_than_one_side(engine, task
         assert result.metrics["gates"] <= 6
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("tip", ["bare", "heavy", "wheeled"])
 def test_a_bar_that_swings_its_starting_block_passes_no_gate_by_it(engine, tasks, tip) -> None:
     machine = swinging_bar(tip, drive_s=1.6).machine
@@ -98,7 +98,7 @@ def test_a_bar_that_swings_its_starting_block_passes_no_gate_by_it(engine, tasks
     assert result.metrics["gates"] <= 1, "the first gate's end is straight ahead"
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("wheels", ["braked", "backward", "tapped"])
 def test_a_car_that_cannons_push_passes_no_gate(engine, tasks, wheels) -> None:
     result, _ = trial(tasks["mechanisms-5"], jet_car(wheels).machine, engine, duration_s=5.0)
@@ -114,8 +114,8 @@ def _arm(*presses: tuple[float, str, float]) -> Machine:
     return drafted(swinging_arm(0), presses)
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(
     "presses",
     [
@@ -131,7 +131,7 @@ def test_a_cargo_that_is_not_put_down_within_the_mark_fails(engine, tasks, press
     assert not result.success
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_an_arm_may_take_its_time(engine, tasks) -> None:
     machine = _arm((2.0, "LeftArrow", 3.96), (10.0, "Alpha1", 0.2), (11.0, "RightArrow", 0.4))
     result, _ = trial(tasks["mechanisms-6"], machine, engine, duration_s=20.0)
@@ -151,7 +151,7 @@ def _tour_of(tasks: dict[str, Task], *places: tuple[float, float]) -> Task:
     return replace(task, scenario=task.scenario.model_copy(update={"marks": tuple(marks)}))
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("wheels", "fires_s"), [("braked", 1.0), ("tapped", 1.0), ("braked", 1.5)])
 def test_where_cannons_push_a_car_is_no_stop(engine, tasks, wheels, fires_s) -> None:
     machine = jet_car(wheels, fires_s=fires_s).machine
@@ -164,7 +164,7 @@ def test_where_cannons_push_a_car_is_no_stop(engine, tasks, wheels, fires_s) -> 
     assert result.flags == ("not_driven",)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_a_boom_that_swings_its_tip_stops_nowhere(engine, tasks) -> None:
     draft = boom_on_a_base()
     draft.press("LeftArrow", 0.5, 1.0)
@@ -176,7 +176,7 @@ def test_a_boom_that_swings_its_tip_stops_nowhere(engine, tasks) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_driving_past_a_point_is_no_stop(engine, tasks) -> None:
     machine = drafted(touring_car(0), [(0.4, "UpArrow", 20.0)])
     task = _tour_of(tasks, (0.0, 20.0), (0.0, 40.0), (0.0, 60.0))
@@ -184,7 +184,7 @@ def test_driving_past_a_point_is_no_stop(engine, tasks) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_stops_in_another_order_do_not_count(engine, tasks) -> None:
     first, second, third = (mark.center[:2] for mark in tasks["transport-4"].scenario.marks)
     task = _tour_of(tasks, second, first, third)
@@ -193,7 +193,7 @@ def test_stops_in_another_order_do_not_count(engine, tasks) -> None:
     assert result.metrics["stops"] == 1
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_a_car_that_goes_on_in_steps_earns_each_stop(engine, tasks) -> None:
     steps = [(0.4 + 3.0 * k, "UpArrow", 1.2) for k in range(3)]
     machine = drafted(touring_car(0), steps)
@@ -213,8 +213,8 @@ def _stepping(*presses: tuple[float, str, float]) -> Machine:
     return drafted(stepping_hoverer(0), presses)
 
 
-@pytest.mark.samples(2)
-@slow_on_pybullet
+@pytest.mark.nightly(keep=2)
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("mast", ["below", "aside", "hanging", "legs"])
 def test_a_mast_that_is_lifted_a_little_holds_no_height(engine, tasks, mast) -> None:
     machine = balloons_on_a_mast(mast, rise_s=1.0).machine
@@ -222,8 +222,8 @@ def test_a_mast_that_is_lifted_a_little_holds_no_height(engine, tasks, mast) -> 
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(
     ("presses", "held_s"),
     [
@@ -240,7 +240,7 @@ def test_heights_are_held_in_their_order(engine, tasks, presses, held_s) -> None
     assert result.indicator <= 10.0 + held_s
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_a_hoverer_without_its_cargo_holds_nothing(engine, tasks) -> None:
     task = tasks["flight-3"]
     cargo = task.scenario.cargo.model_copy(update={"at": (6, 6, 0)})
@@ -250,7 +250,7 @@ def test_a_hoverer_without_its_cargo_holds_nothing(engine, tasks) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_a_hoverer_may_hurry_from_height_to_height(engine, tasks) -> None:
     machine = _stepping((0.3, "UpArrow", 4.35), (9.0, "UpArrow", 3.0), (16.5, "DownArrow", 1.5))
     result, _ = trial(tasks["flight-3"], machine, engine, duration_s=23.0)
@@ -271,7 +271,7 @@ def _payload(*presses: tuple[float, str, float]) -> Machine:
     return drafted(replace(design, control={"control_config": config}), presses)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("release_s", [0.0, 2.2])
 def test_a_payload_that_is_let_go_does_not_count(engine, tasks, release_s) -> None:
     machine = _payload((release_s, "Alpha3", 1.0), (1.9, "Alpha1", 12.0))
@@ -280,7 +280,7 @@ def test_a_payload_that_is_let_go_does_not_count(engine, tasks, release_s) -> No
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("fires_s", [0.9, 1.0])
 @pytest.mark.parametrize("thrown", [False, True])
 def test_a_payload_that_coasts_or_is_thrown_does_not_count(engine, tasks, fires_s, thrown) -> None:
@@ -292,7 +292,7 @@ def test_a_payload_that_coasts_or_is_thrown_does_not_count(engine, tasks, fires_
     assert result.flags == ("not_carried",)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_what_is_too_heavy_stays_down_however_long_it_fires(engine, tasks) -> None:
     for begin_s in (4.5, 8.0):
         machine = drafted(payload_rocket(0), [(begin_s, "Alpha1", 5.0)])
@@ -300,7 +300,7 @@ def test_what_is_too_heavy_stays_down_however_long_it_fires(engine, tasks) -> No
         assert (result.success, result.indicator) == (False, 0.0)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("begin_s", [0.5, 1.5])
 def test_a_payload_weighs_what_it_did_when_it_left_the_ground(engine, tasks, begin_s) -> None:
     machine = drafted(payload_rocket(0), [(begin_s, "Alpha1", 12.0)])
@@ -313,8 +313,8 @@ def test_a_payload_weighs_what_it_did_when_it_left_the_ground(engine, tasks, beg
 # A load hauled
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(
     ("pivot", "show"), [("Swivel", "apart"), ("Swivel", "meshing"), ("Swivel", "on the beam")]
 )
@@ -325,8 +325,8 @@ def test_a_see_saw_hauls_no_load(engine, tasks, pivot, show) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.samples(1)
-@slow_on_pybullet
+@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("begin_s", "lasts_s"), [(0.7, 0.3), (8.0, 3.0), (3.0, 1.6)])
 def test_a_lift_that_ends_low_hauls_nothing(engine, tasks, begin_s, lasts_s) -> None:
     machine = drafted(loaded_lift(0), [(begin_s, "UpArrow", lasts_s)])
@@ -335,7 +335,7 @@ def test_a_lift_that_ends_low_hauls_nothing(engine, tasks, begin_s, lasts_s) -> 
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("begin_s", [0.8, 0.9])
 def test_a_load_weighs_what_it_did_when_it_left_the_ground(engine, tasks, begin_s) -> None:
     machine = drafted(loaded_lift(0), [(begin_s, "UpArrow", 1.3)])

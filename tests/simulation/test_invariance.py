@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 from benchmarks.simulation.bench_agreement import compared
-from support.long_tests import long, slow_on_pybullet
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, deck
 from support.machines.random_machines import TASKS, random_machine
 from support.machines.trials import trial
+from support.marks import nightly
 
 from buildarena_benchmark import Task
 from buildarena_geometry import Machine
@@ -24,8 +24,8 @@ def _turned(machine: Machine, yaw_deg: float) -> Machine:
     return whole
 
 
-@slow_on_pybullet
-@pytest.mark.parametrize("yaw_deg", [90, long(180), long(270)])
+@pytest.mark.nightly(engine="pybullet")
+@pytest.mark.parametrize("yaw_deg", [90, nightly(180), nightly(270)])
 def test_a_turned_bridge_carries_the_same(engine, tasks, yaw_deg) -> None:
     task = tasks["support-1"]
     for machine in (deck(5, 7), beam(9, "t")):
@@ -66,8 +66,8 @@ def _turning_car(*, mirrored: bool) -> Machine:
     return draft.machine
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 def test_a_mirrored_car_drives_as_far(engine, tasks) -> None:
     task = tasks["transport-1"]
     found = [trial(task, _turning_car(mirrored=m), engine)[0] for m in (False, True)]
@@ -75,9 +75,9 @@ def test_a_mirrored_car_drives_as_far(engine, tasks) -> None:
     assert found[0].indicator == pytest.approx(found[1].indicator, rel=TOLERANCE[engine])
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
-    "task", [long(task) if task in {"transport-2", "transport-3"} else task for task in TASKS]
+    "task", [nightly(task) if task in {"transport-2", "transport-3"} else task for task in TASKS]
 )
 def test_engines_agree_on_machines_that_nobody_chose(task) -> None:
     result = compared("basic", task, seed=5)

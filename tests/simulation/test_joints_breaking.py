@@ -36,7 +36,7 @@ def _tried(rig: Rig, engine: str, duration_s: float = 2.0) -> Trajectory:
     return simulate(rig.machine, scenario, engine)
 
 
-@pytest.mark.samples(5)
+@pytest.mark.nightly(keep=5)
 @pytest.mark.parametrize("joint", KINDS)
 def test_a_joint_bears_what_hangs_on_it(engine, joint) -> None:
     rig, seat = _hung(joint, 3)
@@ -50,7 +50,7 @@ def test_a_joint_bears_what_hangs_on_it(engine, joint) -> None:
     assert settled == pytest.approx(load, rel=0.04)
 
 
-@pytest.mark.samples(9)
+@pytest.mark.nightly(keep=9)
 @pytest.mark.parametrize("joint", KINDS)
 @pytest.mark.parametrize(("strength", "holds"), [(1.15, True), (0.9, False)])
 def test_a_joint_breaks_above_its_strength_and_lets_go(

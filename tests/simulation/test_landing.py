@@ -21,7 +21,7 @@ from buildarena_simulation import simulate
 from buildarena_simulation.constants import BOUNCE_MASS, CARGO_BOUNCE, MIN_LANDING_SPEED
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_the_beam_of_seven_fails_as_in_the_game(engine, tasks) -> None:
     scenario = in_game(tasks["support-1"].scenario)
     trajectory = simulate(beam(7), scenario, engine)
@@ -51,7 +51,7 @@ def test_the_log_has_the_figures_that_engines_are_held_to() -> None:
     assert logged("support-2_through_y.csv")["contact_s"] is None, "a deck that is gone through"
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("braces", ["t", "tb"])
 def test_a_braced_beam_bears_both_landings(engine, tasks, braces) -> None:
     result, trajectory = trial(tasks["support-1"], beam(7, braces), engine)
@@ -82,7 +82,7 @@ def test_a_cargo_bounces_less_on_a_heavier_machine(engine, tasks) -> None:
     assert peaks[1] < 0.6 * peaks[0]
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_what_lies_does_not_hop(engine, tasks) -> None:
     """A cargo that grows heavier where it lies is never thrown up again."""
     _, trajectory = trial(tasks["support-1"], deck(5, 7, cross=True), engine)

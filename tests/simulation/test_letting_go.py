@@ -33,7 +33,7 @@ def _fallen(machine: Machine, engine: str, *, pressed: bool = True) -> Trajector
     return simulate(machine, scenario, engine, controls=PRESSED if pressed else ())
 
 
-@pytest.mark.samples(5)
+@pytest.mark.nightly(keep=5)
 @pytest.mark.parametrize(("below", "above"), [(1, 1), (6, 2), (2, 9)])
 @pytest.mark.parametrize("across", [False, True])
 def test_both_sides_leave_with_the_same_momentum(engine, below, above, across) -> None:

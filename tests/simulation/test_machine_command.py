@@ -109,7 +109,7 @@ def test_a_seed_varies_the_start(run, tmp_path) -> None:
     assert all(abs(x) <= 0.1 and abs(y) <= 0.1 for x, y, _ in starts)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_seeds_tell_how_often_a_machine_succeeds(run) -> None:
     given = ("simulate", str(DATA / "beam-braced-on-top.json"), "--engine", "mujoco")
     done = run(*given, "--seeds", "3", "--json", task_name="support-1")

@@ -20,13 +20,13 @@ def _require_kept(name: str, engine: str) -> None:
     assert _disqualifying(now["flags"]) == _disqualifying(told["flags"])
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", HANDFUL)
 def test_a_handful_of_honest_machines_keep_their_verdict(engine, name) -> None:
     _require_kept(name, engine)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("name", [name for name in HONEST if name not in HANDFUL])
 def test_honest_machines_keep_their_verdict(engine, name) -> None:
     _require_kept(name, engine)

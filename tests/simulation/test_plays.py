@@ -28,7 +28,7 @@ def written(outcome: Trajectory | MachineNotSimulable) -> bytes:
     return write_trajectory(outcome)
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("build", "task"),
     [

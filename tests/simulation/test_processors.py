@@ -27,7 +27,7 @@ TASK = builtin_tasks()["support-1"]
 SCENARIO = TASK.scenario.model_copy(update={"duration_s": 2.6})
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @several
 def test_what_the_libraries_would_choose_does_not_matter() -> None:
     first, second = (lines(TRIALS, as_on(name)) for name in (kernels.PINNED, OTHERS[0]))
@@ -35,7 +35,7 @@ def test_what_the_libraries_would_choose_does_not_matter() -> None:
     assert compared(first[1:], second[1:])["equal"] == TRIALS
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @several
 def test_a_trial_of_other_kernels_is_repeated_to_the_byte() -> None:
     machine = load_machine("wide-deck")

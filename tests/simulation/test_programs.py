@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.long_tests import LONG, long
+from support.marks import nightly
 
 from buildarena_simulation import ControllerFailed
 from buildarena_simulation.controllers import program as bounds
@@ -271,7 +271,7 @@ WHERE = {
 
 @pytest.mark.parametrize("body", ENDLESS.values(), ids=ENDLESS)
 @pytest.mark.parametrize(
-    "program", [*list(WHERE.values())[:2], *map(long, list(WHERE.values())[2:])]
+    "program", [*list(WHERE.values())[:2], *map(nightly, list(WHERE.values())[2:])]
 )
 def test_no_program_goes_on_for_ever(body, program) -> None:
     began = time.process_time()
@@ -280,7 +280,7 @@ def test_no_program_goes_on_for_ever(body, program) -> None:
     assert time.process_time() - began < 10 * bounds.MAX_TICK_S
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_ten_at_a_time_are_bounded_alike() -> None:
     programs = [where.format(body=body) for where in WHERE.values() for body in ENDLESS.values()]
     with ProcessPoolExecutor(10, mp_context=get_context("spawn")) as pool:
@@ -378,9 +378,9 @@ def mutated(draw: random.Random) -> str:
     return text
 
 
-@pytest.mark.sized
-def test_a_mutated_program_answers_or_fails_by_its_own_fault() -> None:
-    draw, failures, count = random.Random(3), [], 10_000 if LONG else 400
+@pytest.mark.parametrize("count", [400, nightly(10_000)])
+def test_a_mutated_program_answers_or_fails_by_its_own_fault(count) -> None:
+    draw, failures = random.Random(3), []
     for _ in range(count):
         try:
             answers = answered(mutated(draw), ticks=3)

@@ -19,7 +19,7 @@ QUICK_ON_PYBULLET = (
 TRIALS = [(name, "mujoco") for name in REFERENCES] + [(n, "pybullet") for n in QUICK_ON_PYBULLET]
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(("name", "engine"), TRIALS)
 def test_a_reference_machine_gives_what_it_gave(name, engine) -> None:
     expected, found = EXPECTED[name][engine], outcome(name, engine)

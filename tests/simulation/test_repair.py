@@ -3,21 +3,18 @@
 from dataclasses import replace
 
 import pytest
-from support.long_tests import LONG, long, slow_on_pybullet
 from support.machines.repairs import TRICKS, faulty, faulty_side, new_car, repaired, wheels_of
 from support.machines.trials import trial
+from support.marks import nightly
 
 from buildarena_benchmark import broken_constraint, score
 from buildarena_benchmark.families.cars import drawn_car
 from buildarena_benchmark.families.given import edits_between, given_machine, whole_machine
 from buildarena_simulation import simulate
 
-SEEDS = range(40 if LONG else 3)
 
-
-@pytest.mark.slow
-@pytest.mark.samples(1)
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.ci
+@pytest.mark.parametrize("seed", [0, *(nightly(seed) for seed in range(1, 40))])
 def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
     result, _ = trial(task, faulty(task), engine)
@@ -27,8 +24,8 @@ def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, see
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
 
 
-@pytest.mark.samples(1)
-@pytest.mark.parametrize("seed", [0, 1, long(2), long(3)])
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("seed", [0, 1, nightly(2), nightly(3)])
 def test_the_expert_repairs_it(engine, tasks, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
     machine = repaired(task)
@@ -37,7 +34,7 @@ def test_the_expert_repairs_it(engine, tasks, seed) -> None:
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("seed", [4, 5])
 def test_a_repaired_car_stays_straight_in_another_world(engine, tasks, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
@@ -46,10 +43,10 @@ def test_a_repaired_car_stays_straight_in_another_world(engine, tasks, seed) -> 
         assert score(task, repaired(task), path).indicator == 1.0
 
 
-@pytest.mark.samples(3)
-@slow_on_pybullet
+@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("trick", TRICKS)
-@pytest.mark.parametrize("seed", [0, 1, 2, long(3), long(4)])
+@pytest.mark.parametrize("seed", [0, 1, 2, nightly(3), nightly(4)])
 def test_what_finds_no_fault_regains_little(engine, tasks, trick, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
     machine = TRICKS[trick](task)
@@ -59,7 +56,7 @@ def test_what_finds_no_fault_regains_little(engine, tasks, trick, seed) -> None:
     assert result.indicator < 0.5
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("seed", [1, 3])
 def test_a_fault_that_stays_keeps_it_from_driving_straight(engine, tasks, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
@@ -79,7 +76,7 @@ def test_a_car_that_is_thrown_far_is_not_driven(engine, tasks) -> None:
     assert "not_driven" in result.flags
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_a_new_car_drives_straight_and_is_refused(engine, tasks) -> None:
     task = tasks["repair-1"].drawn(0)
     result, _ = trial(task, new_car(), engine)

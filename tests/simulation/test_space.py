@@ -55,8 +55,8 @@ def path(trial: Any) -> np.ndarray:
     return trial.positions.astype(float).mean(axis=1) + np.array([0, 0, RADIUS])
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 def test_a_free_fall_round_the_planet_keeps_keplers_laws(engine) -> None:
     radius = RADIUS + 400.5
     speed = 1.1 * math.sqrt(PULL * RADIUS**2 / radius)
@@ -83,7 +83,7 @@ def rocket(tank: str = "Fuel Barrel Big") -> Machine:
     return bound(machine, thrust="Alpha1")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(("tank", "burn_s"), [("Fuel Barrel Big", 40.0), ("Fuel Barrel", 8.0)])
 def test_the_rocket_equation_holds_as_fuel_is_used_up(engine, tank, burn_s) -> None:
     machine = rocket(tank)
@@ -109,7 +109,7 @@ def test_the_rocket_equation_holds_as_fuel_is_used_up(engine, tank, burn_s) -> N
     assert not trial.breaks
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_fuel_ends_and_flows_through_what_holds_fuel_alone(engine) -> None:
     own, barrel = 1.0, 10.0
     joined = rocket("Fuel Barrel")

@@ -4,11 +4,11 @@ import itertools
 from collections.abc import Sequence
 
 import pytest
-from support.long_tests import long, slow_on_pybullet
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, deck
 from support.machines.references import load_machine
 from support.machines.trials import trial
+from support.marks import nightly
 
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
@@ -16,7 +16,7 @@ from buildarena_simulation.scenario import SpanPlacement, gap_terrain
 from buildarena_worker.builtin.designs.drafting import BRACE, EAST, NORTH, SOUTH, UP
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_more_bracing_carries_more(engine, tasks) -> None:
     beams = [beam(7, braces) for braces in ("", "t", "tb", "12")]
     loads = [trial(tasks["support-1"], actions, engine)[0].indicator for actions in beams]
@@ -24,8 +24,8 @@ def test_more_bracing_carries_more(engine, tasks) -> None:
     assert all(b > 1.2 * a for a, b in itertools.pairwise(loads))
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 def test_a_braced_deck_carries_more_than_a_bare_one(engine, tasks) -> None:
     bare, _ = trial(tasks["support-1"], deck(5, 7), engine)
     braced, trajectory = trial(tasks["support-1"], deck(5, 7, cross=True), engine)
@@ -35,7 +35,7 @@ def test_a_braced_deck_carries_more_than_a_bare_one(engine, tasks) -> None:
     assert min(event.time_s for event in trajectory.breaks) > 5.0  # not while the cargo is light
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_the_one_shot_bridge_stands_in_the_gap(engine, tasks) -> None:
     result, _ = trial(tasks["support-1"], load_machine("one-shot-bridge"), engine)
     assert result.metrics["load_when_decided"] >= 900.0
@@ -44,8 +44,8 @@ def test_the_one_shot_bridge_stands_in_the_gap(engine, tasks) -> None:
     assert result.metrics["floor_share"] > 0.5  # its pillars reach the gap's floor
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tasks) -> None:
     # Over a gap so deep that its pillars hang free; over the task's they stand on the floor.
     deep = tasks["support-1"].scenario.model_copy(
@@ -58,8 +58,8 @@ def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tas
     assert first.cargo_mass == pytest.approx(1000.0, rel=0.03)
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 def test_overlap_on_the_terrain_never_hurts(engine, tasks) -> None:
     loads = [
         trial(tasks["support-1"], beam(length, "t"), engine)[0].metrics["load_at_first_break"]
@@ -81,14 +81,14 @@ def _beam_with(
     return draft.machine
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(
     "spans",
     [
         ((0, 3), (3, 6)),
-        long(((0, 6),)),
-        long(((0, 6), (0, 5), (1, 6), (1, 5))),
-        long(tuple((k, k + 1) for k in range(6))),
+        nightly(((0, 6),)),
+        nightly(((0, 6), (0, 5), (1, 6), (1, 5))),
+        nightly(tuple((k, k + 1) for k in range(6))),
     ],
 )
 def test_connectors_stacked_on_the_same_faces_are_worth_one(engine, tasks, spans) -> None:
@@ -98,8 +98,8 @@ def test_connectors_stacked_on_the_same_faces_are_worth_one(engine, tasks, spans
     assert trial(task, _beam_with(spans * 5), engine)[0].indicator < 1000.0
 
 
-@pytest.mark.slow
-@slow_on_pybullet
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
 def test_winches_stacked_between_the_same_faces_are_one_rope(engine, tasks) -> None:
     spans = ((0, 3), (3, 6), (0, 6))
     loads = [
@@ -109,14 +109,14 @@ def test_winches_stacked_between_the_same_faces_are_one_rope(engine, tasks) -> N
     assert loads[1] <= 1.05 * loads[0]
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(engine, tasks) -> None:
     result, _ = trial(tasks["support-1"], beam(5), engine)
     assert not result.success
     assert result.indicator == 0.0
 
 
-@slow_on_pybullet
+@pytest.mark.nightly(engine="pybullet")
 def test_a_bridge_built_along_the_gap_is_turned_across_it(engine, tasks) -> None:
     along = trial(tasks["support-1"], beam(7, "t", direction=EAST), engine)[0]
     across = trial(tasks["support-1"], beam(7, "t"), engine)[0]

@@ -43,7 +43,7 @@ def test_a_file_gives_back_the_trajectory(tasks) -> None:
     assert len(write_trajectory(bridge)) < 250_000  # 51 blocks, 17 s, most of it falling debris
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(engine, tasks) -> None:
     machine = deck(5, 7)
     cargo = tasks["support-1"].scenario.cargo.model_copy(update={"final_mass": 100.0})
@@ -61,7 +61,7 @@ def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(engine, tas
     assert len(wheels.wheel_ids) == 4
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_a_trajectory_tells_what_each_joint_bears_over_time(engine, tasks) -> None:
     trajectory = simulate(beam(7, "t"), tasks["support-1"].scenario, engine)
     loads = trajectory.joint_loads
@@ -87,7 +87,7 @@ def test_a_trajectory_tells_what_each_joint_bears_over_time(engine, tasks) -> No
     assert 0 < first[broken // 2] < first[broken - 2]
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_ropes_bear_their_share_too(engine, tasks) -> None:
     draft = KeyedDraft()
     middle = draft.start()

@@ -43,7 +43,7 @@ def test_a_wheel_brakes_when_its_key_is_released(engine, tasks) -> None:
     assert abs(north[-1] - north[-10]) < 0.05
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("rails", [True, False])
 def test_a_cargo_stays_on_a_deck(engine, tasks, rails) -> None:
     actions = car(5, 2, deck_half=(2, 2), rails=rails, drive=[("UpArrow", 3.0, 3.0)])
@@ -55,7 +55,7 @@ def test_a_cargo_stays_on_a_deck(engine, tasks, rails) -> None:
     assert np.abs(apart[25:]).max() < 1.0
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 def test_the_large_cargo_stays_on_a_long_deck(engine, tasks) -> None:
     actions = car(9, 2, deck_half=(2, 4), drive=[("UpArrow", 3.0, 2.0), ("DownArrow", 5.5, 2.0)])
     result, trajectory = trial(tasks["transport-3"], actions, engine, duration_s=8.0)
@@ -65,7 +65,7 @@ def test_the_large_cargo_stays_on_a_long_deck(engine, tasks) -> None:
     assert trajectory.cargo_position[-1, 2] > 1.5
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(
     "machine", [car(bound=False), car(drive=()), load_machine("stool-with-wheels-on-top")]
 )

@@ -119,7 +119,7 @@ def test_a_shaft_bent_by_thirty_degrees_turns_as_its_motor(engine) -> None:
     assert abs(turns[25:].sum()) > 20.0
 
 
-@pytest.mark.samples(5)
+@pytest.mark.nightly(keep=5)
 @pytest.mark.parametrize("wheel", ["Wheel Unpowered", "Large Wheel Unpowered", "Fly Wheel"])
 def test_a_cart_rolls_downhill_as_its_inertia_says(engine, wheel) -> None:
     rig = Rig()
@@ -150,7 +150,7 @@ def test_a_cart_rolls_downhill_as_its_inertia_says(engine, wheel) -> None:
     assert gained == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 def test_what_swings_freely_never_rises_above_its_start(engine) -> None:
     rig = Rig()
     first = rig.attach(rig.row(rig.top, NORTH, 2)[-1], NORTH, "Swivel")

@@ -51,7 +51,7 @@ def test_what_is_let_go_falls_by_the_scenarios_gravity(engine, beam, gravity) ->
     assert trajectory.settings["gravity"] == gravity
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("gravity", [10.0, 60.0])
 def test_bearing_is_in_weights_and_joints_bear_the_true_weight(engine, gravity) -> None:
     machine = beam(5)

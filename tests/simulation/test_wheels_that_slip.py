@@ -56,7 +56,7 @@ def _driven(machine: Machine, engine: str) -> tuple[float, float]:
     return float(travelled), float(heading[-1] - heading[0])
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(
     ("braked", "length", "track"),
     [((0,), 5, 1), ((1,), 5, 1), ((2,), 5, 1), ((3,), 5, 1), ((0,), 9, 1), ((3,), 7, 2)],
@@ -71,7 +71,7 @@ def test_a_car_with_a_braking_wheel_turns_and_travels_as_coulomb_says(
     assert turned == pytest.approx(expected.turned, rel=0.05)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("braked", [0, 3])
 def test_wheels_on_hinges_that_only_steer_share_their_load_alike(engine, braked) -> None:
     """The hinges' drives give way a little: the turn may differ more than a rigid car's."""
@@ -103,7 +103,7 @@ def _on_the_rough_road(seed: int, engine: str, duration_s: float) -> tuple[Machi
     )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", [5, 8, 10])
 def test_edges_under_wheels_push_nothing_on(engine, seed) -> None:
     """A vehicle on ridges is no faster than its motors turn its wheels, and falls on none."""
@@ -115,7 +115,7 @@ def test_edges_under_wheels_push_nothing_on(engine, seed) -> None:
     assert 0.6 * rim < speed.max() < 1.05 * rim
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", [5, 8])
 def test_the_ground_bears_a_vehicle_on_suspensions_by_its_weight(engine, seed) -> None:
     machine, trajectory = _on_the_rough_road(seed, engine, 1.2)

@@ -1,7 +1,6 @@
 """A database of the version before: it is migrated, and its jobs stay as they were and verify."""
 
 import json
-import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -31,9 +30,9 @@ ROWS = json.loads((BEFORE / "rows.json").read_text())
 
 
 @pytest.fixture
-def old_database(worker_id: str) -> Iterator[str]:
+def old_database(worker_id: str, postgres_url: str) -> Iterator[str]:
     """A database with the schema and the rows of the version before."""
-    server, name = os.environ["TEST_POSTGRES_URL"], f"upgrade_{worker_id}"
+    server, name = postgres_url, f"upgrade_{worker_id}"
     admin = create_engine(
         server.replace("postgresql://", "postgresql+psycopg://"), isolation_level="AUTOCOMMIT"
     )

@@ -6,14 +6,13 @@ import httpx
 import psutil
 import pytest
 from support.documents.pages import in_browser, needs_pages
-from support.long_tests import LONG
+from support.marks import nightly
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import finished, running_stack
 from tests.web.random_machines import built_session
 
-pytestmark = [*needs_pages, pytest.mark.slow]
+pytestmark = [*needs_pages, pytest.mark.ci]
 
-MACHINES, A_SESSION = (50, 10) if LONG else (8, 4)
 LATENCY_S = 0.3
 SWEEP = {
     "name": "room",
@@ -35,12 +34,12 @@ def processes(*names: str) -> str:
     return ",".join(found)
 
 
-@pytest.mark.sized
-def test_the_room_of_a_job_shows_what_is(tmp_path) -> None:
+@pytest.mark.parametrize(("machines", "a_session"), [(8, 4), nightly(50, 10)])
+def test_the_room_of_a_job_shows_what_is(tmp_path, machines, a_session) -> None:
     with running_stack(tmp_path) as stack:
         with httpx.Client(base_url=stack.url, timeout=30) as client:
             sweep = client.post("/v1/sweeps", json=SWEEP).raise_for_status().json()["id"]
-            groups = [range(k, k + A_SESSION) for k in range(0, MACHINES, A_SESSION)]
+            groups = [range(k, k + a_session) for k in range(0, machines, a_session)]
             sessions = [built_session(client, f"random-{g[0]}", g) for g in groups]
             finished(client, sweep)
         assert any(step["ghosts"] for session in sessions for step in session["steps"])

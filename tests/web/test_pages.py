@@ -6,7 +6,7 @@ import httpx
 import pytest
 from pydantic import SecretStr
 from support.challenge import bridge_files, packed, zipped
-from support.documents.pages import BUILDARENA, in_browser, needs_pages
+from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from support.servers.stacks import finished, running_stack
 
@@ -22,10 +22,10 @@ ADMIN = "operator-secret-that-is-long-enough"
 pytestmark = needs_pages
 
 
-@pytest.mark.slow
-@pytest.mark.sized
+@pytest.mark.ci
 @pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
-def test_pages_work_in_a_browser(tmp_path, files) -> None:
+@pytest.mark.parametrize("looks", LOOKS)
+def test_pages_work_in_a_browser(tmp_path, files, looks) -> None:
     report = tmp_path / "report.md"
     with running_stack(tmp_path) as stack:
         with httpx.Client(base_url=stack.url) as client:
@@ -33,10 +33,10 @@ def test_pages_work_in_a_browser(tmp_path, files) -> None:
             finished(client, sweep_id)
         write = [BUILDARENA, "report", sweep_id, "--out", str(report), "--url", stack.url]
         subprocess.run(write, check=True, timeout=60)
-        in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report))
+        in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report), **looks)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
         in_browser(
@@ -45,7 +45,7 @@ def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> N
         )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_packages_are_looked_at_handed_in_and_ranked(tmp_path) -> None:
     files = bridge_files()
     (tmp_path / "sound.zip").write_bytes(zipped(files))
@@ -56,14 +56,14 @@ def test_packages_are_looked_at_handed_in_and_ranked(tmp_path) -> None:
         in_browser(stack.url, ["e2e/challenges"], BUILDARENA_WEB_PACKAGES=str(tmp_path))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path) -> None:
     with running_stack(tmp_path, require_keys=True, admin_key=SecretStr(ADMIN)) as stack:
         given = {"BUILDARENA_WEB_GUARDED_URL": stack.url, "BUILDARENA_WEB_ADMIN_KEY": ADMIN}
         in_browser(stack.url, ["e2e/keys"], **given)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_pages_work_below_a_path(tmp_path) -> None:
     with (
         running_stack(tmp_path, base_path="/tools/arena") as stack,

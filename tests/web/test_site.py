@@ -10,10 +10,10 @@ from pathlib import Path
 
 import httpx
 import pytest
-from support.documents.pages import BUILDARENA, in_browser, needs_pages
+from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
 from support.servers.stacks import finished, running_stack
 
-pytestmark = [*needs_pages, pytest.mark.slow]
+pytestmark = [*needs_pages, pytest.mark.ci]
 
 SWEEP = {
     "name": "published",
@@ -50,8 +50,8 @@ def file_server(folder: Path) -> Iterator[str]:
         server.server_close()
 
 
-@pytest.mark.sized
-def test_a_site_works_from_a_file_server(tmp_path) -> None:
+@pytest.mark.parametrize("looks", LOOKS)
+def test_a_site_works_from_a_file_server(tmp_path, looks) -> None:
     host = tmp_path / "host"
     with running_stack(tmp_path) as stack, file_server(host) as address:
         with httpx.Client(base_url=stack.url) as client:
@@ -69,4 +69,5 @@ def test_a_site_works_from_a_file_server(tmp_path) -> None:
             stack.url,
             ["e2e/site"],
             BUILDARENA_WEB_SITES=",".join(f"{address}{PLACE}/{name}/" for name in ("all", "best")),
+            **looks,
         )

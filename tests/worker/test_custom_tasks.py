@@ -98,7 +98,7 @@ def test_a_job_in_work_is_tried_and_verified_with_its_own_version(context, play,
         assert_verified(context, context.store.jobs.get(job.id))
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("level", ["car-1", "catapult-8", "delivery-1"])
 def test_the_expert_plays_levels_of_besiegefield(context, submit, finish, level) -> None:
     name = f"besiegefield-{level}"
@@ -115,7 +115,7 @@ def test_what_a_task_asks_of_modules_is_checked(context, play) -> None:
     assert "0 of Winch" in job.detail
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("model", ["builtin/expert", "builtin/random", "builtin/idle"])
 @pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
 def test_built_in_models_end_with_a_score(context, submit, finish, model, workflow) -> None:
@@ -133,7 +133,7 @@ def test_the_expert_says_that_it_has_no_design(context, submit, finish) -> None:
     assert "I have no design for narrow-gap" in job.detail
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("builtin", ["transport-2", "support-2", "lift-1", "lift-3"])
 @pytest.mark.parametrize(
     "more", [{"one_shot": True}, {"closed_loop": {"rounds": 2, "analyst": True}}]
@@ -148,7 +148,7 @@ def test_every_kind_of_task_and_variant_ends_with_a_score(
     assert_verified(context, job)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("builtin", ["transport-1", "transport-2", "support-1", "lift-1", "lift-2"])
 def test_a_trial_that_tracks_one_block_only_is_scored(context, play, finish, builtin) -> None:
     scenario = dict(builtin_tasks()[builtin].as_document()["scenario"])
@@ -158,7 +158,7 @@ def test_a_trial_that_tracks_one_block_only_is_scored(context, play, finish, bui
     assert_verified(context, job)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("roped", [True, False])
 def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
     context, finish, roped

@@ -43,14 +43,14 @@ def another_winch(weight: float, north: float) -> Task:
     return replace(task, statement=statement, scenario=scenario)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", TASKS)
 def test_numbers_in_the_prompt_are_enough_for_a_first_success(name, engine) -> None:
     assert first_try(builtin_tasks()[name], engine)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("weight", "north"), OTHER_WINCHES)
 def test_other_numbers_make_other_machines_that_succeed_too(weight, north, engine) -> None:
@@ -72,7 +72,7 @@ def test_a_lighter_cargo_takes_fewer_motors() -> None:
     assert motors == [4, 3]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("workflow", ["builder", "guidance-builder", "five-role"])
 def test_the_words_on_programs_are_enough_to_land_in_any_world(workflow, engine) -> None:

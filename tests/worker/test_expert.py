@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 import pytest
-from support.long_tests import long
+from support.marks import nightly
 
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_simulation import simulate
@@ -16,7 +16,7 @@ SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "1")))
 ON_PYBULLET = ["flight-1", "lift-3", "support-1", "transport-1", "mechanisms-2"]
 """One task of each category; PyBullet takes several times as long, the rest is for test-long."""
 TRIALS = [
-    (task, engine) if engine == "mujoco" or task in ON_PYBULLET else long(task, engine)
+    (task, engine) if engine == "mujoco" or task in ON_PYBULLET else nightly(task, engine)
     for task in TASKS
     if not builtin_tasks()[task].tests  # those are in test_identify.py
     for engine in ("pybullet", "mujoco")
@@ -34,7 +34,7 @@ def tried(play, model: str, task: str, seed: int, engine: str):
     return score(drawn, machine, trajectory)
 
 
-@pytest.mark.samples(5)
+@pytest.mark.nightly(keep=5)
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(("task", "engine"), TRIALS)
 def test_the_expert_succeeds(play, task, seed, engine) -> None:

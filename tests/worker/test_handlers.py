@@ -41,7 +41,7 @@ def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
     assert {"transcript", "rollout 0: trajectory", "score: indicator", "usage: cost_usd"} <= names
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("statement", "check"),
     [

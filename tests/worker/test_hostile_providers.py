@@ -45,7 +45,7 @@ def lose(context, job_id: str) -> None:
         )
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("how", ["hang", "drip"])
 @pytest.mark.parametrize("end", [cancel, lose])
 def test_a_request_ends_with_its_lease(context, tmp_path, how, end) -> None:
@@ -58,7 +58,7 @@ def test_a_request_ends_with_its_lease(context, tmp_path, how, end) -> None:
     assert context.store.journal.read(job_id) == []
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_wait_between_tries_ends_with_the_lease(context, tmp_path) -> None:
     with (
         ProviderStandIn(fault=lambda _: "500") as bad,
@@ -71,7 +71,7 @@ def test_a_wait_between_tries_ends_with_the_lease(context, tmp_path) -> None:
         wait_until(lambda: workers.slots.free == workers.slots.total, SOON_S, "the slot is free")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("how", ["hang", "drip", "500", "garbage"])
 def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how) -> None:
     with stuck(how) as bad, crew(context, tmp_path, bad=bad) as workers:
@@ -90,7 +90,7 @@ def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
     limits = BudgetLimits(max_cost_usd=Decimal(100))
     with context.store.database.transaction() as connection:
@@ -117,7 +117,7 @@ def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
     assert context.store.budgets.get("key_a") == spent
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_shutdown_ends_open_requests(context, settings, tmp_path) -> None:
     with stuck("hang") as bad:
         file = models_file(tmp_path, {"bad": bad})
@@ -202,7 +202,7 @@ GARBAGE = {
 CHARGED = {"usage alone", "choices of text", "no choices", "text a number", "name a number"}
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("name", GARBAGE)
 def test_garbage_is_counted_charged_and_bounded(context, tmp_path, name) -> None:
     with (

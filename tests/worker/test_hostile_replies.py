@@ -88,7 +88,7 @@ def spiced_expert() -> object:
     return reply
 
 
-@pytest.mark.samples(2)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
 @pytest.mark.parametrize("task", ["support-2", "transport-1"])
 def test_lures_reach_nothing(play, monkeypatch, workflow, task) -> None:

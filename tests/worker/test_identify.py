@@ -45,8 +45,8 @@ def verdict(context: Context, job: Job) -> str | None:
     return context.store.verifications.get(check).verdict
 
 
-@pytest.mark.slow
-@pytest.mark.samples(1)
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("workflow", ["five-role", "builder"])
 def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
     context, submissions, workflow
@@ -66,7 +66,7 @@ def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
     assert verdict(context, job) == "verified"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
@@ -79,9 +79,9 @@ def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
     assert trial.counts, trial.score
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
-@pytest.mark.parametrize("worlds", [4, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("worlds", [4, pytest.param(12, marks=pytest.mark.ci)])
 def test_what_passes_in_one_world_fails_in_nearly_all_others(engine, worlds) -> None:
     """No machine and no schedule is good for all: the world must be found out."""
     design = riser(0)
@@ -103,7 +103,7 @@ def test_a_test_trial_counts_for_nothing_however_good_it_was(rollout) -> None:
     assert best_rollout(made, builtin_tasks()["transport-1"]).number == 0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
     context, submissions, monkeypatch
 ) -> None:
@@ -133,7 +133,7 @@ def test_rounds_of_a_closed_loop_give_no_further_trials(context, submissions) ->
     assert len(context.store.rollouts.read(job.id)) <= TASK.tests + 1
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_varied_worlds_keep_what_was_drawn(context, submissions) -> None:
     job = ended(context, submissions, worlds=3)
     records = context.store.rollouts.read(job.id)

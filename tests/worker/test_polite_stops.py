@@ -56,7 +56,7 @@ def attempts(context, job_ids: Sequence[str]) -> list[str | None]:
 
 @pytest.mark.parametrize(
     ("latency_s", "statement_s"),
-    [(1.5, 0.1), pytest.param(12.0, 1.0, marks=pytest.mark.long)],
+    [(1.5, 0.1), pytest.param(12.0, 1.0, marks=pytest.mark.nightly)],
 )
 def test_open_requests_are_answered_and_journalled(
     context, tmp_path, latency_s, statement_s
@@ -99,7 +99,7 @@ def test_a_request_that_takes_too_long_is_given_up_and_counted(context, tmp_path
     assert spent.lost_requests == 1
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
     with (
         ProviderStandIn(fault=lambda _: "500") as model,
@@ -116,7 +116,7 @@ def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
     assert context.store.jobs.get(job).faults == 0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_worker_that_is_asked_to_stop_waits_for_its_reply(context, settings, tmp_path) -> None:
     with ProviderStandIn(latency_s=1.5) as model:
         file = models_file(tmp_path, {"good": model})

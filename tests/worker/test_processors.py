@@ -65,7 +65,7 @@ def test_a_manifest_names_the_processor(job) -> None:
     assert job.manifest["simulator"]["processor"] == dict(processor())
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @several
 def test_a_result_of_other_kernels_is_verified_with_them(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)
@@ -77,7 +77,7 @@ def test_a_result_of_other_kernels_is_verified_with_them(context, job) -> None:
     assert "rollout 0: trajectory" not in failed(context, job)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @several
 @pytest.mark.parametrize("there", [None, "a cloud"])
 def test_a_result_that_names_no_processor_is_tried_with_all_kernels(context, job, there) -> None:
@@ -91,7 +91,7 @@ def test_a_result_that_names_no_processor_is_tried_with_all_kernels(context, job
     assert verifier(context).verify(job.id).verdict == Verdict.INCONCLUSIVE
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @several
 def test_a_runner_that_names_none_is_tried_once(context, job, monkeypatch) -> None:
     (record,) = context.store.rollouts.read(job.id)
@@ -102,7 +102,7 @@ def test_a_runner_that_names_none_is_tried_once(context, job, monkeypatch) -> No
     assert "rollout 0: trajectory" in failed(context, job)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @several
 def test_what_differs_is_said_where_the_kernels_are_not_here(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)
@@ -120,7 +120,7 @@ def test_what_differs_is_said_where_the_kernels_are_not_here(context, job) -> No
     assert verifier(context).verify(job.id).verdict == Verdict.INCONCLUSIVE
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @several
 def test_who_names_kernels_that_are_here_is_held_to_them(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)

@@ -59,7 +59,7 @@ def answered(*answers: str, task: str = TASK):
     return Player()(task=task, client=model, workflow="builder"), model
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
 @pytest.mark.parametrize(
     "task",
@@ -151,7 +151,7 @@ def test_a_program_is_no_answer_where_keys_alone_count() -> None:
     assert played.suspended is None or played.suspended.machine.controller == ""
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_job_is_scored_over_the_worlds_that_its_trials_drew(context, submissions) -> None:
     job, _ = submissions.submit_job(
         JobSpec(task=TASK, model="builtin/expert", workflow="builder", worlds=2)
@@ -221,7 +221,7 @@ def test_a_table_tells_what_a_program_sensed_and_asked_for() -> None:
     assert blind.splitlines()[0].split(", ") == ["t", *piloting.action_names]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_controller_reads_that_table_after_its_trial(context, submissions, monkeypatch) -> None:
     program = "function control(t, sense) return { fly = 0.3 - 0.01 * sense.velocity.z } end"
     model = Answering(fenced(program))

@@ -70,7 +70,7 @@ def turns_of(played) -> list[dict]:
     return json.loads(played.session.transcript.to_json())["turns"]
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("workflow", "name"), SESSIONS)
 def test_the_words_of_the_prompts_are_enough_for_a_success(play, workflow, name, engine) -> None:
@@ -111,7 +111,7 @@ def test_trees_are_built_by_ordinary_actions_that_can_be_replayed(play, workflow
         assert placed(replay.machine) == placed(machine)
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("workflow", "name"), SESSIONS)
 def test_a_job_of_a_tree_workflow_is_scored_and_verified(
     context, submissions, monkeypatch, workflow, name

@@ -82,7 +82,7 @@ def test_seeds_are_drawn_anew_for_each_job(context, submissions) -> None:
     assert not seeds[0] & seeds[1]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_best_of_several_trials_is_what_worlds_try(context, submissions) -> None:
     # Its controller tries several times; a closed loop ends in its session, not in a trial.
     loop = ClosedLoop(rounds=2)
@@ -101,7 +101,7 @@ def test_what_breaks_a_rule_is_tried_in_no_world(context, submissions) -> None:
     assert (job.success, rollouts(context, job)) == (False, ([], []))
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     "tampering",
     [

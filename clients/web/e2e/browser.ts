@@ -3,8 +3,8 @@ import { chromium, type Browser, type BrowserContext, type Page } from "playwrig
 import { expect } from "vitest";
 
 export const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
-/** Whether the long tests run: every page in every look. */
-export const LONG = (process.env.BUILDARENA_TEST_LONG ?? "") !== "";
+/** Whether every page is looked at in every look. */
+export const ALL_LOOKS = (process.env.BUILDARENA_WEB_ALL_LOOKS ?? "") !== "";
 const CHROMIUM = process.env.BUILDARENA_CHROMIUM ?? "/usr/bin/chromium";
 // A machine without a graphics card draws 3D all the same; tests step faster than people.
 const ARGUMENTS = [

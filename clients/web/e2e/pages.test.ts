@@ -1,6 +1,6 @@
 import type { Browser } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { expectNoSeriousFault, launched, LONG, URL_OF_SERVICE, type Visit, visit } from "./browser";
+import { ALL_LOOKS, expectNoSeriousFault, launched, URL_OF_SERVICE, type Visit, visit } from "./browser";
 
 let browser: Browser;
 let sweep = "";
@@ -40,9 +40,9 @@ const LOOKS = [
   [390, "dark"],
 ] as const;
 
-// Every page in one look, alternately; in both in the long tests.
+// Every page in one look, alternately; in both in the nightly tests.
 describe.each(PAGES.map((page, index) => [...page, index] as const))("the page of the %s", (_, path, index) => {
-  it.each(LOOKS.filter((__, look) => LONG || look === index % 2))(
+  it.each(LOOKS.filter((__, look) => ALL_LOOKS || look === index % 2))(
     "at %d px, %s, has no serious fault",
     async (width, scheme) => {
       const { page, faults, context } = await open(path(), width, scheme);

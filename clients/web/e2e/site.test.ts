@@ -4,7 +4,7 @@ import type { components } from "../src/api/contract";
 import { listed, type Rows } from "../src/api/kept-jobs";
 import type { Site } from "../src/api/site";
 import { count, number, percent, places } from "../src/format";
-import { expectNoSeriousFault, launched, LONG, URL_OF_SERVICE } from "./browser";
+import { ALL_LOOKS, expectNoSeriousFault, launched, URL_OF_SERVICE } from "./browser";
 import { expectNumbers, numbersOf } from "./numbers";
 
 type Board = components["schemas"]["Board"];
@@ -84,7 +84,7 @@ describe.skipIf(WHOLE === "")("a published site", () => {
     ["a new sweep", 1280, () => "/sweeps/new"],
   ];
 
-  it.each(PAGES.filter((_, index) => LONG || index % 2 === 0))(
+  it.each(PAGES.filter((_, index) => ALL_LOOKS || index % 2 === 0))(
     "shows %s at %d px without a fault, from its own files",
     async (_, width, path) => {
       const { page, faults } = await opened(WHOLE, path(), width);

@@ -68,7 +68,7 @@ print(log.status)
 """
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_program_without_its_guard_is_told_so(folder) -> None:
     (folder / "bare.py").write_text(BARE)
     done = subprocess.run(

@@ -68,7 +68,7 @@ def reviewed(folder: Path, *tasks: str) -> list[str]:
         [PYTHON, REVIEW, folder, *tasks], capture_output=True, text=True, check=False
     )
     if done.returncode and "Failed to fetch" in done.stderr:
-        if os.environ.get("BUILDARENA_TEST_ALL"):
+        if os.environ.get("CI"):
             pytest.fail(done.stderr)
         pytest.skip("uv sync needs a package index, and none answers")
     assert done.returncode == 0, done.stderr
@@ -89,7 +89,7 @@ def test_a_clone_is_installed_and_evaluated_as_a_register_does(tmp_path) -> None
     ]
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.timeout(3600)
 def test_a_clone_evaluates_all_tasks(tmp_path) -> None:
     count, *logs = reviewed(tmp_path)

@@ -38,7 +38,7 @@ def test_the_readme_runs_word_for_word(ran) -> None:
     assert ran(README) == 3
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_a_wrong_readme_fails(ran, tmp_path) -> None:
     wrong = tmp_path / "README.md"
     wrong.write_text(README.read_text().replace("--run.name", "--run.nmae"))

@@ -10,7 +10,6 @@ from dataclasses import replace
 import pytest
 from game_rig import PROGRAMS, Rig, our_score, piloted_text, piloted_trial
 from sqlalchemy import text
-from support.long_tests import LONG
 from support.stages import work
 
 from buildarena_api.leaderboard.agreement import agreement_rows
@@ -30,7 +29,7 @@ from buildarena_worker.wiring import verifier
 ALL = os.environ.get("BESIEGE_TASKS") == "all"
 pytestmark = pytest.mark.timeout(1200 if ALL else 400)
 CATEGORIES = ("transport-2", "support-1", "lift-2")
-TASKS = tuple(paper_tasks()) if ALL else CATEGORIES if LONG else CATEGORIES[:1]
+TASKS = tuple(paper_tasks()) if ALL else CATEGORIES[:1]
 NEAR = 0.01
 """What a log's four decimals and 25 samples a second leave open, as a share of an indicator."""
 
@@ -65,8 +64,7 @@ def playing(context: Context, rig: Rig, screen: dict[str, str]) -> Iterator[Cont
     service.close()
 
 
-@pytest.mark.slow
-@pytest.mark.sized
+@pytest.mark.ci
 def test_each_category_is_played_scored_verified_and_compared(playing, rig) -> None:
     submissions = Submissions(playing, load_registry())
     for task in TASKS:
@@ -145,7 +143,7 @@ def _spoil_log(context: Context, job: Job, name: str, digest: str) -> None:
     assert failed, "a changed log passed"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_programs_are_played_scored_and_verified(playing, rig) -> None:
     """One that drives has a trajectory of what it sensed; one that fails has its log."""
     task, _ = piloted_trial("drives")
@@ -185,7 +183,7 @@ def _pretend(context: Context, job: Job, line: str) -> None:
         )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_job_of_another_version_of_the_game_ends_with_what_to_do(playing, rig) -> None:
     other = open_context(playing.settings.model_copy(update={"besiege_mod": "1.5"}))
     Submissions(other, load_registry()).submit_job(

@@ -52,7 +52,7 @@ def test_a_program_that_failed_in_the_game_is_believed_by_its_log(logs) -> None:
     refusable(FAILS, logs[FAILS], refused=FAILED)
 
 
-@pytest.mark.samples(3)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize(
     ("text", "log", "more", "words"),
     [

@@ -63,7 +63,7 @@ def settings(rig: Rig, **changes: object) -> BesiegeSettings:
     return BesiegeSettings.model_validate(own)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_an_evening_is_played_packed_and_judged(rig, screen) -> None:
     slow = replace(rig, speed=1.2, patience=2.0)
     said = played(slow, screen, "--steps", "doctor,calibration,sampler,drop,scales")
@@ -85,7 +85,7 @@ def test_an_evening_is_played_packed_and_judged(rig, screen) -> None:
     assert not list(rig.machines.iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_dialog_in_the_way_fails_its_step_with_a_picture_and_the_next_goes_on(
     rig, screen, monkeypatch
 ) -> None:
@@ -110,7 +110,7 @@ def test_a_dialog_in_the_way_fails_its_step_with_a_picture_and_the_next_goes_on(
         assert any("picture-fault-" in name for name in packed.namelist())
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_killed_evening_goes_on_where_it_stopped(rig, screen) -> None:
     fast = replace(rig, speed=6.0, patience=2.0)
     program = subprocess.Popen(

@@ -38,7 +38,7 @@ def headless(rig: Rig, monkeypatch) -> Iterator[tuple[Rig, BesiegeSimulator]]:
     simulator.close()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_car_is_driven_as_by_our_engine(headless) -> None:
     rig, simulator = headless
     task, machine = short_trial("transport-1")
@@ -68,7 +68,7 @@ def test_what_needs_the_script_is_refused_with_the_reason(headless, name) -> Non
         headless[1].run(trial_of(task, machine))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("fault", ["crash", "freeze"])
 def test_a_fault_once_is_got_over(headless, fault) -> None:
     rig, simulator = headless

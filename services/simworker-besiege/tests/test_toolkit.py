@@ -97,7 +97,7 @@ def test_a_car_is_driven_as_by_our_engine(simulator) -> None:
     assert write_trajectory(again) == sent
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("fault", ["reordered", "other_names"])
 def test_columns_are_found_by_name(simulator, faults, fault) -> None:
     faults(fault)
@@ -134,7 +134,7 @@ FAULTS = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_once_is_got_over_and_named(simulator, faults, fault) -> None:
     faults(fault)
@@ -175,7 +175,7 @@ def started(folder: Path) -> tuple[int, int]:
     return own, other
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_what_hangs_is_ended_with_all_it_started(toolkit, faults, tmp_path) -> None:
     faults("hang", "orphan")
     impatient = toolkit.model_copy(update={"patience": 0.01})
@@ -188,7 +188,7 @@ def test_what_hangs_is_ended_with_all_it_started(toolkit, faults, tmp_path) -> N
     assert is_gone(started(tmp_path)[1]), "what the second run left behind was ended, too"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_lost_lease_ends_the_run_and_all_it_started(simulator, faults, tmp_path) -> None:
     faults("hang")
     task, machine = short_trial("transport-1")
@@ -235,8 +235,7 @@ def test_the_doctor_says_what_is_missing(toolkit, command, says) -> None:
     assert all(point.ok for point in examine(toolkit))
 
 
-@pytest.mark.slow
-@pytest.mark.sized
+@pytest.mark.ci
 def test_a_killed_runner_leaves_nothing_and_the_next_one_plays(toolkit, faults, tmp_path) -> None:
     """Its command and all that started still run; the next runner ends them first."""
     faults("hang")
@@ -276,8 +275,7 @@ def playing(context: Context, tmp_path: Path) -> Iterator[Context]:
     service.close()
 
 
-@pytest.mark.slow
-@pytest.mark.sized
+@pytest.mark.ci
 def test_a_submission_is_played_scored_and_verified(playing, faults, tmp_path) -> None:
     faults("other_machine", "hang")
     spec = JobSpec(task="transport-1", model="builtin/expert", simulator="besiege")

@@ -13,7 +13,7 @@ def boards(seed: int, count: int, rates, sizes, loads):
         yield rankings(board(rng, rates, sizes, [LOADS[loads]] * MODELS))
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("rate", "size", "loads"),
     [

@@ -16,7 +16,7 @@ from buildarena_benchmark.statistics import (
 loads = arrays(float, st.integers(0, 40), elements=st.sampled_from([0.0, 3.0, 20.0, 250.0, 1500.0]))
 
 
-@pytest.mark.samples(24)
+@pytest.mark.nightly(keep=24)
 @pytest.mark.parametrize(
     ("trials", "rate"), [(16, 0.9), (12, 1.0), (24, 0.6), (48, 0.3), (128, 0.1), (512, 0.03)]
 )

@@ -32,7 +32,7 @@ def test_a_killed_broker_is_started_again_with_its_data(tmp_path) -> None:
     assert not psutil.pid_exists(pid)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_process_that_keeps_dying_is_given_up() -> None:
     def start() -> subprocess.Popen[bytes]:
         return subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"])

@@ -60,7 +60,7 @@ print(*sorted(path.name for path in (data / "postgres").iterdir()))
 FEW = ("private folder", "long path", "noexec", "read-only checkout")
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("user", "case"),
     [
@@ -69,7 +69,7 @@ FEW = ("private folder", "long path", "noexec", "read-only checkout")
             id=f"{user}-{name}",
             marks=()
             if name in FEW and (user == "root" or name == "private folder")
-            else pytest.mark.long,
+            else pytest.mark.nightly,
         )
         for user in ("root", "ordinary user")
         for name, case in CASES.items()
@@ -81,13 +81,13 @@ def test_the_servers_start_anywhere(case, user) -> None:
     assert printed.splitlines() == ["42", "True", "", "cluster password"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_root_in_a_container_needs_no_further_privilege() -> None:
     printed = run_elsewhere(Case(contained=True), ["-c", BOTH, "{data}"])
     assert printed.splitlines() == ["42", "True", "", "cluster password"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_two_clones_start_side_by_side() -> None:
     second = Case(folder="clone/second")
     both = Case(
@@ -109,7 +109,7 @@ print([process.wait() for process in started])
     assert run_elsewhere(both, ["-c", program, *arguments]) == "[0, 0]\n"
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_postgres_gets_its_own_folder_and_nothing_around_it() -> None:
     program = SERVERS + (
         "(data / 'notes').write_text('for everybody who can enter')\n"
@@ -122,7 +122,7 @@ def test_postgres_gets_its_own_folder_and_nothing_around_it() -> None:
     assert refusal.endswith("Permission denied")
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_data_that_an_older_version_kept_elsewhere_is_found_again() -> None:
     program = (
         SERVERS
@@ -164,7 +164,7 @@ def _refusal(case: Case) -> str:
     return run_elsewhere(case, ["-c", program, "{data}"])
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_suite_itself_runs_in_a_private_clone() -> None:
     case = Case(noexec=("/tmp",), folder="Übungen für später", unset=("HOME",))
     few = f"{case.clone}/tests/store/test_schema.py"
@@ -173,7 +173,7 @@ def test_the_suite_itself_runs_in_a_private_clone() -> None:
     assert "passed" in printed
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_whole_service_runs_from_a_read_only_checkout_without_pybullet() -> None:
     case = Case(folder="Übungen für später", read_only=True, noexec=("/tmp",), unset=("HOME",))
     port = str(free_port())
@@ -203,7 +203,7 @@ def test_the_whole_service_runs_from_a_read_only_checkout_without_pybullet() -> 
     assert process.returncode == 0
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_read_only_checkout_without_a_data_folder_is_refused_in_words() -> None:
     run = "import os, sys; os.chdir(sys.argv.pop(1)); from buildarena_cli.main import run; run()"
     with start_elsewhere(Case(read_only=True), ["-c", run, "{clone}", "demo"]) as process:

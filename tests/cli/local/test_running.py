@@ -32,7 +32,7 @@ def gone(pids: list[int]) -> bool:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 @pytest.mark.timeout(240)
 def test_the_life_of_a_service_in_the_background(data) -> None:
     where, port = ("--data", str(data)), str(free_port())
@@ -79,7 +79,7 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
     assert not is_running(data)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_a_service_that_does_not_start_says_why(data, tmp_path) -> None:
     import socket
 
@@ -116,7 +116,7 @@ def test_a_note_without_a_lock_is_of_a_run_that_is_over(tmp_path) -> None:
     assert noted_run(tmp_path) is None
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_logs_are_followed(tmp_path) -> None:
     (tmp_path / "logs").mkdir()
     for name in ("api", "mujoco-worker"):

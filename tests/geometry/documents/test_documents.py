@@ -121,7 +121,7 @@ def test_what_is_no_document_at_all_is_refused(document):
         Machine.from_document(document)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_documents_with_random_damage_are_read_or_refused_and_nothing_else(machine):
     rng = random.Random(7)
     whole = json.loads(json.dumps(machine.to_document()))

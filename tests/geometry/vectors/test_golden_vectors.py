@@ -29,7 +29,7 @@ def vectors():
     }
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", ["single", "assembly"])
 @pytest.mark.parametrize("part", range(PARTS))
 def test_every_step_has_the_vectors_verdict_and_state(vectors, name, part):
@@ -51,7 +51,7 @@ def assert_sequence(sequence):
         assert_same_state(ours["state"], step["state"], rebound, where)
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_few_steps_lie_behind_a_known_difference(vectors):
     compared = steps = 0
     for raw in (*vectors["single"], *vectors["assembly"]):

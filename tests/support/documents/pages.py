@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from support.marks import nightly
 
 from buildarena_api.dashboard.files import FOLDER
 
@@ -17,6 +18,11 @@ BUILDARENA = str(Path(sys.executable).with_name("buildarena"))
 MAX_S = 1200
 """What hangs is ended then; on a busy machine the pages take ten minutes."""
 
+LOOKS = [
+    nightly({"BUILDARENA_WEB_ALL_LOOKS": "1"}, id="all looks"),
+    pytest.param({}, id="one look"),
+]
+"""Each page in one look; in all of them, wide and narrow, light and dark."""
 needs_pages = [
     pytest.mark.skipif(
         CHROMIUM is None, reason="pages need a browser: install the Debian packages chromium"

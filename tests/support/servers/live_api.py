@@ -11,10 +11,12 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
+from weakref import WeakSet
 
 import structlog
 import uvicorn
 from fastapi import FastAPI
+from fastapi.dependencies import models
 from fastapi.routing import _IncludedRouter
 from starlette.testclient import TestClient
 
@@ -27,6 +29,10 @@ LOOPBACK = "http://127.0.0.1"
 """What a client in the test's process calls the API: a service without keys has no other name."""
 ROUTES: list[_IncludedRouter] = []
 """Those of the first app."""
+APPS: WeakSet[FastAPI] = WeakSet()
+"""Those that were made and have not been collected: an app refers to itself."""
+CACHES = [value for value in vars(models).values() if hasattr(value, "cache_clear")]
+"""FastAPI remembers functions of the last thousand apps, and these their apps: gigabytes."""
 TICK_S = 0.01
 """How often a server looks whether it shall end; uvicorn's own waits a tenth of a second, twice."""
 
@@ -34,6 +40,7 @@ TICK_S = 0.01
 def app_of(context: Context) -> FastAPI:
     """The application, with routes that may have been used before."""
     app = create_app(context, load_registry())
+    APPS.add(app)
     routes = app.router.routes
     own = [number for number, route in enumerate(routes) if isinstance(route, _IncludedRouter)]
     if not ROUTES:
@@ -41,6 +48,12 @@ def app_of(context: Context) -> FastAPI:
     for number, route in zip(own, ROUTES, strict=True):
         routes[number] = route
     return app
+
+
+def forget_apps() -> None:
+    """Clears what FastAPI remembers of apps."""
+    for cache in CACHES:
+        cache.cache_clear()
 
 
 class PromptServer(uvicorn.Server):

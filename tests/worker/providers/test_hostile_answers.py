@@ -54,7 +54,7 @@ def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
         one.close()
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("status", ["301", "307"])
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_no_protocol_follows_a_redirect(client, protocol, status) -> None:
@@ -77,7 +77,7 @@ GARBAGE = {
 
 
 # A list is a legal answer to Google's library: an empty reply.
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("protocol", "name"),
     sorted({(w, n) for w in PROTOCOLS for n in GARBAGE} - {("google", "a list")}),

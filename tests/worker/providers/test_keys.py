@@ -44,7 +44,7 @@ def test_an_operators_models_have_keys_too(tmp_path) -> None:
     assert not [name for name in report.without if name.startswith("builtin/")]
 
 
-@pytest.mark.samples(1)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("models", "variables", "says"),
     [

@@ -191,7 +191,7 @@ def test_an_owner_without_an_open_request_may_send_one_whoever_hangs(context, br
     del context
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeypatch) -> None:
     monkeypatch.setattr(throttle_module, "SLOT_TTL_S", 1)
 

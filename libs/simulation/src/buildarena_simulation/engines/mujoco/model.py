@@ -110,6 +110,7 @@ def mjcf_of(world: World, state: MjcfState, settings: MjcfSettings) -> str:
             cone="elliptic",
             impratio=settings.impratio,
             iterations=settings.iterations,
+            jacobian="dense",
             tolerance=1e-10,
             ccd_tolerance=1e-9,
             ccd_iterations=200,
