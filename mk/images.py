@@ -134,17 +134,14 @@ def bill(image: str, digest: str) -> str:
 
 def provenance(image: str, digest: str, commit: str, times: tuple[datetime, datetime]) -> str:
     """How an image was made, as SLSA says it."""
-    locks = sorted((ROOT / "deploy/docker/locks").glob("*.lock"))
+    lock = ROOT / "requirements.lock"
     needed: list[dict[str, Any]] = [
         {"uri": f"git+{source()}@{commit}", "digest": {"gitCommit": commit}},
         *({"uri": f"docker:{b}", "digest": {"sha256": digest_of(b)}} for b in bases().values()),
-        *(
-            {
-                "uri": f"file:{lock.relative_to(ROOT)}",
-                "digest": {"sha256": hashlib.sha256(lock.read_bytes()).hexdigest()},
-            }
-            for lock in locks
-        ),
+        {
+            "uri": f"file:{lock.name}",
+            "digest": {"sha256": hashlib.sha256(lock.read_bytes()).hexdigest()},
+        },
     ]
     started, finished = (time.isoformat(timespec="seconds") for time in times)
     statement = {

@@ -3,6 +3,7 @@
 set -euo pipefail
 venv=$1
 shift
+packages=("$@")
 here=$(dirname "$0")
 
 uv() {
@@ -27,9 +28,9 @@ choose_python() {
     uv python find --system --no-python-downloads cpython3.11 2>/dev/null || command -v python3 || echo python3
 }
 
-# The lock without PyBullet, which everything else can do without.
-without_pybullet() {
-    awk '/^pybullet/ { skip = 1 } skip { skip = /\\$/; next } { print }' requirements.lock
+# What the packages and the tests need of the lock, less what is named.
+locked() {
+    "$python" "$here/locked.py" requirements.lock "${packages[@]}" requirements-dev.in --without "$@"
 }
 
 sync() {
@@ -37,15 +38,16 @@ sync() {
 }
 
 install_requirements() {
-    sync --only-binary pybullet --only-binary pybullet-arm64 requirements.lock 2>/dev/null && return
-    without_pybullet >"$venv/without-pybullet.lock"
+    locked >"$venv/requirements.lock"
+    sync --only-binary pybullet --only-binary pybullet-arm64 "$venv/requirements.lock" 2>/dev/null && return
+    locked pybullet pybullet-arm64 >"$venv/without-pybullet.lock"
     sync "$venv/without-pybullet.lock"
     if ! command -v "${CXX:-c++}" >/dev/null; then
         echo "PyBullet has no wheel for $system and there is no C++ compiler: without it, name MuJoCo where machines are simulated (simulator: mujoco)."
         return
     fi
     echo "PyBullet has no wheel for $system: compiling it, which takes some minutes. README.md names the systems that need not."
-    sync requirements.lock 2>"$venv/pybullet.log" ||
+    sync "$venv/requirements.lock" 2>"$venv/pybullet.log" ||
         echo "PyBullet could not be compiled (see $venv/pybullet.log): without it, name MuJoCo where machines are simulated (simulator: mujoco)."
 }
 
@@ -60,7 +62,7 @@ if [ "$python" != "$venv/bin/python" ]; then
 fi
 install_requirements
 editable=()
-for package in "$@"; do
+for package in "${packages[@]}"; do
     editable+=(-e "$package")
 done
 uv pip install --quiet --python "$venv/bin/python" --no-deps --no-build-isolation "${editable[@]}"

@@ -1,4 +1,4 @@
-.PHONY: test-integrations check-integrations lock-integrations lock-uv inspect-tasks
+.PHONY: test-integrations check-integrations lock-integrations inspect-tasks
 
 # Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
 INTEGRATIONS := inspect verifiers openenv gymnasium
@@ -8,10 +8,26 @@ LIBRARIES_inspect := clients/python libs/besiege libs/store libs/pipeline servic
 INTEGRATION_STAMPS := $(foreach name,$(INTEGRATIONS),.venv-integrations/$(name)/.installed)
 
 test-integrations: check-integrations ## Each adapter against its real framework
-	@bash mk/integrations.sh test $(INTEGRATIONS)
+	@bash mk/integrations.sh test "" $(INTEGRATIONS)
 
 check-integrations: $(INTEGRATION_STAMPS)
 	@bash mk/integrations.sh check $(INTEGRATIONS)
+
+# What adapters have or test with, and only the worker's designs tell.
+EXPERT_CALLS := build/expert_calls.json
+DRIVEN := integrations/gymnasium/src/buildarena_gymnasium/machines.json
+DESIGNS := $(shell find services/worker/src/buildarena_worker/builtin libs/benchmark/src libs/geometry/src libs/simulation/src -type f -not -name '*.pyc')
+
+$(EXPERT_CALLS): tests/support/machines/expert_calls.py $(DESIGNS) $(STAMP)
+	@mkdir -p $(@D)
+	@$(TEST_PYTHON) -m support.machines.expert_calls $@
+
+$(DRIVEN): tests/support/machines/drive_machines.py $(DESIGNS) $(STAMP)
+	@$(TEST_PYTHON) -m support.machines.drive_machines
+
+check-integrations test-integrations: $(EXPERT_CALLS) $(DRIVEN)
+
+dist: $(DRIVEN)
 
 .venv-integrations/%/.installed: integrations/%/requirements.lock integrations/%/pyproject.toml $(STAMP)
 	@bash mk/integrations.sh install $* $(LIBRARIES) $(LIBRARIES_$*)
@@ -20,10 +36,6 @@ check-integrations: $(INTEGRATION_STAMPS)
 # Physics comes in the versions of requirements.lock: elsewhere the same trial has other bytes.
 lock-integrations:
 	@set -e; $(foreach name,$(INTEGRATIONS),bash mk/integrations.sh lock $(name) $(LIBRARIES) $(LIBRARIES_$(name));)
-	@$(MAKE) --no-print-directory lock-uv
-
-lock-uv: ## Writes the adapters' uv.lock from their requirements.lock
-	@$(BIN)/python mk/uv_locks.py $(addprefix integrations/,$(INTEGRATIONS))
 
 inspect-tasks: $(STAMP) ## Writes the tasks of Inspect's adapter and their versions again, after a change of tasks
 	@$(BIN)/python mk/inspect_tasks.py

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Environments of the adapters: integrations.sh install NAME LIBRARY..., check NAME..., test NAME...,
+# Environments of the adapters: integrations.sh install NAME LIBRARY..., check NAME..., test MARKS NAME...,
 # lock NAME LIBRARY...
 set -euo pipefail
 here=$(dirname "$0")
@@ -40,11 +40,12 @@ check_example() {
 }
 
 run_tests() {
-    local name failed=0
+    local marks=$1 name failed=0
+    shift
     for name in "$@"; do
         echo "-- $name"
-        "$environments/$name/bin/pytest" --confcutdir "integrations/$name" "integrations/$name/tests" -n "${WORKERS:-2}" --dist loadgroup -rs \
-            -m "${BUILDARENA_TEST_LONG:+long or }not long" || failed=1
+        "$environments/$name/bin/pytest" --confcutdir "integrations/$name" "integrations/$name/tests" -n "${WORKERS:-2}" --dist loadfile -rs \
+            -m "$marks" || failed=1
     done
     return "$failed"
 }

@@ -21,17 +21,14 @@ from license_expression import ExpressionError, get_license_index, get_spdx_lice
 ROOT = Path(__file__).parents[1]
 PIN = re.compile(r"^(?P<name>[A-Za-z0-9._-]+)(\[[^]]*\])?==(?P<version>[^ ;\\]+)", re.MULTILINE)
 LOCKS = {
-    "services and clients": "requirements.lock",
-    "documents": "requirements-docs.lock",
-    "hunt": "requirements-hunt.lock",
-    "images' build": "deploy/docker/locks/build.lock",
+    "product and tools": "requirements.lock",
     **{
         f"adapter {lock.parent.name}": str(lock.relative_to(ROOT))
         for lock in sorted(ROOT.glob("integrations/*/requirements.lock"))
     },
 }
 PAGES = "clients/web/package-lock.json"
-ENVIRONMENTS = (".venv", ".venv-integrations/*", ".venv-docs")
+ENVIRONMENTS = (".venv", ".venv-integrations/*")
 NOT_HERE, UNKNOWN = "not installed here", "unknown"
 SPDX = get_spdx_licensing()
 CATEGORIES: Mapping[str, str] = {

@@ -8,6 +8,7 @@ from importlib.metadata import PathDistribution
 from pathlib import Path
 
 import pytest
+from support.documents.locks import image_locks
 
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "mk"))
@@ -40,7 +41,7 @@ def test_licences_are_what_packages_say(parts) -> None:
     assert told["numpy"][0].startswith("BSD-3-Clause")
     assert parts["mouseinfo"].kind == "Copyleft"
     assert parts["react"].licence == "MIT"
-    assert parts["certifi"].of[0] == "services and clients"
+    assert parts["certifi"].of[0] == "product and tools"
 
 
 @pytest.mark.ci
@@ -49,12 +50,9 @@ def test_no_licence_is_unknown(parts) -> None:
 
 
 @pytest.mark.ci
-def test_copyleft_is_where_we_know_of_it(parts) -> None:
+def test_copyleft_is_where_we_know_of_it(parts, tmp_path) -> None:
     """A new one in what the images hold is a decision, and its text goes into them."""
-    images = set()
-    for lock in (ROOT / "deploy/docker/locks").glob("*.lock"):
-        if lock.stem != "build":
-            images |= set(re.findall(r"^([a-z0-9._-]+)==", lock.read_text(), re.MULTILINE))
+    images = set().union(*image_locks(tmp_path).values())
     found = {name for name in images if parts[licences.normal(name)].kind.startswith("Copyleft")}
     assert found == {"psycopg", "psycopg-binary", "certifi"}
 

@@ -19,7 +19,7 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 # isort: split
 
 from support.machines import random_machines, random_workshop
-from support.machines.expert_calls import DATA
+from support.machines.expert_calls import calls_of
 from support.machines.references import REFERENCES, load_machine
 
 from buildarena_benchmark import builtin_tasks, score
@@ -86,7 +86,7 @@ def _machine(trial: ProcessorTrial) -> Machine:
             return random_machines.random_machine(trial.task, int(name))
         return random_workshop.random_workshop_machine(trial.task, int(name))
     bench = bench_of(builtin_tasks()[trial.task], data_sheets=False)
-    for call in json.loads(DATA.read_text(encoding="utf-8"))[trial.task]["calls"]:
+    for call in calls_of(trial.task):
         bench.call(call["machine"], call["tool"], call["arguments"])
     chosen = bench.result()
     assert chosen is not None, f"the expert's machine of {trial.task} has no blocks"

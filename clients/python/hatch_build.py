@@ -1,7 +1,7 @@
 """Writes the types of the API's documents from its contract whenever the package is built.
 
-``buildarena_client.schemas`` is not in the repository: an installation writes it, and
-``make client-schemas`` does after the contract has changed. A source distribution contains it.
+``buildarena_client.schemas`` is not in the repository: ``make install`` writes it, and every make
+target that needs it does after the contract has changed. A source distribution contains it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, Final
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 HERE: Final = Path(__file__).parent
-CONTRACT: Final = HERE.parents[1] / "tests" / "data" / "openapi.json"
+CONTRACT: Final = HERE.parents[1] / "build" / "openapi.json"
 MODULE: Final = HERE / "src" / "buildarena_client" / "schemas.py"
 
 HEAD: Final = '''\
@@ -53,11 +53,12 @@ WIDTH: Final = 96
 
 
 class SchemasHook(BuildHookInterface):
-    """Writes the module before any build, editable ones too."""
+    """Writes the module before a build; an editable installation may get it later."""
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002 - hatchling's
         """Called by hatchling."""
-        write_module()
+        if version != "editable":
+            write_module()
 
 
 def module_text(contract: Mapping[str, Any]) -> str:
@@ -83,7 +84,9 @@ def write_module() -> None:
     if CONTRACT.exists():
         MODULE.write_text(module_text(json.loads(CONTRACT.read_bytes())), encoding="utf-8")
     elif not MODULE.exists():
-        raise FileNotFoundError(f"{MODULE} can't be written: there is no contract at {CONTRACT}")
+        raise FileNotFoundError(
+            f"{MODULE} can't be written: there is no contract at {CONTRACT}; `make openapi` writes it"
+        )
 
 
 def _used(contract: Mapping[str, Any]) -> set[str]:

@@ -26,7 +26,7 @@ SMALL = {
     "broker_s": 3,
 }
 QUICK = {"tenants", "truncated bodies", "harmful runner", "strangers", "look-alikes", "boards"}
-"""What takes seconds; the others are left to `make test-slow`."""
+"""What takes seconds; the others are left to `make test-nightly`."""
 
 
 @pytest.fixture(scope="module")

@@ -4,19 +4,19 @@ import json
 import re
 import socket
 import time
-from pathlib import Path
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
 from pydantic import ValidationError
 from support.clients.tenants import operator
+from support.contract import contract
 from support.servers.live_api import api_client, live_api
 
 from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.settings import Settings
 
-CONTRACT = json.loads((Path(__file__).parents[1] / "data" / "openapi.json").read_text())
+CONTRACT = contract()
 METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "PROPFIND")
 JOB = json.dumps({"task": "support-1", "model": "builtin/idle"}).encode()
 OPEN = json.dumps({"task": "support-1", "agent": "me"}).encode()

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import NotRequired, get_origin, get_type_hints
 
 import pytest
+from support.contract import contract
 
 from buildarena_client import AsyncClient, Client, RetryPolicy, schemas
 from buildarena_client.client import run
 
 ROOT = Path(__file__).parents[2]
 PROJECT = ROOT / "clients" / "python"
-CONTRACT = json.loads((ROOT / "tests" / "data" / "openapi.json").read_text())
+CONTRACT = contract()
 METHODS = [
     name for name, _ in inspect.getmembers(AsyncClient, callable) if not name.startswith("_")
 ]
@@ -90,7 +91,7 @@ def test_types_change_with_the_contract() -> None:
     build = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(build)
     text = build.module_text(CONTRACT)
-    assert text == Path(schemas.__file__).read_text(), "run `make client-schemas`"
+    assert text == Path(schemas.__file__).read_text(), "run `make install`"
     changed = json.loads(json.dumps(CONTRACT).replace('"cancelled"', '"stopped"'))
     assert build.module_text(changed) != text
 

@@ -9,6 +9,7 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 import pytest
+from support.documents.locks import image_locks
 
 ROOT = Path(__file__).parents[2]
 RECIPES = ROOT / "deploy/docker"
@@ -32,12 +33,7 @@ def program():
 def site(tmp_path) -> Path:
     """The metadata of what the images' locks hold, as it is installed here."""
     folder = tmp_path / "site-packages"
-    locks = [path for path in (RECIPES / "locks").glob("*.lock") if path.stem != "build"]
-    names = {
-        name
-        for lock in locks
-        for name in re.findall(r"^([a-z0-9._-]+)==", lock.read_text(), re.MULTILINE)
-    }
+    names = set().union(*image_locks(tmp_path / "locks").values())
     for found in distributions():
         if re.sub(r"[-_.]+", "-", found.name).lower() in names:
             metadata = Path(str(found.locate_file(".")), f"{found._path.name}")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import yaml
+from support.documents.locks import image_locks
 
 from buildarena_cli.command_table import COMMANDS
 from buildarena_geometry import kernels
@@ -103,14 +104,22 @@ def test_images_share_the_layers_of_what_all_need() -> None:
     assert "RUN" not in DOCKERFILE.split("FROM scratch AS proxy")[1], "it has no shell"
 
 
-def test_an_engine_is_only_where_something_is_simulated() -> None:
+def test_an_engine_is_only_where_something_is_simulated(tmp_path) -> None:
     engines = {"mujoco", "pybullet"}
-    for lock in (ROOT / "deploy/docker/locks").glob("*.lock"):
-        found = set(re.findall(r"^([a-z]+)==", lock.read_text(), re.MULTILINE)) & engines
-        # The API simulates what people drive.
-        simulated = {"api": engines, "construct": engines, "build": set()}
-        wanted = {name.removeprefix("simulate-") for name in [lock.stem] if "simulate" in name}
-        assert found == simulated.get(lock.stem, wanted), lock.name
+    # The API simulates what people drive.
+    simulated = {
+        "shared": set(),
+        "api": engines,
+        "construct": engines,
+        "simulate-mujoco": {"mujoco"},
+        "simulate-pybullet": {"pybullet"},
+        "tools": set(),
+    }
+    locks = image_locks(tmp_path)
+    assert {name: names & engines for name, names in locks.items()} == simulated
+    for names in locks.values():
+        assert {"psycopg", "celery"} <= names
+        assert not names & {"pytest", "ribs", "mkdocs", "cython"}
 
 
 @pytest.mark.ci
@@ -229,13 +238,3 @@ def test_secrets_once_made_stay_and_open_for_their_owner_alone(tmp_path) -> None
 def test_what_git_must_not_take_is_ignored() -> None:
     ignored = run("git", "check-ignore", "secrets/admin_key", ".env")
     assert ignored.stdout.split() == ["secrets/admin_key", ".env"]
-
-
-def test_locks_of_images_are_part_of_the_whole_lock() -> None:
-    def pinned(path: Path) -> set[str]:
-        return set(re.findall(r"^([a-z0-9.-]+==[^ \\;]+)", path.read_text(), re.MULTILINE))
-
-    whole = pinned(ROOT / "requirements.lock")
-    for lock in sorted((ROOT / "deploy/docker/locks").glob("*.lock")):
-        if lock.name != "build.lock":
-            assert pinned(lock) <= whole, lock.name

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import pytest
-from support.machines.expert_calls import DATA, played
+from support.machines import expert_calls
+from support.machines.expert_calls import played
 
 from buildarena_environment import Environment
 from buildarena_geometry import Machine
@@ -15,7 +15,7 @@ from buildarena_worker.builtin.designs.calls import Call
 
 @pytest.fixture(scope="session")
 def experts() -> dict[str, Any]:
-    return json.loads(DATA.read_text())
+    return expert_calls.experts()
 
 
 @pytest.fixture(scope="session")

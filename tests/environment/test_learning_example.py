@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.machines.expert_calls import calls_of
 
 from buildarena_benchmark import broken_constraint, builtin_tasks
 from buildarena_environment import Environment, try_machine
@@ -79,9 +80,8 @@ def test_refused_choices_are_left_out_of_a_bridge(example) -> None:
 def test_the_learned_bridge_beats_the_expert(engine) -> None:
     pytest.importorskip(engine)
     machine = Machine.from_document(json.loads((KEPT / "bridge.machine.json").read_text()))
-    material = json.loads((ROOT / "tests/data/expert_calls.json").read_text())
     expert = Environment("support-1")
-    for call in material["support-1"]["calls"]:
+    for call in calls_of("support-1"):
         assert expert.step(call["tool"], call["arguments"]).ok
     task = builtin_tasks()["support-1"]
     learned = try_machine(task, machine, engine)

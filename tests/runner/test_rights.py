@@ -1,18 +1,16 @@
 """A runner key may lease trials and nothing else, and nobody else may do that."""
 
-import json
-from pathlib import Path
-
 import pytest
 from sqlalchemy import text
 from support.clients.tenants import ADMIN, everything
+from support.contract import contract
 from support.servers.runner_rig import Caller, as_admin, runner_key, true_trajectory, waiting
 from support.servers.stacks import wait_until
 
 from buildarena_api.runners import lease_queue
 from buildarena_simulation import SIMULATION_VERSION, write_trajectory
 
-CONTRACT = json.loads((Path(__file__).parents[1] / "data" / "openapi.json").read_text())
+CONTRACT = contract()
 OTHERS = [
     (method.upper(), path)
     for path, methods in CONTRACT["paths"].items()

@@ -7,7 +7,7 @@ from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_simulation import ENGINES
 
 HANDFUL = ["arch over 5", "car of 5 wheels", "ring of 3 cannons", "canard"]
-"""One of several categories each; `make test-slow` tries all."""
+"""One of several categories each; `make test-nightly` tries all."""
 
 
 def _disqualifying(flags: list[str]) -> list[str]:

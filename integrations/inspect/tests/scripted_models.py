@@ -16,7 +16,7 @@ from buildarena_environment.workbench import Workbench
 from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[3]
-EXPERTS = json.loads((ROOT / "tests/data/expert_calls.json").read_text(encoding="utf-8"))
+EXPERTS = json.loads((ROOT / "build/expert_calls.json").read_text(encoding="utf-8"))
 USAGE = ModelUsage(input_tokens=7, output_tokens=3, total_tokens=10)
 Answer = Callable[[list[ChatMessage]], ModelOutput]
 

@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-DATA = Path(__file__).parents[3] / "tests/data/expert_calls.json"
+DATA = Path(__file__).parents[3] / "build/expert_calls.json"
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-DATA = Path(__file__).parents[3] / "tests/data/expert_calls.json"
+DATA = Path(__file__).parents[3] / "build/expert_calls.json"
 SUBMIT = {"tool": "submit", "arguments": {}}
 
 

@@ -10,8 +10,16 @@ from pathlib import Path
 import pytest
 
 SCRIPTS = Path(__file__).parents[3] / "mk"
-REST = "numpy==2.0 \\\n    --hash=a\nscipy==1.0\n"
-LOCK = REST.replace("scipy", "pybullet==3.2.7 ; a \\\n    --hash=b \\\n    --hash=c\nscipy")
+PYBULLET = """\
+pybullet==3.2.7 ; a \\
+    --hash=b \\
+    --hash=c
+    # via buildarena-a (libs/a/pyproject.toml)
+"""
+NUMPY = "numpy==2.0 \\\n    --hash=a\n    # via pybullet, scipy\n"
+SCIPY = "scipy==1.0\n    # via -r requirements-dev.in\n"
+OF_OTHERS = "ribs==1.0\n    # via -r requirements-tools.in\n"
+LOCK = f"# Its head.\n{NUMPY}{PYBULLET}{OF_OTHERS}{SCIPY}"
 UV = """#!/bin/sh
 echo "$@" >> calls
 case "$*" in
@@ -25,6 +33,8 @@ esac
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "requirements.lock").write_text(LOCK)
+    (tmp_path / "libs/a").mkdir(parents=True)
+    (tmp_path / "libs/a/pyproject.toml").write_text('[project]\nname = "buildarena-a"\n')
     (tmp_path / "bin").mkdir()
     for name in ("sh", "bash", "awk", "dirname", "mkdir", "ln", "cat", "cp", "mktemp", "rm"):
         (tmp_path / "bin" / name).symlink_to(shutil.which(name))
@@ -60,7 +70,10 @@ def test_set_up_says_nothing_where_everything_has_a_wheel(folder) -> None:
     done = set_up(folder)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     (sync,) = [call for call in calls(folder) if "sync" in call]
-    assert sync.endswith("--only-binary pybullet --only-binary pybullet-arm64 requirements.lock")
+    assert sync.endswith(
+        "--only-binary pybullet --only-binary pybullet-arm64 .venv/requirements.lock"
+    )
+    assert (folder / ".venv/requirements.lock").read_text() == NUMPY + PYBULLET + SCIPY
     assert calls(folder)[-1].endswith("--no-deps --no-build-isolation -e libs/a")
 
 
@@ -72,7 +85,7 @@ def test_without_wheel_and_compiler_all_but_pybullet_is_installed(folder) -> Non
     done = set_up(folder, NO_WHEEL, NO_COMPILING)
     assert (done.returncode, done.stderr) == (0, "")
     assert "there is no C++ compiler: without it, name MuJoCo" in done.stdout
-    assert (folder / ".venv/without-pybullet.lock").read_text() == REST
+    assert (folder / ".venv/without-pybullet.lock").read_text() == NUMPY + SCIPY
 
 
 def test_pybullet_that_cannot_be_compiled_is_left_out_in_words(folder) -> None:

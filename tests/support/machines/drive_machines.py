@@ -1,7 +1,7 @@
 """The expert's machines that Gymnasium's adapter has driven, without their programs.
 
-Run as a module (`python -m support.machines.drive_machines` in tests/), it writes the adapter's
-file again.
+Run as a module, it writes the adapter's file, which stands in no repository: installing the adapter
+and building its distribution begin with that.
 """
 
 import json

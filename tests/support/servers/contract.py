@@ -1,7 +1,6 @@
 """The OpenAPI contract, and requests that are generated from a part of it."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import schemathesis
@@ -14,8 +13,9 @@ from schemathesis.specs.openapi.checks import (
     response_schema_conformance,
     status_code_conformance,
 )
+from support.contract import contract
 
-SCHEMA = schemathesis.openapi.from_path(Path(__file__).parents[2] / "data" / "openapi.json")
+SCHEMA = schemathesis.openapi.from_dict(contract())
 CHECKS = [
     not_a_server_error,
     status_code_conformance,
