@@ -27,7 +27,9 @@ VALKEY_DATABASES: Final = 16
 LONGEST: Final = ("tests/web/", "scenarios/chaos/", "tests/e2e/", "tests/cli/local/")
 """Tests of whole services; at the end of a run one of them would be waited for."""
 LEFT_OUT: Final = ("install the Debian packages", "make web")
-MAX_MEMORY: Final = 700 * 2**20
+MAX_ID: Final = 60
+"""Characters of a parameter that its test's name has."""
+MAX_MEMORY: Final = 800 * 2**20
 """Bytes of a test worker above which garbage is collected after a module."""
 
 
@@ -42,6 +44,14 @@ def pytest_collection_finish() -> None:
     """Two million objects of modules and tests live to the end: the collector need not see them."""
     gc.collect()
     gc.freeze()
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Shortens long texts: an id of megabytes is sent to and fro, and printed in failures."""
+    if isinstance(val, str | bytes) and len(val) > MAX_ID:
+        begins = val[:MAX_ID] if isinstance(val, str) else argname
+        return f"{begins}... {len(val)}".encode("unicode_escape").decode("ascii")
+    return None
 
 
 def pytest_configure(config: pytest.Config) -> None:

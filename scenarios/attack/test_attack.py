@@ -10,6 +10,8 @@ from scenarios.attack.run import small_disk
 from scenarios.attack.scenarios import SCENARIOS
 from support.marks import nightly
 
+pytestmark = pytest.mark.nightly
+
 SMALL = {
     "jobs": 60,
     "streams": 60,
@@ -40,7 +42,6 @@ def place() -> Iterator[Arena]:
         yield found
 
 
-@pytest.mark.nightly(keep=1)
 @pytest.mark.timeout(180)
 @pytest.mark.parametrize(
     "name",

@@ -27,6 +27,8 @@ from buildarena_cli.local.stack import Stack
 from buildarena_simulation import simulate
 from buildarena_store import Database
 
+pytestmark = pytest.mark.nightly
+
 JOBS = int(os.environ.get("CHAOS_JOBS", "12"))
 EVERY_S = float(os.environ.get("CHAOS_EVERY_S", "2.5"))
 STRIKES = math.inf if "CHAOS_JOBS" in os.environ else len(VICTIMS)
@@ -107,7 +109,6 @@ def started_runner(stack: Stack, words: list[str]) -> subprocess.Popen[bytes]:
 
 
 @pytest.mark.timeout(3600)
-@pytest.mark.ci
 @pytest.mark.parametrize("way", ["database", "api"])
 def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
     rng = random.Random(SEED)

@@ -10,6 +10,8 @@ from scenarios.gameday.faults import FAULTS
 from scenarios.gameday.run import HOUR_MIN, day
 from support.servers.prometheus import needs_alertmanager
 
+pytestmark = pytest.mark.nightly
+
 JOBS = 12
 CHOSEN = {
     "the API is killed": 1.0,
@@ -35,7 +37,6 @@ def test_the_plan_is_an_hour_of_twelve_faults_whose_names_differ() -> None:
 
 
 @needs_alertmanager
-@pytest.mark.ci
 @pytest.mark.timeout(900)
 def test_a_small_game_day(folder) -> None:
     faults = [replace(f, at_min=CHOSEN[f.name]) for f in FAULTS if f.name in CHOSEN]

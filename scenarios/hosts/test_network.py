@@ -12,6 +12,8 @@ import psutil
 import pytest
 from support.servers.stacks import wait_until
 
+pytestmark = pytest.mark.nightly
+
 ROOT = Path(__file__).parents[2]
 PROGRAMS = ("ip", "tc", "unshare")
 
@@ -31,7 +33,6 @@ def devices() -> set[str]:
     return {file.name for file in Path("/sys/class/net").iterdir()}
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_links_are_slow_and_cut_and_nothing_is_left(how) -> None:
     require_namespaces()

@@ -27,6 +27,8 @@ from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs.couriers import courier
 from buildarena_worker.builtin.designs.drafting import EAST, UP
 
+pytestmark = pytest.mark.nightly
+
 START = Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])
 GENERATIONS = 6
 
@@ -67,7 +69,6 @@ def test_the_search_finds_a_planted_hole_and_its_checks_name_it() -> None:
     assert not closed.success
 
 
-@pytest.mark.ci
 def test_a_search_with_the_same_seed_is_the_same_whoever_does_the_work() -> None:
     def elites(workers: int) -> list[dict[str, object]]:
         search = TaskSearch("lift-1", seed=5)
@@ -146,7 +147,6 @@ def _pushed() -> Machine:
     return drafted(courier(0), [(0.4, "UpArrow", 1.0)])
 
 
-@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("task", "machine", "check"),
     [
@@ -162,7 +162,6 @@ def test_checks_name_what_throws_and_brings_in_another_way(task, machine, check)
     assert check in suspicions(found)
 
 
-@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("task", ["throw-1", "deliver-1", "drive-1"])
 def test_checks_find_nothing_odd_in_the_experts(task) -> None:
     found = tried(task, expert_genome(task))
@@ -213,7 +212,6 @@ def test_every_task_has_seeds_that_may_be_tried(name) -> None:
     assert any(broken_constraint(task, grown(seed)[0]) is None for seed in seeds_of(name))
 
 
-@pytest.mark.nightly(keep=4)
 @pytest.mark.parametrize(
     "task",
     {(task.scorer, kind_of(name)): name for name, task in builtin_tasks().items()}.values(),
@@ -228,7 +226,6 @@ def test_machines_of_every_scorer_and_kind_can_be_hunted(task) -> None:
     assert finding is None or finding.objective >= -1.0
 
 
-@pytest.mark.ci
 def test_checks_name_a_program_that_looks_at_nothing() -> None:
     expert = expert_genome("balance-1")
     honest = tried("balance-1", expert)

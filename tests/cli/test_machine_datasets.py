@@ -32,6 +32,8 @@ from buildarena_cli.dataset.machines.trying import SPLITS, split_of
 from buildarena_environment import Environment
 from buildarena_environment.variation.genome import Genome
 
+pytestmark = pytest.mark.ci
+
 TASKS = ("support-1", "throw-1", "lift-1")
 COUNT = 24
 WORDS = ("--count", str(COUNT), "--seed", "3", *(w for task in TASKS for w in ("--task", task)))
@@ -59,7 +61,6 @@ def made(tmp_path_factory) -> Path:
     return out
 
 
-@pytest.mark.ci
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_it_loads_with_its_splits_and_no_two_machines_are_alike(made, tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
@@ -97,7 +98,6 @@ def test_the_card_counts_what_is_there(made):
         assert f"| {split_of(task)} | {task} | {counts}" in text
 
 
-@pytest.mark.ci
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_the_code_of_the_card_runs(made, tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
@@ -110,7 +110,6 @@ def test_the_code_of_the_card_runs(made, tmp_path, monkeypatch):
     assert scope["environment"].trials
 
 
-@pytest.mark.ci
 def test_the_same_seed_is_the_same_bytes_in_any_number_of_processes(made, tmp_path):
     assert make(tmp_path / "two", "--processes", "3").returncode == 0
     assert contents(tmp_path / "two") == contents(made)
@@ -132,7 +131,6 @@ def resumed_at(monkeypatch) -> list[int]:
     return asked
 
 
-@pytest.mark.ci
 def test_what_was_interrupted_is_resumed(made, tmp_path, monkeypatch, resumed_at):
     out, journal = tmp_path / "out", tmp_path / ".out.rows.jsonl"
     add = Journal.add
@@ -156,7 +154,6 @@ def test_what_was_interrupted_is_resumed(made, tmp_path, monkeypatch, resumed_at
     assert not journal.exists()
 
 
-@pytest.mark.ci
 def test_what_was_killed_is_resumed_and_loses_nothing(made, tmp_path, resumed_at):
     out, journal = tmp_path / "out", tmp_path / ".out.rows.jsonl"
     words = ["dataset", "machines", "--out", str(out), *WORDS, "--processes", "1"]
@@ -210,7 +207,6 @@ def test_without_designs_nothing_is_made(tmp_path, monkeypatch):
     assert (done.returncode, "install buildarena-worker" in done.stderr) == (1, True)
 
 
-@pytest.mark.ci
 def test_a_machine_that_comes_out_different_ends_the_making(tmp_path, monkeypatch):
     monkeypatch.setattr(making, "repeated", lambda rows, *_: ((row, ["mass"]) for row in rows))
     done = make(tmp_path / "out", "--count", "1", "--processes", "1")
@@ -243,7 +239,6 @@ def tampered(name: str, row: dict) -> None:
             row["canary"] = ""
 
 
-@pytest.mark.ci
 def test_verify_finds_every_row_that_was_tampered_with(made, tmp_path):
     (folder := tmp_path / "bad").mkdir()
     training = [row for row in rows(made) if row["split"] == "train"]
@@ -274,7 +269,6 @@ def test_verify_finds_every_row_that_was_tampered_with(made, tmp_path):
     assert f"number {COUNT}, {twice['id']}: another row has the same machine" in done.stderr
 
 
-@pytest.mark.ci
 def test_verify_passes_what_was_made(made, tmp_path):
     (folder := tmp_path / "few").mkdir()
     for split in SPLITS:

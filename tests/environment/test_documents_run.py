@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from support.documents.code_blocks import run_document, shown_in
 
+pytestmark = pytest.mark.ci
+
 ROOT = Path(__file__).parents[2]
 README = ROOT / "libs/environment/README.md"
 TRAINING = ROOT / "docs/training.md"

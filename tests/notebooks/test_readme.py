@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from support.clients.commands import run
 
+pytestmark = pytest.mark.ci
+
 ROOT = Path(__file__).parents[2]
 README = ROOT / "clients" / "buildarena" / "README.md"
 PAGE = ROOT / "docs" / "notebooks.md"
@@ -29,7 +31,6 @@ def test_its_python_runs_as_it_stands(tmp_path, monkeypatch):
     assert (tmp_path / "bridge.html").stat().st_size > 1000
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize(
     "change", [("load 959.81", "load 959.82"), ("Refused (", "Accepted ("), ('"F")', '"A")')]
 )

@@ -21,6 +21,8 @@ from buildarena_simulation import SIMULATION_VERSION, write_trajectory
 from buildarena_simworker.remote.api import check_url, tls_context
 from buildarena_simworker.remote.doctor import examined
 
+pytestmark = pytest.mark.ci
+
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 LONG = SHORT.replace("name: short", "name: long").replace("duration_s: 0.4", "duration_s: 600")
 LONG += "constraints: {max_blocks: 30}\n"
@@ -59,7 +61,6 @@ def engines(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
     return [one for one in children if "spawn_main" in " ".join(one.cmdline())]
 
 
-@pytest.mark.ci
 def test_a_runner_does_what_waits_and_hands_back_what_it_can_not_end(
     context, url, tmp_path
 ) -> None:

@@ -16,6 +16,8 @@ from buildarena_store.archives import write_archive
 from buildarena_store.jobs.histories import PACKED, Histories
 from buildarena_worker.wiring import verifier
 
+pytestmark = pytest.mark.ci
+
 SWEEP = {
     "tasks": ["support-1"],
     "models": ["builtin/expert", "builtin/random"],

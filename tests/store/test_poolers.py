@@ -14,6 +14,8 @@ from buildarena_pipeline.runtime.context import open_context
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_store import Database
 
+pytestmark = pytest.mark.ci
+
 JOBS = 60
 WORKERS = 8
 

@@ -24,6 +24,8 @@ from buildarena_store.jobs.job import JobKey, configuration_hash
 from buildarena_store.migrating import alembic_config
 from buildarena_worker.wiring import verifier
 
+pytestmark = pytest.mark.ci
+
 BEFORE = Path(__file__).parents[1] / "data" / "store" / "before-states"
 REVISION = "2026_11_21_keys_budgets_tasks"
 ROWS = json.loads((BEFORE / "rows.json").read_text())

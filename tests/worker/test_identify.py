@@ -26,6 +26,8 @@ from buildarena_worker.builtin.designs.calls import calls_with
 from buildarena_worker.builtin.designs.risers import riser
 from buildarena_worker.wiring import verification_runner
 
+pytestmark = pytest.mark.ci
+
 TASK = builtin_tasks()["identify-1"]
 SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "2")))
 
@@ -45,7 +47,6 @@ def verdict(context: Context, job: Job) -> str | None:
     return context.store.verifications.get(check).verdict
 
 
-@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("workflow", ["five-role", "builder"])
 def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
@@ -66,7 +67,6 @@ def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
     assert verdict(context, job) == "verified"
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_the_expert_succeeds_in_nearly_every_world(seed, engine) -> None:
@@ -103,7 +103,6 @@ def test_a_test_trial_counts_for_nothing_however_good_it_was(rollout) -> None:
     assert best_rollout(made, builtin_tasks()["transport-1"]).number == 0
 
 
-@pytest.mark.ci
 def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
     context, submissions, monkeypatch
 ) -> None:
@@ -133,7 +132,6 @@ def test_rounds_of_a_closed_loop_give_no_further_trials(context, submissions) ->
     assert len(context.store.rollouts.read(job.id)) <= TASK.tests + 1
 
 
-@pytest.mark.ci
 def test_varied_worlds_keep_what_was_drawn(context, submissions) -> None:
     job = ended(context, submissions, worlds=3)
     records = context.store.rollouts.read(job.id)

@@ -25,6 +25,8 @@ from buildarena_worker.workflow.rounds import Loop
 from buildarena_worker.workflow.tree_iterative import EDITS
 from buildarena_worker.workflow.trees import TREE_TURNS
 
+pytestmark = pytest.mark.ci
+
 SESSIONS = [
     ("tree-single", "transport-1"),
     ("tree-iterative", "support-1"),

@@ -20,6 +20,8 @@ from buildarena_simulation import Drive, SimulationError, simulate, write_trajec
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.trial import Trial
 
+pytestmark = pytest.mark.nightly
+
 IDS = buildarena_gymnasium.drive_ids()
 HOVER = builtin_tasks()["hover-3"]
 SHORT = replace(HOVER, scenario=HOVER.scenario.model_copy(update={"duration_s": 6.0}))

@@ -8,6 +8,8 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 
 import buildarena_gymnasium
 
+pytestmark = pytest.mark.nightly
+
 WAIT = '{"tool": "get_machine_summary", "arguments": {}}'
 TASKS = ("lift-1", "lift-2", "support-1")
 

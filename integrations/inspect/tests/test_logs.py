@@ -12,6 +12,7 @@ from pathlib import Path
 from urllib.parse import quote
 from urllib.request import urlopen
 
+import pytest
 from inspect_ai import Task
 from inspect_ai.dataset import Sample
 from inspect_ai.log import read_eval_log, write_eval_log
@@ -20,6 +21,8 @@ from scripted_models import EXPERTS, call, listed, only
 
 from buildarena_inspect.__main__ import main
 from buildarena_inspect.logs import LoggedSample, logged_samples
+
+pytestmark = pytest.mark.nightly
 
 BIN = Path(sys.executable).parent
 OFFLINE = Path(__file__).with_name("offline")

@@ -21,6 +21,8 @@ from buildarena_inspect.task_factory import TASKS
 from buildarena_inspect.versions import inspect_version
 from buildarena_simulation import SIMULATION_VERSION, engine_version
 
+pytestmark = pytest.mark.nightly
+
 HERE = Path(__file__).parent
 REVIEW = HERE / "register_review.py"
 PYTHON = Path(sys.executable)
@@ -89,7 +91,6 @@ def test_a_clone_is_installed_and_evaluated_as_a_register_does(tmp_path) -> None
     ]
 
 
-@pytest.mark.nightly
 @pytest.mark.timeout(3600)
 def test_a_clone_evaluates_all_tasks(tmp_path) -> None:
     count, *logs = reviewed(tmp_path)

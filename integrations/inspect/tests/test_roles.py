@@ -15,6 +15,8 @@ from buildarena_environment import Workbench, try_machine
 from buildarena_geometry import Machine
 from buildarena_inspect.scorers import machine_hash
 
+pytestmark = pytest.mark.nightly
+
 expert = pytest.importorskip("buildarena_worker.builtin.expert", reason="needs the extra `roles`")
 
 

@@ -14,6 +14,8 @@ import websockets
 from buildarena_environment import LONGEST_CALL
 from buildarena_openenv import BuildAction, BuildClient
 
+pytestmark = pytest.mark.nightly
+
 START = {"type": "step", "data": {"tool": "start", "arguments": {}}}
 
 

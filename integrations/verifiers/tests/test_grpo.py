@@ -14,6 +14,8 @@ import pytest
 
 from buildarena_environment import Environment, call
 
+pytestmark = pytest.mark.nightly
+
 ROOT = Path(__file__).parents[3]
 sys.path.insert(0, str(ROOT / "examples/learning/grpo"))
 

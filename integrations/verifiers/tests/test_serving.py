@@ -22,6 +22,8 @@ from verifiers.v1.utils.loaders import resolve_env_config
 
 from buildarena_verifiers import BuildEnv, load_environment
 
+pytestmark = pytest.mark.nightly
+
 README = Path(__file__).parents[1] / "README.md"
 SOURCE = {"name", "env", "serve", "sampling", "group_size", "ratio", "interval"}
 """What prime-rl reads of a source; all but `env` and `serve` is its own."""

@@ -7,12 +7,11 @@ import sys
 import pytest
 from game_rig import SUPPORT
 
-pytestmark = pytest.mark.timeout(240)
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(240)]
 SEEDS = (4, 7, 10)
 """A dialog in the way three times; a crash and a stolen clipboard; lines lost and cut off."""
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_fault_ends_in_a_right_score_or_in_a_sentence_with_a_picture(
     tmp_path, screen, seed

@@ -19,6 +19,8 @@ from buildarena_simworker_besiege.first_evening import evening, first_evening
 from buildarena_simworker_besiege.first_evening.playing import StepDone
 from buildarena_simworker_besiege.settings import BesiegeSettings
 
+pytestmark = pytest.mark.nightly
+
 PROGRAM = [sys.executable, "-m", "buildarena_simworker_besiege", "first-evening"]
 QUICK = "doctor,calibration"
 
@@ -63,7 +65,6 @@ def settings(rig: Rig, **changes: object) -> BesiegeSettings:
     return BesiegeSettings.model_validate(own)
 
 
-@pytest.mark.ci
 def test_an_evening_is_played_packed_and_judged(rig, screen) -> None:
     slow = replace(rig, speed=1.2, patience=2.0)
     said = played(slow, screen, "--steps", "doctor,calibration,sampler,drop,scales")
@@ -85,7 +86,6 @@ def test_an_evening_is_played_packed_and_judged(rig, screen) -> None:
     assert not list(rig.machines.iterdir())
 
 
-@pytest.mark.ci
 def test_a_dialog_in_the_way_fails_its_step_with_a_picture_and_the_next_goes_on(
     rig, screen, monkeypatch
 ) -> None:
@@ -110,7 +110,6 @@ def test_a_dialog_in_the_way_fails_its_step_with_a_picture_and_the_next_goes_on(
         assert any("picture-fault-" in name for name in packed.namelist())
 
 
-@pytest.mark.ci
 def test_a_killed_evening_goes_on_where_it_stopped(rig, screen) -> None:
     fast = replace(rig, speed=6.0, patience=2.0)
     program = subprocess.Popen(

@@ -21,7 +21,7 @@ from buildarena_simworker_besiege.headless import HeadlessDesktop
 from buildarena_simworker_besiege.settings import BesiegeSettings
 from buildarena_simworker_besiege.simulator import BesiegeSimulator
 
-pytestmark = pytest.mark.timeout(120)
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(120)]
 
 
 @pytest.fixture
@@ -38,7 +38,6 @@ def headless(rig: Rig, monkeypatch) -> Iterator[tuple[Rig, BesiegeSimulator]]:
     simulator.close()
 
 
-@pytest.mark.ci
 def test_a_car_is_driven_as_by_our_engine(headless) -> None:
     rig, simulator = headless
     task, machine = short_trial("transport-1")
@@ -68,7 +67,6 @@ def test_what_needs_the_script_is_refused_with_the_reason(headless, name) -> Non
         headless[1].run(trial_of(task, machine))
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("fault", ["crash", "freeze"])
 def test_a_fault_once_is_got_over(headless, fault) -> None:
     rig, simulator = headless

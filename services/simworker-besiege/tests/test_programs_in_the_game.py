@@ -47,6 +47,8 @@ from buildarena_simulation.scenario import (
 )
 from buildarena_worker.builtin.designs.drafting import UP
 
+pytestmark = pytest.mark.ci
+
 EXAMPLE = Path(__file__).parents[3] / "examples/control"
 
 
@@ -77,7 +79,6 @@ def to_the_mark() -> tuple[Machine, Scenario, Recorded, LuaGame]:
     return machine, scenario, run, game_of(run, scenario)
 
 
-@pytest.mark.ci
 def test_a_program_senses_and_answers_in_the_game_what_it_does_in_an_engine(to_the_mark) -> None:
     machine, scenario, run, game = to_the_mark
     ours, there = run.trajectory.piloting, read_back(game, machine, scenario).piloting
@@ -88,7 +89,6 @@ def test_a_program_senses_and_answers_in_the_game_what_it_does_in_an_engine(to_t
     assert np.abs(there.answers - ours.answers).max() < 0.01
 
 
-@pytest.mark.ci
 def test_the_log_of_a_program_is_a_trajectory_that_can_be_scored_and_stored(to_the_mark) -> None:
     machine, scenario, _, game = to_the_mark
     trajectory = read_back(game, machine, scenario)
@@ -107,7 +107,6 @@ def changed(lines: list[str], kind: str, change) -> list[str]:
     return [*lines[:at], *([] if body is None else [f"{body},{check_sum(body)}"]), *lines[at + 1 :]]
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -138,7 +137,6 @@ def test_a_log_is_of_one_program(to_the_mark) -> None:
         read_back(game, other, scenario)
 
 
-@pytest.mark.ci
 def test_all_kinds_of_joints_and_the_cargo_are_sensed_as_in_an_engine() -> None:
     text = 'sensors = { "12" }\n' + program(
         """return { spinning_forward = t > 0.5 and 0.6 or 0, turn_left = t > 1 and 0.5 or 0 }"""

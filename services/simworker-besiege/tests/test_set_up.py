@@ -24,6 +24,8 @@ from buildarena_simworker_besiege.screen.calibration import (
 from buildarena_simworker_besiege.settings import BesiegeSettings
 from buildarena_simworker_besiege.traces import Traces
 
+pytestmark = pytest.mark.ci
+
 PROGRAM = [sys.executable, "-m", "buildarena_simworker_besiege"]
 
 
@@ -42,7 +44,6 @@ def answer(words: list[str], rig: Rig, screen: dict[str, str] | None, **given: o
     )
 
 
-@pytest.mark.ci
 def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> None:
     done = answer(["calibrate", "--defaults"], rig, screen)
     assert done.returncode == 0, (done.stdout, done.stderr)
@@ -50,7 +51,6 @@ def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> 
     assert not list(rig.machines.iterdir())
 
 
-@pytest.mark.ci
 def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     places = {**Calibration().positions, "open_machine": (0.9, 0.9)}
     Calibration(positions=places).save(rig.folder / "state" / "calibration.json")
@@ -60,7 +60,6 @@ def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     assert "load the machine batry: the list of machines stayed open" in done.stdout
 
 
-@pytest.mark.ci
 def test_a_person_points_at_each_place(rig, screen) -> None:
     with GamePlayed(rig, screen) as person:
         done = person.calibrate()

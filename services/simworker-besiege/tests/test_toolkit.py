@@ -32,7 +32,7 @@ from buildarena_simworker_besiege.settings import BesiegeSettings
 from buildarena_simworker_besiege.toolkit.simulator import ToolkitSimulator
 from buildarena_worker.wiring import verifier
 
-pytestmark = pytest.mark.timeout(200)
+pytestmark = [pytest.mark.ci, pytest.mark.timeout(200)]
 
 
 def environment(folder: Path) -> dict[str, str]:
@@ -134,7 +134,6 @@ FAULTS = {
 }
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_once_is_got_over_and_named(simulator, faults, fault) -> None:
     faults(fault)
@@ -175,7 +174,6 @@ def started(folder: Path) -> tuple[int, int]:
     return own, other
 
 
-@pytest.mark.ci
 def test_what_hangs_is_ended_with_all_it_started(toolkit, faults, tmp_path) -> None:
     faults("hang", "orphan")
     impatient = toolkit.model_copy(update={"patience": 0.01})
@@ -188,7 +186,6 @@ def test_what_hangs_is_ended_with_all_it_started(toolkit, faults, tmp_path) -> N
     assert is_gone(started(tmp_path)[1]), "what the second run left behind was ended, too"
 
 
-@pytest.mark.ci
 def test_a_lost_lease_ends_the_run_and_all_it_started(simulator, faults, tmp_path) -> None:
     faults("hang")
     task, machine = short_trial("transport-1")
@@ -235,7 +232,6 @@ def test_the_doctor_says_what_is_missing(toolkit, command, says) -> None:
     assert all(point.ok for point in examine(toolkit))
 
 
-@pytest.mark.ci
 def test_a_killed_runner_leaves_nothing_and_the_next_one_plays(toolkit, faults, tmp_path) -> None:
     """Its command and all that started still run; the next runner ends them first."""
     faults("hang")
@@ -275,7 +271,6 @@ def playing(context: Context, tmp_path: Path) -> Iterator[Context]:
     service.close()
 
 
-@pytest.mark.ci
 def test_a_submission_is_played_scored_and_verified(playing, faults, tmp_path) -> None:
     faults("other_machine", "hang")
     spec = JobSpec(task="transport-1", model="builtin/expert", simulator="besiege")
