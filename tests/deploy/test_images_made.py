@@ -50,7 +50,12 @@ elif words[-1] == "version":
 def repository(tmp_path) -> Path:
     """A clone with what building the images needs, and a Docker that only says what it is asked."""
     folder = tmp_path / "repository"
-    for name in ("mk/images.py", "deploy/docker", "clients/cli/pyproject.toml"):
+    for name in (
+        "mk/images.py",
+        "deploy/docker",
+        "requirements.lock",
+        "clients/cli/pyproject.toml",
+    ):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
         copy(ROOT / name, folder / name)

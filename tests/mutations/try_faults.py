@@ -27,7 +27,7 @@ import pytest
 
 HERE: Final = Path(__file__).resolve().parent
 ROOT: Final = HERE.parents[1]
-MARKS: Final = "not slow"
+MARKS: Final = "not ci and not nightly"
 """Which tests `make test` runs."""
 UNTRACKED: Final = (
     "clients/python/src/buildarena_client/schemas.py",
