@@ -1,12 +1,17 @@
-"""Draws the pictures of the geometry guide: `make geometry-pictures`."""
+"""Of the site of documents: the pictures of the geometry guide."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 from buildarena_geometry import Machine
 from buildarena_geometry.export import View, machine_svg
+
+PICTURES = {
+    "World and block frames": "geometry/frames.svg",
+    "Free faces of three blocks": "geometry/faces.svg",
+    "A cannon on the east face and a torch on the south face": "geometry/pointing.svg",
+    "A car with four wheels": "geometry/first-machine.svg",
+}
+"""The pictures' paths among the documents, by what they show."""
 
 
 def build(*parts: tuple[str, str, str]) -> Machine:
@@ -22,7 +27,7 @@ def build(*parts: tuple[str, str, str]) -> Machine:
 
 
 def pictures() -> dict[str, str]:
-    """The guide's pictures by file name."""
+    """The guide's pictures by their paths among the documents."""
     block, wheel = "Small Wooden Block", "Powered Wheel"
     car = build(
         ("1", "E", block),
@@ -35,22 +40,10 @@ def pictures() -> dict[str, str]:
     spread = build(("1", "A", block), ("2", "E", wheel))
     engine = build(("1", "A", "Water Cannon"), ("1", "F", "Torch"))
     return {
-        "frames.svg": machine_svg(
+        "geometry/frames.svg": machine_svg(
             build(("1", "A", block)), View(scale=110, frames=("1", "2"), compass=True)
         ),
-        "faces.svg": machine_svg(spread, View(scale=110, face_labels=("1", "2", "3"))),
-        "pointing.svg": machine_svg(engine, View(scale=80, ids=True)),
-        "first-machine.svg": machine_svg(car, View(ids=True)),
+        "geometry/faces.svg": machine_svg(spread, View(scale=110, face_labels=("1", "2", "3"))),
+        "geometry/pointing.svg": machine_svg(engine, View(scale=80, ids=True)),
+        "geometry/first-machine.svg": machine_svg(car, View(ids=True)),
     }
-
-
-def main() -> None:
-    """Writes the pictures to the folder named on the command line."""
-    folder = Path(sys.argv[1])
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in pictures().items():
-        (folder / name).write_text(text)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,12 +1,10 @@
-"""Writes the guide of all modules with their pictures: `make module-guide`."""
+"""Of the site of documents: the guide of all modules, with their pictures."""
 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator, Mapping
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 from buildarena_geometry import Module, module_set
@@ -14,7 +12,7 @@ from buildarena_geometry.export import module_svg
 from buildarena_geometry.feedback.words import plain, point
 
 FILES = ("modules.yaml", "extended.yaml")
-PICTURES = Path("images", "modules")
+PICTURES = "images/modules"
 GUIDE = "modules.md"
 NOT_PHYSICS = {
     *(
@@ -42,13 +40,12 @@ _SURE = (
 """What in the words of an origin says how sure it is."""
 HEAD = """# All modules
 
-What machines can be made of, from the module files; `make module-guide` writes this page again. The
-set `basic` has the paper's modules, `workshop` those and every further type that is simulated but for
-what tasks must name (`by_name`),
-`all` every type that can be built; a task names the set it offers. Lengths are edges of a small
-block, masses the game's, forces the weights of a mass (mass·g), angles degrees. Pictures show a
-module standing on its root point: x red, y green, z blue, away from the face it sits on; letters
-name the faces.
+What machines can be made of, from the module files; `make docs` writes this page. The set `basic`
+has the paper's modules, `workshop` those and every further type that is simulated but for what
+tasks must name (`by_name`), `all` every type that can be built; a task names the set it offers.
+Lengths are edges of a small block, masses the game's, forces the weights of a mass (mass·g), angles
+degrees. Pictures show a module standing on its root point: x red, y green, z blue, away from the
+face it sits on; letters name the faces.
 
 Each figure says where it comes from: **known** was read out of the game or measured by its
 publishers, **community** was told or measured by players, **chosen** is our own with its reason,
@@ -56,14 +53,14 @@ publishers, **community** was told or measured by players, **chosen** is our own
 """
 
 
-def files() -> dict[Path, str]:
-    """The guide and its pictures by their paths in the folder of documents."""
+def module_guide() -> dict[str, str]:
+    """The guide and its pictures by their paths among the documents."""
     modules = [module for module in module_set("all").values() if module.kind != "cargo"]
     entries = _entries()
-    made = {PICTURES / f"{_slug(module)}.svg": module_svg(module) for module in modules}
+    made = {_picture(module): module_svg(module) for module in modules}
     sections = [_contents(modules)]
     sections += ["\n".join(_section(module, entries[module.name])) for module in modules]
-    made[Path(GUIDE)] = "\n\n".join([HEAD.strip(), *sections]) + "\n"
+    made[GUIDE] = "\n\n".join([HEAD.strip(), *sections]) + "\n"
     return made
 
 
@@ -78,6 +75,10 @@ def _entries() -> dict[str, Mapping[str, Any]]:
 
 def _slug(module: Module) -> str:
     return module.name.lower().replace(" ", "-")
+
+
+def _picture(module: Module) -> str:
+    return f"{PICTURES}/{_slug(module)}.svg"
 
 
 def _contents(modules: list[Module]) -> str:
@@ -96,7 +97,7 @@ def _contents(modules: list[Module]) -> str:
 
 def _section(module: Module, entry: Mapping[str, Any]) -> Iterator[str]:
     yield f"## {module.name}\n"
-    yield f"![{module.name}]({(PICTURES / _slug(module)).as_posix()}.svg)\n"
+    yield f"![{module.name}]({_picture(module)})\n"
     yield f"{module.description}\n"
     yield "| | |"
     yield "|---|---|"
@@ -171,18 +172,3 @@ def _confidence(origin: str) -> str:
         return origin
     sure = dict.fromkeys(word for word, signs in _SURE if any(sign in origin for sign in signs))
     return f"{', '.join(sure) or 'chosen'}: {origin}"
-
-
-def main(folder: Path) -> None:
-    """Writes the files, and takes away pictures of modules that are gone."""
-    made = files()
-    for old in (folder / PICTURES).glob("*.svg"):
-        if old.relative_to(folder) not in made:
-            old.unlink()
-    for path, text in made.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]))
