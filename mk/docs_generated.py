@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import logging
 import re
+import sys
+from pathlib import Path
 from typing import Any
 
 from docs_modules import module_guide
@@ -15,7 +17,8 @@ from docs_pictures import PICTURES, pictures
 from mkdocs.structure.files import File
 
 LOG = logging.getLogger("mkdocs.hooks.generated")
-PAGES = {"the module guide": "modules.md"}
+TESTS = str(Path(__file__).parents[1] / "tests")
+PAGES = {"the module guide": "modules.md", "what a model sees": "what-a-model-sees.md"}
 """Pages by how documents call them, followed by (`make docs`)."""
 CALLED = re.compile(rf"({'|'.join(PAGES)}) \(`make docs`\)", re.IGNORECASE)
 PICTURE = re.compile(r"^\*Picture \(`make docs`\): (.+)\.\*$", re.MULTILINE)
@@ -23,10 +26,19 @@ PICTURE = re.compile(r"^\*Picture \(`make docs`\): (.+)\.\*$", re.MULTILINE)
 
 def on_files(files: Any, *, config: Any) -> Any:
     """Called by mkdocs with the files that it found."""
-    made = {**module_guide(), **pictures()}
+    made = {**module_guide(), **pictures(), "what-a-model-sees.md": _what_a_model_sees()}
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
     return files
+
+
+def _what_a_model_sees() -> str:
+    """Its sessions are played by the tests' support package."""
+    if TESTS not in sys.path:
+        sys.path.insert(0, TESTS)
+    from support.documents.what_a_model_sees import page
+
+    return page()
 
 
 def on_page_markdown(markdown: str, *, page: Any, **_: object) -> str:

@@ -3,11 +3,6 @@
 bench-tokens: $(STAMP) ## Measures where a session's input tokens go; JSON in .buildarena/
 	@$(TEST_PYTHON) -m benchmarks.tokens.bench_tokens --json .buildarena/bench-tokens.json
 
-.PHONY: what-a-model-sees
-
-what-a-model-sees: $(STAMP) ## Writes docs/what-a-model-sees.md again, after an intended change
-	@$(TEST_PYTHON) -m support.documents.what_a_model_sees
-
 .PHONY: kept-sessions
 
 kept-sessions: $(STAMP) ## Writes tests/data/sessions again, after an intended change of what models read
