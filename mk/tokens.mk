@@ -5,5 +5,5 @@ bench-tokens: $(STAMP) ## Measures where a session's input tokens go; JSON in .b
 
 .PHONY: kept-sessions
 
-kept-sessions: $(STAMP) ## Writes tests/data/sessions again, after an intended change of what models read
+kept-sessions: $(STAMP) ## Writes tests/data/sessions.json again, after an intended change of what models read
 	@$(TEST_PYTHON) -m support.documents.kept_sessions
