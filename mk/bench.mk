@@ -131,23 +131,12 @@ bench-separation: $(STAMP) ## Measures on how many tasks boards tell three model
 bench-tokens: $(STAMP) ## Measures where a session's input tokens go; JSON in .buildarena/
 	@$(TEST_PYTHON) -m benchmarks.tokens.bench_tokens --json .buildarena/bench-tokens.json
 
-.PHONY: what-a-model-sees
-
-what-a-model-sees: $(STAMP) ## Writes docs/what-a-model-sees.md again, after an intended change
-	@$(TEST_PYTHON) -m support.documents.what_a_model_sees
-
 .PHONY: kept-sessions
 
-kept-sessions: $(STAMP) ## Writes tests/data/sessions again, after an intended change of what models read
+kept-sessions: $(STAMP) ## Writes tests/data/sessions.json again, after an intended change of what models read
 	@$(TEST_PYTHON) -m support.documents.kept_sessions
 
-.PHONY: bench-geometry geometry-pictures module-guide
+.PHONY: bench-geometry
 
 bench-geometry: $(STAMP) ## Measures the geometry library; JSON in .buildarena/
 	@$(TEST_PYTHON) -m benchmarks.geometry.bench_geometry --json .buildarena/bench-geometry.json
-
-geometry-pictures: $(STAMP) ## Draws the pictures of the geometry guide again
-	@$(BIN)/python examples/geometry/draw_guide.py docs/geometry
-
-module-guide: $(STAMP) ## Writes docs/modules.md and its pictures again, after a change of the module files
-	@$(BIN)/python examples/geometry/describe_modules.py docs

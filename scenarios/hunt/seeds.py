@@ -15,8 +15,8 @@ from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.builtin.designs.calls import control_of
 
 DATA: Final = Path(__file__).parents[2] / "tests" / "data"
-EXPLOITS: Final = DATA / "exploits"
-_REFERENCES: Final = DATA / "simulation"
+EXPLOITS: Final = DATA / "exploits.json"
+_REFERENCES: Final = DATA / "simulation" / "machines.json"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +24,7 @@ class Exploit:
     """A machine that once earned points without building what is asked for.
 
     Attributes:
-        name: The file's.
+        name: Under which it is stored.
         task: The task it is for.
         once: What it was once worth.
         why: Why that is an exploit.
@@ -43,16 +43,16 @@ class Exploit:
 
     @property
     def machine(self) -> Machine:
-        """The machine, with every action that its file has."""
+        """The machine, with every action that is stored."""
         machine, kept = grown(self.genome, most=sys.maxsize)
         if kept.as_json() != self.genome.as_json():
             raise ValueError(f"{self.name}: not all of its actions are accepted")
         return machine
 
 
-def exploits(folder: Path = EXPLOITS) -> list[Exploit]:
-    """The stored exploits by name."""
-    return [_exploit(path, _content(path)) for path in sorted(folder.glob("*.json"))]
+def exploits(file: Path = EXPLOITS) -> list[Exploit]:
+    """The stored exploits."""
+    return [_exploit(name, content) for name, content in _contents(file).items()]
 
 
 def seeds_of(task_name: str) -> list[Genome]:
@@ -97,25 +97,23 @@ def expert_genome(task_name: str) -> Genome:
 
 
 def _stored() -> Iterator[tuple[str, Genome]]:
-    for path in [*sorted(_REFERENCES.glob("*.json")), *sorted(EXPLOITS.glob("*.json"))]:
-        content = _content(path)
-        if "task" in content:
-            yield content["task"], Genome.from_json(content)
+    for content in [*_contents(_REFERENCES).values(), *_contents(EXPLOITS).values()]:
+        yield content["task"], Genome.from_json(content)
 
 
-def _content(path: Path) -> dict[str, Any]:
-    return dict(json.loads(path.read_text(encoding="utf-8")))
+def _contents(file: Path) -> dict[str, dict[str, Any]]:
+    return dict(json.loads(file.read_text(encoding="utf-8")))
 
 
-def _exploit(path: Path, content: dict[str, Any]) -> Exploit:
+def _exploit(name: str, content: dict[str, Any]) -> Exploit:
     missing = {"task", "once", "why", "seconds", "most", "actions"} - content.keys()
     if missing or content.get("task") not in builtin_tasks():
         raise ValueError(
-            f"{path}: an exploit has a built-in task, once, why, seconds, most and actions; "
+            f"{name}: an exploit has a built-in task, once, why, seconds, most and actions; "
             f"missing or wrong: {', '.join(sorted(missing)) or 'task'}"
         )
     return Exploit(
-        name=path.stem,
+        name=name,
         task=content["task"],
         once=content["once"],
         why=content["why"],

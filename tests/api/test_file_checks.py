@@ -1,18 +1,17 @@
 """Strangers' files are read in a process apart: whatever they hold, others are answered."""
 
-import gzip
 import json
 import os
 import re
 import signal
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from pathlib import Path
 
 import httpx
 import psutil
 import pytest
 from support.clients.tenants import WITH_KEYS
+from support.machine_files import published_files
 from support.machines.building import BLOCK, built
 from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
@@ -22,7 +21,6 @@ from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_api.machine_uploads import UploadChecker, read_upload, shared_checker
 from buildarena_simulation.constants import MAX_PARTS
 
-BSG = Path(__file__).parents[1] / "data" / "besiege" / "bsg"
 SPARE = 200 << 20
 SPREAD = 3.0
 """Units between blocks, so that none overlap."""
@@ -39,7 +37,7 @@ def place(number: int) -> tuple[float, float, float]:
 
 def starting_blocks(count: int = MAX_PARTS - 10) -> bytes:
     """A file of the game with nothing but starting blocks, each at a place of its own."""
-    text = gzip.decompress((BSG / "single_1_support_hard.bsg.gz").read_bytes()).decode("utf-8-sig")
+    text = published_files()["single_1_support_hard"].decode("utf-8-sig")
     blocks = re.findall(r"<Block .*?</Block>", text, re.DOTALL)
     start = next(block for block in blocks if 'id="0"' in block)
     made = []

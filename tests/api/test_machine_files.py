@@ -1,19 +1,17 @@
 """Machines that come as files: looked at, checked, tried; hostile ones refused in words."""
 
-import gzip
 import json
 import zlib
-from pathlib import Path
 
 import pytest
 from support.clients.tenants import new_tenant
+from support.machine_files import published_files
 from support.machines.building import BLOCK, built
 
 from buildarena_api.machine_uploads import MAX_BYTES
 from buildarena_geometry import Machine
 from buildarena_store.jobs import files
 
-BSG = Path(__file__).parents[1] / "data" / "besiege" / "bsg"
 TRIAL = {"task": "support-1", "simulator": "mujoco"}
 
 
@@ -48,7 +46,7 @@ def test_a_document_is_looked_at(api) -> None:
 
 
 def test_a_file_of_the_game_is_looked_at(api) -> None:
-    data = gzip.decompress((BSG / "single_1_support_hard.bsg.gz").read_bytes())
+    data = published_files()["single_1_support_hard"]
     seen = check(api, data).json()
     assert seen["parts"] > 3
     assert len(seen["scene"]["blocks"]) + len(seen["scene"]["connectors"]) == seen["parts"]

@@ -7,10 +7,9 @@ import time
 import traceback
 from collections import Counter
 
-from tests.besiege.golden import golden_file
+from support.machine_files import RICH, published_files
 from tests.besiege.hostile import mutated, rearranged
 from tests.besiege.playing import press, vehicle
-from tests.besiege.real_files import RICH
 from tests.besiege.round_trips import round_trip
 
 from buildarena_benchmark import builtin_tasks
@@ -26,7 +25,7 @@ def _trial(task: str) -> bytes:
 
 
 SAMPLES = [
-    golden_file("single_5_transport_medium"),
+    published_files()["single_5_transport_medium"],
     plain_machine_file(vehicle(cannon=True), name="m", controls=[press(1.0, "UpArrow", 1.0)]),
     _trial("transport-2"),
     _trial("lift-2"),

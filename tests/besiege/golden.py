@@ -76,14 +76,6 @@ def task_of(export: dict[str, Any]) -> str:
     return f"{export['category']}-{LEVELS.index(export['level']) + 1}"
 
 
-def golden_file(name: str) -> bytes:
-    return gzip.decompress((DATA / "besiege" / "bsg" / f"{name}.bsg.gz").read_bytes())
-
-
-def golden_files() -> list[str]:
-    return sorted(path.name[:-7] for path in (DATA / "besiege" / "bsg").glob("*.bsg.gz"))
-
-
 @cache
 def _states() -> dict[str, Any]:
     """By machine, the states of the geometry vectors that were exported, without the rest."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from support.lua_game import LuaGame
-from tests.besiege.golden import golden_file
+from support.machine_files import published_files
 from tests.besiege.playing import vehicle
 from tests.besiege.published_logs import copies
 from tests.besiege.test_published_logs import DRIVE_ROWS
@@ -98,7 +98,7 @@ def test_wrong_words_are_named(machine, tmp_path, monkeypatch, words, says) -> N
 
 def test_machine_files_are_read_wherever_machines_are(tmp_path) -> None:
     file = tmp_path / "published.bsg"
-    file.write_bytes(golden_file("single_1_plain_none"))
+    file.write_bytes(published_files()["single_1_plain_none"])
     done = run("machine", "check", file)
     assert (done.exit_code, "25 parts" in done.stdout) == (1, True)
     assert "the Lua script is not ours" in done.stderr

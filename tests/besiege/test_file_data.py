@@ -4,10 +4,10 @@ import json
 from xml.etree import ElementTree as ET
 
 import pytest
+from support.machine_files import RICH, published_files
 from support.machines.building import attach
 from tests.besiege.foreign_files import block, foreign
 from tests.besiege.playing import act, vehicle
-from tests.besiege.real_files import RICH, stored_files
 from tests.besiege.round_trips import blocks, entries, lost, round_trip, said
 
 from buildarena_benchmark import builtin_tasks
@@ -30,9 +30,9 @@ def keys(file: bytes, number: int, name: str) -> list[str | None]:
     return [child.text for child in entry]
 
 
-@pytest.mark.parametrize("file", stored_files())
+@pytest.mark.parametrize("file", published_files())
 def test_files_at_hand_go_round_without_a_loss(file) -> None:
-    assert round_trip(stored_files()[file])
+    assert round_trip(published_files()[file])
 
 
 def test_a_file_of_a_person_goes_round_without_a_loss() -> None:

@@ -7,8 +7,9 @@ import uuid
 
 import numpy as np
 import pytest
+from support.machine_files import published_files
 from tests.besiege.foreign_files import block, foreign
-from tests.besiege.golden import golden, golden_file, golden_files, goldens, scenario_of
+from tests.besiege.golden import golden, goldens, scenario_of
 from tests.besiege.playing import act, press, vehicle
 
 from buildarena_benchmark import builtin_tasks
@@ -137,9 +138,9 @@ def near(place, block) -> bool:
     return all(abs(a - b) < 1e-3 for a, b in zip(place, block.world_from_block.xyz, strict=True))
 
 
-@pytest.mark.parametrize("name", golden_files())
+@pytest.mark.parametrize("name", published_files())
 def test_published_files_are_read(name) -> None:
-    imported = read_machine_file(golden_file(name))
+    imported = read_machine_file(published_files()[name])
     found = next(one for one in goldens() if one.name == "-".join(name.split("_")[:2]))
     _, _, category, level = name.split("_")
     export = next(

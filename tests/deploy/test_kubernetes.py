@@ -30,13 +30,8 @@ from buildarena_pipeline.runtime.settings import ARTIFACT_CREDENTIALS, SECRETS, 
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
 from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
-DATA = Path(__file__).parents[1] / "data"
-SCHEMAS = {
-    "ScaledObject": "keda-scaledobject",
-    "PodMonitor": "podmonitor",
-    "HTTPRoute": "httproute",
-}
-"""Kinds that are not Kubernetes' own, with the schema of each."""
+SCHEMAS = json.loads((Path(__file__).parents[1] / "data/kubernetes-schemas.json").read_text())
+"""Schemas of kinds that are not Kubernetes' own."""
 MAINTENANCE = {
     "backup": ["backup", "$(BACKUPS)"],
     "gc": ["artifacts", "gc"],
@@ -62,8 +57,7 @@ def each_overlay(test):
 def check(document: dict) -> None:
     """Validates a document against Kubernetes' own schemas, or those of what extends it."""
     if document["kind"] in SCHEMAS:
-        schema = json.loads((DATA / f"{SCHEMAS[document['kind']]}.schema.json").read_text())
-        jsonschema.Draft202012Validator(schema).validate(document)
+        jsonschema.Draft202012Validator(SCHEMAS[document["kind"]]).validate(document)
         return
     for version in VERSIONS:
         kubernetes_validate.validate(document, version, strict=True)

@@ -8,7 +8,7 @@ import av
 import pytest
 from PIL import Image
 from support.machines.families import beam
-from support.machines.references import DATA, actions_of, load_machine
+from support.machines.references import actions_of, content_of, load_machine
 from typer.testing import CliRunner
 
 from buildarena_cli.commands.machine import app
@@ -43,8 +43,20 @@ def run(tmp_path: Path):
     return call
 
 
-def test_json_tells_the_score_and_nothing_else(run) -> None:
-    done = run("simulate", str(DATA / "beam.json"), "--engine", "mujoco", "--json")
+@pytest.fixture
+def stored(tmp_path: Path):
+    """Writes a stored machine to a file of its own; its name."""
+
+    def write(name: str) -> str:
+        file = tmp_path / f"{name}.json"
+        file.write_text(json.dumps(content_of(name)), encoding="utf-8")
+        return str(file)
+
+    return write
+
+
+def test_json_tells_the_score_and_nothing_else(run, stored) -> None:
+    done = run("simulate", stored("beam"), "--engine", "mujoco", "--json")
     assert done.exit_code == 0, done.output
     report = json.loads(done.stdout)
     assert (report["task"], report["engine"], report["success"]) == ("short-bridge", "mujoco", True)
@@ -68,9 +80,9 @@ def test_a_document_a_log_and_a_bare_list_are_the_same_machine(run, tmp_path) ->
 
 
 @pytest.mark.parametrize("kind", ["png", "gif", "mp4"])
-def test_a_film_shows_the_trial(run, tmp_path, kind) -> None:
+def test_a_film_shows_the_trial(run, stored, tmp_path, kind) -> None:
     video, data = tmp_path / f"film.{kind}", tmp_path / "beam.parquet"
-    file = str(DATA / "beam.json")
+    file = stored("beam")
     done = run("simulate", file, "--engine", "mujoco", "--trajectory", str(data))
     assert done.exit_code == 0, done.output
     assert len(read_trajectory(data.read_bytes()).time_s) == 26
@@ -90,13 +102,13 @@ def test_a_film_shows_the_trial(run, tmp_path, kind) -> None:
     assert len(colors) > 8
 
 
-def test_a_seed_varies_the_start(run, tmp_path) -> None:
+def test_a_seed_varies_the_start(run, stored, tmp_path) -> None:
     starts = []
     for more in ([], ["--seed", "1"], ["--seed", "2"]):
         data = tmp_path / "shifted.parquet"
         run(
             "simulate",
-            str(DATA / "beam.json"),
+            stored("beam"),
             "--engine",
             "mujoco",
             "--trajectory",
@@ -110,22 +122,22 @@ def test_a_seed_varies_the_start(run, tmp_path) -> None:
 
 
 @pytest.mark.ci
-def test_seeds_tell_how_often_a_machine_succeeds(run) -> None:
-    given = ("simulate", str(DATA / "beam-braced-on-top.json"), "--engine", "mujoco")
+def test_seeds_tell_how_often_a_machine_succeeds(run, stored) -> None:
+    given = ("simulate", stored("beam-braced-on-top"), "--engine", "mujoco")
     done = run(*given, "--seeds", "3", "--json", task_name="support-1")
     found = json.loads(done.stdout)
     assert (found["trials"], found["successes"], found["robustness"]) == (3, 3, 1.0)
     loads = [result["indicator"] for result in found["results"]]
     assert len(set(loads)) > 1
     assert max(loads) < 1.3 * min(loads)
-    short = str(DATA / "beam-too-short.json")
+    short = stored("beam-too-short")
     done = run("simulate", short, "--engine", "mujoco", "--seeds", "2", task_name="support-2")
     assert "0 of 2 succeed" in done.output
     assert "failed seeds" in done.output
 
 
-def test_seeds_and_a_single_trials_options_exclude_each_other(run) -> None:
-    done = run("simulate", str(DATA / "beam.json"), "--seeds", "3", "--seed", "1")
+def test_seeds_and_a_single_trials_options_exclude_each_other(run, stored) -> None:
+    done = run("simulate", stored("beam"), "--seeds", "3", "--seed", "1")
     assert done.exit_code == 1
     assert "--seed" in done.output
 
@@ -158,8 +170,8 @@ def test_bad_input_is_reported_in_one_line(run, tmp_path, content, arguments, re
     assert "Traceback" not in done.output
 
 
-def test_an_unknown_task_is_reported_with_the_known_ones(run) -> None:
-    done = run("simulate", str(DATA / "beam.json"), task_name="support-9")
+def test_an_unknown_task_is_reported_with_the_known_ones(run, stored) -> None:
+    done = run("simulate", stored("beam"), task_name="support-9")
     assert done.exit_code == 1
     assert "support-3" in done.output
 
@@ -182,11 +194,11 @@ def test_a_machine_that_breaks_a_constraint_is_not_simulated(run, tmp_path, form
     assert checked.exit_code == 1
 
 
-def test_an_assembly_with_too_few_sub_structures_is_not_simulated(run) -> None:
-    done = run("simulate", str(DATA / "rocket-two.json"), "--json", task_name="lift-3")
+def test_an_assembly_with_too_few_sub_structures_is_not_simulated(run, stored) -> None:
+    done = run("simulate", stored("rocket-two"), "--json", task_name="lift-3")
     assert "the machine has 1 sub-structure, the task asks for 2" in done.stderr
     assert json.loads(done.stdout)["success"] is False
-    fine = run("check", str(DATA / "assembly-braced.json"), task_name="lift-3")
+    fine = run("check", stored("assembly-braced"), task_name="lift-3")
     assert fine.exit_code == 0, fine.output
 
 

@@ -8,13 +8,12 @@ from typing import Any
 
 import pytest
 from support.documents.kept_sessions import (
-    FOLDER,
-    NAMES,
     SCRIPTED,
+    SESSIONS,
     described,
     digest_of,
-    kept_session,
     played_again,
+    transcript_of,
 )
 
 from buildarena_store import JournalEntry, Usage
@@ -26,9 +25,9 @@ def entry(data: dict[str, Any]) -> JournalEntry:
 
 
 @pytest.mark.parametrize("resumed", [False, True], ids=["verified", "resumed"])
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SESSIONS)
 def test_a_kept_session_replays_to_the_same_bytes(play, name, resumed) -> None:
-    kept = kept_session(name)
+    kept = SESSIONS[name]
     entries = [entry(data) for data in kept["journal"]]
     # A resumed session has a model to ask, and asks it only for what the journal lacks.
     offline = not resumed
@@ -39,12 +38,11 @@ def test_a_kept_session_replays_to_the_same_bytes(play, name, resumed) -> None:
     if resumed:
         # Those that kept them kept no prompts.
         assert [replace(entry, told=None) for entry in played.entries] == entries
-    transcript = (FOLDER / f"{name}.transcript.json").read_bytes()
-    assert played.session.transcript.to_json() == transcript
+    assert played.session.transcript.to_json() == transcript_of(kept)
     assert played.session.transcript.refusals == kept["refusals"]
     assert digest_of(played) == kept["machine"]
 
 
 def test_the_kept_sessions_end_in_every_way() -> None:
-    kinds = {kept_session(name)["result"]["kind"] for name in NAMES}
+    kinds = {kept["result"]["kind"] for kept in SESSIONS.values()}
     assert kinds == {"Finished", "Suspended", "Failed", "LimitReached"}

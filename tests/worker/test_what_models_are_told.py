@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
-from support.documents.what_a_model_sees import PAGE, page
 from support.providers.scripted import Recording
 
 from buildarena_benchmark import builtin_tasks
@@ -310,7 +309,3 @@ def test_before_a_success_nothing_is_kept(play) -> None:
     )
     played = play(task="transport-1", client=model)
     assert played.failure.reason == "control_invalid"
-
-
-def test_the_page_of_what_models_see_is_as_sessions_are_now() -> None:
-    assert page() == PAGE.read_text(encoding="utf-8"), "run `make what-a-model-sees` and look at it"

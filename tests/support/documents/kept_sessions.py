@@ -1,4 +1,4 @@
-"""Plays the kept sessions of tests/data/sessions again and writes what they read now.
+"""Plays the kept sessions of tests/data/sessions.json again and writes what they read now.
 
 Run it after an intended change of prompts, tools or answers: `make kept-sessions`. Built-in models
 are asked again; other replies are those that were kept.
@@ -15,20 +15,21 @@ from support.player import Played, Player
 from support.providers.scripted import Scripted
 
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_store import RolloutRecord
+from buildarena_store import JournalEntry, RolloutRecord
 from buildarena_worker.session.messages import Completion, ToolCall
 from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
 from buildarena_worker.workflow.rounds import Loop
 
-FOLDER = Path(__file__).parents[2] / "data/sessions"
+FILE = Path(__file__).parents[2] / "data/sessions.json"
 SCRIPTED = "scripted-failures"
-NAMES = sorted(p.stem for p in FOLDER.glob("*.json") if not p.stem.endswith(".transcript"))
+SESSIONS: dict[str, dict[str, Any]] = json.loads(FILE.read_text(encoding="utf-8"))
+"""What was kept of each session, by its name."""
 
 
-def kept_session(name: str) -> dict[str, Any]:
-    """What was kept of a session."""
-    kept: dict[str, Any] = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
-    return kept
+def transcript_of(kept: dict[str, Any]) -> bytes:
+    """The transcript that was kept, in the form in which transcripts are stored."""
+    text = json.dumps(kept["transcript"], ensure_ascii=False, separators=(",", ":"))
+    return text.encode()
 
 
 def rollout(data: dict[str, Any]) -> RolloutRecord:
@@ -76,23 +77,27 @@ def completion(reply: dict[str, Any]) -> Completion:
     return Completion(text=reply["text"], calls=calls, finish=reply["finish"])
 
 
+def _kept(entry: JournalEntry) -> dict[str, Any]:
+    """An entry without what the role was told, which playing it again makes anew."""
+    fields = json.loads(json.dumps(asdict(entry), default=str))
+    return {name: value for name, value in fields.items() if name != "told"}
+
+
 def main() -> None:
-    """Plays each from its beginning, and writes it."""
-    for name in NAMES:
-        kept = kept_session(name)
+    """Plays each from its beginning, and writes them."""
+    for name, kept in SESSIONS.items():
         scripted = name == SCRIPTED
         client = Scripted(*(completion(e["reply"]) for e in kept["journal"])) if scripted else None
         played = played_again(Player(), kept, client=client)
         transcript = played.session.transcript
-        kept |= {
+        SESSIONS[name] = kept | {
             "result": described(played.result),
             "machine": digest_of(played),
             "refusals": transcript.refusals,
-            "journal": [json.loads(json.dumps(asdict(e), default=str)) for e in played.entries],
+            "journal": [_kept(entry) for entry in played.entries],
+            "transcript": json.loads(transcript.to_json()),
         }
-        text = json.dumps(kept, indent=1, ensure_ascii=False) + "\n"
-        (FOLDER / f"{name}.json").write_text(text, encoding="utf-8")
-        (FOLDER / f"{name}.transcript.json").write_bytes(transcript.to_json())
+    FILE.write_text(json.dumps(SESSIONS, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

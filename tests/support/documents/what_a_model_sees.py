@@ -1,7 +1,6 @@
-"""Writes docs/what-a-model-sees.md: one whole session of each category, as its roles read it.
+"""The page of what models see: one whole session of each category, as its roles read it.
 
-Run by `make what-a-model-sees` after an intended change of prompts, statements or answers; a test
-compares the file with what sessions say now.
+`make docs` adds it to the site as what-a-model-sees.md.
 """
 
 import re
@@ -9,8 +8,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from datetime import UTC, datetime
+from functools import cache
 from itertools import groupby
-from pathlib import Path
 
 from support.player import Player
 from support.providers.scripted import Recording
@@ -25,7 +24,6 @@ from buildarena_worker.builtin import CHARACTERS_PER_TOKEN
 from buildarena_worker.session.messages import Message, Request
 from buildarena_worker.workflow.rounds import Loop
 
-PAGE = Path(__file__).parents[3] / "docs" / "what-a-model-sees.md"
 SESSIONS = (
     ("support-1", 0),
     ("transport-1", 2),
@@ -48,7 +46,7 @@ HEAD = """# What a model sees
 A session of each category in the default workflow, played by `builtin/expert`, with what each role
 reads: its system message, what it reads first, and then what is new in each request. Replies are
 indented. The expert's solutions are left out: of what it says, and of what is read of it later, a
-beginning stands here. `make what-a-model-sees` writes this page.
+beginning stands here. `make docs` writes this page.
 """
 TREES_HEAD = """## Construction trees
 
@@ -78,6 +76,7 @@ LISTED = re.compile(r"^\s*(- )?\d+\.? \S")
 """A step of a draft, or a block of a machine."""
 
 
+@cache
 def page() -> str:
     """The whole page."""
     parts = [HEAD.format(canary=CANARY)]
@@ -231,7 +230,3 @@ def _rollout(number: int) -> RolloutRecord:
         created_at=now,
         finished_at=now,
     )
-
-
-if __name__ == "__main__":
-    PAGE.write_text(page(), encoding="utf-8")

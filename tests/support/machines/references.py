@@ -18,6 +18,7 @@ from buildarena_simulation import ENGINES, simulate
 
 DATA: Final = Path(__file__).parents[2] / "data" / "simulation"
 GOLDENS: Final = DATA / "goldens.json"
+RULE_BREAKERS: Final = "rule-breakers"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -29,13 +30,18 @@ class Reference:
 
 
 def actions_of(name: str) -> list[dict[str, Any]]:
-    """The action log in a machine's file."""
-    return list(_content(name)["actions"])
+    """The action log of a machine."""
+    return list(content_of(name)["actions"])
+
+
+def content_of(name: str) -> dict[str, Any]:
+    """A stored machine: its task, sub-structures and actions."""
+    return dict(_CONTENTS[name])
 
 
 def load_machine(name: str) -> Machine:
-    """A machine from its file, whose name has a folder where it breaks a rule."""
-    content = _content(name)
+    """A stored machine, whose name begins with `rule-breakers/` where it breaks a rule."""
+    content = _CONTENTS[name]
     parts = {key: _replayed(log, {}) for key, log in content.get("sub_structures", {}).items()}
     return _replayed(content["actions"], parts)
 
@@ -54,10 +60,6 @@ def outcome(name: str, engine: str) -> dict[str, Any]:
     }
 
 
-def _content(name: str) -> dict[str, Any]:
-    return dict(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8")))
-
-
 def _replayed(actions: list[dict[str, Any]], parts: Mapping[str, Machine]) -> Machine:
     machine = Machine(available=parts) if parts else Machine()
     for action in actions:
@@ -67,16 +69,20 @@ def _replayed(actions: list[dict[str, Any]], parts: Mapping[str, Machine]) -> Ma
     return machine
 
 
-def _references() -> dict[str, Reference]:
-    names = sorted(file.stem for file in DATA.glob("*.json") if file != GOLDENS)
-    contents = {name: _content(name) for name in names}
-    return {
+def _stored(kind: str) -> dict[str, dict[str, Any]]:
+    return dict(json.loads((DATA / f"{kind}.json").read_text(encoding="utf-8")))
+
+
+_MACHINES: Final = _stored("machines")
+_CONTENTS: Final = _MACHINES | {
+    f"{RULE_BREAKERS}/{name}": content for name, content in _stored(RULE_BREAKERS).items()
+}
+REFERENCES: Final[Mapping[str, Reference]] = MappingProxyType(
+    {
         name: Reference(task=content["task"], quality=content["quality"])
-        for name, content in contents.items()
+        for name, content in sorted(_MACHINES.items())
     }
-
-
-REFERENCES: Final[Mapping[str, Reference]] = MappingProxyType(_references())
+)
 
 
 def _write() -> None:

@@ -20,7 +20,7 @@ from buildarena_simworker_besiege.calibrate import TRIAL_S
 HERE = Path(__file__).parent
 SUPPORT = os.pathsep.join([str(HERE), str(HERE.parents[3] / "tests")])
 """What programs of these tests import from."""
-GAMES = HERE.parent / "games"
+GAMES = HERE.parent / "games.zip"
 """What the stand-in says of each run; `record_games` writes it."""
 TRIALS = {
     "transport-1": {"duration_s": 5.0},

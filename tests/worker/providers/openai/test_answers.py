@@ -14,7 +14,7 @@ import pytest
 from buildarena_worker.providers.failures import ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
 
-KEPT = json.loads((Path(__file__).parents[3] / "data/openai/answers.json").read_text())
+KEPT = json.loads((Path(__file__).parents[3] / "data/openai.json").read_text())["answers"]
 URL = "http://127.0.0.1:1/v1"
 READERS = {url: AnswerReader(url) for url in {case.get("url", URL) for case in KEPT}}
 

@@ -16,7 +16,8 @@ from buildarena_worker.session.messages import Message, Request, ToolCall
 from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT
 from buildarena_worker.workflow.machine_tools import ASSEMBLE, BUILD, QUERIES, REFINE, tools_named
 
-KEPT = json.loads((Path(__file__).parents[3] / "data/openai/requests.json").read_text())
+STORED = json.loads((Path(__file__).parents[3] / "data/openai.json").read_text())
+KEPT = STORED["requests"]
 CALL = ToolCall(id="c1", name="start", arguments={"block": "Wüfel", "n": 1.5})
 TALK = [
     Message(role="system", text="Build."),
@@ -114,7 +115,7 @@ def test_requests_carry_what_kept_ones_carried(case) -> None:
 
 
 def test_schemas_are_written_as_kept_ones_were() -> None:
-    for case in json.loads((Path(__file__).parents[3] / "data/openai/schemas.json").read_text()):
+    for case in STORED["schemas"]:
         tool = ToolDefinition(name="t", description="d", parameters=case["given"])
         function = function_tool(tool)["function"]
         found = {"sent": function["parameters"], "strict": function.get("strict", False)}

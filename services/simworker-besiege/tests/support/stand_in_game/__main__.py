@@ -1,4 +1,4 @@
-"""Starts the stand-in game: `python -m stand_in_game --machines DIR --games DIR`."""
+"""Starts the stand-in game: `python -m stand_in_game --machines DIR --games FILE`."""
 
 import argparse
 import ctypes
@@ -56,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="stand_in_game", description=__doc__)
     add = parser.add_argument
     add("--machines", type=Path, default=Path(), metavar="DIR", help="the SavedMachines folder")
-    add("--games", type=Path, required=True, metavar="DIR", help="the golden logs")
+    add("--games", type=Path, required=True, metavar="FILE", help="the golden logs, a ZIP file")
     add("--level", metavar="FILE", help="a level (.blv); else the flat sandbox")
     add("--title-screen", action="store_true", help="begin there: two clicks lead to the level")
     add("--speed", type=float, default=1.0, help="game time over the wall clock")

@@ -4,8 +4,8 @@ A golden log has each line once, without the run's mark in front and the check s
 a game without a window stand below them.
 """
 
-import gzip
 import re
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -81,12 +81,13 @@ def read_run(path: Path, games: Path) -> Run:
         raise GameFileError(f"could not load {path.stem}: {error}") from error
     script = next((e.text for e in root.iter() if e.text and "local prefix" in e.text), "")
     mark, begin = _text(script, "prefix"), _text(script, "begin")
-    for file in sorted(games.glob("*.log.gz")):
-        first, *rest = gzip.decompress(file.read_bytes()).decode().splitlines()
-        if first == f"b,{begin}":
-            states = tuple(line for line in rest if line.startswith("GameStat:"))
-            lines = [line for line in rest if not line.startswith("GameStat:")]
-            return _run(mark, [first, *lines], states, _probes(script))
+    with zipfile.ZipFile(games) as archive:
+        for name in archive.namelist():
+            first, *rest = archive.read(name).decode().splitlines()
+            if first == f"b,{begin}":
+                states = tuple(line for line in rest if line.startswith("GameStat:"))
+                lines = [line for line in rest if not line.startswith("GameStat:")]
+                return _run(mark, [first, *lines], states, _probes(script))
     raise GameFileError(f"no game was recorded of {path.stem}, whose log begins with {begin!r}")
 
 
