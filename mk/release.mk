@@ -18,7 +18,7 @@ release: $(STAMP) ## Makes a release of what is committed: make release V=1.2.0
 .PHONY: docs
 
 docs: $(VENV)/.docs ## The documents as a site in .buildarena/docs, links checked
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --clean
+	@NO_MKDOCS_2_WARNING=1 PYTHONPATH=$(CURDIR):$(CURDIR)/tests $(BIN)/mkdocs build --quiet --clean
 
 $(VENV)/.docs: $(STAMP)
 	@bash mk/install_tool.sh $(BIN)/python mkdocs-material

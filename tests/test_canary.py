@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from support.documents.what_a_model_sees import BEGINNING, LISTED
 from support.documents.what_a_model_sees import page as what_a_model_sees
+from support.machines import drive_machines
 
 from buildarena_benchmark import CANARY, builtin_tasks
 from buildarena_pipeline.agents.briefing import briefing
@@ -18,7 +19,6 @@ SOURCES = [
     *sorted((ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/catalogue").glob("*.yaml")),
     *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").glob("*.py")),
     *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").rglob("*.lua")),
-    ROOT / "integrations/gymnasium/src/buildarena_gymnasium/machines.json",
     ROOT / "docs/expert.md",
 ]
 MAX_TOLD = 0.5
@@ -37,6 +37,10 @@ STEP = re.compile(r"^\W*(\d+\. )?(attach_block_to|connect_blocks)\b")
 def test_statements_and_solutions_have_the_canary(source) -> None:
     assert len(SOURCES) > len(builtin_tasks())
     assert NUMBER in source.read_text(encoding="utf-8")
+
+
+def test_machines_that_are_driven_have_the_canary() -> None:
+    assert NUMBER in drive_machines.written()
 
 
 @pytest.mark.parametrize("task", builtin_tasks().values(), ids=lambda task: task.name)
