@@ -69,31 +69,11 @@ test-ci: web-if-it-can-be check-integrations
 	@$(RUN_TESTS) -m "ci and not nightly"
 	@bash mk/integrations.sh test "not nightly" $(INTEGRATIONS)
 
-test-nightly: $(WEB_STAMP) $(HUNTING) check-integrations ## Both engines and every variant, adapters whole, attack, hunt, soak, containers; 90 min
+test-nightly: $(WEB_STAMP) check-integrations ## Both engines and every variant, adapters whole, attack, hunt, soak, containers; 90 min
 	@bash mk/nightly.sh $(INTEGRATIONS)
 
 test-durations: $(STAMP) ## The tests of make test, and which 30 took longest
 	@$(RUN_TESTS) -m "$(UNMARKED)" --durations 30 --durations-min 1
-
-# Types of Python and of the dashboard are each the work of one processor, side by side.
-check: $(STAMP) ## Format, lint, types and import rules; the dashboard's where it has changed, and in CI
-	@$(MAKE) --no-print-directory -j2 --output-sync=target check-python check-web-if-changed
-
-check-python: $(SCHEMAS)
-	@echo "== format"
-	@$(BIN)/ruff format --check --quiet $(CODE)
-	@echo "== lint"
-	@$(BIN)/ruff check --quiet $(CODE)
-	@echo "== types"
-	@$(BIN)/mypy --no-error-summary $(SOURCES)
-	@echo "== import rules"
-	@set -o pipefail; $(BIN)/lint-imports | tail -n 3
-
-check-web-if-changed: $(STAMP)
-	@if [ -n "$$CI" ] || bash mk/web_changed.sh; then $(MAKE) --no-print-directory check-web; fi
-
-clean: ## Removes the environment, caches and local data
-	rm -rf $(VENV) $(VENV)-uv build .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # -- What is made of the API's own description: the clients' types -----------------------------
 CONTRACT := build/openapi.json
@@ -114,6 +94,26 @@ $(SCHEMAS): $(CONTRACT) clients/python/hatch_build.py
 	@$(BIN)/python clients/python/hatch_build.py
 
 install: $(SCHEMAS)
+
+# Types of Python and of the dashboard are each the work of one processor, side by side.
+check: $(STAMP) ## Format, lint, types and import rules; the dashboard's where it has changed, and in CI
+	@$(MAKE) --no-print-directory -j2 --output-sync=target check-python check-web-if-changed
+
+check-python: $(SCHEMAS)
+	@echo "== format"
+	@$(BIN)/ruff format --check --quiet $(CODE)
+	@echo "== lint"
+	@$(BIN)/ruff check --quiet $(CODE)
+	@echo "== types"
+	@$(BIN)/mypy --no-error-summary $(SOURCES)
+	@echo "== import rules"
+	@set -o pipefail; $(BIN)/lint-imports | tail -n 3
+
+check-web-if-changed: $(STAMP)
+	@if [ -n "$$CI" ] || bash mk/web_changed.sh; then $(MAKE) --no-print-directory check-web; fi
+
+clean: ## Removes the environment, caches and local data
+	rm -rf $(VENV) $(VENV)-uv build .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis
 
 # -- Locks -------------------------------------------------------------------------------------
 # Who asks for what stands in the lock: mk/locked.py takes from it what one of them needs.

@@ -58,6 +58,8 @@ HUNTING := $(VENV)/.hunting
 hunt: $(HUNTING) ## Searches for machines that score without building what is asked; MINUTES=60
 	@OMP_NUM_THREADS=1 $(TEST_PYTHON) -m scenarios.hunt.run --minutes $(MINUTES) --seed $(HUNT_SEED)
 
+test-nightly: $(HUNTING)
+
 # The search's library brings 80 MB along, which nobody needs who does not hunt.
 $(HUNTING): $(STAMP)
 	@bash mk/install_tool.sh $(BIN)/python ribs
