@@ -109,7 +109,7 @@ check-python: $(SCHEMAS)
 	@echo "== import rules"
 	@set -o pipefail; $(BIN)/lint-imports | tail -n 3
 
-check-web-if-changed: $(STAMP)
+check-web-if-changed: $(CONTRACT)
 	@if [ -n "$$CI" ] || bash mk/web_changed.sh; then $(MAKE) --no-print-directory check-web; fi
 
 clean: ## Removes the environment, caches and local data

@@ -92,11 +92,13 @@ def heading_of(version: Version) -> str | None:
 
 
 def build(version: Version) -> None:
-    """Wheels, sdists, images, what a host needs, and the site, with their hashes."""
+    """Wheels, sdists, images, the contract, what a host needs, and the site, with their hashes."""
     shutil.rmtree(OUT, ignore_errors=True)
     make("dist")
     make("images")
     make("docs")
+    make("openapi")
+    shutil.copy(ROOT / "build/openapi.json", OUT / f"buildarena-openapi-{version}.json")
     name = OUT / f"buildarena-deploy-{version}"
     git("archive", f"--prefix={name.name}/", "--output", f"{name}.tar.gz", "HEAD", *DEPLOYED)
     site = OUT / f"buildarena-docs-{version}"

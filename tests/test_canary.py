@@ -122,6 +122,7 @@ def longest_passage(text: str, form: re.Pattern[str]) -> int:
     return max(counts)
 
 
+@pytest.mark.ci
 def test_machines_in_what_models_read_are_cut_short(solutions) -> None:
     page = what_a_model_sees()
     assert NUMBER in page

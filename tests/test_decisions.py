@@ -6,7 +6,7 @@ from pathlib import Path
 FOLDER = Path(__file__).parents[1] / "docs" / "decisions"
 HEAD = re.compile(
     r"# (?P<title>(?P<number>\d+)\. .+)\n\nDate: (?P<date>\d{4}-\d\d-\d\d) · "
-    r"Status: (accepted|superseded by \[.+\]\(.+\.md\))\n\n"
+    r"Status: (accepted(?:, replaces .+)?|superseded by \[.+\]\(.+\.md\))\n\n"
 )
 
 

@@ -143,6 +143,7 @@ def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
         assert client.get("/v1/health").status_code == 200, "probes are not counted"
 
 
+@pytest.mark.ci
 def test_guessing_keys_is_limited(context) -> None:
     changes = {**WITH_KEYS, "rate_limit": "3/minute"}
     with changed(context, **changes) as own, api_client(own) as client:

@@ -87,6 +87,7 @@ def test_who_has_no_good_key_is_answered_before_the_body_comes(url, secret) -> N
     assert httpx.get(f"{url}/v1/health").status_code in {200, 503}
 
 
+@pytest.mark.ci
 def test_a_body_that_stalls_is_given_up(url, context) -> None:
     _, secret = context.store.keys.create(name="slow", scopes=["submit"])
     with begin(url, secret) as connection:
@@ -95,6 +96,7 @@ def test_a_body_that_stalls_is_given_up(url, context) -> None:
         assert status_of(connection) == 408
 
 
+@pytest.mark.ci
 def test_requests_of_runners_are_small(url, context) -> None:
     _, secret = context.store.keys.create(name="r", scopes=["runner"], simulators=["mujoco"])
     with begin(url, secret, length=2 * MIB, path="/v1/runner/heartbeat") as connection:

@@ -58,6 +58,7 @@ def test_the_api_works_below_a_path(below) -> None:
         assert client.get(f"{below}/v1/nothing").status_code == 404
 
 
+@pytest.mark.ci
 def test_the_contract_and_its_page_name_the_path(below) -> None:
     contract = httpx.get(f"{below}/openapi.json").json()
     assert contract["servers"] == [{"url": BASE}]

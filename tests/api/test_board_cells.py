@@ -218,6 +218,7 @@ def process(context):
         yield start
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("seed", range(4))
 def test_boards_equal_boards_made_from_every_job(context, process, seed) -> None:

@@ -29,7 +29,7 @@ def service(context, submissions) -> Iterator[str]:
         yield url
 
 
-@pytest.mark.nightly(keep=6)
+@pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: f"{way[0].label}-{way[1].value}")
 def test_every_answer_is_a_documented_one(service, way) -> None:
     def prepare(case) -> None:

@@ -71,6 +71,7 @@ def test_too_large_a_file_is_refused_while_it_comes(api, monkeypatch) -> None:
     assert api.post(PATH, content=packed("doctor")).status_code == 413
 
 
+@pytest.mark.ci
 def test_admins_send_and_every_key_reads(context) -> None:
     settings = context.settings.model_copy(update=WITH_KEYS)
     with TestClient(create_app(replace(context, settings=settings), load_registry())) as client:

@@ -106,6 +106,7 @@ def test_bombs_are_answered_in_words_and_leave_the_process_well(api, name) -> No
     assert api.post("/v1/machines/check", content=written()).status_code == 200
 
 
+@pytest.mark.ci
 def test_a_file_is_not_read_in_the_apis_process(api, monkeypatch) -> None:
     from buildarena_api import machine_uploads
 
@@ -214,6 +215,7 @@ def test_a_file_that_kills_its_process_is_read_twice_and_no_more(checker) -> Non
     assert checker.ask(["pid"]) not in {first, os.getpid()}
 
 
+@pytest.mark.ci
 def test_a_file_that_takes_too_much_memory_is_refused(checker) -> None:
     with pytest.raises(CheckFailedError, match="memory"):
         checker.ask(["take", 2 * SPARE])

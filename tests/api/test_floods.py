@@ -144,6 +144,7 @@ def test_a_callers_exports_are_made_one_after_the_other(as_key, sweep_id, contex
         assert {one.result().status_code for one in asked} == {200}
 
 
+@pytest.mark.ci
 def test_a_callers_ordinary_requests_take_turns(as_key, sweep_id, context) -> None:
     greedy, other = as_key(), as_key()
     for client in (greedy, other):

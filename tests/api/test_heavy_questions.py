@@ -178,6 +178,7 @@ def board(context, submissions) -> None:
     )
 
 
+@pytest.mark.ci
 @pytest.mark.usefixtures("board")
 def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(
     as_key, context

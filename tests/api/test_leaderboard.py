@@ -220,6 +220,7 @@ def test_a_reader_who_has_the_answer_gets_none_until_something_changes(api, cont
     assert again.headers["etag"] != first.headers["etag"]
 
 
+@pytest.mark.ci
 def test_a_board_kept_up_to_date_equals_one_that_is_made_anew(api, context, played) -> None:
     def fresh() -> bytes:
         with api_client(context) as other:

@@ -194,6 +194,7 @@ def test_a_session_that_is_resumed_takes_no_turn_twice(api, context) -> None:
     assert len(kept) == len(indices)
 
 
+@pytest.mark.ci
 def test_a_turn_that_was_journalled_and_not_told_is_told_when_the_session_resumes(
     api, context, monkeypatch
 ) -> None:

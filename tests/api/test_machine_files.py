@@ -35,6 +35,7 @@ def attempt(api, data: bytes, **params: object):
     return api.post("/v1/machines/trials", content=data, params={**TRIAL, **params})
 
 
+@pytest.mark.ci
 def test_a_document_is_looked_at(api) -> None:
     machine = bridge()
     seen = check(api, document(machine)).json()

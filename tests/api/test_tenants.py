@@ -176,6 +176,7 @@ def test_what_was_spent_before_a_hand_over_stays_where_it_was_spent(a, b, guarde
     )
 
 
+@pytest.mark.ci
 def test_a_budget_stop_hands_over_and_costs_the_other_nothing(a, b, guarded, context) -> None:
     budget(b, guarded, 1000)
     models = ["builtin/idle", "builtin/expert"]

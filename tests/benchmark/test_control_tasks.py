@@ -172,6 +172,7 @@ SPENDTHRIFTS = {
 }
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("how", SPENDTHRIFTS)

@@ -166,6 +166,7 @@ def test_what_is_carried_along_the_line_without_its_wheels_is_flagged() -> None:
     assert result.indicator == 0
 
 
+@pytest.mark.ci
 def test_a_wheel_that_comes_off_ends_it() -> None:
     machine, trial = honest("mujoco")
     whole = score(TASK, machine, trial)
@@ -185,6 +186,7 @@ def _until(task: Any, machine: Machine, trial: Trajectory, samples: int) -> int:
     return int(score(task, machine, replace(trial, positions=positions)).metrics["stretches"])
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("aside", [0.0, 0.9, 1.3])
 def test_only_what_is_near_the_line_counts(aside) -> None:

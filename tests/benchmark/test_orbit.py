@@ -52,6 +52,7 @@ def arms_of(trial: Trajectory) -> np.ndarray:
     return trial.positions[:, 0].astype(float) + np.array([0, 0, RADIUS])
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_flies_round(engine) -> None:
@@ -142,6 +143,7 @@ def test_what_only_hovers_over_the_ground_has_not_landed() -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.ci
 def test_what_comes_down_hard_or_elsewhere_has_not_come_back() -> None:
     def hard(trial: Trajectory, touch: int) -> Trajectory:
         positions = trial.positions.copy()

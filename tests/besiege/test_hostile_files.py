@@ -46,6 +46,7 @@ def test_bad_values_are_named(old, new, says) -> None:
         read_machine_file(text.encode())
 
 
+@pytest.mark.ci
 def test_a_thousand_blocks_at_one_place_are_no_hang() -> None:
     many = "".join(block(15, place='x="0" y="0" z="0.5"') for _ in range(1200))
     started = time.process_time()

@@ -75,6 +75,7 @@ def stored(context: Context) -> dict[str, bytes]:
     return {item.hash: context.artifacts.get(item.hash) for item in context.artifacts.all()}
 
 
+@pytest.mark.ci
 def test_a_restored_service_is_the_one_that_was_backed_up(
     context, submissions, elsewhere, tmp_path
 ) -> None:

@@ -80,6 +80,7 @@ def end_jobs(context, *, rounds: int = 1) -> None:
                 add_rollout(connection, job, **trial, final=last, success=won, metrics={"parts": 9})
 
 
+@pytest.mark.ci
 @pytest.mark.usefixtures("sweep")
 def test_the_leaderboard_shows_shared_ranks_and_the_paper_when_asked(url) -> None:
     text = printed(url, "leaderboard", "--task", "support-1", "--task", "lift-1", "--published")
@@ -93,6 +94,7 @@ def test_the_leaderboard_shows_shared_ranks_and_the_paper_when_asked(url) -> Non
     assert "No jobs have ended yet." in later
 
 
+@pytest.mark.ci
 @pytest.mark.usefixtures("sweep")
 def test_two_models_are_compared_task_by_task(url) -> None:
     words = ["compare", "openai/gpt-5", "builtin/random"]
@@ -106,6 +108,7 @@ def test_two_models_are_compared_task_by_task(url) -> None:
     assert "builtin/random@" in unknown.stderr
 
 
+@pytest.mark.ci
 @pytest.mark.usefixtures("sweep")
 def test_exports_are_files_of_the_asked_format(url, tmp_path) -> None:
     for ending in (".csv", ".parquet", ".tex"):
@@ -170,6 +173,7 @@ def test_a_closed_loop_beside_single_shots(url, sweep, context, submissions, tmp
     assert rates[-1] > rates[0]
 
 
+@pytest.mark.ci
 def test_simulators_are_compared_on_the_same_machines(url, context, submissions, tmp_path):
     sweeps = []
     for simulator in ("pybullet", "mujoco"):
@@ -208,6 +212,7 @@ def test_a_report_of_nothing_scored_says_so(url, context, submissions, tmp_path)
     assert run_cli(url, "report", "sweep_x", "--out", str(tmp_path / "r.md")).returncode == 1
 
 
+@pytest.mark.ci
 @pytest.mark.usefixtures("sweep")
 def test_an_audit_tells_every_difference(url, context) -> None:
     stopping = threading.Event()

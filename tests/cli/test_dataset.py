@@ -82,6 +82,7 @@ def called(messages: list[dict]) -> list[tuple[str, dict]]:
     return [(call["function"]["name"], json.loads(call["function"]["arguments"])) for call in calls]
 
 
+@pytest.mark.ci
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_a_sweep_loads_and_every_machine_is_found_again(url, context, tmp_path):
     submitted(url)
@@ -189,6 +190,7 @@ def test_the_same_jobs_are_the_same_bytes(url, context, tmp_path):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
 
 
+@pytest.mark.ci
 def test_filters_take_what_they_say(url, context, tmp_path):
     first = submitted(url, models=["builtin/expert", "builtin/idle"])
     second = submitted(url, models=["builtin/idle"], tasks=["support-1", "lift-1"], name="other")

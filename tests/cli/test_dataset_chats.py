@@ -49,6 +49,7 @@ def machine_of(row: dict) -> Machine:
     return bench.submitted()
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize(
     ("task", "models"),
     [("support-1", ["builtin/expert", "builtin/random"]), ("lift-3", ["builtin/expert"])],
@@ -97,6 +98,7 @@ def test_a_chat_has_all_that_roles_were_told(url, context, tmp_path):
     assert set(first.values()) == {"system"}
 
 
+@pytest.mark.ci
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")
 def test_chats_go_through_a_file_of_json_lines(url, context, tmp_path, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")

@@ -14,6 +14,7 @@ def file(tmp_path):
     return path
 
 
+@pytest.mark.ci
 def test_evidence_is_sent_once_listed_and_shown(url, file) -> None:
     first = run("besiege", "evidence", "add", str(file), "--url", url)
     assert first.returncode == 0, first.stderr

@@ -1,5 +1,6 @@
 """What the command line says of results that were imported, and of limits."""
 
+import pytest
 from support.clients.commands import printed
 from support.servers.databases import empty
 from support.stages import work
@@ -11,6 +12,7 @@ from buildarena_worker.wiring import verification_runner
 SPEC = SweepSpec(tasks=["lift-1"], models=["builtin/expert"], seeds=[0, 1], simulator="mujoco")
 
 
+@pytest.mark.ci
 def test_imported_results_are_marked_until_and_after_they_count(
     context, submissions, url, tmp_path
 ) -> None:

@@ -47,6 +47,7 @@ def test_an_unknown_format_is_refused_with_the_known_ones(machine_file, tmp_path
     assert (done.returncode, ".glb, .svg, .json" in done.stderr) == (1, True)
 
 
+@pytest.mark.ci
 def test_a_jobs_trial_is_drawn(url, context, submissions, tmp_path) -> None:
     job, _ = submissions.submit_job(
         JobSpec(task="lift-1", model="builtin/expert", simulator="mujoco")

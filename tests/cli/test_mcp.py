@@ -83,12 +83,14 @@ async def play_against_the_rules(connected) -> dict[str, object]:
         return json.loads(await said(session, "submit", here))
 
 
+@pytest.mark.ci
 def test_an_agent_reads_which_rule_its_machine_breaks(stdio) -> None:
     result = asyncio.run(play_against_the_rules(stdio))
     assert (result["outcome"], result["reason"]) == ("construction_failed", "unjoined_parts")
     assert result["detail"].startswith("sub-structure B is not joined to the starting block A_1")
 
 
+@pytest.mark.ci
 def test_an_agent_builds_over_streamable_http(context, url) -> None:
     port = free_port()
     server = subprocess.Popen([BUILDARENA, "mcp", "--url", url, "--http", str(port)])

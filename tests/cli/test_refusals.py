@@ -59,6 +59,7 @@ def test_a_port_that_is_no_port() -> None:
     assert_refused(done, "BUILDARENA_PORT", "99999")
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("text", "code", "says"),

@@ -143,6 +143,7 @@ def _check_lists(url, site, sweeps, rows, whole) -> None:
     assert [task["task"] for task in board["tasks"]] == ["support-1"]
 
 
+@pytest.mark.ci
 def test_the_first_page_finds_its_files_beside_itself(url, idle, tmp_path) -> None:
     printed(url, "site", idle, "--out", str(tmp_path / "site"))
     page = (tmp_path / "site" / "index.html").read_text()
@@ -159,6 +160,7 @@ def test_its_policy_is_the_services() -> None:
     assert "; ".join(told) == site_pages.POLICY
 
 
+@pytest.mark.ci
 def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
     with changed(context, **WITH_KEYS) as own, live_api(own) as url:
         sweep = submitted(url, {**IDLE, "seeds": [0]}, Authorization=f"Bearer {ADMIN}")

@@ -63,6 +63,7 @@ def test_a_large_site_is_not_written_unasked(refused, monkeypatch, tmp_path) -> 
     assert (tmp_path / "site" / "index.html").exists()
 
 
+@pytest.mark.ci
 def test_two_do_not_write_one_folder(refused, tmp_path) -> None:
     site = tmp_path / "site"
     site.mkdir()

@@ -63,6 +63,7 @@ def test_a_hundred_requests_at_once_are_bounded(at_once) -> None:
     assert server.most == at_once
 
 
+@pytest.mark.ci
 def test_a_hundred_requests_at_once_to_the_service(service) -> None:
     async def ask() -> list[str]:
         async with AsyncClient(service.url) as client:

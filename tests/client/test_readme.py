@@ -31,6 +31,7 @@ def ran(program: str, url: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(("program", "says"), list(zip(PROGRAMS, SAYS, strict=True)), ids=SAYS)
 def test_a_program_does_what_it_says(busy, program, says) -> None:

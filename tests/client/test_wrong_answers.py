@@ -34,7 +34,6 @@ SHORT = b"HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\n{}"
 SHORT_PIECES = b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n5\r\n[1,2\r\n"
 BUSY = answer(429, b'{"detail": "too many", "errors": []}', Retry_After="0")
 STREAM = b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n\r\n"
-ENDLESS = b"data: " + b"x" * MAX_EVENT_BYTES
 AWAY = answer(503, b'{"detail": "away", "errors": []}', Retry_After="0")
 NOTHING_TWICE = {
     *("cancel_job", "retry_job", "verify_job", "verify_leaderboard", "add_task"),
@@ -331,7 +330,8 @@ def test_what_is_no_page_is_refused(make, page) -> None:
 
 
 def test_a_stream_of_nonsense_is_refused(make) -> None:
-    bodies = (b"id: x\ndata: {}\n\n", b"id: 1\ndata: [\n\n", b"id: 1\ndata: 5\n\n", ENDLESS)
+    endless = b"data: " + b"x" * MAX_EVENT_BYTES
+    bodies = (b"id: x\ndata: {}\n\n", b"id: 1\ndata: [\n\n", b"id: 1\ndata: 5\n\n", endless)
     for nonsense in (*(STREAM + body for body in bodies), HTML):
         with (
             wrong_server(nonsense) as server,

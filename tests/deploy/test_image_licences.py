@@ -41,6 +41,7 @@ def site(tmp_path) -> Path:
     return folder
 
 
+@pytest.mark.ci
 @needs_common_texts
 def test_each_part_that_wants_it_has_its_text(program, site, tmp_path) -> None:
     out = tmp_path / "licenses"
@@ -53,6 +54,7 @@ def test_each_part_that_wants_it_has_its_text(program, site, tmp_path) -> None:
     assert program.gathered(site, out).keys() == copies.keys(), "layers run it again"
 
 
+@pytest.mark.ci
 def test_a_part_without_its_text_stops_the_build(program, site, tmp_path) -> None:
     (licence,) = site.glob("certifi-*.dist-info/licenses/LICENSE")
     licence.unlink()

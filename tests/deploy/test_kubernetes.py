@@ -69,6 +69,7 @@ def test_each_file_is_valid_by_itself(path) -> None:
         check(document)
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @each_overlay
 def test_each_overlay_is_valid_as_a_whole(overlay) -> None:
@@ -388,6 +389,7 @@ def test_a_gateway_takes_the_place_of_the_ingress(overlay, with_component) -> No
     assert {"kubernetes.io/metadata.name": parent} in spaces
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @each_overlay
 def test_prometheus_operator_finds_each_pod_of_the_api(overlay, with_component) -> None:

@@ -81,6 +81,7 @@ def test_each_alert_is_tried_before_and_while_it_fires() -> None:
     assert fires == quiet | {"BuildArenaWatchdog"} == {rule["alert"] for rule in RULES}
 
 
+@pytest.mark.ci
 @needs_promtool
 def test_rules_and_configuration_are_prometheus_own() -> None:
     promtool("check", "rules", str(MONITORING / "prometheus" / "alerts.yml"))

@@ -41,6 +41,7 @@ def make_due(context: Context) -> None:
         connection.exec_driver_sql("UPDATE jobs SET available_at = now()")
 
 
+@pytest.mark.ci
 def test_a_failing_store_delays_jobs_and_loses_none(context, submissions, folder) -> None:
     job, _ = submissions.submit_job(SPEC)
     break_store(folder)
@@ -86,6 +87,7 @@ def test_health_says_that_the_store_fails_and_that_it_works_again(
     assert not list((folder / "probe").iterdir())
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("damage", ["damaged", "missing"])
 @pytest.mark.parametrize("name", ["machine", "transcript", "trajectory-0"])

@@ -4,6 +4,7 @@ import threading
 from contextlib import ExitStack
 
 import httpx
+import pytest
 from pydantic import SecretStr
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import live_api
@@ -24,6 +25,7 @@ def bearer(secret: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {secret}"}
 
 
+@pytest.mark.ci
 def test_keys_are_replaced_under_a_running_sweep(context) -> None:
     with ExitStack() as stack:
 

@@ -17,6 +17,7 @@ version) bash mk/version.sh "${2#V=}" $(dirname $(git ls-files "*/pyproject.toml
 dist) mkdir -p dist && echo wheel >dist/buildarena.whl ;;
 images) mkdir -p dist/images && git rev-parse HEAD >dist/images/api.provenance.json ;;
 docs) mkdir -p .buildarena/docs && echo page >.buildarena/docs/index.html ;;
+openapi) mkdir -p build && echo "{}" >build/openapi.json ;;
 esac
 """
 NEXT = "99.1.0"
@@ -59,7 +60,7 @@ def test_a_release_is_committed_built_and_then_tagged(clone) -> None:
     done = release(clone, NEXT)
     assert done.returncode == 0, done.stderr
     made = (clone / "made").read_text().splitlines()
-    assert made == [f"version V={NEXT}", "dist", "images", "docs"]
+    assert made == [f"version V={NEXT}", "dist", "images", "docs", "openapi"]
     assert run(clone, "git", "status", "--porcelain") == ""
     assert run(clone, "git", "log", "-1", "--format=%s") == f"Release {NEXT}"
     assert run(clone, "git", "rev-parse", f"v{NEXT}^{{}}") == run(clone, "git", "rev-parse", "HEAD")
@@ -80,6 +81,7 @@ def test_a_release_is_committed_built_and_then_tagged(clone) -> None:
         "images/api.provenance.json",
         f"buildarena-deploy-{NEXT}.tar.gz",
         f"buildarena-docs-{NEXT}.tar.gz",
+        f"buildarena-openapi-{NEXT}.json",
     }
     run(clone / "dist", "sha256sum", "--check", "--quiet", "SHA256SUMS")
     run(clone / "dist", "tar", "xzf", f"buildarena-deploy-{NEXT}.tar.gz")

@@ -56,6 +56,7 @@ def assert_children(of: ReadableSpan, children: list[ReadableSpan]) -> None:
         assert child.context.trace_id == of.context.trace_id
 
 
+@pytest.mark.ci
 def test_a_job_is_one_trace_from_its_submission_on(context) -> None:
     with recorded() as spans:
         job = submitted(context)

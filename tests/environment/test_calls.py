@@ -26,6 +26,7 @@ def as_text(made: dict) -> str:
     return json.dumps({"tool": made["tool"], "arguments": arguments})
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("task", ["support-1", "lift-3"])
 def test_the_experts_calls_as_text_earn_what_they_earn_as_steps(experts, task) -> None:
     rewards = {"indicator": 1.0, "constraint_progress": 0.1}

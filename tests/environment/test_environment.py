@@ -86,6 +86,7 @@ def test_refused_steps_change_nothing_but_are_counted() -> None:
     assert environment.submit().trial.reason == "empty_machine"
 
 
+@pytest.mark.ci
 def test_machines_have_room_for_so_many_parts_together(bridge_calls) -> None:
     environment = played(Environment("support-1", limits=Limits(parts=20)), bridge_calls)
     size = environment.machines["main"].part_count

@@ -65,6 +65,7 @@ def test_trajectories_come_along_when_asked_for(short, bridge) -> None:
     assert len(trajectory.time_s) == short.scenario.sample_count
 
 
+@pytest.mark.ci
 def test_a_process_that_dies_costs_one_trial_and_is_replaced(bridge) -> None:
     task = builtin_tasks()["support-1"]
     with Evaluator(task, processes=1) as evaluator:
@@ -117,6 +118,7 @@ def test_names_and_numbers_are_checked() -> None:
         Evaluator(hasty)
 
 
+@pytest.mark.ci
 def test_environments_and_evaluators_agree(short, bridge) -> None:
     environment = Environment(short)
     environment.restore(replace(environment.state(), machines={"main": bridge.logged}))

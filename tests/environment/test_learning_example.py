@@ -75,6 +75,7 @@ def test_refused_choices_are_left_out_of_a_bridge(example) -> None:
     assert {link.module.name for link in machine.connectors.values()} == {"Brace"}
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_the_learned_bridge_beats_the_expert(engine) -> None:

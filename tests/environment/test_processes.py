@@ -68,6 +68,7 @@ def test_a_program_ends_with_its_parent(how, child, within_s) -> None:
                 os.kill(int(pid), signal.SIGKILL)
 
 
+@pytest.mark.ci
 def test_a_program_that_nobody_told_of_a_parent_goes_on() -> None:
     code = WATCHING.format(extra="")
     launcher = (

@@ -55,6 +55,7 @@ def test_one_that_dies_is_started_again(process) -> None:
     assert process.ask(["hello"]) == "hello"
 
 
+@pytest.mark.ci
 def test_memory_is_bounded(process) -> None:
     assert process.ask(["take", SPARE // 4]) == SPARE // 4
     with pytest.raises(ProcessEndedError):
@@ -62,6 +63,7 @@ def test_memory_is_bounded(process) -> None:
     assert process.ask(["hello"]) == "hello"
 
 
+@pytest.mark.ci
 def test_work_that_is_given_up_is_broken_off(process) -> None:
     pid = process.ask(["pid"])
 

@@ -102,6 +102,7 @@ def test_a_service_is_read(tmp_path, context, monkeypatch):
     assert "success, load" in shown(done, "text/html")[-1]
 
 
+@pytest.mark.ci
 def test_a_cell_that_fails_is_a_failure(tmp_path):
     from nbclient.exceptions import CellExecutionError
 

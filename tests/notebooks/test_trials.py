@@ -26,6 +26,7 @@ def row(each_side: int) -> ba.Machine:
     return machine
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_a_trial_has_the_score_of_the_libraries(engine):
@@ -38,6 +39,7 @@ def test_a_trial_has_the_score_of_the_libraries(engine):
         assert (trial.refusal, trial.task) == (None, task)
 
 
+@pytest.mark.ci
 def test_a_trial_keeps_the_machine_as_it_was():
     machine = row(3)
     trial = ba.simulate(machine, "support-1")

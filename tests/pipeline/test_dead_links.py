@@ -92,6 +92,7 @@ def test_a_connection_that_ended_unseen_leaves_a_request_to_the_own_count(broker
     assert others[2] is not None
 
 
+@pytest.mark.ci
 def test_heartbeats_go_on_whatever_they_meet(context) -> None:
     beats = []
 

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import pytest
 from support.servers.stacks import wait_until
 
 from buildarena_cli.local import EmbeddedValkey
 from buildarena_pipeline.broker.queues import ENOUGH_WAITING, Queues
 
 
+@pytest.mark.ci
 def test_messages_are_sent_again_when_the_broker_is_back(tmp_path) -> None:
     valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "valkey.log")
     process = valkey.start()

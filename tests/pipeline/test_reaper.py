@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from support.statements import statements_of
 
 from buildarena_cli.local import free_port
@@ -126,6 +127,7 @@ def test_of_several_processes_one_reaps_in_each_period(context, monkeypatch) -> 
     away.close()
 
 
+@pytest.mark.ci
 def test_a_queue_that_is_always_empty_is_sent_more_each_time(context, submissions) -> None:
     submit(context, submissions, 1700)
     reaper, sent = Reaper(context), []

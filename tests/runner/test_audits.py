@@ -164,6 +164,7 @@ def test_what_the_house_simulates_counts_at_once(context, submissions) -> None:
     assert ended(context, job) == now
 
 
+@pytest.mark.ci
 def test_what_is_refuted_leaves_with_all_that_its_key_brought(context, trusting, bring) -> None:
     liar, honest = (with_key(context, trusting) for _ in range(2))
     true, other = bring(liar, 0), bring(honest, 1)
@@ -186,6 +187,7 @@ def test_what_is_refuted_leaves_with_all_that_its_key_brought(context, trusting,
     assert context.store.events.after(0, job_id=lie.id)[-1].kind == "refuted"
 
 
+@pytest.mark.ci
 def test_a_suspended_key_may_do_nothing_until_it_is_reinstated(context, url, caller, bring) -> None:
     lie = bring(caller, 0, SHIFTED)
     key = caller.more["key"]
@@ -209,6 +211,7 @@ def test_a_suspended_key_may_do_nothing_until_it_is_reinstated(context, url, cal
     assert ended(context, lie).audit == "refuted"
 
 
+@pytest.mark.ci
 def test_a_refuted_trial_is_run_again_and_nothing_is_built_twice(context, url, bring) -> None:
     liar, honest = (with_key(context, url) for _ in range(2))
     job = bring(liar, 0, SHIFTED)

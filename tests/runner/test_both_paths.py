@@ -84,6 +84,7 @@ def raising(error: Exception) -> Played:
     return Played(around)
 
 
+@pytest.mark.ci
 def test_a_trial_is_scored_and_kept(context, do_next) -> None:
     job = waiting(context)
     trajectory = true_trajectory(context, job)
@@ -167,6 +168,7 @@ def test_files_are_kept_by_name(context, do_next) -> None:
     assert (context.artifacts.get(kept.hash), kept.media_type) == (b"it went well", "text/plain")
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 def test_a_cancelled_trial_is_broken_off(context, do_next) -> None:
     job = waiting(context)
@@ -208,6 +210,7 @@ def lease_of_another(context) -> Iterator[None]:
     yield
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 def test_a_driven_car_goes_back_to_its_session_each_time(context, submissions, do_next) -> None:
     job = submitted(context, submissions, task="transport-1")

@@ -39,6 +39,7 @@ def short_pauses(monkeypatch) -> None:
     monkeypatch.setattr(remote_api, "LONGEST_PAUSE_S", 0.2)
 
 
+@pytest.mark.ci
 def test_uploads_go_on_where_they_were_cut(context, url) -> None:
     job = waiting(context)
     log = WithLog(3_500_000)
@@ -104,6 +105,7 @@ def test_a_runner_gives_up_dead_links_unless_a_proxy_ends_them(url, monkeypatch)
     assert options() is None
 
 
+@pytest.mark.ci
 def test_an_api_that_is_away_is_waited_for(context) -> None:
     own = open_context(context.settings.model_copy(update={**WITH_KEYS, "lease_s": 30.0}))
     job = waiting(context)
@@ -136,6 +138,7 @@ def test_an_outcome_that_comes_too_late_is_left(context, url) -> None:
             one.api.upload(lease, data)
 
 
+@pytest.mark.ci
 def test_nothing_is_leased_to_who_has_left(context, url) -> None:
     secret = runner_key(context)[1]
     with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {secret}"}) as client:
@@ -148,6 +151,7 @@ def test_nothing_is_leased_to_who_has_left(context, url) -> None:
     assert ended(context, job).faults == 0
 
 
+@pytest.mark.ci
 def test_who_waits_gets_what_comes_at_once(context, url) -> None:
     secret = runner_key(context)[1]
     with slot(url, secret) as one:

@@ -188,12 +188,14 @@ FILES: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
+@pytest.mark.ci
 def test_files_that_are_no_trajectories_are_refused(refused) -> None:
     for name, make in FILES.items():
         said = refused(lambda true, make=make: make(write_trajectory(true)))
         assert said, name
 
 
+@pytest.mark.ci
 def test_what_is_said_beside_a_trajectory_is_checked(refused) -> None:
     same: Callable[[Trajectory], Trajectory] = lambda true: true  # noqa: E731
     for versions in (

@@ -90,6 +90,7 @@ def test_what_is_said_of_a_program_is_bounded_and_sound(honest, machine, forge, 
     assert told in str(caught.value)
 
 
+@pytest.mark.ci
 def test_a_trial_in_an_easier_world_is_not_that_of_the_seed(machine, honest) -> None:
     """The world of another seed, said to be this one's: it starts elsewhere."""
     for seed in (None, 8):
@@ -101,6 +102,7 @@ def test_a_trial_in_an_easier_world_is_not_that_of_the_seed(machine, honest) -> 
         checked(write_trajectory(honest), machine, seed=None)
 
 
+@pytest.mark.ci
 def test_keys_have_sensed_nothing(honest, machine) -> None:
     by_keys = machine.with_controller("")
     keys = simulate(by_keys, TASK.scenario, "mujoco", seed=SEED)

@@ -50,6 +50,7 @@ def test_a_key_that_misses_a_trial_again_and_again_counts_once(context, keys, ho
     assert offered(keys[1])
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("how", ["fault", "hand back", "lost", "never"])
 def test_a_key_waits_for_what_it_missed_and_others_do_not(context, keys, how) -> None:
@@ -79,6 +80,7 @@ def test_the_pause_grows(context, keys) -> None:
         ended_ago(pause_s + 1)
 
 
+@pytest.mark.ci
 def test_what_can_not_be_done_needs_two_keys(context, keys) -> None:
     job = waiting(context)
     misses(keys[0], "never", context)

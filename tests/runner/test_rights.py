@@ -31,6 +31,7 @@ def filled(path: str) -> str:
     return path.removeprefix("/v1/runner")
 
 
+@pytest.mark.ci
 def test_a_runner_key_reaches_no_other_route(context, url) -> None:
     assert len(OTHERS) > 40
     caller = Caller(url, runner_key(context)[1])

@@ -286,6 +286,7 @@ def test_fire_takes_shares(engine) -> None:
     assert rises[2] > rises[0] + 1
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("seed", [None, 5])
 def test_the_same_program_gives_the_same_bytes_in_every_process(engine, seed) -> None:

@@ -6,6 +6,7 @@ from benchmarks.simulation.game_evidence import MADE, ROOT, written
 from support.evenings import packed
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("name", MADE)
 def test_documents_have_what_is_made_today(name) -> None:
     assert (ROOT / name).read_text() == written(name), "run `make game-evidence`"

@@ -24,6 +24,7 @@ from buildarena_worker.builtin.designs.rovers import long_slalom_car, touring_ca
 SPANS = [("support-4", 30), nightly("support-5", 45)]
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("task", "gap"), SPANS)
@@ -58,6 +59,7 @@ def test_stilts_that_hang_over_the_floor_add_nothing(engine, tasks, task, gap, h
     assert stilted[0].indicator <= 1.1 * bare[0].indicator
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(("task", "gap"), SPANS)
 def test_a_long_bridge_counts_and_tells_its_load_over_its_mass(engine, tasks, task, gap) -> None:
@@ -131,6 +133,7 @@ def test_a_cargo_that_is_not_put_down_within_the_mark_fails(engine, tasks, press
     assert not result.success
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 def test_an_arm_may_take_its_time(engine, tasks) -> None:
     machine = _arm((2.0, "LeftArrow", 3.96), (10.0, "Alpha1", 0.2), (11.0, "RightArrow", 0.4))
@@ -250,6 +253,7 @@ def test_a_hoverer_without_its_cargo_holds_nothing(engine, tasks) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 def test_a_hoverer_may_hurry_from_height_to_height(engine, tasks) -> None:
     machine = _stepping((0.3, "UpArrow", 4.35), (9.0, "UpArrow", 3.0), (16.5, "DownArrow", 1.5))

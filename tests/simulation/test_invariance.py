@@ -24,6 +24,7 @@ def _turned(machine: Machine, yaw_deg: float) -> Machine:
     return whole
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize("yaw_deg", [90, nightly(180), nightly(270)])
 def test_a_turned_bridge_carries_the_same(engine, tasks, yaw_deg) -> None:

@@ -19,6 +19,7 @@ def test_a_heated_engine_lifts_itself_and_a_cold_one_does_not(engine, tasks) -> 
     assert 0.0 < cold.indicator < 1.0
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 def test_a_balanced_rocket_rises_and_a_lopsided_one_tips(engine, tasks) -> None:
     balanced, flight = trial(tasks["lift-2"], rocket((EAST, WEST)), engine)

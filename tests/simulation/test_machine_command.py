@@ -79,6 +79,7 @@ def test_a_document_a_log_and_a_bare_list_are_the_same_machine(run, tmp_path) ->
     assert reports[0] == reports[1] == reports[2]
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("kind", ["png", "gif", "mp4"])
 def test_a_film_shows_the_trial(run, stored, tmp_path, kind) -> None:
     video, data = tmp_path / f"film.{kind}", tmp_path / "beam.parquet"

@@ -20,6 +20,7 @@ def _require_kept(name: str, engine: str) -> None:
     assert _disqualifying(now["flags"]) == _disqualifying(told["flags"])
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", HANDFUL)
 def test_a_handful_of_honest_machines_keep_their_verdict(engine, name) -> None:

@@ -28,6 +28,7 @@ def written(outcome: Trajectory | MachineNotSimulable) -> bytes:
     return write_trajectory(outcome)
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize(
     ("build", "task"),

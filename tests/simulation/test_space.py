@@ -109,6 +109,7 @@ def test_the_rocket_equation_holds_as_fuel_is_used_up(engine, tank, burn_s) -> N
     assert not trial.breaks
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 def test_fuel_ends_and_flows_through_what_holds_fuel_alone(engine) -> None:
     own, barrel = 1.0, 10.0

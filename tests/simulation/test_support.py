@@ -16,6 +16,7 @@ from buildarena_simulation.scenario import SpanPlacement, gap_terrain
 from buildarena_worker.builtin.designs.drafting import BRACE, EAST, NORTH, SOUTH, UP
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 def test_more_bracing_carries_more(engine, tasks) -> None:
     beams = [beam(7, braces) for braces in ("", "t", "tb", "12")]
@@ -81,6 +82,7 @@ def _beam_with(
     return draft.machine
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 @pytest.mark.parametrize(
     "spans",
@@ -109,6 +111,7 @@ def test_winches_stacked_between_the_same_faces_are_one_rope(engine, tasks) -> N
     assert loads[1] <= 1.05 * loads[0]
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(engine, tasks) -> None:
     result, _ = trial(tasks["support-1"], beam(5), engine)
@@ -116,6 +119,7 @@ def test_a_beam_that_is_too_short_for_the_gap_scores_nothing(engine, tasks) -> N
     assert result.indicator == 0.0
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 def test_a_bridge_built_along_the_gap_is_turned_across_it(engine, tasks) -> None:
     along = trial(tasks["support-1"], beam(7, "t", direction=EAST), engine)[0]

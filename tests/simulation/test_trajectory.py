@@ -32,6 +32,7 @@ def _equal(first: object, second: object) -> bool:
     return first == second
 
 
+@pytest.mark.ci
 def test_a_file_gives_back_the_trajectory(tasks) -> None:
     bridge = simulate(load_machine("one-shot-bridge"), tasks["support-1"].scenario, "mujoco")
     scenario = tasks["lift-1"].scenario.model_copy(update={"duration_s": 1.0})
@@ -43,6 +44,7 @@ def test_a_file_gives_back_the_trajectory(tasks) -> None:
     assert len(write_trajectory(bridge)) < 250_000  # 51 blocks, 17 s, most of it falling debris
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(engine, tasks) -> None:
     machine = deck(5, 7)

@@ -35,6 +35,7 @@ def age(folder: Path, days: float) -> None:
             os.utime(file, (then, then))
 
 
+@pytest.mark.ci
 def test_only_old_bytes_that_nothing_refers_to_go_and_only_after_the_trash(
     context, add, collector, folder
 ) -> None:

@@ -179,6 +179,7 @@ def test_changes_are_gathered(filled) -> None:
         assert connection.execute(select(func.count()).select_from(figure_changes)).scalar() == 0
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=3)
 @pytest.mark.parametrize("few", [0, 40_000])
 @pytest.mark.parametrize("descending", [False, True])

@@ -32,6 +32,7 @@ def bucket(monkeypatch) -> Iterator[object]:
     server.stop()
 
 
+@pytest.mark.ci
 def test_bytes_come_back_from_a_bucket(bucket) -> None:
     store = ArtifactStore("s3://arena/artifacts")
     kept = store.put(b"a bridge", "application/json")

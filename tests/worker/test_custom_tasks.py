@@ -80,6 +80,7 @@ def assert_verified(context, job: Job) -> None:
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
+@pytest.mark.ci
 def test_an_agents_bridge_is_simulated_scored_and_verified(context, play, finish) -> None:
     version = add(context, EXAMPLE)
     job = finish(play("narrow-gap").id)
@@ -88,6 +89,7 @@ def test_an_agents_bridge_is_simulated_scored_and_verified(context, play, finish
     assert_verified(context, job)
 
 
+@pytest.mark.ci
 def test_a_job_in_work_is_tried_and_verified_with_its_own_version(context, play, finish) -> None:
     add(context, EXAMPLE)
     old = play("narrow-gap")
@@ -148,6 +150,7 @@ def test_every_kind_of_task_and_variant_ends_with_a_score(
     assert_verified(context, job)
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("builtin", ["transport-1", "transport-2", "support-1", "lift-1", "lift-2"])
 def test_a_trial_that_tracks_one_block_only_is_scored(context, play, finish, builtin) -> None:
@@ -158,6 +161,7 @@ def test_a_trial_that_tracks_one_block_only_is_scored(context, play, finish, bui
     assert_verified(context, job)
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("roped", [True, False])
 def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(

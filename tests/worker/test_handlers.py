@@ -96,6 +96,7 @@ def test_a_missing_key_ends_the_job_as_errored(run, monkeypatch) -> None:
     assert "OPENAI_API_KEY" in job.detail
 
 
+@pytest.mark.ci
 def test_a_driven_car_is_tried_three_times_and_the_best_counts(context, run) -> None:
     job = run(task="transport-1")
     assert job.outcome == "success"
@@ -112,6 +113,7 @@ def test_a_driven_car_is_tried_three_times_and_the_best_counts(context, run) -> 
     assert verifier(context).verify(job.id).as_document()["ok"]
 
 
+@pytest.mark.ci
 def test_an_assembled_rocket_flies(context, run) -> None:
     job = run(task="lift-3")
     assert job.outcome == "success"

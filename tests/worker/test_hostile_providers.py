@@ -146,6 +146,7 @@ def test_shutdown_ends_open_requests(context, settings, tmp_path) -> None:
     assert [a.result for a in context.store.jobs.attempts(job.id)] == ["handed_back"]
 
 
+@pytest.mark.ci
 def test_forty_hanging_sessions_leave_room_for_another_owner(context, tmp_path) -> None:
     with (
         stuck("hang") as bad,
@@ -229,6 +230,7 @@ def test_garbage_forever_ends_as_errored(context, tmp_path, monkeypatch) -> None
     assert (job.outcome, job.reason, job.requests) == ("errored", "provider_outage", 18)
 
 
+@pytest.mark.ci
 def test_after_garbage_the_session_goes_on_and_is_verified(context, tmp_path) -> None:
     bad_ones = {3, 4, 9}
     with (

@@ -132,6 +132,7 @@ def test_who_names_kernels_that_are_here_is_held_to_them(context, job) -> None:
     assert verifier(context).verify(job.id).verdict == Verdict.REFUTED
 
 
+@pytest.mark.ci
 def test_changed_bytes_of_the_same_processor_have_no_such_excuse(context, job) -> None:
     (record,) = context.store.rollouts.read(job.id)
     as_of(context, job, record.versions, b"changed")

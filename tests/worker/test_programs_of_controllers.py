@@ -204,6 +204,7 @@ def test_a_job_of_no_world_is_refused_where_worlds_decide(context, asked) -> Non
         assert "mujoco" in issue.message
 
 
+@pytest.mark.ci
 def test_a_table_tells_what_a_program_sensed_and_asked_for() -> None:
     task = builtin_tasks()[TASK]
     machine = experts_machine(task)

@@ -45,6 +45,7 @@ def asked(context, submissions) -> list[str]:
     return list(requested.ids.values())
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("fails", [False, True])
 def test_one_message_has_all_done_and_few_at_once(context, asked, fails) -> None:
     slow = Slow(fails=fails)

@@ -55,6 +55,7 @@ def rollouts(context: Context, job: Job) -> tuple[list[RolloutRecord], list[Roll
     return [r for r in records if r.seed is None], [r for r in records if r.seed is not None]
 
 
+@pytest.mark.ci
 def test_each_world_is_a_trial_of_the_same_machine_and_the_job_has_their_mean(
     context, submissions
 ) -> None:
@@ -76,6 +77,7 @@ def test_each_world_is_a_trial_of_the_same_machine_and_the_job_has_their_mean(
     assert verdict(context, job) == "verified"
 
 
+@pytest.mark.ci
 def test_seeds_are_drawn_anew_for_each_job(context, submissions) -> None:
     jobs = [tried(context, submissions, seed=seed) for seed in (0, 1)]
     seeds = [{r.seed for r in rollouts(context, job)[1]} for job in jobs]
@@ -101,6 +103,7 @@ def test_what_breaks_a_rule_is_tried_in_no_world(context, submissions) -> None:
     assert (job.success, rollouts(context, job)) == (False, ([], []))
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     "tampering",
@@ -120,6 +123,7 @@ def test_no_world_can_be_left_out_or_changed(context, submissions, tampering) ->
     assert verdict(context, context.store.jobs.get(job.id)) == "refuted"
 
 
+@pytest.mark.ci
 def test_boards_count_a_job_by_its_share_of_worlds(context, submissions) -> None:
     jobs = [tried(context, submissions, seed=seed) for seed in (0, 1)]
     with context.store.database.transaction() as connection:
@@ -160,6 +164,7 @@ def test_a_game_has_no_worlds_that_a_seed_could_vary(context) -> None:
             submissions.plan(SweepSpec(**spec, samples=1, worlds=2))
 
 
+@pytest.mark.ci
 def test_a_world_can_be_run_again_by_anybody(context, submissions) -> None:
     job = tried(context, submissions)
     record = rollouts(context, job)[1][0]

@@ -16,6 +16,7 @@ from buildarena_cli.local.supervisor import LOOK_EVERY_S
 from buildarena_pipeline.errors import StartupError
 
 
+@pytest.mark.ci
 def test_a_killed_broker_is_started_again_with_its_data(tmp_path) -> None:
     valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
     managed = ManagedProcess(name="valkey", start=valkey.start, stop=valkey.stop)
@@ -80,6 +81,7 @@ def test_what_is_started_again_while_all_is_stopped_is_stopped_too(started) -> N
     assert [process.returncode for process in started] == [-signal.SIGKILL, -signal.SIGTERM]
 
 
+@pytest.mark.ci
 def test_what_dies_while_all_is_stopped_is_not_started_again(started) -> None:
     def start() -> subprocess.Popen[bytes]:
         started.append(sleeper())
@@ -107,6 +109,7 @@ def test_a_server_that_ends_at_once_is_reported(tmp_path) -> None:
         valkey.stop(process)
 
 
+@pytest.mark.ci
 def test_children_do_not_outlive_a_killed_parent(tmp_path) -> None:
     program = (
         "import sys, time, pathlib\n"

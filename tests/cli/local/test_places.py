@@ -60,6 +60,7 @@ print(*sorted(path.name for path in (data / "postgres").iterdir()))
 FEW = ("private folder", "long path", "noexec", "read-only checkout")
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("user", "case"),
@@ -139,6 +140,7 @@ print(once("SELECT n FROM kept"))
     assert run_elsewhere(Case(), ["-c", program, "{data}"]) == "7\n"
 
 
+@pytest.mark.ci
 def test_a_full_disk_is_named_in_the_message() -> None:
     small = Case(before=("mount -t tmpfs -o mode=755,size=8m none {data}",))
     message = _refusal(small)

@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
-from weakref import WeakSet
 
 import structlog
 import uvicorn
@@ -29,8 +28,6 @@ LOOPBACK = "http://127.0.0.1"
 """What a client in the test's process calls the API: a service without keys has no other name."""
 ROUTES: list[_IncludedRouter] = []
 """Those of the first app."""
-APPS: WeakSet[FastAPI] = WeakSet()
-"""Those that were made and have not been collected: an app refers to itself."""
 CACHES = [value for value in vars(models).values() if hasattr(value, "cache_clear")]
 """FastAPI remembers functions of the last thousand apps, and these their apps: gigabytes."""
 TICK_S = 0.01
@@ -40,7 +37,6 @@ TICK_S = 0.01
 def app_of(context: Context) -> FastAPI:
     """The application, with routes that may have been used before."""
     app = create_app(context, load_registry())
-    APPS.add(app)
     routes = app.router.routes
     own = [number for number, route in enumerate(routes) if isinstance(route, _IncludedRouter)]
     if not ROUTES:

@@ -76,6 +76,7 @@ GARBAGE = {
 }
 
 
+@pytest.mark.ci
 # A list is a legal answer to Google's library: an empty reply.
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(

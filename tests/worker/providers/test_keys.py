@@ -44,6 +44,7 @@ def test_an_operators_models_have_keys_too(tmp_path) -> None:
     assert not [name for name in report.without if name.startswith("builtin/")]
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize(
     ("models", "variables", "says"),
@@ -59,6 +60,7 @@ def test_the_worker_says_what_is_wrong_without_starting(models, variables, says)
     assert says in done.stdout
 
 
+@pytest.mark.ci
 def test_the_worker_says_what_is_there(tmp_path) -> None:
     file = tmp_path / "key"
     file.write_text("sk-very-secret")

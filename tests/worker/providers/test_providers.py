@@ -27,6 +27,7 @@ def ask(text: str = "hello") -> Request:
     )
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_a_whole_session_over_http_equals_the_one_played_inside(play, protocol, client) -> None:
     with ProviderStandIn() as standin:

@@ -60,6 +60,7 @@ def test_a_driven_session_alternates_through_three_attempts(
         assert is_strict(speakers(protocol, body)), speakers(protocol, body)
 
 
+@pytest.mark.ci
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_a_closed_loop_with_an_analyst_alternates(play, rollout, protocol, client) -> None:
     with ProviderStandIn(respond=awkward) as standin:

@@ -104,6 +104,7 @@ async def until(holds: Callable[[], object]) -> None:
     raise AssertionError("not within 30 s")
 
 
+@pytest.mark.ci
 def test_a_free_slot_waits_for_the_next_request_and_then_goes_back(
     context, broker_url, monkeypatch
 ) -> None:
