@@ -36,6 +36,27 @@ demo: $(STAMP) ## One small sweep from start to leaderboard; stops everything at
 up: $(STAMP) ## The whole service on this machine until Ctrl-C
 	@$(BIN)/buildarena up
 
+# -- What is made of the API's own description: the clients' types -----------------------------
+CONTRACT := build/openapi.json
+SCHEMAS := clients/python/src/buildarena_client/schemas.py
+
+openapi: $(CONTRACT) ## Writes the API's contract to build/openapi.json
+
+# Most changes of the code leave the contract as it is, and what is made of it too.
+$(CONTRACT): build/.contract ;
+build/.contract: $(STAMP) $(shell find $(SOURCES) -name '*.py' -not -path '$(SCHEMAS)')
+	@mkdir -p build
+	@$(BIN)/python -m buildarena_api.contract >build/openapi.new
+	@cmp -s build/openapi.new $(CONTRACT) || mv build/openapi.new $(CONTRACT)
+	@rm -f build/openapi.new
+	@touch $@
+
+$(SCHEMAS): $(CONTRACT) clients/python/hatch_build.py
+	@$(BIN)/python clients/python/hatch_build.py
+
+install: $(SCHEMAS)
+
+# -- Checks and tests ---------------------------------------------------------------------------
 # Threads' arenas keep what a large test took: with two, and trimming, a worker stays below 900 MB.
 RUN_TESTS := MALLOC_ARENA_MAX=2 MALLOC_TRIM_THRESHOLD_=131072 $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -rs
 UNMARKED := not ci and not nightly
@@ -50,7 +71,7 @@ TESTS_OF_clients/python := tests/client
 TESTS_OF_clients/buildarena := tests/notebooks
 PACKAGE_TESTS := $(or $(TESTS_OF_$(PACKAGE)),tests/$(notdir $(PACKAGE)))
 
-test: $(STAMP)
+test: $(STAMP) $(if $(filter clients/%,$(PACKAGE)),$(SCHEMAS))
 	@$(BIN)/ruff format --check --quiet $(PACKAGE)/src $(PACKAGE_TESTS)
 	@$(BIN)/ruff check --quiet $(PACKAGE)/src $(PACKAGE_TESTS)
 	@$(BIN)/mypy --no-error-summary $(PACKAGE)/src
@@ -74,26 +95,6 @@ test-nightly: $(WEB_STAMP) check-integrations ## Both engines and every variant,
 
 test-durations: $(STAMP) ## The tests of make test, and which 30 took longest
 	@$(RUN_TESTS) -m "$(UNMARKED)" --durations 30 --durations-min 1
-
-# -- What is made of the API's own description: the clients' types -----------------------------
-CONTRACT := build/openapi.json
-SCHEMAS := clients/python/src/buildarena_client/schemas.py
-
-openapi: $(CONTRACT) ## Writes the API's contract to build/openapi.json
-
-# Most changes of the code leave the contract as it is, and what is made of it too.
-$(CONTRACT): build/.contract ;
-build/.contract: $(STAMP) $(shell find $(SOURCES) -name '*.py' -not -path '$(SCHEMAS)')
-	@mkdir -p build
-	@$(BIN)/python -m buildarena_api.contract >build/openapi.new
-	@cmp -s build/openapi.new $(CONTRACT) || mv build/openapi.new $(CONTRACT)
-	@rm -f build/openapi.new
-	@touch $@
-
-$(SCHEMAS): $(CONTRACT) clients/python/hatch_build.py
-	@$(BIN)/python clients/python/hatch_build.py
-
-install: $(SCHEMAS)
 
 # Types of Python and of the dashboard are each the work of one processor, side by side.
 check: $(STAMP) ## Format, lint, types and import rules; the dashboard's where it has changed, and in CI

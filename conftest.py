@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
+import re
 import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -36,6 +38,16 @@ MAX_GROWTH: Final = 60 * 2**20
 """Bytes that a test worker may grow by before garbage is collected."""
 MEMORY: Final = {"collected": 0}
 """Bytes of this test worker when garbage was last collected."""
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leaves out modules that are marked as a whole, with the libraries that only they import."""
+    left_out = re.findall(r"not (\w+)", config.option.markexpr)
+    if left_out and collection_path.suffix == ".py":
+        mark = re.search(r"^pytestmark = .*", collection_path.read_text(), re.MULTILINE)
+        if mark and any(f"pytest.mark.{name}" in mark[0] for name in left_out):
+            return True
+    return None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -96,6 +108,8 @@ def collected_garbage() -> Iterator[None]:
     yield
     if psutil.Process().memory_info().rss > MEMORY["collected"] + MAX_GROWTH:
         gc.collect()
+        if sys.platform == "linux":
+            ctypes.CDLL(None).malloc_trim(0)
         MEMORY["collected"] = psutil.Process().memory_info().rss
 
 

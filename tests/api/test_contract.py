@@ -12,6 +12,8 @@ from support.servers.live_api import live_api
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 
+pytestmark = pytest.mark.ci
+
 FRAMING = {"content-length", "transfer-encoding", "connection", "expect"}
 """A request that announces what it does not send has no end, and no answer."""
 schemathesis.serializer.alias(["application/zip"], "application/octet-stream")

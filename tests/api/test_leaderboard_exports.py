@@ -5,6 +5,8 @@ import pyarrow.parquet as pq
 import pytest
 from support.jobs import claim, finish
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.fixture
 def ended(api, context, sweep) -> None:

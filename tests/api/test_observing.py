@@ -139,6 +139,7 @@ def test_metrics_say_what_the_service_stands_on(api, context) -> None:
     assert all(used[pool] <= most[pool] for pool in most)
 
 
+@pytest.mark.ci
 def test_metrics_notice_an_artifact_store_that_fails(api, context) -> None:
     folder = context.settings.data / "artifacts"
     shutil.rmtree(folder)

@@ -57,6 +57,7 @@ def ups(url: str) -> dict[str, float]:
     }
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("part", ["database", "broker"])
 def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part, monkeypatch) -> None:

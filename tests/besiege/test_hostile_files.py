@@ -13,6 +13,8 @@ from tests.besiege.round_trips import round_trip
 
 from buildarena_besiege import MachineFileError, read_machine_file
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.mark.parametrize("trick", TRICKS)
 def test_tricks_are_refused_in_a_moment(trick) -> None:
@@ -46,7 +48,6 @@ def test_bad_values_are_named(old, new, says) -> None:
         read_machine_file(text.encode())
 
 
-@pytest.mark.ci
 def test_a_thousand_blocks_at_one_place_are_no_hang() -> None:
     many = "".join(block(15, place='x="0" y="0" z="0.5"') for _ in range(1200))
     started = time.process_time()
@@ -55,7 +56,6 @@ def test_a_thousand_blocks_at_one_place_are_no_hang() -> None:
     assert time.process_time() - started < 20
 
 
-@pytest.mark.ci
 @given(st.integers(0, 2**32), st.sampled_from(SAMPLES), st.sampled_from(DAMAGES))
 @settings(max_examples=150, deadline=None)
 def test_damaged_files_are_refused_or_go_round_without_a_loss(seed, sample, damage) -> None:

@@ -6,6 +6,8 @@ import pytest
 from support.clients.commands import run
 from support.evenings import packed, repacked
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.fixture
 def file(tmp_path):
@@ -14,7 +16,6 @@ def file(tmp_path):
     return path
 
 
-@pytest.mark.ci
 def test_evidence_is_sent_once_listed_and_shown(url, file) -> None:
     first = run("besiege", "evidence", "add", str(file), "--url", url)
     assert first.returncode == 0, first.stderr

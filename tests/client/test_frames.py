@@ -16,6 +16,8 @@ from buildarena_client import (
     sweeps_frame,
 )
 
+pytestmark = pytest.mark.ci
+
 USAGE = {
     **dict.fromkeys(("cached_tokens", "input_tokens", "output_tokens", "reasoning_tokens")),
     "requests": 3,

@@ -15,7 +15,7 @@ from buildarena_worker.builtin.designs.calls import Call
 
 @pytest.fixture(scope="session")
 def experts() -> dict[str, Any]:
-    return expert_calls.experts()
+    return expert_calls.Experts()
 
 
 @pytest.fixture(scope="session")

@@ -81,6 +81,7 @@ def test_a_process_that_dies_costs_one_trial_and_is_replaced(bridge) -> None:
     assert not child.is_running()
 
 
+@pytest.mark.ci
 def test_a_trial_that_takes_too_long_is_broken_off(bridge) -> None:
     with Evaluator("support-1", processes=1, timeout_s=0.2) as evaluator:
         evaluator._pool.processes[0].start()

@@ -12,6 +12,8 @@ from support.evenings import packed, repacked, step_inputs
 from buildarena_pipeline.evidence import EvidenceError, Verdict, read_evidence, reading
 from buildarena_pipeline.evidence.archive_names import DOCUMENT, MAX_MEMBERS, PAGE
 
+pytestmark = pytest.mark.ci
+
 GOOD = packed("doctor", "probe")
 LOG = "steps/probe/log-1.txt"
 

@@ -10,6 +10,8 @@ from moto.server import ThreadedMotoServer
 from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore, Uploads
 from buildarena_store.uploads import UploadedFile
 
+pytestmark = pytest.mark.ci
+
 
 @pytest.fixture
 def bucket(monkeypatch) -> Iterator[object]:
@@ -32,7 +34,6 @@ def bucket(monkeypatch) -> Iterator[object]:
     server.stop()
 
 
-@pytest.mark.ci
 def test_bytes_come_back_from_a_bucket(bucket) -> None:
     store = ArtifactStore("s3://arena/artifacts")
     kept = store.put(b"a bridge", "application/json")

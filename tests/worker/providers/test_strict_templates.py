@@ -12,6 +12,8 @@ from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.workflow.rounds import Loop
 
+pytestmark = pytest.mark.ci
+
 PROTOCOLS = ["openai", "anthropic", "google"]
 
 
@@ -60,7 +62,6 @@ def test_a_driven_session_alternates_through_three_attempts(
         assert is_strict(speakers(protocol, body)), speakers(protocol, body)
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_a_closed_loop_with_an_analyst_alternates(play, rollout, protocol, client) -> None:
     with ProviderStandIn(respond=awkward) as standin:
