@@ -21,8 +21,6 @@ from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import BudgetLimits
 
-pytestmark = pytest.mark.ci
-
 SESSIONS = 16
 
 
@@ -82,6 +80,7 @@ def test_open_requests_are_answered_and_journalled(
         assert attempts(context, jobs) == ["handed_back", "done"] * SESSIONS
 
 
+@pytest.mark.ci
 def test_a_request_that_takes_too_long_is_given_up_and_counted(context, tmp_path) -> None:
     with context.store.database.transaction() as connection:
         context.store.budgets.set("key_a", BudgetLimits(max_requests=9), connection=connection)
@@ -101,6 +100,7 @@ def test_a_request_that_takes_too_long_is_given_up_and_counted(context, tmp_path
     assert spent.lost_requests == 1
 
 
+@pytest.mark.ci
 def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
     with (
         ProviderStandIn(fault=lambda _: "500") as model,
@@ -117,6 +117,7 @@ def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
     assert context.store.jobs.get(job).faults == 0
 
 
+@pytest.mark.ci
 def test_a_worker_that_is_asked_to_stop_waits_for_its_reply(context, settings, tmp_path) -> None:
     with ProviderStandIn(latency_s=1.5) as model:
         file = models_file(tmp_path, {"good": model})
