@@ -53,7 +53,7 @@ def handed_in(url: str, key: str, notes: list[str], over: Event) -> int:
     return tries
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.timeout(3600)
 def test_packages_outlive_kills_and_are_checked_once() -> None:
     notes, over = [f"entry {n}" for n in range(PACKAGES)], Event()

@@ -65,7 +65,7 @@ def driver(url: str, **hello: object) -> Iterator[Driver]:
         yield one
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_free_ground_is_driven_by_keys_and_stored_nowhere(served) -> None:
     with driver(served) as one:
         ready = one.until("ready")
@@ -104,7 +104,7 @@ def job_of(context: Context, ended: dict) -> Job:
     return context.store.jobs.get(ended["job"])
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_drive_stands_under_a_name_with_the_keys_and_is_verified(context, served) -> None:
     ended = driven(context, served, driver="ada")
     assert ended["why"] == "time"
@@ -128,7 +128,7 @@ def test_a_drive_stands_under_a_name_with_the_keys_and_is_verified(context, serv
     assert driven(context, served, driver="ada", seconds=1.0)["job"] != job.id
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_drive_of_twenty_seconds_is_verified(context, served) -> None:
     ended = driven(context, served, driver="ada", seconds=20)
     assert ended["why"] == "time"
@@ -140,7 +140,7 @@ def test_a_drive_of_twenty_seconds_is_verified(context, served) -> None:
     assert report.verdict == "verified", report
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_page_that_is_gone_ends_the_drive_with_what_there_is(context, served) -> None:
     text = TASK.read_text("utf-8")
     task = parse_custom_task(text, origin="test")
@@ -170,7 +170,7 @@ def refusal(url: str, **hello: object) -> tuple[int, str]:
         return problem["status"], problem["detail"]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_cannot_be_driven_is_refused_in_words(context, served) -> None:
     status, detail = refusal(served, task="support-9")
     assert (status, "support-1" in detail or "support-9" in detail) == (422, True)
@@ -183,7 +183,7 @@ def test_what_cannot_be_driven_is_refused_in_words(context, served) -> None:
     assert not context.store.jobs.page(limit=10)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_key_is_asked_for_and_drives_are_bounded(context) -> None:
     with changed(context, **WITH_KEYS) as own, live_api(own) as url:
         assert refusal(url) == (401, "an API key is needed: send `Authorization: Bearer KEY`")

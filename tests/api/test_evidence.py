@@ -24,7 +24,7 @@ def boasting() -> bytes:
     return repacked(packed("probe"), damage)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_is_sent_is_judged_stored_once_and_shown(api) -> None:
     data = packed("doctor", "probe", "expert-support-1")
     first, again = (api.post(PATH, content=data) for _ in range(2))
@@ -44,7 +44,7 @@ def test_what_is_sent_is_judged_stored_once_and_shown(api) -> None:
     assert api.get(f"{PATH}/{added['id']}/file").content == data
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_verdicts_that_logs_do_not_bear_out_are_marked(api) -> None:
     done = api.post(PATH, content=boasting()).json()
     assert done["differing"] == 4
@@ -53,7 +53,7 @@ def test_verdicts_that_logs_do_not_bear_out_are_marked(api) -> None:
     assert (row["verdict"], row["stated"]) == ("not_seen", "confirmed")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "data",
     [b"", b"PK", repacked(packed("doctor"), lambda m: m.pop(DOCUMENT))],
@@ -71,7 +71,7 @@ def test_too_large_a_file_is_refused_while_it_comes(api, monkeypatch) -> None:
     assert api.post(PATH, content=packed("doctor")).status_code == 413
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_admins_send_and_every_key_reads(context) -> None:
     settings = context.settings.model_copy(update=WITH_KEYS)
     with TestClient(create_app(replace(context, settings=settings), load_registry())) as client:

@@ -47,7 +47,7 @@ def _service(context) -> TestClient:
     return TestClient(create_app(replace(context, settings=settings), load_registry()))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_the_service_checks_what_comes_by_itself(context) -> None:
     with _service(context) as client:
         ann = new_tenant(client, "ann", "submit")
@@ -59,7 +59,7 @@ def test_the_service_checks_what_comes_by_itself(context) -> None:
         assert shown["report"]["score"]["unknown"][0] == "omega_ref"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_package_is_taken_in_checked_and_ranked(people, checks) -> None:
     _, ann, bob = people
     first = ann.ask("POST", PATH, params=as_entry(), content=packed())
@@ -82,7 +82,7 @@ def test_a_package_is_taken_in_checked_and_ranked(people, checks) -> None:
     assert checks.check_waiting() == 0
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_look_at_a_package_keeps_nothing(people) -> None:
     _, ann, _ = people
     asked = {"season": KNOWN.name, "track": "autopilot"}
@@ -94,7 +94,7 @@ def test_a_look_at_a_package_keeps_nothing(people) -> None:
     assert ann.get(PATH) == []
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_newer_package_of_the_same_name_replaces_the_older(people, checks) -> None:
     _, ann, _ = people
     ids = []
@@ -108,7 +108,7 @@ def test_a_newer_package_of_the_same_name_replaces_the_older(people, checks) -> 
     assert [row["package"]["id"] for row in board] == ids[:1]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_nobody_learns_from_another_before_the_season_is_closed(people, checks) -> None:
     client, ann, bob = people
     made = ann.ask("POST", PATH, params=as_entry(), content=packed()).json()
@@ -130,7 +130,7 @@ def test_nobody_learns_from_another_before_the_season_is_closed(people, checks) 
     assert ann.ask("POST", PATH, params=as_entry("late"), content=b"").status_code == 409
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_breaks_a_rule_is_refused_with_its_sentence(people, checks) -> None:
     _, ann, _ = people
     for content, words in ((b"PK", "no sound ZIP file"), (packed()[:-40], "no sound ZIP file")):
@@ -144,7 +144,7 @@ def test_what_breaks_a_rule_is_refused_with_its_sentence(people, checks) -> None
     assert ann.get(f"/v1/seasons/{KNOWN.name}/board?track=autopilot") == []
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_organisers_decide_with_reasons_that_stay(people, checks) -> None:
     client, ann, bob = people
     mine = ann.ask("POST", PATH, params=as_entry(), content=packed()).json()["id"]
@@ -170,7 +170,7 @@ def test_organisers_decide_with_reasons_that_stay(people, checks) -> None:
     ]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_other_rules_have_packages_checked_again_but_words_of_people_stay(people, context) -> None:
     client, ann, _ = people
     mine = ann.ask("POST", PATH, params=as_entry(), content=packed()).json()["id"]
@@ -189,7 +189,7 @@ def test_other_rules_have_packages_checked_again_but_words_of_people_stay(people
     after.close()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_season_takes_so_many_a_day_of_one_owner(people) -> None:
     client, ann, bob = people
     client.app.state.seasons = {KNOWN.name: KNOWN.model_copy(update={"attempts_a_day": 2})}
@@ -201,7 +201,7 @@ def test_a_season_takes_so_many_a_day_of_one_owner(people) -> None:
     assert bob.ask("POST", PATH, params=as_entry(), content=b"1").status_code == 201
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_packages_are_checked_once_by_many_and_none_is_lost(people, context) -> None:
     """Four checkers at once; the package of one that was killed meanwhile is not lost."""
     _, ann, bob = people
@@ -253,7 +253,7 @@ def test_too_large_a_package_is_refused_while_it_comes(people, monkeypatch) -> N
     assert ann.ask("POST", PATH, params=as_entry(), content=packed()).status_code == 413
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_packages_are_no_garbage(people, context) -> None:
     _, ann, _ = people
     made = ann.ask("POST", PATH, params=as_entry(), content=packed()).json()
@@ -263,7 +263,7 @@ def test_packages_are_no_garbage(people, context) -> None:
     assert context.artifacts.get(made["hash"]) == packed()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_passed_is_shown_to_whom_it_concerns(people, checks) -> None:
     client, ann, bob = people
     made = ann.ask("POST", PATH, params=as_entry(), content=packed()).json()
@@ -288,7 +288,7 @@ def test_what_passed_is_shown_to_whom_it_concerns(people, checks) -> None:
     assert operator(client).get(place) == picture
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_admins_see_who_decided_what_in_a_season(people, checks) -> None:
     client, ann, _ = people
     ids = [

@@ -151,7 +151,7 @@ STANDS: Final = {"short", "third wheel", "tandem", "flat"}
 """Those that stand for good by themselves; the rules alone refuse them."""
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", MACHINES)
 def test_who_does_nothing_does_not_balance(name, engine) -> None:
@@ -166,7 +166,7 @@ def test_who_does_nothing_does_not_balance(name, engine) -> None:
     assert stands or name not in STANDS
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_wheels_that_are_not_two_on_one_level_axle_east_and_west_are_named() -> None:
     for name in ("third wheel", "tandem", "flat", "north-south"):
         machine = MACHINES[name]().machine.with_controller(IDLE)
@@ -174,7 +174,7 @@ def test_wheels_that_are_not_two_on_one_level_axle_east_and_west_are_named() -> 
         assert (result.indicator, result.flags) == (0, ("not_on_two_wheels",)), name
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_stands_because_its_mass_is_low_is_flagged(engine) -> None:
     result = scored(TASKS["balance-1"], short().machine.with_controller(IDLE), engine, None)
@@ -238,7 +238,7 @@ def test_each_threshold_ends_a_balance(stricter) -> None:
     assert result.flags == (() if "max_tilt_deg" in stricter else ("propped",))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_who_keeps_its_place_earns_more_and_who_falls_only_its_time() -> None:
     task = TASKS["balance-2"]
     machine = experts_machine(task)

@@ -58,7 +58,7 @@ LEAVES_ITS_LANE = {("walk-2", "mujoco", 1)}
 """Worlds in which the expert fails: two of fifty of walk-2 on MuJoCo, none of other tasks."""
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("seed", [None, *range(4)])
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("task", CONTROL, ids=lambda task: task.name)
@@ -71,7 +71,7 @@ ALIKE = {"walk-1": {2, 3}, "walk-2": {2, 3}}
 """Worlds in which a walker faces within 15° of how it does in the exact one: one in twelve."""
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("task", "seed"),
     [
@@ -109,7 +109,7 @@ LANDINGS = {
 }
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("how", LANDINGS)
 def test_what_is_no_landing(engine, how) -> None:
@@ -120,7 +120,7 @@ def test_what_is_no_landing(engine, how) -> None:
     assert result.indicator == 0
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_descent_that_is_slow_by_the_clock_alone_is_no_landing() -> None:
     """It falls, brakes, and sinks by less than 2 units/s until the ground comes, wherever that is:
     gentle without a look. But it does not know when to let go, nor where the mark is.
@@ -183,7 +183,7 @@ def test_who_burns_its_fuel_in_the_air_does_not_land(engine, how) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_landing_slowly_and_with_more_fans_burns_as_much() -> None:
     """Who sinks as in landing-1 is in the air for too long; twice the fans hold no longer."""
     task = builtin_tasks()["landing-2"]
@@ -208,7 +208,7 @@ def test_landing_slowly_and_with_more_fans_burns_as_much() -> None:
     assert left[0] == pytest.approx(6.8 - 0.4 * 0.96, abs=0.02)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_tower_at_the_place_is_no_flight(engine) -> None:
     """The place is reached from the ground: a mast, and the mass at its top."""
@@ -229,7 +229,7 @@ def test_a_tower_at_the_place_is_no_flight(engine) -> None:
     assert not scored(task, machine, engine, None).success
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 def test_rising_without_looking_does_not_keep_a_place(engine) -> None:
     """Held up by just its weight, it drifts with the wind."""
@@ -239,7 +239,7 @@ def test_rising_without_looking_does_not_keep_a_place(engine) -> None:
     assert not result.success
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 def test_who_stays_where_the_place_was_does_not_follow_it(engine) -> None:
     """The expert's craft, which keeps to the middle of where the place goes, without a look."""

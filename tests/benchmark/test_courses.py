@@ -58,7 +58,7 @@ def test_a_car_whose_wheels_bear_in_turns_has_driven(seed) -> None:
     assert (result.success, result.flags) == (True, ())
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_tower_that_topples_over_the_gates_drives_nothing() -> None:
     """Its mass gets over the first two lines of drive-2, and its wheels turn in the air."""
     draft = KeyedDraft(modules="workshop")
@@ -72,7 +72,7 @@ def test_a_tower_that_topples_over_the_gates_drives_nothing() -> None:
     assert result.indicator == 0
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_weight_that_is_let_lie_is_not_fetched() -> None:
     """The crane without keys, and one that only takes hold."""
     for presses in ([], [(0.6, "RightArrow", 0.38)]):
@@ -81,7 +81,7 @@ def test_a_weight_that_is_let_lie_is_not_fetched() -> None:
         assert result.metrics["distance_to_mark"] > 15
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_weight_that_is_dropped_over_the_mark_is_not_put_down() -> None:
     """Let go at the top of its way it falls for itself by more than 3."""
     machine = drafted(

@@ -46,7 +46,7 @@ def test_the_expert_delivers(engine, name) -> None:
     assert result.indicator == pytest.approx(1 + left, abs=1e-5)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_engines_agree_about_when() -> None:
     times = [score(TASK, *honest(e)).metrics["delivered_s"] for e in FASTER_FIRST]
     assert max(times) < 1.05 * min(times)
@@ -75,7 +75,7 @@ def test_a_tower_that_topples_onto_the_ball(engine) -> None:
     assert result.indicator < 0.2
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_does_nothing_delivers_nothing(engine) -> None:
     result = scored(TASK, drafted(couriers.courier(0), []), engine, None)

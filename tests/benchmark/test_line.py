@@ -54,7 +54,7 @@ def sides(machine: Machine, left: float, right: float) -> Machine:
     )
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize(
     ("left", "right"),
@@ -93,7 +93,7 @@ def test_who_goes_round_the_other_way_has_followed_nothing(engine) -> None:
     assert all(of.metrics["stretches"] <= 1 and not of.success for _, of in backwards)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_shortcut_gains_nothing(engine) -> None:
     """It leaves the line after a while, crosses the middle, and follows the rest."""
@@ -108,7 +108,7 @@ def test_a_shortcut_gains_nothing(engine) -> None:
     assert short.indicator < whole.indicator
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_back_and_forth_counts_once(engine) -> None:
     """The first part of the line, again and again."""
@@ -119,7 +119,7 @@ def test_back_and_forth_counts_once(engine) -> None:
     assert result.metrics["stretches"] <= 4
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_bar_across_the_ring_that_turns_about_its_middle_follows_nothing(engine) -> None:
     """Wheels at the ends of a long bar run along the line's whole length; its middle stays."""
@@ -139,7 +139,7 @@ def test_a_bar_across_the_ring_that_turns_about_its_middle_follows_nothing(engin
     assert result.metrics["broken_joints"] == 0
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_fans_do_not_follow_a_line(engine) -> None:
     """A car whose wheels only roll, and that a fan pushes."""
@@ -155,7 +155,7 @@ def test_fans_do_not_follow_a_line(engine) -> None:
     assert (result.success, result.metrics["stretches"]) == (False, 0)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_is_carried_along_the_line_without_its_wheels_is_flagged() -> None:
     """The expert's trial, in which wheels do not turn: the same way, and nothing that drove it."""
     machine, trial = honest("mujoco")
@@ -166,7 +166,7 @@ def test_what_is_carried_along_the_line_without_its_wheels_is_flagged() -> None:
     assert result.indicator == 0
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_wheel_that_comes_off_ends_it() -> None:
     machine, trial = honest("mujoco")
     whole = score(TASK, machine, trial)
@@ -219,7 +219,7 @@ def test_the_time_ends_once_all_but_one_stretch_are_followed() -> None:
     assert stopped.metrics["all_followed_s"] is None
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "stricter",
     [{"max_distance": 0.05}, {"stretches": 100, "min_stretches": 95, "all_stretches": 99}],
@@ -231,7 +231,7 @@ def test_each_threshold_decides(stricter) -> None:
     assert not score(replace(TASK, scoring=scoring), machine, trial).success
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_lines_are_as_the_statement_says() -> None:
     """Of every drawn world, and of the corners of what is drawn."""
     draws = TASK.scenario.draws

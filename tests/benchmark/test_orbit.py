@@ -77,7 +77,7 @@ def test_what_swings_to_and_fro_goes_nowhere() -> None:
     assert (swept(np.zeros((4, 3)), np.zeros(3)) == 0).all()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("radius", [5.0, 50.0, 300.0])
 def test_circles_over_one_place_are_no_way_round(radius) -> None:
     machine, trial = flown(FASTER_FIRST[0])
@@ -132,7 +132,7 @@ def landed_otherwise(change: Any) -> Any:
     return score(RETURN, machine, change(trial, touch))
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_only_hovers_over_the_ground_has_not_landed() -> None:
     def hovers(trial: Trajectory, _: int) -> Trajectory:
         bearing = trial.bearing
@@ -143,7 +143,7 @@ def test_what_only_hovers_over_the_ground_has_not_landed() -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_comes_down_hard_or_elsewhere_has_not_come_back() -> None:
     def hard(trial: Trajectory, touch: int) -> Trajectory:
         positions = trial.positions.copy()
@@ -161,7 +161,7 @@ def test_what_comes_down_hard_or_elsewhere_has_not_come_back() -> None:
         assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_comes_off_when_it_lands_is_told() -> None:
     def loses(trial: Trajectory, touch: int) -> Trajectory:
         assert trial.pieces is not None
@@ -174,7 +174,7 @@ def test_what_comes_off_when_it_lands_is_told() -> None:
     assert list(result.flags) == ["came_apart"]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("task", [ONCE, shorter(RETURN, 12.0)])
 def test_without_a_program_nothing_flies(task) -> None:
     machine = built(catalogue=module_set("all"))
@@ -182,7 +182,7 @@ def test_without_a_program_nothing_flies(task) -> None:
     assert (result.success, result.indicator, result.metrics["cycles"]) == (False, 0.0, 0.0)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("task", [ROUND, RETURN])
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("seed", [1, 2])

@@ -63,7 +63,7 @@ VARIANTS: Final = {
 }
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("how", VARIANTS)
 def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
@@ -71,7 +71,7 @@ def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
     assert (result.success, result.indicator) == (False, 0.0), result
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
     """It is exactly where it shall be, and nothing of that counts until it is let go."""
@@ -118,7 +118,7 @@ def _apart(seed: int, what: str) -> float:
     return math.dist(world.marks[0].center, exact.marks[0].center)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
     """The same arm on a small foot."""
@@ -129,7 +129,7 @@ def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
     assert result.metrics["base_shift"] > 0.5
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_parts_that_come_off_end_it(engine) -> None:
     machine, trial = honest(engine)
@@ -141,7 +141,7 @@ def test_parts_that_come_off_end_it(engine) -> None:
     assert result.flags == ("came_apart",)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_machine_that_moves_its_base_is_flagged() -> None:
     machine, trial = honest("mujoco")
     moved = trial.positions.copy()

@@ -79,7 +79,7 @@ def test_the_published_score_is_told_beside_it() -> None:
     assert metrics["parabola"] == pytest.approx(distance * (1 + rise), rel=0.02)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_engines_agree_about_how_far_it_flies() -> None:
     near, far = sorted(score(TASK, *honest(engine)).indicator for engine in FASTER_FIRST)
     assert far < 1.1 * near
@@ -113,7 +113,7 @@ def _too_few_stays(draft: Draft, beam: list[str], post: list[str], west: str) ->
         draft.connect(beam[5], beam[9], side)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
     """Engines part what overlaps. It hops no higher than this, and whoever does so is refused."""
@@ -135,7 +135,7 @@ def test_throwing_by_driving(engine) -> None:
     assert (result.success, result.indicator) == (False, 0.0)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_fence_is_cleared_or_not(engine) -> None:
     """The same throw leaves a fence of 3 untouched; one of 40 is what it touches first."""
@@ -175,7 +175,7 @@ def test_the_expert_hits_the_ring_wherever_it_lies(engine, seed) -> None:
     assert result.metrics["miss"] <= RING.scenario.marks[0].radius
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_throws_as_in_the_exact_world_misses_where_the_ring_is_elsewhere(engine) -> None:
     machine = experts_machine(RING)
@@ -191,7 +191,7 @@ STANDING: Final = builtin_tasks()["throw-4"]
 TWO: Final = builtin_tasks()["throw-5"]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("task", [STANDING, TWO], ids=lambda task: task.name)
 @pytest.mark.parametrize("seed", [None, 8, 11])
 @pytest.mark.parametrize("engine", FASTER_FIRST)
@@ -204,7 +204,7 @@ def test_the_expert_throws_through_its_rings_however_high_they_stand(engine, see
     assert rings < result.indicator < 2 * rings
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_ring_is_passed_in_the_air_and_with_all_of_the_boulder() -> None:
     """The same flight by rings beside it, so small that it would touch them, and behind its end."""
     machine = experts_machine(STANDING)
@@ -229,7 +229,7 @@ def test_one_ring_of_two_counts_and_is_no_success() -> None:
     assert 1.0 < result.indicator < 2.0
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_who_throws_as_in_the_exact_world_misses_a_higher_ring() -> None:
     machine = experts_machine(STANDING)
     exact, answers = listened(STANDING, machine, "mujoco")

@@ -154,7 +154,7 @@ FAR: Final = ("telescope", "mast")
 """The starting blocks of these get far enough all the same."""
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("name", MACHINES)
 def test_what_does_not_walk_does_not_pass(name, engine) -> None:
@@ -181,7 +181,7 @@ def test_who_is_pushed_and_slides_does_not_walk(name, engine) -> None:
     assert result.indicator < 3, result
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("task", [WALK, CORNER], ids=lambda task: task.name)
 def test_who_does_nothing_or_walks_on_without_looking_does_not_pass(task, engine) -> None:
@@ -192,7 +192,7 @@ def test_who_does_nothing_or_walks_on_without_looking_does_not_pass(task, engine
     assert not scored(task, machine.with_controller(ahead), engine, None).success
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_feet_take_turns_and_the_least_of_all_counts(engine) -> None:
     machine = experts_machine(WALK)
@@ -209,7 +209,7 @@ def test_feet_take_turns_and_the_least_of_all_counts(engine) -> None:
     assert result.indicator == pytest.approx(float(north.max()), abs=1e-5)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_part_that_comes_off_ends_the_walk() -> None:
     """The same trial, in which a foot stays behind early on."""
     machine = experts_machine(WALK)
@@ -222,7 +222,7 @@ def test_a_part_that_comes_off_ends_the_walk() -> None:
     assert result.indicator < 8
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "stricter", [{"max_tilt_deg": 1}, {"max_part_tilt_deg": 1}, {"lane": 0.01}]
 )

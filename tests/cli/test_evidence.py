@@ -6,7 +6,7 @@ import pytest
 from support.clients.commands import run
 from support.evenings import packed, repacked
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 
 @pytest.fixture

@@ -32,7 +32,7 @@ from buildarena_cli.dataset.machines.trying import SPLITS, split_of
 from buildarena_environment import Environment
 from buildarena_environment.variation.genome import Genome
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 TASKS = ("support-1", "throw-1", "lift-1")
 COUNT = 24

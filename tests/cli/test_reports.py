@@ -15,7 +15,7 @@ from buildarena_cli.report.document import Block, Grid, Heading, Paragraph, Plot
 from buildarena_cli.report.escaping import markdown_cell, markdown_line, typst_string
 from buildarena_cli.report.writing import write_report
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 A4 = {(595, 842), (842, 595)}
 HOSTILE = [

@@ -190,7 +190,7 @@ def test_wheels_and_sdists_say_what_they_are(dist) -> None:
 
 @pytest.mark.ci
 def test_a_package_index_would_take_every_distribution(dist) -> None:
-    makefile = (ROOT / "mk/dist.mk").read_text()
+    makefile = (ROOT / "mk/release.mk").read_text()
     (twine,) = re.findall(r"^TWINE := (.+)$", makefile, re.MULTILINE)
     files = [str(file) for file in sorted(dist.glob("buildarena*"))]
     words = ["tool", "run", "--quiet", "--from", twine, "twine", "--no-color", "check", "--strict"]
@@ -201,7 +201,7 @@ def test_a_package_index_would_take_every_distribution(dist) -> None:
     assert done.stdout.count("PASSED") == len(files) == 2 * len(PROJECTS)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("adapter", ADAPTERS, ids=lambda path: path.parent.name)
 def test_an_adapter_is_installed_by_its_readmes_command(
     dist, adapter, interpreter, tmp_path
@@ -261,7 +261,7 @@ def test_a_notebook_draws_from_an_empty_environment(installed, tmp_path) -> None
     assert len(shown.stdout) > 100_000
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @needs_pages
 def test_demo_report_and_pages_run_from_an_empty_environment(installed, tmp_path) -> None:
     data = tmp_path / "data"

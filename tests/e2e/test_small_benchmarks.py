@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.nightly
+
 ROOT = Path(__file__).parents[2]
 TURNS = 38
 """Turns that the expert takes for its average session of support-1, about."""
 
 
-@pytest.mark.ci
 def test_sessions_are_counted_turn_by_turn(tmp_path) -> None:
     file = tmp_path / "figures.json"
     given = ["--sessions", "3", "--latency", "0.05", "--warm-up", "1", "--json", str(file)]
@@ -33,7 +34,6 @@ def test_sessions_are_counted_turn_by_turn(tmp_path) -> None:
     assert figures["peak_rss_mib"] > 50
 
 
-@pytest.mark.ci
 def test_what_a_job_costs_is_shared_among_all_processes(monkeypatch) -> None:
     from benchmarks.api import overhead
 

@@ -229,7 +229,7 @@ def test_a_runner_s_trial_is_scored_in_its_job_s_trace(context) -> None:
     assert_children(request_of(spans, "/v1/jobs"), [one])
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_all_processes_send_one_trace(tmp_path, monkeypatch) -> None:
     sweep = {"tasks": ["support-1"], "models": ["builtin/expert"], "seeds": [0, 1]}
     with collector() as kept:

@@ -12,7 +12,7 @@ from support.evenings import packed, repacked, step_inputs
 from buildarena_pipeline.evidence import EvidenceError, Verdict, read_evidence, reading
 from buildarena_pipeline.evidence.archive_names import DOCUMENT, MAX_MEMBERS, PAGE
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 GOOD = packed("doctor", "probe")
 LOG = "steps/probe/log-1.txt"

@@ -6,6 +6,8 @@ from support.machines.people.designs import HONEST, kept, verdict
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_simulation import ENGINES
 
+pytestmark = pytest.mark.nightly
+
 HANDFUL = ["arch over 5", "car of 5 wheels", "ring of 3 cannons", "canard"]
 """One of several categories each; `make test-nightly` tries all."""
 
@@ -20,14 +22,11 @@ def _require_kept(name: str, engine: str) -> None:
     assert _disqualifying(now["flags"]) == _disqualifying(told["flags"])
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("name", HANDFUL)
 def test_a_handful_of_honest_machines_keep_their_verdict(engine, name) -> None:
     _require_kept(name, engine)
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("name", [name for name in HONEST if name not in HANDFUL])
 def test_honest_machines_keep_their_verdict(engine, name) -> None:
     _require_kept(name, engine)

@@ -32,7 +32,7 @@ from buildarena_store.jobs.job import configuration_hash
 from buildarena_store.tables import metadata
 from buildarena_worker.wiring import verification_runner, verifier
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 SPEC = SweepSpec(
     tasks=["lift-1"], models=["builtin/expert"], seeds=[0, 1], simulator="mujoco", name="moved"

@@ -16,7 +16,7 @@ from buildarena_store.archives import write_archive
 from buildarena_store.jobs.histories import PACKED, Histories
 from buildarena_worker.wiring import verifier
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 SWEEP = {
     "tasks": ["support-1"],

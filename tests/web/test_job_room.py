@@ -48,6 +48,7 @@ def test_the_room_of_a_job_shows_what_is(tmp_path, machines, a_session) -> None:
         in_browser(stack.url, ["e2e/room"], BUILDARENA_WEB_MACHINES=str(file))
 
 
+@pytest.mark.nightly
 def test_a_session_is_watched_while_processes_die(tmp_path) -> None:
     with ProviderStandIn("expert", latency_s=LATENCY_S) as standin:
         models = tmp_path / "models.yaml"

@@ -36,7 +36,7 @@ def test_pages_work_in_a_browser(tmp_path, files, looks) -> None:
         in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report), **looks)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
         in_browser(
@@ -45,7 +45,7 @@ def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> N
         )
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_packages_are_looked_at_handed_in_and_ranked(tmp_path) -> None:
     files = bridge_files()
     (tmp_path / "sound.zip").write_bytes(zipped(files))
@@ -63,7 +63,7 @@ def test_pages_ask_for_a_key_and_offer_what_it_may(tmp_path) -> None:
         in_browser(stack.url, ["e2e/keys"], **given)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_pages_work_below_a_path(tmp_path) -> None:
     with (
         running_stack(tmp_path, base_path="/tools/arena") as stack,

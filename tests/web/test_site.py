@@ -13,7 +13,7 @@ import pytest
 from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
 from support.servers.stacks import finished, running_stack
 
-pytestmark = [*needs_pages, pytest.mark.ci]
+pytestmark = [*needs_pages, pytest.mark.nightly]
 
 SWEEP = {
     "name": "published",

@@ -26,7 +26,7 @@ from buildarena_worker.builtin.designs.calls import calls_with
 from buildarena_worker.builtin.designs.risers import riser
 from buildarena_worker.wiring import verification_runner
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 TASK = builtin_tasks()["identify-1"]
 SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "2")))

@@ -25,7 +25,7 @@ from buildarena_worker.workflow.rounds import Loop
 from buildarena_worker.workflow.tree_iterative import EDITS
 from buildarena_worker.workflow.trees import TREE_TURNS
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 SESSIONS = [
     ("tree-single", "transport-1"),

@@ -11,7 +11,7 @@ from buildarena_besiege.run import prepared_machine
 from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
 from buildarena_pipeline.runtime.trial_checks import require_refusable
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 FAILS = program("return t < 1 and { spinning_forward = 0.3 } or sense.nothing.here")
 """It fails at 1 s."""

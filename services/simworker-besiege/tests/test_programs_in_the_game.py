@@ -47,7 +47,7 @@ from buildarena_simulation.scenario import (
 )
 from buildarena_worker.builtin.designs.drafting import UP
 
-pytestmark = pytest.mark.ci
+pytestmark = pytest.mark.nightly
 
 EXAMPLE = Path(__file__).parents[3] / "examples/control"
 

@@ -32,7 +32,7 @@ from buildarena_simworker_besiege.settings import BesiegeSettings
 from buildarena_simworker_besiege.toolkit.simulator import ToolkitSimulator
 from buildarena_worker.wiring import verifier
 
-pytestmark = [pytest.mark.ci, pytest.mark.timeout(200)]
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(200)]
 
 
 def environment(folder: Path) -> dict[str, str]:
