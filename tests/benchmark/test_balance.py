@@ -181,8 +181,7 @@ def test_what_stands_because_its_mass_is_low_is_flagged(engine) -> None:
     assert (result.success, result.indicator, result.flags) == (False, 0, ("propped",))
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("share", ["1", "0.3", "t % 0.4 < 0.2 and 1 or -1"])
 def test_driving_on_and_shaking_do_not_balance(engine, share) -> None:
@@ -209,8 +208,7 @@ def test_spinning_in_place_does_not_balance(engine, seed) -> None:
     assert result.indicator < 5
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_wheel_that_comes_off_ends_it(engine) -> None:
     """The same trial, in which a wheel goes on by itself half way."""
@@ -251,8 +249,7 @@ def test_who_keeps_its_place_earns_more_and_who_falls_only_its_time() -> None:
     assert fallen.indicator == fallen.metrics["balanced_s"] < 3
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 def test_pushes_are_what_makes_the_second_harder(engine) -> None:
     """A program that stands, and takes no notice of its place, falls or drifts when pushed."""

@@ -172,8 +172,7 @@ SPENDTHRIFTS = {
 }
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("how", SPENDTHRIFTS)
 def test_who_burns_its_fuel_in_the_air_does_not_land(engine, how) -> None:

@@ -37,8 +37,7 @@ def straight(*, track: int = 1, seconds: float = 19.0) -> Machine:
     return drafted(vehicles._vehicle(length=5, track=track, deck=None, presses=presses))
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["drive-3", "drive-4"])
 def test_who_never_steers_does_not_get_through(name) -> None:
     """Wider than the gap it stays before that; along the track walls turn it once, not twice."""

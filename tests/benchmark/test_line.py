@@ -70,8 +70,7 @@ def test_what_does_not_look_follows_no_line(engine, left, right) -> None:
     assert result.indicator == 0 or not spins
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_goes_round_the_other_way_has_followed_nothing(engine) -> None:
     """A car that turns round at the start, and then follows the line with the same care."""
@@ -186,8 +185,7 @@ def _until(task: Any, machine: Machine, trial: Trajectory, samples: int) -> int:
     return int(score(task, machine, replace(trial, positions=positions)).metrics["stretches"])
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("aside", [0.0, 0.9, 1.3])
 def test_only_what_is_near_the_line_counts(aside) -> None:
     """The expert's trial beside the line, by so much to the east: along half of it, aside."""

@@ -52,8 +52,7 @@ def arms_of(trial: Trajectory) -> np.ndarray:
     return trial.positions[:, 0].astype(float) + np.array([0, 0, RADIUS])
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_flies_round(engine) -> None:
     machine, trial = flown(engine)
@@ -112,8 +111,7 @@ def test_what_comes_down_on_its_way_ends_it() -> None:
     assert 0 < result.metrics["cycles"] < 1
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_comes_back_softly(engine) -> None:
     machine, trial = flown(engine, "orbit-2")

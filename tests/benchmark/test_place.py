@@ -83,8 +83,7 @@ def test_a_cargo_that_is_held_over_the_mark_is_not_put_down(engine) -> None:
     assert score(lax, *varied("never lets go", engine)).indicator > 2
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
     """It may fall by what is allowed, and no farther."""
@@ -96,8 +95,7 @@ def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
     assert not score(strict, machine, falls).success
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("what", ["cargo", "goal"])
 def test_who_remembers_where_things_were_fails_where_they_are_not(what) -> None:
     """It looks at one of the two only; for the other it takes the exact world's place."""

@@ -54,8 +54,7 @@ def index_of(machine: Machine, module: str) -> int:
     return [block.module.name for block in machine.blocks.values()].index(module)
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_expert_throws_five_times_as_far_as_the_best_published(engine) -> None:
     machine, trial = honest(engine)
@@ -90,8 +89,7 @@ def fails(result: Any, *flags: str) -> None:
     assert set(flags) <= set(result.flags), result
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_throwing_by_collapse(engine, monkeypatch) -> None:
     """The same catapult on a post that breaks while it throws, and a mast that topples over."""

@@ -234,8 +234,7 @@ def test_each_threshold_ends_a_walk(stricter) -> None:
     assert (result.success, result.flags) == (False, ("not_walked",))
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_the_corner_must_be_walked_to_and_round(engine) -> None:
     """Who only walks north, or east at once, does not pass, and north counts to the corner."""

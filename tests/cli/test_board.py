@@ -124,7 +124,7 @@ def test_exports_are_files_of_the_asked_format(url, tmp_path) -> None:
     assert "can't be written" in nowhere.stderr
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_report_has_every_section_in_every_format(url, sweep, tmp_path) -> None:
     for ending in (".html", ".md", ".pdf"):
         printed(url, "report", sweep, "--out", str(tmp_path / f"report{ending}"))

@@ -103,6 +103,7 @@ def submitted(operator: Operator, **sweep: object) -> str:
     return str(answer.json()["id"])
 
 
+@pytest.mark.nightly
 def test_jobs_that_no_worker_serves(operator) -> None:
     alert = "BuildArenaNoWorkers"
     sweep = submitted(operator, models=["builtin/expert"])

@@ -29,7 +29,7 @@ WOOD = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
 ALL = {"success": 1.0, "indicator": 1.0, "accepted_share": 0.1, "constraint_progress": 0.1}
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_what_the_expert_builds_is_scored_as_the_references_say() -> None:
     assert json.loads(REFERENCES.read_text()) == references()
     assert list(references()) == list(builtin_tasks())
@@ -284,7 +284,7 @@ def test_machines_may_be_tried_elsewhere(bridge_calls) -> None:
     assert submitted.trial.reason == "empty_machine"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_seed_varies_the_start_and_none_does_not(bridge_calls) -> None:
     def indicator(seed) -> float:
         environment = Environment("support-1", seed=seed)

@@ -16,6 +16,8 @@ from buildarena_benchmark import broken_constraint, builtin_tasks
 from buildarena_environment import Environment, try_machine
 from buildarena_geometry import Machine
 
+pytestmark = pytest.mark.nightly
+
 ROOT = Path(__file__).parents[2]
 EXAMPLE, KEPT = ROOT / "examples/learning", ROOT / "docs/learning"
 
@@ -30,7 +32,6 @@ def example(monkeypatch):
         sys.modules.pop(name, None)
 
 
-@pytest.mark.ci
 def test_the_same_seed_learns_the_same_with_any_number_of_processes(example) -> None:
     told = []
     for processes in (1, 2):
@@ -75,8 +76,6 @@ def test_refused_choices_are_left_out_of_a_bridge(example) -> None:
     assert {link.module.name for link in machine.connectors.values()} == {"Brace"}
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
 def test_the_learned_bridge_beats_the_expert(engine) -> None:
     pytest.importorskip(engine)
@@ -128,7 +127,6 @@ def test_the_curves_of_messages_rise(kept) -> None:
     assert run["tests"]["after"]["mean"] > 4 * run["tests"]["before"]["mean"]
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("kept", RUNS, ids=lambda kept: kept.stem)
 def test_the_best_message_earns_what_its_run_says(kept, languages) -> None:
     run = json.loads(kept.read_text())

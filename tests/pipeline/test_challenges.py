@@ -334,7 +334,7 @@ def test_organisers_see_ranks_refusals_and_copies(tmp_path: Path) -> None:
 BRIDGES = season_named("first-bridges")
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_bridges_are_tried_and_scored() -> None:
     report = checked(bridge_files(), BRIDGES, "agent")
     assert report.passed, report.findings
