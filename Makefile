@@ -58,11 +58,8 @@ install: $(SCHEMAS)
 
 # -- Checks and tests ---------------------------------------------------------------------------
 # Threads' arenas keep what a large test took: with two, and trimming, a worker stays below 900 MB.
-PYTEST := MALLOC_ARENA_MAX=2 MALLOC_TRIM_THRESHOLD_=131072 $(BIN)/pytest --dist loadfile --no-loadscope-reorder -rs
-RUN_TESTS := $(PYTEST) -n $(WORKERS)
+RUN_TESTS := MALLOC_ARENA_MAX=2 MALLOC_TRIM_THRESHOLD_=131072 $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -rs
 UNMARKED := not ci and not nightly
-# Whole services wait for each other for half of their time.
-CI_WORKERS ?= $(shell expr $(WORKERS) \* 3 / 2)
 
 ifdef PACKAGE
 ifeq ($(filter $(PACKAGE),$(PACKAGES)),)
@@ -89,8 +86,8 @@ test-all: test ## What CI runs: make test, then browsers, whole services, PyBull
 	@$(MAKE) --no-print-directory test-ci
 
 test-ci: web-if-it-can-be check-integrations
-	@echo "== tests of CI, $(CI_WORKERS) at once"
-	@$(PYTEST) -n $(CI_WORKERS) -m "ci and not nightly"
+	@echo "== tests of CI, $(WORKERS) at once"
+	@$(RUN_TESTS) -m "ci and not nightly"
 	@bash mk/integrations.sh test "not nightly" $(INTEGRATIONS)
 
 test-nightly: $(WEB_STAMP) check-integrations ## Both engines and every variant, adapters whole, attack, hunt, soak, containers; 90 min

@@ -49,7 +49,7 @@ def programmed(api, session: str, program) -> None:
         act(api, session, "add_control_sequence", press)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -> None:
     session = opened(api)
     design, seen = built(api, session), []

@@ -112,7 +112,7 @@ async def play(url: str, simulate: Callable[[], None]) -> dict[str, dict[str, ob
     return results
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_who_knows_only_what_the_server_sends_builds_bridge_car_and_rocket(context) -> None:
     with live_api(context) as url:
         results = asyncio.run(play(url, lambda: work(context)))

@@ -73,7 +73,7 @@ def asked(url: str, question: str, sweeps: list[str]) -> httpx.Response:
     return httpx.get(f"{url}{path}?{urlencode(params)}", headers=accept)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     sweeps = [submitted(url, EXPERT), submitted(url, {**IDLE, "seeds": [0, 5]})]
     submitted(url, {**IDLE, "tasks": ["lift-1"], "seeds": [9]})
@@ -143,7 +143,7 @@ def _check_lists(url, site, sweeps, rows, whole) -> None:
     assert [task["task"] for task in board["tasks"]] == ["support-1"]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_the_first_page_finds_its_files_beside_itself(url, idle, tmp_path) -> None:
     printed(url, "site", idle, "--out", str(tmp_path / "site"))
     page = (tmp_path / "site" / "index.html").read_text()
@@ -160,7 +160,7 @@ def test_its_policy_is_the_services() -> None:
     assert "; ".join(told) == site_pages.POLICY
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
     with changed(context, **WITH_KEYS) as own, live_api(own) as url:
         sweep = submitted(url, {**IDLE, "seeds": [0]}, Authorization=f"Bearer {ADMIN}")
@@ -175,7 +175,7 @@ def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
         assert ADMIN.encode() not in (site / name).read_bytes()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @pytest.mark.parametrize("place", ["data/", "jobs/", "site.json", "index.html"])
 def test_a_run_that_breaks_off_leaves_nothing_that_looks_whole(
     url, idle, tmp_path, monkeypatch, place
@@ -212,7 +212,7 @@ def _break(patched, place: str) -> None:
     patched.setattr(Folder, "write", write)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_site_stays_whole_while_it_is_written_again(
     url, idle, context, tmp_path, monkeypatch
 ) -> None:
@@ -238,7 +238,7 @@ def test_a_site_stays_whole_while_it_is_written_again(
     assert (site / "CNAME").exists()
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_job_that_changed_is_asked_for_again(url, idle, tmp_path) -> None:
     site = tmp_path / "site"
     printed(url, "site", idle, "--out", str(site))
@@ -251,7 +251,7 @@ def test_a_job_that_changed_is_asked_for_again(url, idle, tmp_path) -> None:
         assert json.loads(index.read_text()) == known
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_track_alone_is_a_site(url, idle, context, tmp_path) -> None:
     other = {**IDLE, "simulator": "pybullet", "seeds": [0]}
     submitted(url, other)
@@ -270,7 +270,7 @@ def test_a_track_alone_is_a_site(url, idle, context, tmp_path) -> None:
     assert read(both)["sweeps"] == [idle]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_jobs_that_have_not_ended_are_told(url, idle, tmp_path) -> None:
     waiting = submitted(url, {**IDLE, "seeds": [3, 4, 5]})
     alone = run_cli(url, "site", waiting, "--out", str(tmp_path / "none"))

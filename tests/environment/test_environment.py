@@ -163,7 +163,7 @@ def test_a_disqualified_trial_earns_nothing(bridge_calls) -> None:
     assert environment.reward == pytest.approx(before)
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_states_are_values_and_lead_back(bridge_calls) -> None:
     environment = Environment("support-1", rewards=ALL)
     played(environment, bridge_calls[:6])
