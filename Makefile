@@ -57,7 +57,7 @@ $(SCHEMAS): $(CONTRACT) clients/python/hatch_build.py
 install: $(SCHEMAS)
 
 # -- Checks and tests ---------------------------------------------------------------------------
-# Threads' arenas keep what a large test took: with two, and trimming, a worker stays below 900 MB.
+# Threads' arenas keep what a large test took: with two, and trimming, a worker stays below 1 GB.
 RUN_TESTS := MALLOC_ARENA_MAX=2 MALLOC_TRIM_THRESHOLD_=131072 $(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -rs
 UNMARKED := not ci and not nightly
 
