@@ -29,10 +29,7 @@ def drain(context) -> None:
 
 
 def is_filled(context) -> bool:
-    """Whether as many messages wait as are kept there; two that fill at once don't see each
-    other's.
-    """
-    return MAX_WAITING <= context.queues.waiting("construct") <= 2 * MAX_WAITING
+    return context.queues.waiting("construct") == MAX_WAITING
 
 
 def test_lost_messages_are_sent_again(context, submissions) -> None:

@@ -3,7 +3,7 @@ import time
 from datetime import timedelta
 
 import pytest
-from sqlalchemy import TextClause, text
+from sqlalchemy import Connection, TextClause, event, text
 from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry
 
 from buildarena_pipeline.runtime.context import Context
@@ -114,6 +114,17 @@ def test_workers_are_notified_of_waiting_jobs_once(context, add) -> None:
     ids = add(1, 2, 3)
     assert set(context.store.waiting.to_notify("construct", 10)) == set(ids)
     assert context.store.waiting.to_notify("construct", 10) == []
+
+
+def test_no_more_jobs_are_notified_than_asked_for_however_it_is_planned(context, add) -> None:
+    add(*range(20))
+
+    def take_nested_loops(connection: Connection) -> None:
+        for way in ("hashagg", "hashjoin", "mergejoin", "sort", "material"):
+            connection.exec_driver_sql(f"SET LOCAL enable_{way} = off")
+
+    event.listen(context.store.database.engine, "begin", take_nested_loops)
+    assert len(context.store.waiting.to_notify("construct", 3)) == 3
 
 
 def test_a_cancelled_job_frees_its_worker(context, add) -> None:

@@ -183,10 +183,12 @@ class Verifications:
             .limit(limit)
             .with_for_update(skip_locked=True)
         )
+        # A plain subquery may be executed once a row, and then marks more than the limit.
+        chosen = unnotified.cte()
         with self._database.transaction() as connection:
             rows = connection.execute(
                 update(verifications)
-                .where(verifications.c.id.in_(unnotified.scalar_subquery()))
+                .where(verifications.c.id == chosen.c.id)
                 .values(notified_at=events.now)
                 .returning(verifications.c.id)
             )

@@ -75,9 +75,11 @@ class WaitingJobs:
             .limit(limit)
             .with_for_update(skip_locked=True)
         )
+        # A plain subquery may be executed once a row, and then marks more jobs than the limit.
+        chosen = unnotified.cte()
         rows = connection.execute(
             update(jobs)
-            .where(jobs.c.id.in_(unnotified.scalar_subquery()))
+            .where(jobs.c.id == chosen.c.id)
             .values(notified_at=events.now)
             .returning(jobs.c.id)
         )
