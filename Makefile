@@ -19,7 +19,7 @@ WEB_OUT := services/api/src/buildarena_api/pages
 WEB_STAMP := $(WEB_OUT)/.built
 WORKERS ?= $(shell getconf _NPROCESSORS_ONLN)
 
-.PHONY: help install demo up test test-all test-ci test-nightly test-durations check check-python check-web-if-changed lock openapi clean
+.PHONY: help install demo up test test-all test-nightly check check-python check-web-if-changed lock clean bench scenario generate
 
 help: ## Lists the targets
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 20
@@ -39,8 +39,6 @@ up: $(STAMP) ## The whole service on this machine until Ctrl-C
 # -- What is made of the API's own description: the clients' types -----------------------------
 CONTRACT := build/openapi.json
 SCHEMAS := clients/python/src/buildarena_client/schemas.py
-
-openapi: $(CONTRACT) ## Writes the API's contract to build/openapi.json
 
 # Most changes of the code leave the contract as it is, and what is made of it too.
 $(CONTRACT): build/.contract ;
@@ -82,19 +80,13 @@ test: check ## Checks and the tests without a mark; PACKAGE=libs/geometry: those
 	@$(RUN_TESTS) -m "$(UNMARKED)"
 endif
 
-test-all: test ## What CI runs: make test, then browsers, whole services, PyBullet, wheels, adapters
-	@$(MAKE) --no-print-directory test-ci
-
-test-ci: web-if-it-can-be check-integrations
+test-all: test web-if-it-can-be check-integrations ## What CI runs: make test, then browsers, whole services, PyBullet, wheels, adapters
 	@echo "== tests of CI, $(WORKERS) at once"
 	@$(RUN_TESTS) -m "ci and not nightly"
 	@bash mk/integrations.sh test "not nightly" $(INTEGRATIONS)
 
 test-nightly: $(WEB_STAMP) check-integrations ## Both engines and every variant, adapters whole, attack, hunt, soak, containers; 90 min
 	@bash mk/nightly.sh $(INTEGRATIONS)
-
-test-durations: $(STAMP) ## The tests of make test, and which 30 took longest
-	@$(RUN_TESTS) -m "$(UNMARKED)" --durations 30 --durations-min 1
 
 # Types of Python and of the dashboard are each the work of one processor, side by side.
 check: $(STAMP) ## Format, lint, types and import rules; the dashboard's where it has changed, and in CI
@@ -112,6 +104,21 @@ check-python: $(SCHEMAS)
 
 check-web-if-changed: $(CONTRACT)
 	@if [ -n "$$CI" ] || bash mk/web_changed.sh; then $(MAKE) --no-print-directory check-web; fi
+
+# -- What measures, what takes long, what is written again -------------------------------------------
+BENCHMARKS := agreement api geometry scale sessions simulation statistics trials
+
+bench: $(STAMP) ## Measures: make bench NAME=geometry; OPTIONS go to the program, JSON to .buildarena/
+ifeq ($(filter $(NAME),$(BENCHMARKS)),)
+	$(error no benchmark '$(NAME)'; there are: $(BENCHMARKS))
+endif
+	@OMP_NUM_THREADS=1 $(TEST_PYTHON) -m benchmarks.$(NAME) --json .buildarena/bench-$(NAME).json $(OPTIONS)
+
+scenario: $(STAMP) ## Plays a long scenario: make scenario NAME=attack; OPTIONS go to the program
+	@bash mk/scenario.sh "$(NAME)" $(OPTIONS)
+
+generate: $(STAMP) ## Writes again what a program makes and is committed; NAME=sessions, games, inspect, sweeps, pictures or digests
+	@bash mk/generate.sh $(NAME)
 
 clean: ## Removes the environment, caches and local data
 	rm -rf $(VENV) $(VENV)-uv build .buildarena .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,14 +1,11 @@
-.PHONY: test-integrations check-integrations lock-integrations inspect-tasks
+.PHONY: check-integrations lock-integrations
 
 # Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
-INTEGRATIONS := inspect verifiers openenv gymnasium
+INTEGRATIONS := inspect verifiers gymnasium
 LIBRARIES := libs/geometry libs/simulation libs/benchmark libs/environment
 # What one of them needs besides: our workflows, which Inspect's models can play, and the client.
 LIBRARIES_inspect := clients/python libs/besiege libs/store libs/pipeline services/worker
 INTEGRATION_STAMPS := $(foreach name,$(INTEGRATIONS),.venv-integrations/$(name)/.installed)
-
-test-integrations: check-integrations ## Each adapter against its real framework
-	@bash mk/integrations.sh test "" $(INTEGRATIONS)
 
 check-integrations: $(INTEGRATION_STAMPS)
 	@bash mk/integrations.sh check $(INTEGRATIONS)
@@ -25,9 +22,9 @@ $(EXPERT_CALLS): tests/support/machines/expert_calls.py $(DESIGNS) $(STAMP)
 $(DRIVEN): tests/support/machines/drive_machines.py $(DESIGNS) $(STAMP)
 	@$(TEST_PYTHON) -m support.machines.drive_machines
 
-check-integrations test-integrations: $(EXPERT_CALLS) $(DRIVEN)
+check-integrations: $(EXPERT_CALLS) $(DRIVEN)
 
-dist: $(DRIVEN)
+release: $(DRIVEN)
 
 .venv-integrations/%/.installed: integrations/%/requirements.lock integrations/%/pyproject.toml $(STAMP)
 	@bash mk/integrations.sh install $* $(LIBRARIES) $(LIBRARIES_$*)
@@ -36,6 +33,3 @@ dist: $(DRIVEN)
 # Physics comes in the versions of requirements.lock: elsewhere the same trial has other bytes.
 lock-integrations:
 	@set -e; $(foreach name,$(INTEGRATIONS),bash mk/integrations.sh lock $(name) $(LIBRARIES) $(LIBRARIES_$(name));)
-
-inspect-tasks: $(STAMP) ## Writes the tasks of Inspect's adapter and their versions again, after a change of tasks
-	@$(BIN)/python mk/inspect_tasks.py

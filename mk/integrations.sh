@@ -28,15 +28,6 @@ check() {
         .venv/bin/ruff check --quiet "integrations/$name"
         MYPYPATH=integrations/$name/src .venv/bin/mypy --no-error-summary --python-executable "$environments/$name/bin/python" "integrations/$name/src"
     done
-    if [[ " $* " == *" verifiers "* ]]; then
-        check_example
-    fi
-}
-
-# An example that needs an adapter's environment is checked with it.
-check_example() {
-    local folder=examples/learning/grpo python=$environments/verifiers/bin/python
-    MYPYPATH=integrations/verifiers/src:$folder .venv/bin/mypy --no-error-summary --python-executable "$python" "$folder"
 }
 
 run_tests() {
@@ -51,11 +42,8 @@ run_tests() {
 }
 
 lock() {
-    local name=$1 groups=()
+    local name=$1
     shift
-    if grep -q '^learning = ' "integrations/$name/pyproject.toml"; then
-        groups=(--group "integrations/$name/pyproject.toml:learning")
-    fi
     physics=$(mktemp)
     trap 'rm -f "$physics"' EXIT
     grep -E '^(numpy|scipy|mujoco|pybullet|python-fcl|threadpoolctl)==' requirements.lock | sed 's/ *\\$//' >"$physics"
@@ -63,7 +51,7 @@ lock() {
     uv pip compile --quiet --universal --generate-hashes --no-annotate -c "$physics" \
         --custom-compile-command "make lock" \
         $(printf -- '--no-emit-package buildarena-%s ' $(basename -a "$@") client "$name") \
-        -o "integrations/$name/requirements.lock" "${groups[@]}" \
+        -o "integrations/$name/requirements.lock" \
         integrations/tests.in "integrations/$name/pyproject.toml" \
         $(printf '%s/pyproject.toml ' "$@")
 }

@@ -2,6 +2,7 @@
 # All that is too long for every change: nightly.sh ADAPTER... Each part runs, whatever others gave;
 # in the end it says how long each took, and what failed.
 set -uo pipefail
+here=$(dirname "$0")
 failed=()
 lines=()
 
@@ -19,12 +20,12 @@ tests() {
 }
 
 part "tests" tests
-part "adapters" bash "$(dirname "$0")/integrations.sh" test "" "$@"
-part "attack" make --no-print-directory attack
-part "hunt" make --no-print-directory hunt MINUTES="${HUNT_MINUTES:-10}"
-part "soak" make --no-print-directory soak SOAK_S="${SOAK_S:-600}" SOAK_JOBS="${SOAK_JOBS:-3000}"
+part "adapters" bash "$here/integrations.sh" test "" "$@"
+part "attack" bash "$here/scenario.sh" attack
+part "hunt" bash "$here/scenario.sh" hunt --minutes "${HUNT_MINUTES:-10}"
+part "soak" bash "$here/scenario.sh" soak --seconds "${SOAK_S:-600}" --jobs "${SOAK_JOBS:-3000}"
 if command -v docker >/dev/null; then
-    part "containers" make --no-print-directory test-containers
+    part "containers" bash "$here/scenario.sh" containers
 else
     lines+=("containers: left out, there is no Docker (Debian's packages docker.io, docker-compose and debootstrap)")
 fi

@@ -36,10 +36,10 @@ def git(*words: str) -> str:
     return done.stdout.rstrip()
 
 
-def make(*words: str) -> None:
-    print(f"== make {' '.join(words)}", flush=True)
-    if subprocess.run([os.environ.get("MAKE", "make"), *words], cwd=ROOT, check=False).returncode:
-        refuse(f"`make {words[0]}` failed; nothing was tagged")
+def run(name: str, *words: str) -> None:
+    print(f"== {name}", flush=True)
+    if subprocess.run(words, cwd=ROOT, check=False).returncode:
+        refuse(f"`{name}` failed; nothing was tagged")
 
 
 def present() -> Version:
@@ -77,7 +77,7 @@ def prepare(version: Version) -> None:
     if not section(UNRELEASED):
         refuse(f"CHANGELOG.md says nothing under {UNRELEASED!r}")
     try:
-        make("version", f"V={version}")
+        run("mk/version.sh", "bash", "mk/version.sh", str(version), *os.environ["PACKAGES"].split())
     except SystemExit:
         git("restore", ".")
         raise
@@ -94,10 +94,8 @@ def heading_of(version: Version) -> str | None:
 def build(version: Version) -> None:
     """Wheels, sdists, images, the contract, what a host needs, and the site, with their hashes."""
     shutil.rmtree(OUT, ignore_errors=True)
-    make("dist")
-    make("images")
-    make("docs")
-    make("openapi")
+    for target in ("release", "images", "docs", "build/openapi.json"):
+        run(f"make {target}", os.environ.get("MAKE", "make"), target)
     shutil.copy(ROOT / "build/openapi.json", OUT / f"buildarena-openapi-{version}.json")
     name = OUT / f"buildarena-deploy-{version}"
     git("archive", f"--prefix={name.name}/", "--output", f"{name}.tar.gz", "HEAD", *DEPLOYED)

@@ -4,17 +4,14 @@ set -euo pipefail
 version=${1:-}
 shift || true
 if ! [[ $version =~ ^[0-9]+\.[0-9]+\.[0-9]+((a|b|rc)[0-9]+)?$ ]]; then
-    echo "'$version' is no version: make version V=0.2.0, or V=0.2.0rc1" >&2
+    echo "'$version' is no version: make release V=0.2.0, or V=0.2.0rc1" >&2
     exit 2
 fi
 for package in "$@"; do
     sed -E -i.before \
         -e "s/^version = \".*\"/version = \"$version\"/" \
         -e "s/\"(buildarena-[a-z-]+(\[[a-z]+\])?)==[^\"]+\"/\"\1==$version\"/" "$package/pyproject.toml"
-    if [ -f "$package/openenv.yaml" ]; then
-        sed -E -i.before "s/^version: .*/version: $version/" "$package/openenv.yaml"
-    fi
-    rm -f "$package"/openenv.yaml.before "$package"/pyproject.toml.before
+    rm -f "$package"/pyproject.toml.before
 done
 # Images have the version of what is in them.
 for file in docker-compose.yml .env.example deploy/kubernetes/*/*/kustomization.yaml deploy/kubernetes/*/*/jobs/kustomization.yaml; do

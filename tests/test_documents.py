@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from buildarena_cli.command_table import COMMANDS
+from buildarena_cli.command_table import ADMIN, COMMANDS
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -82,3 +82,5 @@ def test_make_targets_exist(document) -> None:
 def test_commands_exist(document) -> None:
     named = set(re.findall(r"(?<!import )\bbuildarena ([a-z]+)\b", document.read_text()))
     assert named <= COMMANDS.keys()
+    operating = set(re.findall(r"\b(?:buildarena|tools) admin ([a-z]+)\b", document.read_text()))
+    assert operating <= ADMIN.keys()

@@ -129,7 +129,7 @@ function Test-Desktop {
 function Test-Runner {
     $trust = @()
     if ($CaFile) { $trust = @('--ca-file', $CaFile) }
-    Invoke-BuildArena worker doctor simulate.besiege --api $Api --key-file $KeyFile @trust
+    Invoke-BuildArena admin worker simulate.besiege --check --api $Api --key-file $KeyFile @trust
     if (-not $SkipCalibration) {
         Invoke-BuildArena besiege calibrate
     }

@@ -42,7 +42,7 @@ $ErrorActionPreference = 'Continue'
 $pause = 5
 while ($true) {
     $began = Get-Date
-    & $BuildArena worker start simulate.besiege --api $settings.api --key-file $KeyFile @trust 2>&1 | Write-RunnerLog
+    & $BuildArena admin worker simulate.besiege --api $settings.api --key-file $KeyFile @trust 2>&1 | Write-RunnerLog
     "$(Get-Date -Format o) the runner ended with $LASTEXITCODE" | Write-RunnerLog
     # A service that is away is asked less and less often, up to every five minutes.
     $pause = if (((Get-Date) - $began).TotalMinutes -gt 10) { 5 } else { [Math]::Min(2 * $pause, 300) }

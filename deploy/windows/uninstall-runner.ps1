@@ -4,7 +4,7 @@ Stops the runner and removes what install-runner.ps1 made; the game stays as it 
 
 .DESCRIPTION
 A job at hand goes back to the service when its lease ends, within seconds. Revoke the runner's key
-at the service too: buildarena key revoke KEY
+at the service too: buildarena admin key revoke KEY
 #>
 [CmdletBinding()]
 param([switch] $KeepLogs)
@@ -27,4 +27,4 @@ foreach ($name in 'start-runner.ps1', 'check-desktop.ps1', 'common.ps1', 'uninst
     $path = Join-Path $Root $name
     if (Test-Path -LiteralPath $path) { Remove-Item -LiteralPath $path -Force }
 }
-Write-Output 'The runner is gone. Revoke its key at the service: buildarena key revoke KEY'
+Write-Output 'The runner is gone. Revoke its key at the service: buildarena admin key revoke KEY'

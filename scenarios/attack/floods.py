@@ -23,7 +23,7 @@ from support.servers.api_process import Service, api_service
 from buildarena_store import Database
 
 JOBS = 1000
-FLOODS = {"streams": 800, "archives": 60, "verifications": 1500, "exports": 200, "boards": 400}
+FLOODS = {"streams": 800, "verifications": 1500, "exports": 200, "boards": 400}
 """How many requests of each kind are open at once."""
 P99_BOUND_S = 0.25
 RETRY_S = 1.0
@@ -181,7 +181,6 @@ def _paths(kind: str, count: int, url: str, secret: str, sweep: str) -> list[tup
         return [("POST", f"/v1/jobs/{ids[n % len(ids)]}/verify") for n in range(count)]
     path = {
         "streams": f"/v1/sweeps/{sweep}/events",
-        "archives": f"/v1/sweeps/{sweep}/archive",
         "exports": f"/v1/sweeps/{sweep}/results",
     }
     if kind in path:

@@ -21,7 +21,6 @@ from scenarios.attack.scenarios import SCENARIOS
 FULL: Mapping[str, float] = {
     "jobs": 1000,
     "streams": 800,
-    "archives": 60,
     "exports": 200,
     "boards": 400,
     "verifications": 1500,
@@ -34,7 +33,7 @@ FULL: Mapping[str, float] = {
     "broker_s": 60,
 }
 P99_BOUND_S = 0.25
-QUIET = frozenset({"streams", "archives", "verifications"})
+QUIET = frozenset({"streams", "verifications"})
 """Floods beside which an innocent caller's 99th percentile has a bar."""
 MAX_MIB = 400
 DISK_MIB = 64

@@ -1,10 +1,8 @@
 """What an adversary tries: each scenario says what was tried, what came of it, what is wrong."""
 
-import io
 import json
 import socket
 import time
-import zipfile
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -17,7 +15,6 @@ from scenarios.attack.outages import (
     killed_supervisor,
     stopped_broker,
 )
-from scenarios.attack.packages import hostile_packages
 from scenarios.attack.runners import (
     forged_trials,
     harmful_runner,
@@ -78,7 +75,6 @@ def other_tenants(arena: Arena) -> Tried:
         ("POST", "/v1/keys", {"json": {"name": "x", "scopes": ["admin"]}}),
         ("POST", f"/v1/keys/{owner.id}/revoke", {}),
         ("PUT", f"/v1/keys/{owner.id}/budget", {"json": {"max_requests": 1}}),
-        ("POST", "/v1/archives", {"content": b"PK"}),
     ]
     found = Tried(f"{len(tries)} commands over another key's things")
     before = _settled(arena)
@@ -221,15 +217,13 @@ def truncated_bodies(arena: Arena) -> Tried:
         f"/v1/sweeps/{sweep}/resume": "{}",
         "/v1/sessions": json.dumps({**SESSION, "agent": "cut"}),
         "/v1/tasks": EXAMPLE.replace("narrow-gap", "cut-gap"),
-        "/v1/archives": "PK",
     }
     number = 0
     for path, body in paths.items():
-        secret = arena.operator.secret if path == "/v1/archives" else arena.attacker.secret
         kind = "application/yaml" if path == "/v1/tasks" else "application/json"
         head = (
             f"POST {path} HTTP/1.1\r\nHost: x\r\n"
-            f"Authorization: Bearer {secret}\r\nContent-Type: {kind}\r\n"
+            f"Authorization: Bearer {arena.attacker.secret}\r\nContent-Type: {kind}\r\n"
         )
         chunk = f"{len(body.encode()):x}\r\n{body}\r\n"
         for sent in (
@@ -251,65 +245,17 @@ def truncated_bodies(arena: Arena) -> Tried:
     return found
 
 
-def forged_archives(arena: Arena) -> Tried:
-    """Archives that are no archives, bombs, and changed rows."""
-    sweep = arena.operator.post("/v1/sweeps", SWEEP | {"seeds": [40]})["id"]
-    wait_until(lambda: arena.operator.get(f"/v1/sweeps/{sweep}")["state"] == "done", 60, "a sweep")
-    good = arena.operator.ask("GET", f"/v1/sweeps/{sweep}/archive").content
-
-    def changed(name: str, change: Callable[[bytes], bytes]) -> bytes:
-        out = io.BytesIO()
-        with (
-            zipfile.ZipFile(io.BytesIO(good)) as source,
-            zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as target,
-        ):
-            for member in source.namelist():
-                data = source.read(member)
-                target.writestr(member, change(data) if member.startswith(name) else data)
-        return out.getvalue()
-
-    bomb_bytes = int(arena.sizes["bomb_mib"]) << 20
-    tries = {
-        "no archive": b"PK nonsense",
-        "cut": good[: len(good) // 2],
-        "bomb of rows": changed("rows/jobs", lambda _: b"0" * bomb_bytes),
-        "bomb of an artifact": changed("artifacts/", lambda _: b"0" * bomb_bytes),
-        "depth": changed("rows/jobs", lambda _: b"[" * 1_000_000),
-        "outcome": changed("rows/jobs", lambda d: d.replace(b"construction_failed", b"success")),
-        "id": changed("rows/jobs", lambda d: d.replace(b'"seed": 40', b'"seed": 41')),
-        "media type": changed(
-            "rows/artifacts", lambda d: d.replace(b"application/json", b"text/html")
-        ),
-        "artifact": changed("artifacts/", lambda d: d + b" "),
-    }
-    before = everything(arena.database)["jobs"]
-    answers = {
-        name: arena.operator.ask(
-            "POST", "/v1/archives", content=data, headers={"Content-Type": "application/zip"}
-        ).status_code
-        for name, data in tries.items()
-    }
-    found = Tried(f"{len(tries)} forged or damaged archives")
-    found.refused = f"answers {dict(Counter(answers.values()))}"
-    wrong = {name: status for name, status in answers.items() if status != 422}
-    found.require(not wrong, f"answers {wrong}")
-    found.require(everything(arena.database)["jobs"] == before, "a forged archive left something")
-    return found
-
-
 SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     "tenants": other_tenants,
     "hanging provider": hanging_provider,
     "lying provider": lying_provider,
     "truncated bodies": truncated_bodies,
-    "forged archives": forged_archives,
-    "hostile packages": hostile_packages,
     "forged trials": forged_trials,
     "noisy runner": noisy_runner,
     "harmful runner": harmful_runner,
     "strangers": strangers,
     "look-alikes": look_alikes,
-    **{kind: flood(kind) for kind in ("streams", "archives", "exports", "boards", "verifications")},
+    **{kind: flood(kind) for kind in ("streams", "exports", "boards", "verifications")},
     "full disk": full_disk,
     "stopped broker": stopped_broker,
     "flushed broker": flushed_broker,

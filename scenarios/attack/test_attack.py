@@ -1,4 +1,4 @@
-"""The attack at a small size; `make attack` does it at full size."""
+"""The attack at a small size; `make scenario NAME=attack` does it at full size."""
 
 import tempfile
 from collections.abc import Iterator
@@ -15,7 +15,6 @@ pytestmark = pytest.mark.nightly
 SMALL = {
     "jobs": 60,
     "streams": 60,
-    "archives": 6,
     "exports": 12,
     "boards": 20,
     "verifications": 60,

@@ -91,7 +91,7 @@ def backups_during_kills(arena: Arena) -> Tried:
 
         def back_up() -> None:
             while not stopped.is_set():
-                statuses.append(_command(arena, "backup", place).returncode)
+                statuses.append(_command(arena, "admin", "backup", place).returncode)
 
         thread = threading.Thread(target=back_up)
         thread.start()
@@ -109,11 +109,11 @@ def backups_during_kills(arena: Arena) -> Tried:
             thread.join()
         found.require(set(statuses) == {0}, f"backups ended with {Counter(statuses)}")
         _settled(arena)
-        checked = _command(arena, "backup", place)
+        checked = _command(arena, "admin", "backup", place)
         found.require(checked.returncode == 0, checked.stderr[-300:])
         with _empty_database(arena) as other:
             there = {"BUILDARENA_DATABASE_URL": other, "BUILDARENA_DATA": f"{folder}/there"}
-            restored = _command(arena, "restore", place, **there)
+            restored = _command(arena, "admin", "restore", place, **there)
             found.require(restored.returncode == 0, restored.stderr[-300:])
             database = Database(other)
             try:

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scenarios.hunt.trial import Finding, Scorer, tried
+from scenarios.hunt.variation.genome import Genome
+from scenarios.hunt.variation.kinds import kind_of
+from scenarios.hunt.variation.mutation import crossed, mutated
 from threadpoolctl import threadpool_limits
-
-from buildarena_environment.variation.genome import Genome
-from buildarena_environment.variation.kinds import kind_of
-from buildarena_environment.variation.mutation import crossed, mutated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,10 +7,10 @@ from typing import Any, Final
 
 from scenarios.hunt.evidence import Evidence, counts
 from scenarios.hunt.suspicion import suspicions
+from scenarios.hunt.variation.genome import Genome, grown
 from threadpoolctl import threadpool_limits
 
 from buildarena_benchmark import Score, Task, builtin_tasks, robustness, score
-from buildarena_environment.variation.genome import Genome, grown
 from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES, Trajectory, simulate
 from buildarena_simulation.render.film import write_film

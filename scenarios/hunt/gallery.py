@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from scenarios.hunt.confirming import Confirmed
 from scenarios.hunt.trial import Finding, worth
+from scenarios.hunt.variation.genome import Genome
+from scenarios.hunt.variation.kinds import KINDS, kind_of
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment.variation.genome import Genome
-from buildarena_environment.variation.kinds import KINDS, kind_of
 from buildarena_simulation import SIMULATION_VERSION
 
 BEST: Final = 10

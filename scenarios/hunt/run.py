@@ -16,9 +16,9 @@ from scenarios.hunt.gallery import Gallery, best_of, line_of, ranked
 from scenarios.hunt.search import Crew, TaskSearch, hunted
 from scenarios.hunt.seeds import seeds_of
 from scenarios.hunt.trial import Finding
+from scenarios.hunt.variation.kinds import kind_of
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment.variation.kinds import kind_of
 
 _SEARCHING: Final = 0.75
 """Share of the time that is spent searching; the rest is for confirming."""

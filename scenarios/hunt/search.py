@@ -8,9 +8,9 @@ import numpy as np
 from ribs.archives import GridArchive
 from scenarios.hunt.breeding import Child, made
 from scenarios.hunt.trial import CELLS, RANGES, Finding, Scorer
+from scenarios.hunt.variation.genome import Genome
 
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_environment.variation.genome import Genome
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

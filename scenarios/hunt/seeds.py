@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from scenarios.hunt.variation.genome import Genome, grown
+from scenarios.hunt.variation.kinds import ALIKE, kind_of
+
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment.variation.genome import Genome, grown
-from buildarena_environment.variation.kinds import ALIKE, kind_of
 from buildarena_geometry import Machine
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.builtin.designs.calls import control_of

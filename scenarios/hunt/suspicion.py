@@ -18,11 +18,11 @@ from scenarios.hunt.bringing import (
     travels,
 )
 from scenarios.hunt.evidence import Check, Evidence, counts, path_of
+from scenarios.hunt.variation.kinds import kind_of
+from scenarios.hunt.variation.programs import IDLE
 from support.machines.piloted import listened, repeated, scored
 
 from buildarena_benchmark import Score, Task
-from buildarena_environment.variation.kinds import kind_of
-from buildarena_environment.variation.programs import IDLE
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable
 from buildarena_simulation.scenario import SpanPlacement

@@ -13,15 +13,15 @@ from scenarios.hunt.search import Crew, TaskSearch
 from scenarios.hunt.seeds import expert_genome, exploits, seeds_of
 from scenarios.hunt.suspicion import suspicions
 from scenarios.hunt.trial import tried
+from scenarios.hunt.variation.genome import Genome, grown
+from scenarios.hunt.variation.kinds import kind_of
+from scenarios.hunt.variation.mutation import crossed, mutated
+from scenarios.hunt.variation.programs import IDLE
 from support.machines.boulders import car_with_boulder
 from support.machines.drafts import KeyedDraft
 from support.machines.headroom import drafted
 
 from buildarena_benchmark import broken_constraint, builtin_tasks, score
-from buildarena_environment.variation.genome import Genome, grown
-from buildarena_environment.variation.kinds import kind_of
-from buildarena_environment.variation.mutation import crossed, mutated
-from buildarena_environment.variation.programs import IDLE
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs.couriers import courier

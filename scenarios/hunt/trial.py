@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 from scenarios.hunt.evidence import Evidence, counts
 from scenarios.hunt.suspicion import suspicions
+from scenarios.hunt.variation.genome import Genome, grown
 
 from buildarena_benchmark import Score, Task, broken_constraint, builtin_tasks, score
 from buildarena_benchmark.tasks.loading import references
-from buildarena_environment.variation.genome import Genome, grown
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, SimulationError, Trajectory, simulate
 

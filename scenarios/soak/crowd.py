@@ -39,7 +39,7 @@ def honest_runner(url: str, operator: Tenant, folder: Path) -> Iterator[psutil.P
     """A real runner of our program with a key of its own."""
     folder.mkdir()
     (folder / "key").write_text(operator.post("/v1/keys", RUNNER)["secret"])
-    words = ["worker", "start", f"simulate.{ENGINE}", "--api", url, "--key-file"]
+    words = ["admin", "worker", f"simulate.{ENGINE}", "--api", url, "--key-file"]
     with (folder / "runner.log").open("ab") as log:
         command = [BUILDARENA, *words, str(folder / "key")]
         process = subprocess.Popen(command, stdout=log, stderr=log, cwd=folder)

@@ -67,9 +67,9 @@ def test_each_engine_is_compared_with_the_game_on_each_task(api, tried) -> None:
     assert pybullet["low"] < 0.5 < pybullet["high"]
 
 
-def test_an_import_counts_once_it_was_verified(api, context, tried) -> None:
+def test_a_runners_trial_counts_once_it_was_verified(api, context, tried) -> None:
     job = tried(0, success=True, indicator=1.0, mujoco=said(True, 1.0))
-    change(context, job, imported_from="elsewhere", audit="required")
+    change(context, job, audit="required")
     assert table(api)["rows"] == []
     change(context, job, audit="verified")
     assert len(table(api)["rows"]) == 1

@@ -51,7 +51,7 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
     outcome = rng.choice(
         ["success"] * 4 + ["unsuccessful", "construction_failed", "limit", "errored", "cancelled"]
     )
-    imported = rng.random() < 0.2
+    audited = rng.random() < 0.2
     return {
         "id": f"job_{number:020d}",
         "task": task,
@@ -80,9 +80,8 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
         "actions": rng.choice((rng.randrange(9), 2**40 + rng.randrange(9))),
         "refused_actions": rng.randrange(3),
         "finished_at": START + timedelta(hours=rng.randrange(1000)),
-        "imported_from": "elsewhere" if imported else None,
         "by_runner": rng.random() < 0.3,
-        "audit": rng.choice(("required", "verified", "refuted", None)) if imported else None,
+        "audit": rng.choice(("required", "verified", "refuted", None)) if audited else None,
     }
 
 

@@ -82,11 +82,11 @@ def test_a_restored_service_is_the_one_that_was_backed_up(
     submit(submissions, SWEEP)
     work(context)
     place = str(tmp_path / "backups")
-    made = command(context, "backup", place, "--json")
+    made = command(context, "admin", "backup", place, "--json")
     assert made.returncode == 0, made.stderr
     assert json.loads(made.stdout)["copied"] == len(stored(context))
     other = elsewhere()
-    restored = command(other, "restore", place)
+    restored = command(other, "admin", "restore", place)
     assert restored.returncode == 0, restored.stderr
     assert rows(other) == rows(context)
     assert stored(other) == stored(context)
@@ -106,9 +106,9 @@ def test_a_job_half_way_continues_elsewhere_and_asks_nothing_twice(
     work(context, steps=1)
     asked = rows(context)["journal"]
     assert asked
-    assert command(context, "backup", str(tmp_path / "b")).returncode == 0
+    assert command(context, "admin", "backup", str(tmp_path / "b")).returncode == 0
     other = elsewhere()
-    assert command(other, "restore", str(tmp_path / "b")).returncode == 0
+    assert command(other, "admin", "restore", str(tmp_path / "b")).returncode == 0
     work(other)
     (job,) = other.store.jobs.page(limit=10)
     assert (job.state, job.outcome) == ("done", "success")
@@ -119,14 +119,16 @@ def test_a_second_backup_copies_only_what_is_new(context, submissions, tmp_path)
     place = str(tmp_path / "b")
     submit(submissions, {**SWEEP, "models": ["builtin/idle"]})
     work(context)
-    first = json.loads(command(context, "backup", place, "--name", "one", "--json").stdout)
+    first = json.loads(command(context, "admin", "backup", place, "--name", "one", "--json").stdout)
     assert first["copied"] == first["artifacts"] > 0
     submit(submissions, {**SWEEP, "models": ["builtin/random"]})
     work(context)
-    second = json.loads(command(context, "backup", place, "--name", "two", "--json").stdout)
+    second = json.loads(
+        command(context, "admin", "backup", place, "--name", "two", "--json").stdout
+    )
     assert second["artifacts"] > first["artifacts"]
     assert second["copied"] == second["artifacts"] - first["artifacts"]
-    listed = json.loads(command(context, "backup", place, "--list", "--json").stdout)
+    listed = json.loads(command(context, "admin", "backup", place, "--list", "--json").stdout)
     assert [backup["name"] for backup in listed] == ["one", "two"]
 
 
@@ -135,7 +137,7 @@ def test_what_the_store_lost_is_named_and_the_rest_is_saved(context, submissions
     work(context)
     lost, *_ = sorted(stored(context))
     (context.settings.data / "artifacts" / lost[:2] / lost).write_bytes(b"other bytes")
-    made = command(context, "backup", str(tmp_path / "b"))
+    made = command(context, "admin", "backup", str(tmp_path / "b"))
     assert made.returncode == 3
     assert f"missing or damaged in the store: {lost}" in made.stdout
 
@@ -146,19 +148,19 @@ def test_a_damaged_backup_is_refused_and_the_database_stays_empty(
     submit(submissions, {**SWEEP, "models": ["builtin/idle"]})
     work(context)
     place = tmp_path / "b"
-    assert command(context, "backup", str(place), "--name", "good").returncode == 0
+    assert command(context, "admin", "backup", str(place), "--name", "good").returncode == 0
     other = elsewhere()
     whole = {file: file.read_bytes() for file in place.rglob("*") if file.is_file()}
     for damaged, data in whole.items():
         if damaged.name == "manifest.json":
             continue
         damaged.write_bytes(data[:-1] + b"?")
-        refused = command(other, "restore", str(place))
+        refused = command(other, "admin", "restore", str(place))
         assert refused.returncode == 1, damaged
         assert "damaged" in refused.stderr, refused.stderr
         damaged.write_bytes(data)
     assert other.store.database.schema() is None
-    assert command(other, "restore", str(place)).returncode == 0
+    assert command(other, "admin", "restore", str(place)).returncode == 0
 
 
 @pytest.fixture
@@ -166,7 +168,7 @@ def place(context, submissions, tmp_path) -> Path:
     """A place with the backup of a service whose one job has ended."""
     submit(submissions, {**SWEEP, "models": ["builtin/expert"]})
     work(context)
-    assert command(context, "backup", str(tmp_path / "b"), "--name", "one").returncode == 0
+    assert command(context, "admin", "backup", str(tmp_path / "b"), "--name", "one").returncode == 0
     return tmp_path / "b"
 
 
@@ -182,22 +184,25 @@ def trajectory_in(place: Path, context: Context) -> tuple[Path, str]:
 def test_a_damaged_artifact_is_found_and_copied_again(context, place, damage) -> None:
     file, _ = trajectory_in(place, context)
     whole = file.read_bytes()
-    assert command(context, "backup", str(place), "--check").returncode == 0
+    assert command(context, "admin", "backup", str(place), "--check").returncode == 0
     file.unlink() if damage is None else file.write_bytes(damage(whole))
-    found = command(context, "backup", str(place), "--check", "--json")
+    found = command(context, "admin", "backup", str(place), "--check", "--json")
     assert found.returncode == 3
     assert list(json.loads(found.stdout)["problems"]) == [file.name]
-    assert command(context, "backup", str(place), "--name", "two").returncode == 0
+    assert command(context, "admin", "backup", str(place), "--name", "two").returncode == 0
     assert file.read_bytes() == whole
     for name in ("one", "two"):
-        assert command(context, "backup", str(place), "--check", "--name", name).returncode == 0
+        assert (
+            command(context, "admin", "backup", str(place), "--check", "--name", name).returncode
+            == 0
+        )
 
 
 def test_an_artifact_of_another_size_is_copied_again_unasked(context, place) -> None:
     file, _ = trajectory_in(place, context)
     whole = file.read_bytes()
     file.write_bytes(whole[:100])
-    made = command(context, "backup", str(place), "--json")
+    made = command(context, "admin", "backup", str(place), "--json")
     assert (made.returncode, json.loads(made.stdout)["copied"]) == (0, 1)
     assert file.read_bytes() == whole
 
@@ -206,11 +211,11 @@ def test_what_is_left_is_restored_and_what_is_lost_named(context, place, elsewhe
     file, use = trajectory_in(place, context)
     file.unlink()
     other = elsewhere()
-    refused = command(other, "restore", str(place))
+    refused = command(other, "admin", "restore", str(place))
     assert refused.returncode == 1
     assert "--despite-missing" in refused.stderr
     assert other.store.database.schema() is None
-    restored = command(other, "restore", str(place), "--despite-missing")
+    restored = command(other, "admin", "restore", str(place), "--despite-missing")
     assert restored.returncode == 3, restored.stderr
     assert f"lost: artifact {file.name}, {use}" in restored.stdout
     assert rows(other) == rows(context)
@@ -224,15 +229,15 @@ def test_a_restore_names_what_was_missing_when_it_was_backed_up(
     work(context)
     file, use = trajectory_in(context.settings.data, context)
     file.unlink()
-    assert command(context, "backup", str(tmp_path / "b")).returncode == 3
-    restored = command(elsewhere(), "restore", str(tmp_path / "b"), "--json")
+    assert command(context, "admin", "backup", str(tmp_path / "b")).returncode == 3
+    restored = command(elsewhere(), "admin", "restore", str(tmp_path / "b"), "--json")
     assert restored.returncode == 3, restored.stderr
     assert json.loads(restored.stdout)["lost"] == {file.name: [use]}
 
 
 def test_refusals_name_the_offender_and_the_choices(context, elsewhere, tmp_path) -> None:
     place = str(tmp_path / "b")
-    assert command(context, "backup", place, "--name", "one").returncode == 0
+    assert command(context, "admin", "backup", place, "--name", "one").returncode == 0
     other = elsewhere()
     manifest = tmp_path / "b/one/manifest.json"
     empty = tmp_path / "empty"
@@ -250,10 +255,10 @@ def test_refusals_name_the_offender_and_the_choices(context, elsewhere, tmp_path
         assert (refused.returncode, said in refused.stderr) == (1, True), refused.stderr
     newer = json.loads(manifest.read_text()) | {"schema": "2099_01_01_flight", "version": "9.0"}
     manifest.write_text(json.dumps(newer))
-    refused = command(other, "restore", place)
+    refused = command(other, "admin", "restore", place)
     assert "made by version 9.0" in refused.stderr
     nobody = command(
-        context, "backup", place, BUILDARENA_DATABASE_URL="postgresql://a@127.0.0.1:9/x"
+        context, "admin", "backup", place, BUILDARENA_DATABASE_URL="postgresql://a@127.0.0.1:9/x"
     )
     assert "the database can't be reached" in nobody.stderr
 

@@ -12,7 +12,6 @@ from sqlalchemy import insert, select, update
 from support.clients.commands import printed, run_cli
 
 from buildarena_benchmark.leaderboard import published_rows
-from buildarena_cli.commands.report import variant
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store.states import Verdict
@@ -124,94 +123,6 @@ def test_exports_are_files_of_the_asked_format(url, tmp_path) -> None:
     assert "can't be written" in nowhere.stderr
 
 
-@pytest.mark.nightly
-def test_a_report_has_every_section_in_every_format(url, sweep, tmp_path) -> None:
-    for ending in (".html", ".md", ".pdf"):
-        printed(url, "report", sweep, "--out", str(tmp_path / f"report{ending}"))
-    markdown = (tmp_path / "report.md").read_text()
-    headings = re.findall(r"^## (.*)$", markdown, re.MULTILINE)
-    assert headings == [
-        "Ranking",
-        "Performance",
-        "Difficulty dimensions",
-        "Failures",
-        "Cost",
-        "What these samples can show",
-    ]
-    assert "1 have not ended yet" in markdown
-    assert "1 errored" in markdown
-    assert "nan" not in markdown.lower().replace("finance", "")
-    assert "85.9 %" in markdown  # GPT-5 on support-1 in the paper, beside ours
-    for name in re.findall(r"\((report_files/.*?\.png)\)", markdown):
-        assert (tmp_path / name).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
-    page = (tmp_path / "report.html").read_text()
-    assert page.count("<img") == markdown.count("![") == 6
-    assert page.count("<h2>") == len(headings)
-    assert (tmp_path / "report.pdf").read_bytes()[:5] == b"%PDF-"
-
-
-@pytest.mark.ci
-def test_a_closed_loop_beside_single_shots(url, sweep, context, submissions, tmp_path) -> None:
-    cell = {"tasks": ["support-2"], "models": ["openai/gpt-5", "xai/grok-4"], "samples": 16}
-    spec = SweepSpec.model_validate({**cell, "closed_loop": {"rounds": 5, "analyst": True}})
-    loop = submissions.submit_sweep(spec).sweep.id
-    end_jobs(context, rounds=5)
-    out = tmp_path / "report.md"
-    printed(url, "report", sweep, loop, "--out", str(out))
-    text = out.read_text()
-    assert "## Closed loop" in text
-    assert "openai/gpt-5 (5 rounds + analyst)" in text
-    assert "openai/gpt-5 (main)" in text
-    assert re.findall(r"rounds-(.*?)\.png", text) == ["support-2"]
-    line = next(
-        line
-        for line in text.splitlines()
-        if line.startswith("| openai/gpt-5 (5 rounds") and line.count(" / ") == 5
-    )
-    rates = [float(rate) for rate in re.findall(r"([\d.]+) %", line)]
-    assert rates == sorted(rates)
-    assert rates[-1] > rates[0]
-
-
-@pytest.mark.ci
-def test_simulators_are_compared_on_the_same_machines(url, context, submissions, tmp_path):
-    sweeps = []
-    for simulator in ("pybullet", "mujoco"):
-        spec = SweepSpec(
-            tasks=["support-1"], models=["openai/gpt-5"], samples=3, simulator=simulator
-        )
-        sweeps.append(submissions.submit_sweep(spec).sweep.id)
-    with context.store.database.transaction() as connection:
-        for number, job in enumerate(connection.execute(select(jobs).order_by(jobs.c.id)).all()):
-            won = number > 0
-            connection.execute(
-                update(jobs)
-                .where(jobs.c.id == job.id)
-                .values(state="done", outcome="success", success=True, indicator=1.0)
-            )
-            trial = {"machine_hash": f"machine {job.seed}", "indicator": float(job.seed)}
-            add_rollout(connection, job, success=won, **trial)
-    printed(url, "report", *sweeps, "--out", str(tmp_path / "r.md"))
-    text = (tmp_path / "r.md").read_text()
-    assert "| support-1 | mujoco, pybullet | 3 | 66.7 % | 0.00 | 1.00 |" in text
-
-
-def test_a_report_of_nothing_scored_says_so(url, context, submissions, tmp_path) -> None:
-    spec = SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=1)
-    sweep = submissions.submit_sweep(spec).sweep.id
-    for _ in range(2):
-        for ending in (".html", ".md", ".pdf"):
-            printed(url, "report", sweep, "--out", str(tmp_path / f"r{ending}"))
-        assert "No job was scored." in (tmp_path / "r.md").read_text()
-        lease = context.store.leases.claim("construct", owner="w")
-        if lease:
-            context.store.leases.give_up(lease, "gone", reason="lost_worker")
-    assert "1 errored" in (tmp_path / "r.md").read_text()
-    bad = run_cli(url, "report", sweep, "--out", str(tmp_path / "r.doc"))
-    assert (bad.returncode, "must end in .html" in bad.stderr) == (1, True)
-    assert run_cli(url, "report", "sweep_x", "--out", str(tmp_path / "r.md")).returncode == 1
-
-
 @pytest.mark.ci
 @pytest.mark.usefixtures("sweep")
 def test_an_audit_tells_every_difference(url, context) -> None:
@@ -232,25 +143,10 @@ def test_an_audit_tells_every_difference(url, context) -> None:
     worker = threading.Thread(target=verify)
     worker.start()
     try:
-        done = run_cli(url, "audit", "xai/grok-4", "--sample", "4")
+        done = run_cli(url, "job", "verify", "--model", "xai/grok-4", "--sample", "4")
     finally:
         stopping.set()
         worker.join()
     assert done.returncode == 1
     assert re.search(r"4 of (7[5-9]|80) results checked", done.stdout)
     assert done.stdout.count("score: indicator: kept 1, found 2") == 2
-
-
-@pytest.mark.parametrize(
-    ("spec", "name"),
-    [
-        ({}, ""),
-        ({"decoding": {"temperature": 0.5, "top_p": 0.7, "max_tokens": None}}, ""),
-        ({"decoding": {"temperature": 1.0, "top_p": 0.7}}, "temperature 1.0"),
-        ({"decoding": {"temperature": 0.5}}, "top p default"),
-        ({"workflow": "builder", "one_shot": True}, "builder, one-shot"),
-        ({"closed_loop": {"rounds": 5, "analyst": False}}, "5 rounds"),
-    ],
-)
-def test_a_variant_is_named_by_what_differs_from_the_main_experiment(spec, name) -> None:
-    assert variant(spec) == name

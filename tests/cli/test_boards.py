@@ -17,7 +17,6 @@ def row(place: int, model: str, task: str) -> dict[str, Any]:
         "configuration": "c",
         "baseline": model.startswith("builtin/"),
         "decoding": {},
-        "imported": 0,
         "unverified": 0,
         "successes": place,
         "trials": 4,

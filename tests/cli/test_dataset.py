@@ -366,7 +366,7 @@ def made_up(number: int) -> Fetched:
         "refused_actions": 0,
         "usage": dict.fromkeys(("requests", *tokens, "cost_usd")),
         "artifacts": {},
-        **dict.fromkeys((*unknown, "imported_from", "verified_at", "finished_at")),
+        **dict.fromkeys((*unknown, "verified_at", "finished_at")),
     }
     turn = {"index": 0, "stage": "plan", "role": "planner", "text": "x" * 100_000, "actions": []}
     transcript = json.dumps({"version": "1", "turns": [turn]}).encode()

@@ -31,20 +31,20 @@ def call(context, monkeypatch) -> Iterator[Call]:
 
 
 def made(call: Call, *words: str) -> dict[str, str]:
-    return json.loads(call("key", "create", "ada", *words, "--json").stdout)
+    return json.loads(call("admin", "key", "create", "ada", *words, "--json").stdout)
 
 
 def test_a_key_is_made_used_listed_and_revoked(call) -> None:
     key = made(call, "--scope", "submit", "--days", "30", "--max-cost-usd", "12.5")
     assert call("task", "list", key=key["secret"]).exit_code == 0
-    listed = call("key", "list").stdout
+    listed = call("admin", "key", "list").stdout
     assert key["id"][:8] in listed
     assert "$0.00 of" in listed
     assert key["secret"] not in listed
-    call("key", "budget", key["id"], "--max-requests", "7")
-    (shown,) = json.loads(call("key", "list", "--json").stdout)
+    call("admin", "key", "budget", key["id"], "--max-requests", "7")
+    (shown,) = json.loads(call("admin", "key", "list", "--json").stdout)
     assert (shown["budget"]["max_requests"], shown["budget"]["max_cost_usd"]) == (7, None)
-    assert "revoked" in call("key", "revoke", key["id"]).stdout
+    assert "revoked" in call("admin", "key", "revoke", key["id"]).stdout
     with pytest.raises(CommandError, match=r"is revoked: set BUILDARENA_KEY"):
         call("task", "list", key=key["secret"])
 
@@ -56,7 +56,7 @@ def test_without_a_key_the_command_says_what_to_set(call) -> None:
 
 def test_a_wrong_scope_is_named_with_the_choices(call) -> None:
     with pytest.raises(CommandError, match="'root'; choose from read, submit, admin"):
-        call("key", "create", "x", "--scope", "root")
+        call("admin", "key", "create", "x", "--scope", "root")
 
 
 def test_running_a_file_again_takes_the_sweep_up_with_another_budget(call, tmp_path) -> None:
@@ -80,12 +80,14 @@ def test_a_key_is_rotated_with_what_it_owns(call) -> None:
     first = json.loads(
         call("job", "submit", "lift-1", "builtin/idle", "--json", key=key["secret"]).stdout
     )
-    done = json.loads(call("key", "rotate", key["id"], "--overlap", "30m", "--json").stdout)
+    done = json.loads(
+        call("admin", "key", "rotate", key["id"], "--overlap", "30m", "--json").stdout
+    )
     assert done["id"] == key["id"]
     assert done["secret"] != key["secret"]
     for secret in (key["secret"], done["secret"]):
         assert call("job", "show", first["id"], key=secret).exit_code == 0
-    last = json.loads(call("key", "rotate", key["id"], "--overlap", "0", "--json").stdout)
+    last = json.loads(call("admin", "key", "rotate", key["id"], "--overlap", "0", "--json").stdout)
     with pytest.raises(CommandError, match=r"is replaced: set BUILDARENA_KEY"):
         call("job", "list", key=done["secret"])
     with pytest.raises(CommandError, match="unknown API key"):
@@ -96,10 +98,10 @@ def test_a_key_is_rotated_with_what_it_owns(call) -> None:
 @pytest.mark.parametrize("overlap", ["1", "-1h", "1w", "h", "1.5h", "", "9999999h", "1h "])
 def test_an_overlap_that_is_no_time_is_named(call, overlap) -> None:
     with pytest.raises(CommandError, match=r"--overlap .* is not a time"):
-        call("key", "rotate", "key_0", f"--overlap={overlap}")
+        call("admin", "key", "rotate", "key_0", f"--overlap={overlap}")
 
 
 def test_an_overlap_of_years_is_refused(call) -> None:
     key = made(call)
     with pytest.raises(CommandError, match="overlap_hours"):
-        call("key", "rotate", key["id"], "--overlap", "91d")
+        call("admin", "key", "rotate", key["id"], "--overlap", "91d")

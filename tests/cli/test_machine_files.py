@@ -62,10 +62,10 @@ def test_a_jobs_trial_is_drawn(url, context, submissions, tmp_path) -> None:
 def test_a_worker_takes_the_commands_place(monkeypatch) -> None:
     started = []
     monkeypatch.setattr("os.execv", lambda *words: started.append(words))
-    assert run("worker", "start", "simulate.mujoco").returncode == 0
+    assert run("admin", "worker", "simulate.mujoco").returncode == 0
     words = [sys.executable, "-m", "buildarena_simworker", "--simulator", "mujoco"]
     assert started == [(sys.executable, words)]
-    refused = run("worker", "start", "paint")
+    refused = run("admin", "worker", "paint")
     queues = "construct, simulate.pybullet, simulate.mujoco, simulate.besiege"
     assert (refused.returncode, f"choose from {queues}" in refused.stderr) == (1, True)
 

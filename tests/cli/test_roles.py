@@ -1,4 +1,4 @@
-"""`buildarena roles` and `migrate`: what a deployment runs before its processes start."""
+"""`buildarena admin roles` and `migrate`: what a deployment runs before its processes start."""
 
 from __future__ import annotations
 
@@ -62,18 +62,18 @@ def test_roles_then_migration_by_an_owner_who_is_no_superuser(fresh, tmp_path) -
     (owner, owner_url), (api, api_url) = (
         login(tmp_path, fresh, role, "first") for role in ("owner", "api")
     )
-    made = command(fresh, "roles", owner, api)
+    made = command(fresh, "admin", "roles", owner, api)
     assert (made.returncode, made.stdout.strip()) == (0, "logins for owner, api"), made.stderr
-    migrated = command(owner_url, "migrate")
+    migrated = command(owner_url, "admin", "migrate")
     assert migrated.returncode == 0, migrated.stderr
-    assert command(api_url, "migrate").returncode != 0
+    assert command(api_url, "admin", "migrate").returncode != 0
     database = Database(api_url)
     database.require_schema()
     database.close()
     api, renewed = login(tmp_path, fresh, "api", "second")
-    assert command(fresh, "roles", api).returncode == 0
+    assert command(fresh, "admin", "roles", api).returncode == 0
     assert who(renewed) == make_url(renewed).username
-    refused = command(api_url, "migrate")
+    refused = command(api_url, "admin", "migrate")
     assert refused.returncode != 0
     assert "second" not in refused.stderr + refused.stdout
 
@@ -90,6 +90,6 @@ def test_roles_then_migration_by_an_owner_who_is_no_superuser(fresh, tmp_path) -
 def test_mistakes_are_named(database_url, tmp_path, words, message, code) -> None:
     file = tmp_path / "url"
     file.write_text("postgresql://a:b@h/d")
-    done = command(database_url, "roles", *(word.format(file=file) for word in words))
+    done = command(database_url, "admin", "roles", *(word.format(file=file) for word in words))
     assert done.returncode == code
     assert message in done.stderr

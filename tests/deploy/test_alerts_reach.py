@@ -111,7 +111,7 @@ def test_jobs_that_no_worker_serves(operator) -> None:
     shown = operator.doctor()
     assert re.search(rf"!! +workers of {queue} +0 alive; 1 waiting", shown), shown
     assert alert in operator.doctor()
-    words = operator.words(alert, "Do", "buildarena worker start", QUEUE=queue)
+    words = operator.words(alert, "Do", "buildarena admin worker", QUEUE=queue)
     with ExitStack() as stack:
         process = stack.enter_context(
             subprocess.Popen(

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from support.documents.locks import image_locks
+from support.documents.locks import image_lock_names
 
-from buildarena_cli.command_table import COMMANDS
+from buildarena_cli.command_table import ADMIN
 from buildarena_geometry import kernels
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.settings import Settings
@@ -26,6 +26,11 @@ OURS = {
     for name, service in SERVICES.items()
     if service["image"].startswith("buildarena/")
 }
+
+
+@pytest.fixture
+def image_lock(tmp_path) -> set[str]:
+    return image_lock_names(tmp_path / "image")
 
 
 def run(*words: str) -> subprocess.CompletedProcess[str]:
@@ -90,7 +95,7 @@ def test_images_of_ours_run_as_an_ordinary_user() -> None:
         assert users[-1:] == ["10001:10001"], _target(service)
 
 
-def test_images_share_the_layers_of_what_all_need() -> None:
+def test_images_of_services_are_one_environment() -> None:
     parents = {
         stage: base
         for base, stage in re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
@@ -99,49 +104,12 @@ def test_images_share_the_layers_of_what_all_need() -> None:
         line = [target]
         while line[-1] in parents:
             line.append(parents[line[-1]])
-        assert line[-3:] == ["shared", "runtime", "scratch"], line
-    assert parents["proxy"] == "scratch"
-    assert "RUN" not in DOCKERFILE.split("FROM scratch AS proxy")[1], "it has no shell"
+        assert line[-4:] == ["service", "libraries", "runtime", "${PYTHON_IMAGE}"], line
 
 
-def test_an_engine_is_only_where_something_is_simulated(tmp_path) -> None:
-    engines = {"mujoco", "pybullet"}
-    # The API simulates what people drive.
-    simulated = {
-        "shared": set(),
-        "api": engines,
-        "construct": engines,
-        "simulate-mujoco": {"mujoco"},
-        "simulate-pybullet": {"pybullet"},
-        "tools": set(),
-    }
-    locks = image_locks(tmp_path)
-    assert {name: names & engines for name, names in locks.items()} == simulated
-    for names in locks.values():
-        assert {"psycopg", "celery"} <= names
-        assert not names & {"pytest", "ribs", "mkdocs", "cython"}
-
-
-@pytest.mark.ci
-def test_nothing_is_trimmed_that_a_source_names() -> None:
-    lines = (ROOT / "deploy/docker/trimmed.txt").read_text().splitlines()
-    trimmed = {line for line in lines if not line.startswith("#")}
-    assert "trimmed.txt" in (ROOT / "docs/deploying.md").read_text()
-    for path in (
-        *ROOT.glob("libs/*/src"),
-        *ROOT.glob("services/*/src"),
-        *ROOT.glob("clients/*/src"),
-    ):
-        for source in path.rglob("*.py"):
-            named = re.findall(
-                r"^ *(?:import|from) ([a-z][\w.]+)(?: import (\w+))?",
-                source.read_text(),
-                re.MULTILINE,
-            )
-            for module, name in named:
-                found = Path(*module.split("."), name)
-                kept = [found, *found.parents]
-                assert not [p for each in kept for p in trimmed if each.match(p)], (source, module)
+def test_images_have_what_services_need_and_no_tools_of_ours(image_lock) -> None:
+    assert {"mujoco", "pybullet", "psycopg", "celery"} <= image_lock
+    assert not image_lock & {"pytest", "ribs", "mkdocs", "cython", "hatchling"}
 
 
 def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
@@ -149,7 +117,7 @@ def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
     assert {_target(service) for service in OURS.values()} <= targets
     engines = {f"simulate-{name}" for name in installed_engines()}
     assert {"api", "construct", "migrate", "proxy", *engines} <= set(SERVICES)
-    assert {SERVICES[name]["command"][0] for name in ("migrate", "roles")} <= set(COMMANDS)
+    assert {SERVICES[name]["command"][1] for name in ("migrate", "roles")} <= set(ADMIN)
 
 
 def test_only_settings_that_exist_are_set() -> None:

@@ -23,7 +23,7 @@ from support.documents.manifests import (
 )
 from support.documents.promtool import needs_promtool, promtool
 
-from buildarena_cli.command_table import COMMANDS
+from buildarena_cli.command_table import ADMIN
 from buildarena_pipeline import __version__
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
@@ -33,9 +33,8 @@ from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 SCHEMAS = json.loads((Path(__file__).parents[1] / "data/kubernetes-schemas.json").read_text())
 """Schemas of kinds that are not Kubernetes' own."""
 MAINTENANCE = {
-    "backup": ["backup", "$(BACKUPS)"],
-    "gc": ["artifacts", "gc"],
-    "pack": ["history", "pack"],
+    "backup": ["admin", "backup", "$(BACKUPS)"],
+    "gc": ["admin", "gc"],
 }
 DOCKERFILE = KUBERNETES.parent / "docker" / "Dockerfile"
 VERSIONS = ("1.29", kubernetes_validate.latest_version())
@@ -333,7 +332,8 @@ def test_what_must_be_done_again_and_again_has_its_times(overlay) -> None:
         assert each["spec"]["concurrencyPolicy"] == "Forbid"
         (container,) = pods(documents)[name]["spec"]["containers"]
         assert container["args"] == MAINTENANCE[name]
-        assert container["args"][0] in COMMANDS
+        assert container["args"][0] == "admin"
+        assert container["args"][1] in ADMIN
         assert container["image"] == f"buildarena/tools:{VERSION}"
         given = {entry["name"]: entry["value"] for entry in container["env"]}
         mounts = {mount["mountPath"] for mount in container["volumeMounts"]}

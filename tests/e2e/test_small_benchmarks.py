@@ -19,7 +19,7 @@ def test_sessions_are_counted_turn_by_turn(tmp_path) -> None:
     file = tmp_path / "figures.json"
     given = ["--sessions", "3", "--latency", "0.05", "--warm-up", "1", "--json", str(file)]
     subprocess.run(
-        [sys.executable, "-m", "benchmarks.sessions.bench_sessions", *given],
+        [sys.executable, "-m", "benchmarks.sessions", *given],
         check=True,
         timeout=120,
         cwd=ROOT,
@@ -35,7 +35,7 @@ def test_sessions_are_counted_turn_by_turn(tmp_path) -> None:
 
 
 def test_what_a_job_costs_is_shared_among_all_processes(monkeypatch) -> None:
-    from benchmarks.api import overhead
+    from benchmarks import overhead
 
     for name, value in {"ALONE": 2, "IDLE_S": 0.2, "POLL_S": 0.1}.items():
         monkeypatch.setattr(overhead, name, value)

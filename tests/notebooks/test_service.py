@@ -1,16 +1,11 @@
 """What notebooks read of a service is what it keeps; the notebook about it runs."""
 
-import re
-from html import unescape
-
 import httpx
 import pytest
 from support.servers.live_api import live_api
 from support.stages import work
-from typer.testing import CliRunner
 
 import buildarena as ba
-from buildarena_cli.main import app
 from buildarena_client import ClientError, NotFoundError, UnreachableError
 
 SWEEP = {
@@ -58,33 +53,13 @@ def test_a_job_s_machine_and_trial_are_those_that_are_kept(url):
     again = ba.simulate(machine, trial.task)
     assert again.score == trial.score
     assert "success, load" in trial._repr_mimebundle_()["text/html"]
-    from buildarena.service import job_page
-
-    page = job_page(good["id"], url)
-    assert f"support-1 by builtin/expert, seed 0. {trial!r}".splitlines()[0] in unescape(page)
-    for read in (ba.job_machine, ba.job_trial, job_page):
+    for read in (ba.job_machine, ba.job_trial):
         with pytest.raises(ClientError, match=f"{empty['id']} has no .*: plan_unreadable"):
             read(empty["id"])
         with pytest.raises(NotFoundError):
             read("job_00000000000000000000")
         with pytest.raises(ClientError):
             read("../sweeps")
-
-
-@pytest.mark.ci
-def test_one_command_shows_a_job_to_somebody_without_a_service(url, tmp_path):
-    (good,) = httpx.get(f"{url}/v1/jobs?model=builtin/expert").json()["jobs"]
-    file = tmp_path / "shown.html"
-    words = ["job", "page", good["id"], "--url", url, "--out"]
-    done = CliRunner().invoke(app, [*words, str(file)])
-    assert done.exit_code == 0, done.output
-    page = file.read_text()
-    assert "support-1 by builtin/expert, seed 0" in unescape(page)
-    assert url not in page
-    for address in re.findall(r'(?:src|href)="([^"]+)"', page):
-        assert address.startswith(("data:", "#")), address
-    refused = CliRunner().invoke(app, [*words, str(tmp_path)])
-    assert (refused.exit_code, "can't be written" in str(refused.exception)) == (1, True)
 
 
 def test_no_service_is_said_so():

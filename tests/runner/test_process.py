@@ -17,7 +17,7 @@ from support.clients.tenants import ADMIN
 from support.servers.runner_rig import SHORT, ended, runner_key, true_trajectory, waiting
 from support.servers.stacks import wait_until
 
-from buildarena_simulation import SIMULATION_VERSION, write_trajectory
+from buildarena_simulation import write_trajectory
 from buildarena_simworker.remote.api import check_url, tls_context
 from buildarena_simworker.remote.doctor import examined
 
@@ -42,7 +42,7 @@ def runner(folder: Path, url: str, secret: str, *more: str) -> Iterator[subproce
     key.write_text(secret + "\n")
     ours = {name: value for name, value in os.environ.items() if "BUILDARENA" not in name}
     ours["BUILDARENA_STOP_GRACE_S"] = "3"
-    words = ["worker", "start", "simulate.mujoco", "--api", url, "--key-file", str(key), *more]
+    words = ["admin", "worker", "simulate.mujoco", "--api", url, "--key-file", str(key), *more]
     with (folder / "runner.log").open("ab") as log:
         process = subprocess.Popen([BUILDARENA, *words], env=ours, stdout=log, stderr=log, cwd="/")
     family = psutil.Process(process.pid)
@@ -139,7 +139,7 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
     ],
 )
 def test_wrong_options_are_named(words, says) -> None:
-    done = run("worker", "start", *words)
+    done = run("admin", "worker", *words)
     assert done.returncode == 1
     assert says in done.stderr
 
@@ -186,29 +186,26 @@ def test_the_doctor_says_what_a_runner_lacks(context, url, tmp_path, monkeypatch
     assert not checked(None, "http://127.0.0.1:9")["api"]
 
 
-def test_workers_are_listed(context, url, monkeypatch) -> None:
-    monkeypatch.setenv("BUILDARENA_KEY", ADMIN)
-    context.store.workers.report(
-        worker_id="runner@key_0a/lab-1",
-        kind="simulate",
-        queues=["simulate.mujoco"],
-        host="lab-1",
-        pid=1,
-        versions={"engine": "mujoco", "simulation": SIMULATION_VERSION},
-    )
-    done = run_cli(url, "worker", "list")
-    assert "runner@key_0a/lab-1" in done.stdout
-    assert "alive" in done.stdout
-    assert json.loads(run_cli(url, "worker", "list", "--json").stdout)[0]["pid"] == 1
-
-
 def test_a_runner_key_is_made_by_the_command_line(url, monkeypatch) -> None:
     monkeypatch.setenv("BUILDARENA_KEY", ADMIN)
-    words = ("key", "create", "lab", "--scope", "runner", "--simulator", "mujoco", "--json")
+    words = (
+        "admin",
+        "key",
+        "create",
+        "lab",
+        "--scope",
+        "runner",
+        "--simulator",
+        "mujoco",
+        "--json",
+    )
     made = json.loads(run_cli(url, *words).stdout)
     assert (made["scopes"], made["simulators"], made["job_owners"]) == (
         ["runner"],
         ["mujoco"],
         None,
     )
-    assert "names its simulators" in run_cli(url, "key", "create", "a", "--scope", "runner").stderr
+    assert (
+        "names its simulators"
+        in run_cli(url, "admin", "key", "create", "a", "--scope", "runner").stderr
+    )

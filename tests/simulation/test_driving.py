@@ -11,7 +11,6 @@ from support.machines.piloted import experts_machine
 from buildarena_simulation import (
     ControllerFailed,
     Drive,
-    KeyDrive,
     Scenario,
     SimulationError,
     Trajectory,
@@ -241,51 +240,3 @@ def test_trials_without_senses_cannot_be_driven() -> None:
             Drive(car(drive=()), scenario, "mujoco")
     with pytest.raises(UnknownEngineError, match="no engine 'game'"):
         Drive(car(drive=()), SHORT, "game")
-
-
-TAPPING = [
-    {
-        key
-        for key, every in (("UpArrow", 3), ("DownArrow", 7), ("Keypad9", 5))
-        if tick % (2 * every) < every
-    }
-    for tick in range(50)
-]
-"""Keys that are held in each tick; nothing is bound to the last."""
-
-
-@pytest.mark.parametrize("until_s", [None, 1.313])
-def test_the_keys_that_were_held_make_the_same_trial_again(engine, until_s) -> None:
-    scenario = Scenario(duration_s=2.0, control=Control(mode="agent", until_s=until_s))
-    drive = KeyDrive(car(drive=()).with_controller(WEAVING), scenario, engine)
-    seen = [drive.poses]
-    for held in TAPPING:
-        drive.step(held)
-        seen.append(drive.poses)
-    assert drive.is_over
-    machine = car(drive=()).with_control_sequence(drive.presses())
-    again = simulate(machine, scenario, engine)
-    assert write_trajectory(drive.trajectory()) == write_trajectory(again)
-    assert np.allclose(np.array(seen)[..., :3], again.positions, atol=1e-3)
-    assert np.allclose(np.array(seen)[..., 3:], again.quaternions, atol=1e-3)
-    still = simulate(car(drive=()), scenario, engine)
-    assert not np.array_equal(still.positions, again.positions)
-
-
-def test_keys_of_a_flyer_with_a_cargo_make_the_same_trial_again(engine, tasks) -> None:
-    task = tasks["lift-1"]
-    scenario = task.scenario.model_copy(update={"duration_s": 2.0})
-    machine = experts_machine(task)
-    keys = {
-        name
-        for actions in machine.blocks.values()
-        for bound in actions.bindings.values()
-        for name in bound
-    }
-    drive = KeyDrive(machine, scenario, engine)
-    while not drive.is_over:
-        drive.step(keys if drive.tick % 20 < 15 else ())
-    again = simulate(machine.with_control_sequence(drive.presses()), scenario, engine)
-    assert write_trajectory(drive.trajectory()) == write_trajectory(again)
-    with pytest.raises(ValueError, match="over"):
-        drive.step(())

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from benchmarks.simulation.bench_agreement import compared
+from benchmarks.agreement import compared
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, deck
 from support.machines.random_machines import TASKS, random_machine

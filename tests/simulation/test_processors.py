@@ -5,7 +5,6 @@ import subprocess
 import sys
 
 import pytest
-from benchmarks.simulation.bench_processors import as_on, compared, lines
 from support.machines.references import load_machine
 
 from buildarena_benchmark import builtin_tasks
@@ -25,14 +24,6 @@ several = pytest.mark.skipif(not OTHERS, reason="this processor has one kind of 
 TRIALS = 1
 TASK = builtin_tasks()["support-1"]
 SCENARIO = TASK.scenario.model_copy(update={"duration_s": 2.6})
-
-
-@pytest.mark.ci
-@several
-def test_what_the_libraries_would_choose_does_not_matter() -> None:
-    first, second = (lines(TRIALS, as_on(name)) for name in (kernels.PINNED, OTHERS[0]))
-    assert first[0] == second[0]
-    assert compared(first[1:], second[1:])["equal"] == TRIALS
 
 
 @pytest.mark.ci

@@ -6,7 +6,7 @@ from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from benchmarks.scale.filling import TRACKS, Amount, fill
+from benchmarks.filling import TRACKS, Amount, fill
 from sqlalchemy import delete, func, select, text, update
 
 from buildarena_store import STAGE_SECONDS, NewSweep, TrialFilter

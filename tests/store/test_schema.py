@@ -52,7 +52,7 @@ def test_an_older_schema_is_refused_with_advice(database) -> None:
     database.require_schema()
     with (
         of_schema(database, "2026_11_22_annotations"),
-        pytest.raises(SchemaVersionError, match=r"schema 2026_11_22_anno.*buildarena migrate"),
+        pytest.raises(SchemaVersionError, match=r"schema 2026_11_22_anno.*buildarena admin migr"),
     ):
         database.require_schema()
 

@@ -36,7 +36,7 @@ def gone(pids: list[int]) -> bool:
 @pytest.mark.timeout(240)
 def test_the_life_of_a_service_in_the_background(data) -> None:
     where, port = ("--data", str(data)), str(free_port())
-    before = piped("status", *where)
+    before = piped("admin", "status", *where)
     assert (before.returncode, before.stdout) == (1, f"nothing runs on {data}\n")
     up = piped("up", "--detach", "--port", port, *where)
     try:
@@ -46,31 +46,31 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
         assert f"API http://127.0.0.1:{port}" in up.stdout
         assert f"pid {run.pid}" in up.stdout
         assert os.getsid(run.pid) == run.pid != os.getsid(0)
-        shown = json.loads(piped("status", "--json", *where).stdout)
+        shown = json.loads(piped("admin", "status", "--json", *where).stdout)
         assert shown["healthy"] is True
         names = {process["name"] for process in shown["processes"]}
         assert {"supervisor", "postgres", "valkey", "api", "construct-worker"} <= names
         (api,) = (p for p in shown["processes"] if p["name"] == "api")
         assert api["ports"] == [int(port)]
-        table = piped("status", *where).stdout
+        table = piped("admin", "status", *where).stdout
         assert table.startswith(f"ok: API http://127.0.0.1:{port}")
         again = piped("up", "--detach", *where)
         assert (again.returncode, "another BuildArena runs" in again.stderr) == (1, True)
-        assert "supervisor  " in piped("logs", "-n", "1", *where).stdout
-        wrong = piped("logs", "apu", *where)
+        assert "supervisor  " in piped("admin", "logs", "-n", "1", *where).stdout
+        wrong = piped("admin", "logs", "apu", *where)
         assert (wrong.returncode, "did you mean api?" in wrong.stderr) == (1, True)
 
         pids = [process["pid"] for process in shown["processes"]]
         pids += [child.pid for child in psutil.Process(run.pid).children(recursive=True)]
         os.kill(run.pid, signal.SIGKILL)
         wait_until(lambda: gone(pids), 15, "children end with their parent")
-        after = piped("status", *where)
+        after = piped("admin", "status", *where)
         assert (after.returncode, f"process {run.pid}" in after.stdout) == (1, True)
         over = piped("down", *where)
         assert (over.returncode, over.stdout) == (0, f"nothing runs on {data}\n")
 
         assert piped("up", "--detach", "--port", port, *where).returncode == 0
-        assert piped("status", *where).returncode == 0
+        assert piped("admin", "status", *where).returncode == 0
     finally:
         last, down = noted_run(data), piped("down", *where)
     assert (down.returncode, down.stdout) == (0, "stopped\n")
@@ -110,7 +110,7 @@ def test_a_note_without_a_lock_is_of_a_run_that_is_over(tmp_path) -> None:
         assert not is_running(tmp_path)
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert running(tmp_path) == noted_run(tmp_path) is not None
-        status = piped("status", "--data", str(tmp_path))
+        status = piped("admin", "status", "--data", str(tmp_path))
         assert (status.returncode, "does not answer" in status.stdout) == (1, True)
     (tmp_path / "run.json").write_text("{")
     assert noted_run(tmp_path) is None
@@ -122,10 +122,10 @@ def test_logs_are_followed(tmp_path) -> None:
     for name in ("api", "mujoco-worker"):
         (tmp_path / "logs" / f"{name}.log").write_text("".join(f"{name} {n}\n" for n in range(9)))
     assert list(log_files(tmp_path)) == ["api", "mujoco-worker"]
-    shown = piped("logs", "mujoco worker", "-n", "2", "--data", str(tmp_path)).stdout
+    shown = piped("admin", "logs", "mujoco worker", "-n", "2", "--data", str(tmp_path)).stdout
     assert shown == "mujoco-worker 7\nmujoco-worker 8\n"
     process = subprocess.Popen(
-        [BUILDARENA, "logs", "-f", "-n", "1", "--data", str(tmp_path)],
+        [BUILDARENA, "admin", "logs", "-f", "-n", "1", "--data", str(tmp_path)],
         stdout=subprocess.PIPE,
         text=True,
     )
@@ -141,7 +141,7 @@ def test_logs_are_followed(tmp_path) -> None:
     assert process.wait() == 130
     process.stdout.close()
     stopping.cancel()
-    assert "there are no logs" in piped("logs", "--data", str(tmp_path / "other")).stderr
+    assert "there are no logs" in piped("admin", "logs", "--data", str(tmp_path / "other")).stderr
 
 
 def test_a_log_that_was_cut_is_read_from_its_beginning(tmp_path, capsys) -> None:

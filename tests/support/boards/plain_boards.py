@@ -70,7 +70,7 @@ def plain_summary(
     trials: Sequence[EndedJob], *, policy: ScoringPolicy = ScoringPolicy.OURS
 ) -> Cell:
     """The summary of one cell's trials."""
-    first, imported = trials[0], sum(trial.imported for trial in trials)
+    first = trials[0]
     by_runner = sum(trial.by_runner for trial in trials)
     refuted = sum("refuted" in trial.flags for trial in trials)
     given, trials = len(trials), [trial for trial in trials if not trial.unverified]
@@ -101,7 +101,6 @@ def plain_summary(
         cancelled=outcomes[Outcome.CANCELLED],
         flagged=sum(_is_flagged(trial, policy) for trial in scored),
         flags=dict(sorted(Counter(flag for t in scored for flag in set(t.flags)).items())),
-        imported=imported,
         by_runner=by_runner,
         unverified=given - len(trials),
         refuted=refuted,

@@ -3,16 +3,17 @@
 import re
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
 
 
-def image_locks(folder: Path) -> dict[str, set[str]]:
-    """Names of the distributions in each image.
+def image_lock_names(folder: Path) -> set[str]:
+    """Names of the distributions in the images.
 
     Args:
-        folder: Where the recipe's program finds the sources and writes, new or empty.
+        folder: Where the recipe's program finds the sources, new or empty.
     """
     folder.mkdir(exist_ok=True)
     shutil.copy(ROOT / "mk/locked.py", folder)
@@ -21,9 +22,13 @@ def image_locks(folder: Path) -> dict[str, set[str]]:
         target = folder / project.relative_to(ROOT)
         target.parent.mkdir(parents=True)
         shutil.copy(project, target)
-    program = ROOT / "deploy/docker/locks.sh"
-    subprocess.run(["bash", program, folder / "locks"], cwd=folder, check=True)
-    return {
-        lock.stem: set(re.findall(r"^([a-z0-9._-]+)==", lock.read_text(), re.MULTILINE))
-        for lock in (folder / "locks").glob("*.lock")
-    }
+    recipe = (ROOT / "deploy/docker/Dockerfile").read_text().replace("\\\n", " ")
+    (words,) = re.findall(r"locked\.py (requirements\.lock services.*?) >", recipe)
+    done = subprocess.run(
+        [sys.executable, "locked.py", *words.split()],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(re.findall(r"^([a-z0-9._-]+)==", done.stdout, re.MULTILINE))

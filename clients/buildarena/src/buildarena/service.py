@@ -112,38 +112,6 @@ def job_trial(job_id: str, url: str | None = None) -> Trial:
         )
 
 
-def job_page(job_id: str, url: str | None = None) -> str:
-    """A whole page of a job's machine in its trial, or as it was built, which asks for nothing.
-
-    Args:
-        job_id: The job.
-        url: As in `leaderboard`.
-
-    Raises:
-        ClientError: There is no such job, it has no machine, or the service does not answer.
-        DocumentError: The service's machine is none that is read here.
-        TrajectoryFormatError: The service's trajectory is none that is read here.
-    """
-    from buildarena.pages import FRAME_HEIGHT, Shown
-
-    with Client(url) as client:
-        job = client.job(job_id)
-        machine = _machine(client, job_id, job)
-        tried = any(name.startswith("trajectory-") for name in job["artifacts"])
-    trial = job_trial(job_id, url) if tried else None
-    title = f"{job['task']} by {job['model']}, seed {job['seed']}"
-    ended = job["reason"] or job["outcome"] or job["state"]
-    verdict = ended.replace("_", " ") if trial is None else repr(trial).splitlines()[0]
-    return Shown(
-        title=title,
-        heading=f"{title}. {verdict}",
-        machine=machine,
-        height=FRAME_HEIGHT,
-        task=None if trial is None else trial.task,
-        trajectory=None if trial is None else trial.trajectory,
-    ).page()
-
-
 def _machine(client: Client, job_id: str, job: JobDetail) -> Machine:
     from buildarena.machines import Machine
 

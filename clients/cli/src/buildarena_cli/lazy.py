@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, MutableMapping
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 import typer
 from typer.core import TyperGroup
 from typer.main import get_command, get_group
 
-from buildarena_cli.command_table import COMMANDS, Entry
+from buildarena_cli.command_table import ADMIN, GROUPS, Entry
 from buildarena_cli.suggestions import suggested_words
 
 MAX_WIDTH = 100
@@ -42,14 +42,20 @@ class SuggestingGroup(TyperGroup):
 class LazyGroup(SuggestingGroup):
     """The group of all commands."""
 
+    groups: ClassVar[Mapping[str, Mapping[str, Entry]]] = GROUPS
+
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
-        self.commands = _Commands(COMMANDS)
+        self._entries = {
+            name: entry for each in self.groups.values() for name, entry in each.items()
+        }
+        self.commands = _Commands(self._entries)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:  # noqa: ARG002 - click's
         """Writes the commands' names and first sentences, without loading them."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, entry.help) for name, entry in COMMANDS.items()])
+        for title, entries in self.groups.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, entry.help) for name, entry in entries.items()])
 
     def shell_complete(self, ctx: Any, incomplete: str) -> list[Any]:
         """What the shell offers for the first word."""
@@ -59,9 +65,15 @@ class LazyGroup(SuggestingGroup):
             return super(TyperGroup, self).shell_complete(ctx, incomplete)
         return [
             CompletionItem(name, help=entry.help)
-            for name, entry in COMMANDS.items()
+            for name, entry in self._entries.items()
             if name.startswith(incomplete)
         ]
+
+
+class AdminGroup(LazyGroup):
+    """The group of operators' commands."""
+
+    groups: ClassVar[Mapping[str, Mapping[str, Entry]]] = {"Commands": ADMIN}
 
 
 class _Commands(MutableMapping[str, Any]):
@@ -89,16 +101,17 @@ class _Commands(MutableMapping[str, Any]):
         return len(self._entries)
 
 
-def new_group(text: str) -> typer.Typer:
+def new_group(text: str, cls: type[TyperGroup] = SuggestingGroup) -> typer.Typer:
     """An empty group of commands.
 
     Args:
         text: What they are for.
+        cls: What finds them.
     """
     return typer.Typer(
         help=text,
         no_args_is_help=True,
-        cls=SuggestingGroup,
+        cls=cls,
         rich_markup_mode=None,
         add_completion=False,
         pretty_exceptions_enable=False,

@@ -23,7 +23,7 @@ from buildarena_geometry.state import MachineState
 from buildarena_geometry.tools import action_named, tool_definitions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -217,15 +217,6 @@ class Machine:
         """
         check_controller(program)
         state = replace(self._state, controller=program)
-        return self.restored(replace(self.logged, state=state))
-
-    def with_control_sequence(self, presses: Iterable[KeyPress]) -> Self:
-        """A copy that these key presses control, and no program.
-
-        Args:
-            presses: the presses in the order of entry.
-        """
-        state = replace(self._state, control_sequence=tuple(presses), controller="")
         return self.restored(replace(self.logged, state=state))
 
     @property

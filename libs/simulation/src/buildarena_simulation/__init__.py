@@ -8,7 +8,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 
 from buildarena_simulation.constants import DEFAULT_ENGINE
-from buildarena_simulation.driving import Drive, KeyDrive, pilot_of
+from buildarena_simulation.driving import Drive, pilot_of
 from buildarena_simulation.engines.registry import ALL_ENGINES, ENGINES, engine_version
 from buildarena_simulation.errors import (
     BuildarenaSimulationError,
@@ -44,7 +44,6 @@ __all__ = [
     "Drive",
     "Event",
     "JointPeak",
-    "KeyDrive",
     "MachineNotSimulable",
     "Piloting",
     "Play",

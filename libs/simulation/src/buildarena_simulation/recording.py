@@ -95,20 +95,6 @@ class Recorder:
             return None
         return rounded_positions(self._cargo_position[self._row - 1])
 
-    @property
-    def poses_now(self) -> NDArray[np.float32]:
-        """(N, 7) positions and quaternions (w, x, y, z) of the tracked blocks at the last sample.
-
-        World frame, units; a cargo's pose is one more row.
-        """
-        positions, quaternions = self._poses(self._row - 1)
-        rows = np.concatenate([positions[0], quaternions[0]], axis=1)
-        if self._cargo_size is not None:
-            last = self._row - 1
-            cargo = np.concatenate([self._cargo_position[last], self._cargo_quaternion[last]])
-            rows = np.concatenate([rows, cargo[None]])
-        return rows.astype(np.float32)
-
     def _heated_in(self, clusters: Clusters, motion: Motion) -> BoolArray:
         structure = self._structure
         shown = motion.points(clusters, structure.shown)

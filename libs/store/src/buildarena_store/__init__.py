@@ -47,13 +47,6 @@ from buildarena_store.jobs.runner_leases import RunnerLeases
 from buildarena_store.jobs.turns import TurnRecord, TurnResult, Turns
 from buildarena_store.jobs.verifications import Verification, Verifications
 from buildarena_store.metrics import STAGE_SECONDS, Metrics, MetricValues
-from buildarena_store.package_values import (
-    Checked,
-    PackageChange,
-    PackageState,
-    StoredPackage,
-)
-from buildarena_store.packages import Packages, TooManyPackagesError
 from buildarena_store.states import (
     JobState,
     Outcome,
@@ -86,7 +79,6 @@ __all__ = [
     "Budgets",
     "CellId",
     "CellRecord",
-    "Checked",
     "Database",
     "EndedKeyError",
     "Event",
@@ -113,9 +105,6 @@ __all__ = [
     "NewSweep",
     "NotOwnedError",
     "Outcome",
-    "PackageChange",
-    "PackageState",
-    "Packages",
     "Results",
     "RolloutRecord",
     "RolloutRequest",
@@ -129,7 +118,6 @@ __all__ = [
     "Store",
     "StoreError",
     "StoredEvidence",
-    "StoredPackage",
     "StoredTask",
     "Sweep",
     "SweepForecast",
@@ -139,7 +127,6 @@ __all__ = [
     "Tasks",
     "TooManyFilesError",
     "TooManyLeasesError",
-    "TooManyPackagesError",
     "TransitionError",
     "TrialFilter",
     "TurnRecord",

@@ -212,7 +212,7 @@ class Database:
         known = known_schemas()
         if found is not None and found not in known and self._compatible_since() in known:
             return
-        advice = "run `buildarena migrate` with the program's version that is to be used"
+        advice = "run `buildarena admin migrate` with the program's version that is to be used"
         if found is not None and found not in known:
             advice = "it is of a later version, which this one does not work with: upgrade"
         raise SchemaVersionError(

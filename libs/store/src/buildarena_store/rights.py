@@ -19,8 +19,6 @@ _SUBMITTED = (
     "budgets",
     "job_wants",
     "evidence",
-    "packages",
-    "package_changes",
     "sweeps",
     "sweep_jobs",
     "tasks",

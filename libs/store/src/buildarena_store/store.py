@@ -20,7 +20,6 @@ from buildarena_store.jobs.turns import Turns
 from buildarena_store.jobs.verifications import Verifications
 from buildarena_store.jobs.waiting import WaitingJobs
 from buildarena_store.metrics import Metrics
-from buildarena_store.packages import Packages
 from buildarena_store.sweeps.lifecycle import SweepLifecycle
 from buildarena_store.sweeps.sweeps import Sweeps
 from buildarena_store.tasks import Tasks
@@ -48,7 +47,6 @@ class Store:
     budgets: Budgets
     tasks: Tasks
     evidence: EvidenceFiles
-    packages: Packages
     events: Events
     workers: Workers
     metrics: Metrics
@@ -81,7 +79,6 @@ def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
         budgets=Budgets(database),
         tasks=Tasks(database),
         evidence=EvidenceFiles(database),
-        packages=Packages(database),
         events=Events(database),
         workers=Workers(database),
         metrics=Metrics(database),

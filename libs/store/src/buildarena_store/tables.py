@@ -101,7 +101,6 @@ jobs = Table(
     Column("refusals", JSONB),
     # What it was imported from, if it was; whether a runner ran one of its trials; whether its
     # score waits for a verification, and what the last one that could tell said, and when.
-    Column("imported_from", Text),
     Column("by_runner", Boolean, nullable=False, server_default=text("false")),
     Column("audit", Text),
     time_column("verified_at"),

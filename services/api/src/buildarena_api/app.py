@@ -17,7 +17,6 @@ from buildarena_api.events.hub import EventHub
 from buildarena_api.http.access import admission, caller_of, known_key
 from buildarena_api.http.admission import BodyBuffers
 from buildarena_api.http.concurrency import limited, usual_limits
-from buildarena_api.http.former_names import FormerNamesMiddleware
 from buildarena_api.http.infrastructure import InfrastructureMetrics
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.limits import BodyLimitMiddleware
@@ -32,21 +31,17 @@ from buildarena_api.http.outer_address import (
 )
 from buildarena_api.http.overload import OverloadMiddleware
 from buildarena_api.http.own_pool import OwnPool
-from buildarena_api.http.probes import PROBERS, Probes
+from buildarena_api.http.probes import Probes
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
-from buildarena_api.package_checks import PackageChecks
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
-    archives,
     callers,
     catalogue,
-    challenges,
     comparisons,
-    drives,
     events,
     evidence,
     exports,
@@ -56,7 +51,6 @@ from buildarena_api.routes import (
     leaderboard,
     machines,
     metrics,
-    package_pictures,
     pictures,
     replays,
     runner,
@@ -74,7 +68,6 @@ from buildarena_api.runners.service import RunnerService
 from buildarena_pipeline import __version__
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.challenges.season import all_seasons
 from buildarena_pipeline.runtime.context import Context
 from buildarena_pipeline.runtime.reaper import Reaper
 from buildarena_pipeline.runtime.settings import Settings
@@ -86,9 +79,7 @@ POOL_SIZE = 10
 WATCHERS = 3
 """Threads and connections for key checks and event streams."""
 EXPORTERS = 4
-"""Threads and connections for exports and archives: as many as may go on at once, two of each."""
-MAX_CONNECTIONS = 2 * (POOL_SIZE + WATCHERS + EXPORTERS + PROBERS)
-"""Connections to Postgres that a process may open; half of them stay open."""
+"""Threads and connections for exports: as many as may go on at once."""
 ORDINARY = (
     verifications,
     sessions,
@@ -108,10 +99,7 @@ ORDINARY = (
     versions,
     workers,
 )
-LIMITED_THEMSELVES = (
-    *(events, exports, archives, evidence, challenges, package_pictures),
-    *(comparisons, metrics),
-)
+LIMITED_THEMSELVES = (events, exports, evidence, comparisons, metrics)
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
 thread."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
@@ -134,20 +122,16 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
     hub = EventHub(watching)
     runners = RunnerService(context)
-    seasons = all_seasons(context.settings.seasons)
-    packages = PackageChecks(context, seasons)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         probes.start()
         reaper.start()
         runners.start()
-        packages.start()
         yield
         reaper.stop()
         await asyncio.to_thread(probes.close)
         runners.close()
-        packages.close()
         await hub.close()
         await rate_limits.close()
         watching.close()
@@ -188,8 +172,6 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
     app.state.exporting = exporting
     app.state.hub = hub
     app.state.runners = runners
-    app.state.seasons = seasons
-    app.state.package_checks = packages
     app.state.key_checks = KeyChecks(watching)
     app.state.concurrency = usual_limits()
     app.state.body_buffers = BodyBuffers()
@@ -212,7 +194,6 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
 
 def _add_routes(app: FastAPI) -> None:
     app.include_router(health.router)
-    app.include_router(drives.router)  # its first message says who asks
     for route in (*LIMITED_THEMSELVES, *ORDINARY):
         own = [] if route in LIMITED_THEMSELVES else [limited()]
         app.include_router(
@@ -240,7 +221,7 @@ def _add_middleware(app: FastAPI) -> None:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
         BodyLimitMiddleware,
-        unlimited={archives.IMPORT_PATH, evidence.PATH, challenges.PATH, challenges.CHECK_PATH},
+        unlimited={evidence.PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
         most=runner.max_request_bytes,
@@ -250,7 +231,6 @@ def _add_middleware(app: FastAPI) -> None:
     routes = all_routes()
     methods = [(found.path, found.methods or ()) for found in routes]
     app.add_middleware(MethodMiddleware, routes=methods)
-    app.add_middleware(FormerNamesMiddleware)
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
     app.add_middleware(RequestLog, metrics=app.state.metrics)

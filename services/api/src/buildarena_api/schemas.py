@@ -93,10 +93,9 @@ class JobView(_Answer):
     refused_actions: int
     refusals: dict[str, int] | None = Field(description="Refused actions by class")
     faults: int = Field(description="Infrastructure faults at the current stage")
-    imported_from: str | None = Field(description="The archive it was imported from, if it was")
     by_runner: bool = Field(description="Whether a runner ran one of its trials")
     audit: Literal[Audit.REQUIRED, Audit.VERIFIED, Audit.REFUTED] | None = Field(
-        description="Of a score that was imported, brought by a runner, or refuted: it counts once "
+        description="Of a score that was brought by a runner, or refuted: it counts once "
         "it is verified, and nowhere while a verification is required or refuted it"
     )
     verified_at: datetime | None = Field(description="When such a score was verified")

@@ -23,8 +23,6 @@ from buildarena_pipeline.runtime.settings import load_settings
 from buildarena_pipeline.runtime.tracing import Tracing
 from buildarena_store import SchemaVersionError
 
-MAX_MESSAGE = 3 << 20
-"""Bytes of a socket's message: the first of a drive has a machine."""
 SWITCH_S = 0.0001
 """How long a thread may keep the interpreter: a light question asks for it some twenty times, and
 waits so long each time while a heavy one is being answered."""
@@ -67,8 +65,7 @@ def main() -> None:
             log_config=None,
             access_log=False,
             timeout_graceful_shutdown=5,
-            ws_max_size=MAX_MESSAGE,
-            ws_per_message_deflate=False,  # poses hardly become smaller
+            ws="none",
             proxy_headers=False,  # the application itself reads them, from trusted proxies
         )
     finally:

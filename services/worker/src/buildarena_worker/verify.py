@@ -32,7 +32,6 @@ from buildarena_pipeline.catalog.tasks import TaskCatalog
 from buildarena_pipeline.catalog.tracks import (
     EXTERNAL_WORKFLOW,
     FILE_WORKFLOW,
-    PILOTED_WORKFLOW,
     has_data_sheets,
     worlds_of,
 )
@@ -70,7 +69,6 @@ from buildarena_store import (
     RolloutRecord,
     Store,
 )
-from buildarena_store.jobs.histories import Histories
 from buildarena_worker.game_trials import annotations_again
 from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.processors import (
@@ -134,7 +132,6 @@ class Verifier:
         """Verifies a job that was scored."""
         job = self._store.jobs.get(job_id)
         try:
-            Histories(self._store.database, self._artifacts).unpack([job_id])
             repeated = self._checks(job)
         except (ArtifactMissingError, ArtifactDamagedError) as error:
             repeated = [broken_off(str(error))]
@@ -165,7 +162,7 @@ class Verifier:
     def _checks(self, job: Job) -> list[Check]:
         if job.state != JobState.DONE or job.success is None:
             return [compare("scored", kept=True, found=False)]
-        if job.track_config["workflow"] in {EXTERNAL_WORKFLOW, FILE_WORKFLOW, PILOTED_WORKFLOW}:
+        if job.track_config["workflow"] in {EXTERNAL_WORKFLOW, FILE_WORKFLOW}:
             return self._external_checks(job)
         try:
             session, host, result = self._replay(job)
@@ -203,7 +200,7 @@ class Verifier:
     def _external_checks(self, job: Job) -> list[Check]:
         """What came about elsewhere: the calls are made again, or the machine is read again."""
         workflow, stored = job.track_config["workflow"], self._artifact(job, "machine")
-        if workflow in {FILE_WORKFLOW, PILOTED_WORKFLOW}:
+        if workflow == FILE_WORKFLOW:
             # A file's job is named after the machine; the keys that a person held are part of it.
             named = str(job.model_config.get("model") if workflow == FILE_WORKFLOW else stored)
             machine = Machine.from_document(json.loads(self._artifacts.get(named)))

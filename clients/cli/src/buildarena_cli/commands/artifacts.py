@@ -1,4 +1,4 @@
-"""The commands of the artifact store, for operators of the service."""
+"""The command ``buildarena admin gc``: garbage in the store of artifacts."""
 
 from __future__ import annotations
 
@@ -8,20 +8,12 @@ from typing import Annotated
 import typer
 
 from buildarena_cli.errors import CommandError
-from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DataOption, JsonOption
 from buildarena_cli.terminal.output import print_json, say
 
-app = new_group("Look after the store of artifacts.")
 MEBIBYTE = 1024 * 1024
 
 
-@app.callback()
-def _artifacts() -> None:
-    """Look after the store of artifacts."""
-
-
-@app.command("gc")
 def collect(
     *,
     dry_run: Annotated[

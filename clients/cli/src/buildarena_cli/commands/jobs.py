@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any
 
 import typer
 
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_files import job_files
 from buildarena_cli.commands.job_lists import list_jobs
-from buildarena_cli.commands.job_page import page
 from buildarena_cli.commands.job_replay import replay
-from buildarena_cli.errors import DONE, FAILED
+from buildarena_cli.commands.job_verify import verify
 from buildarena_cli.given_paths import to_read
 from buildarena_cli.ids import whole_id
 from buildarena_cli.lazy import new_group
@@ -84,35 +83,8 @@ def retry_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOptio
     _change(url, job_id, "retry", as_json=as_json)
 
 
-VERDICTS: Final = {
-    "verified": "Every figure is the same.",
-    "refuted": "Some figures differ: the score counts nowhere.",
-    "inconclusive": "It can't be said here: something is missing, damaged or of another version.",
-}
-"""What a verification comes to, for people."""
-
-
-@app.command("verify")
-def verify_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Replay a finished job without a model, simulate it again and compare every figure."""
-    client = Client(url)
-    check = client.post(at("jobs", whole_id(client, "job", job_id), "verify"), {})
-    check = client.get_in_state(at("verifications", check["id"]), "done")
-    report = check["report"]
-    if as_json:
-        print_json(report)
-    else:
-        for entry in report["checks"]:
-            mark = "ok" if entry["ok"] else "!!"
-            stored, computed = entry["kept"], entry["found"]
-            shown = stored if entry["ok"] else f"kept {stored}, found {computed}"
-            say(f"{mark}  {entry['name']:<32} {shown}")
-        say(VERDICTS[report.get("verdict") or ("verified" if report["ok"] else "refuted")])
-    raise typer.Exit(DONE if report["ok"] else FAILED)
-
-
+app.command("verify")(verify)
 app.command("replay")(replay)
-app.command("page")(page)
 
 
 def _change(url: str, job_id: str, verb: str, *, as_json: bool) -> None:
@@ -143,8 +115,6 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     for flag in job["flags"] or ():
         say(f"flag      {flag}: {meaning(flag)}" if meaning(flag) else f"flag      {flag}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
-    if job["imported_from"]:
-        say(f"imported  from {job['imported_from']}")
     if job.get("by_runner"):
         say("trials    by a runner")
     if job.get("audit"):

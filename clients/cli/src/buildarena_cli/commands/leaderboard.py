@@ -1,15 +1,13 @@
-"""The commands around the leaderboard: leaderboard, compare, audit."""
+"""The commands around the leaderboard: leaderboard and compare."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from datetime import datetime
 from typing import Annotated, Any
 
 import typer
 
-from buildarena_cli.client import Client, at
-from buildarena_cli.errors import DONE, FAILED
+from buildarena_cli.client import Client
 from buildarena_cli.options import (
     DEFAULT_URL,
     JsonOption,
@@ -153,49 +151,3 @@ def compare(
             "p: McNemar's and Wilcoxon's tests on shared seeds, adjusted over all of them (Holm)",
         ],
     )
-
-
-def audit(
-    model: ModelName,
-    *,
-    sample: Annotated[int | None, typer.Option(help="How many results; default: all.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the random sample.")] = 0,
-    task: TasksOption = None,
-    track: TrackOption = None,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
-    """Replay and simulate a model's results again.
-
-    Every difference is shown, and makes the exit code 1.
-    """
-    body = {"model": model, "sample": sample, "seed": seed, "tasks": task, "track": track}
-    differences: list[dict[str, Any]] = []
-    client = Client(url)
-    accepted = client.post("/v1/leaderboard/verify", body)
-    for id_ in _verifications(client, accepted):
-        check = client.get_in_state(at("verifications", id_), "done")
-        if not check["report"]["ok"]:
-            wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
-            differences.append({"job_id": check["job_id"], "checks": wrong})
-    checked = len(accepted["verifications"]) + len(accepted["left"])
-    if as_json:
-        print_json({"scored": accepted["scored"], "checked": checked, "differences": differences})
-    else:
-        say(f"{checked} of {accepted['scored']} results checked")
-        for difference in differences:
-            for entry in difference["checks"]:
-                say(
-                    f"!!  {difference['job_id']} {entry['name']}: kept {entry['kept']}, "
-                    f"found {entry['found']}"
-                )
-        if not differences:
-            say("Every figure is the same.")
-    raise typer.Exit(FAILED if differences else DONE)
-
-
-def _verifications(client: Client, accepted: dict[str, Any]) -> Iterator[str]:
-    """Ids of all verifications; those that found no room are asked for when others have ended."""
-    yield from accepted["verifications"]
-    for job_id in accepted["left"]:
-        yield client.post(at("jobs", job_id, "verify"), {})["id"]

@@ -181,7 +181,7 @@ def _health_at(url: str, *, advice: str | None = None) -> dict[str, Any]:
 
 
 def _health(run: Run) -> dict[str, Any]:
-    advice = "`buildarena logs api` says why" if run.ready else "it is starting"
+    advice = "`buildarena admin logs api` says why" if run.ready else "it is starting"
     return _health_at(run.url, advice=advice)
 
 

@@ -130,7 +130,7 @@ def _detach(settings: Settings, *, keys: bool) -> None:
     data = settings.data.absolute()
     if is_running(data):
         raise CommandError(
-            f"another BuildArena runs on the data folder {data}: see `buildarena status`, "
+            f"another BuildArena runs on the data folder {data}: see `buildarena admin status`, "
             "or choose another folder with --data or BUILDARENA_DATA"
         )
     try:

@@ -10,7 +10,6 @@ import typer
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import gathered, show_cursor
 from buildarena_cli.commands.keys import spent
-from buildarena_cli.errors import CommandError
 from buildarena_cli.given_paths import to_read
 from buildarena_cli.ids import whole_id
 from buildarena_cli.lazy import new_group
@@ -114,14 +113,6 @@ def run_sweep(
             print_json(accepted)
         return
     raise typer.Exit(exit_code(_watch(client, accepted["id"], as_json=as_json)))
-
-
-@app.command("schema")
-def print_schema() -> None:
-    """Print the JSON schema of sweep files, for editors; docs/sweep.schema.json holds it."""
-    from buildarena_cli.sweep_files import sweep_schema
-
-    print_json(sweep_schema())
 
 
 @app.command("list")
@@ -231,49 +222,6 @@ def cancel_sweep(
 ) -> None:
     """End a sweep's jobs that have not ended and that no other sweep wants."""
     _change(url, sweep_id, "cancel", as_json=as_json)
-
-
-@app.command("export")
-def export_sweep(
-    sweep_id: SweepId,
-    *,
-    out: Annotated[Path | None, typer.Option(help="File to write; SWEEP.zip without.")] = None,
-    url: UrlOption = DEFAULT_URL,
-) -> None:
-    """Write a whole sweep, artifacts included, into one ZIP file."""
-    client = Client(url)
-    whole = whole_id(client, "sweep", sweep_id)
-    target = out or Path(f"{whole}.zip")
-    try:
-        client.download(at("sweeps", whole, "archive"), target)
-    except OSError as error:
-        raise CommandError(f"{target}: {error.strerror}") from error
-    say(f"{target}: {target.stat().st_size:,} bytes")
-
-
-@app.command("import")
-def import_sweep(
-    file: Annotated[
-        Path, typer.Argument(help="ZIP file that `sweep export` wrote.", callback=to_read)
-    ],
-    *,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
-    """Import an exported sweep; jobs that already exist stay as they are."""
-    try:
-        done = Client(url).upload("/v1/archives", file, "application/zip")
-    except OSError as error:
-        raise CommandError(f"{file}: {error.strerror}") from error
-    if as_json:
-        print_json(done)
-    else:
-        say(f"{done['sweep_id']}: {done['jobs']} jobs, {done['added']} of them new")
-        if done["unverified"]:
-            say(
-                f"{done['unverified']} scores count when they were found again here: their "
-                "verification was requested (`buildarena job show` says how it went)"
-            )
 
 
 def _row(sweep: dict[str, Any]) -> list[str]:

@@ -1,11 +1,11 @@
-"""`buildarena worker`, `migrate` and `roles`: parts of a service that runs on several machines."""
+"""`buildarena admin worker`, `migrate` and `roles`: a service that runs on several machines."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -13,24 +13,14 @@ from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.exec import exec_module
 from buildarena_cli.given_paths import to_read
-from buildarena_cli.lazy import new_group
-from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.options import JsonOption
 from buildarena_cli.suggestions import did_you_mean
-from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
+from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
     from buildarena_store import Database
 
-app = new_group("Run workers by themselves.")
-
 SIMULATE: Final = "simulate."
-MEBIBYTE: Final = 1024 * 1024
-MAX_LISTED: Final = 500
-COLUMNS = columns(
-    *("worker", "queues", "state", "version", "MiB", "since"),
-    numeric=("MiB",),
-    leaving=("since", "MiB", "version"),
-)
 ApiOption = Annotated[
     str | None,
     typer.Option("--api", metavar="URL", help="Reach only this API, with a runner key."),
@@ -52,8 +42,7 @@ AllowHttpOption = Annotated[
 ]
 
 
-@app.command("start")
-def start_worker(
+def worker(
     queue: Annotated[
         str, typer.Argument(help="construct, or simulate.SIMULATOR, such as simulate.mujoco.")
     ],
@@ -65,6 +54,14 @@ def start_worker(
         int | None, typer.Option("--at-once", help="Trials at once, with --api.", min=1, max=64)
     ] = None,
     allow_http: AllowHttpOption = False,
+    check: Annotated[
+        bool,
+        typer.Option(
+            "--check",
+            help="Only show whether a runner could work from here.",
+        ),
+    ] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Serve a queue from this process until Ctrl-C.
 
@@ -72,7 +69,11 @@ def start_worker(
     database nor broker.
     """
     options = _options({"--key-file": key_file, "--ca-file": ca_file, "--at-once": at_once})
-    options += ["--allow-http"] * allow_http
+    options += [
+        *(["--allow-http"] * allow_http),
+        *(["--check"] * check),
+        *(["--json"] * (check and as_json)),
+    ]
     if api is not None:
         exec_module([*_remote(queue), "--api", api, *options])
     if options:
@@ -80,43 +81,11 @@ def start_worker(
     exec_module(_known(queue))
 
 
-@app.command("list")
-def list_workers(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """List the workers that a service heard of within the last hour, runners included."""
-    from buildarena_cli.client import Client
-
-    pages = Client(url).pages("/v1/workers", limit=MAX_LISTED)
-    workers = [worker for page in pages for worker in page["workers"]]
-    if as_json:
-        print_json(workers)
-        return
-    print_table(COLUMNS, [_row(worker) for worker in workers])
-
-
-@app.command("doctor")
-def check_runner(
-    queue: Annotated[str, typer.Argument(help="The queue to serve, such as simulate.mujoco.")],
-    *,
-    api: Annotated[str, typer.Option("--api", metavar="URL", help="The API to reach.")],
-    key_file: KeyFileOption = None,
-    ca_file: CaFileOption = None,
-    allow_http: AllowHttpOption = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Show whether a runner could work from here, and what to do if not.
-
-    The exit code is 1 when anything is wrong.
-    """
-    words = [*_remote(queue), "--api", api, "--check"]
-    words += _options({"--key-file": key_file, "--ca-file": ca_file})
-    exec_module([*words, *(["--allow-http"] * allow_http), *(["--json"] * as_json)])
-
-
 def migrate() -> None:
     """Bring the database to this program's schema.
 
-    The database is the one that BUILDARENA_DATABASE_URL names. Roles that `buildarena roles` made
-    get their rights on it.
+    The database is the one that BUILDARENA_DATABASE_URL names. Roles that `admin roles` made get
+    their rights on it.
     """
     with _database() as database:
         say(f"schema {database.migrate()}")
@@ -204,16 +173,3 @@ def _remote(queue: str) -> list[str]:
 def _options(flags: Mapping[str, object]) -> list[str]:
     """Options that are given, as words."""
     return [word for name, value in flags.items() if value for word in (name, str(value))]
-
-
-def _row(worker: dict[str, Any]) -> list[str]:
-    versions, peak = worker["versions"], worker["peak_memory_bytes"]
-    shown = [str(versions[name]) for name in ("engine", "simulation") if name in versions]
-    return [
-        worker["id"],
-        ", ".join(worker["queues"]),
-        "alive" if worker["alive"] else f"last seen {minute_of(worker['seen_at'])}",
-        " ".join(shown),
-        "" if peak is None else number(peak / MEBIBYTE, 0),
-        minute_of(worker["started_at"]),
-    ]

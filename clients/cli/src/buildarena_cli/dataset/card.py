@@ -13,7 +13,7 @@ from buildarena_benchmark import CANARY
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column
 from buildarena_cli.dataset.counts import Counts
-from buildarena_cli.report.escaping import markdown_cell
+from buildarena_cli.dataset.escaping import markdown_cell
 
 CARD: Final = "README.md"
 FILES: Final = {"jobs": "jobs.parquet", "actions": "actions.parquet"}

@@ -97,10 +97,9 @@ JOBS: Final[Sequence[Column]] = (
     Column("cached_tokens", _WHOLE, "Part of the input that the provider had in its cache."),
     Column("reasoning_tokens", _WHOLE, "Part of the output that was hidden reasoning."),
     Column("cost_usd", _REAL, "Price of the requests, US dollars."),
-    Column("imported", _YES, "Whether another service ran it."),
     Column("by_runner", _YES, "Whether a runner ran one of its trials."),
     Column("audit", _TEXT, "required, verified or refuted: only null and verified ones count."),
-    Column("verified", _YES, "Of imported jobs and such by runners: whether they were verified."),
+    Column("verified", _YES, "Of jobs by runners: whether they were verified."),
     Column("finished_at", pa.timestamp("us", tz="UTC"), "When it ended."),
     Column("license", _TEXT, "Licence of the row."),
     Column("canary", _TEXT, "The same in every row: a corpus that has it holds benchmark data."),
@@ -118,65 +117,6 @@ ACTIONS: Final[Sequence[Column]] = (
     Column("accepted", _YES, "Whether it was carried out."),
     Column("refusal", _TEXT, "Refusal class, if it was refused."),
     Column("feedback", _TEXT, "What was read of a refusal; that of accepted ones is in `jobs`."),
-)
-
-MACHINES: Final[Sequence[Column]] = (
-    Column("id", _TEXT, "The machine: the beginning of `parts_sha256`."),
-    Column("task", _TEXT, "Name of the task that it was tried in."),
-    Column("task_version", _TEXT, "Hash of everything in the task that can change a score."),
-    Column("kind", _TEXT, "What sort of machine the task asks for; a split has whole kinds."),
-    Column("split", _TEXT, "train, validation or test, as the file is called."),
-    Column("seed", _WHOLE, "Seed of the dataset, which draws everything."),
-    Column("number", _WHOLE, "Place of the machine in the dataset, from 0, over all splits."),
-    Column("maker", _TEXT, "What made it; the table below says how."),
-    Column(
-        "parent",
-        _TEXT,
-        "`parts_sha256` of the design's machine that it was made from; null where it is that "
-        "machine itself, or was drawn from nothing.",
-    ),
-    Column(
-        "actions",
-        _TEXT,
-        "JSON: the accepted tool calls that build it, in order, each with `machine`, `tool` and "
-        "`arguments`, as `Environment.step` takes them.",
-    ),
-    Column("blocks", _WHOLE, "Its blocks."),
-    Column("connectors", _WHOLE, "Its braces, winches and springs."),
-    Column("mass", _REAL, "Its mass, mass units."),
-    Column(
-        "parts_sha256",
-        _TEXT,
-        "SHA-256 of the machine document without its logs, keys sorted and without spaces; no two "
-        "rows have the same.",
-    ),
-    Column("simulator", _TEXT, "What tried it, from the task's exact start."),
-    Column("simulator_version", _TEXT, "Version of the engine's library."),
-    Column("simulation_version", _TEXT, "Version of what is simulated."),
-    Column("scorer_version", _WHOLE, "Version of the scorers."),
-    Column("geometry_version", _TEXT, "Version of the geometry library."),
-    Column("processor", _TEXT, "JSON: what of the computer can change a trial's last bits."),
-    Column("outcome", _TEXT, "`success` or `unsuccessful`, by the task's criterion alone."),
-    Column("reason", _TEXT, "Why the simulator refused the machine; null where it simulated it."),
-    Column("flags", pa.list_(_TEXT), "Remarks on the score."),
-    Column("disqualified", _YES, "Whether a flag makes it a failure in our rankings."),
-    Column("indicator", _REAL, "The task's figure: load, distance, height or thrust to weight."),
-    Column("indicator_name", _TEXT, "What the figure is."),
-    Column("indicator_unit", _TEXT, "Its unit; `1` for a ratio."),
-    Column(
-        "score",
-        _REAL,
-        "The figure as a share of the built-in expert's, from 0, and 0 for a disqualified "
-        "machine: the reward `indicator` of an episode.",
-    ),
-    Column(
-        "trajectory_sha256",
-        _TEXT,
-        "SHA-256 of the trial's trajectory up to the moment that decided it; null without one.",
-    ),
-    Column("retried", _YES, "Whether it was simulated once more before this was published."),
-    Column("license", _TEXT, "Licence of the row."),
-    Column("canary", _TEXT, "The same in every row: a corpus that has it holds benchmark data."),
 )
 
 

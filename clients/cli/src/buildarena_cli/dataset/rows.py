@@ -52,7 +52,7 @@ def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         licence: Licence of what models, agents and people made.
 
     Raises:
-        CommandError: The job's documents are not what they should be, as an imported job's may be.
+        CommandError: The job's documents are not what they should be.
     """
     try:
         return _rows_of(fetched, tools=tools, licence=licence)
@@ -92,7 +92,6 @@ def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         "trajectory_sha256": _trajectories(job["artifacts"]),
         "versions": compact({k: v for k, v in manifest.items() if k not in NO_VERSION}),
         "refusals": compact(job["refusals"] or {}),
-        "imported": job["imported_from"] is not None,
         "by_runner": job.get("by_runner", False),
         "audit": job.get("audit"),
         "verified": job["verified_at"] is not None if _is_unproved(job) else None,
@@ -105,7 +104,7 @@ def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
 
 def _is_unproved(job: Mapping[str, Any]) -> bool:
     """Whether a job counts only once it was verified."""
-    return job["imported_from"] is not None or job.get("audit") is not None
+    return job.get("audit") is not None
 
 
 def _turns(transcript: bytes) -> list[dict[str, Any]]:

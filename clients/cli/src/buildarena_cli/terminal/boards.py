@@ -107,7 +107,7 @@ def task_table(task: Mapping[str, Any]) -> None:
             "95 % is the exact interval of the success rate, and the one of the mean indicator",
             "too few: with so few successes no interval of the mean indicator holds",
             *_remarks(task["rows"]),
-            *_imports(task["rows"]),
+            *_of_runners(task["rows"]),
         ],
     )
 
@@ -292,7 +292,7 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
         "* baseline; # is the overall rank, shared by statistically tied models",
         *_remarks(rows),
         *_policy(board, rows),
-        *_imports(rows),
+        *_of_runners(rows),
     ]
 
 
@@ -306,8 +306,7 @@ def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
     limits = first.get("decoding", {}).get("limits", {})
     spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
     marks = "*" if first.get("baseline") else ""
-    marks += "†" if any(row.get("imported") for row in rows) else ""
-    marks += "‡" if any(row.get("by_runner") for row in rows) else ""
+    marks += "†" if any(row.get("by_runner") for row in rows) else ""
     return f"{first['model']}{marks}" + (f" ({spelled})" if spelled else "")
 
 
@@ -340,18 +339,14 @@ def _policy(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list
     return remarks
 
 
-def _imports(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def _of_runners(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """What the marks of results mean that others brought, if there are any."""
-    names = ("imported", "by_runner", "unverified", "refuted")
-    # Services of before have no runners in their rows.
-    imported, by_runner, unverified, refuted = (
-        sum(row.get(name, 0) for row in rows) for name in names
+    by_runner, unverified, refuted = (
+        sum(row[name] for row in rows) for name in ("by_runner", "unverified", "refuted")
     )
     remarks = []
-    if imported:
-        remarks.append(f"† with results of other services: {imported} were imported")
     if by_runner:
-        remarks.append(f"‡ with trials by a runner: {by_runner} jobs")
+        remarks.append(f"† with trials by a runner: {by_runner} jobs")
     if unverified:
         remarks.append(
             f"{unverified - refuted} wait for their verification, {refuted} were refuted: "

@@ -19,10 +19,8 @@ if TYPE_CHECKING:
     from buildarena_client.schemas import (
         Budget,
         ForecastView,
-        ImportedView,
         Result,
         SweepAccepted,
-        SweepComparison,
         SweepEstimate,
         SweepView,
         TroubleView,
@@ -117,19 +115,6 @@ class Sweeps(Sender):
     async def sweep_troubles(self, sweep_id: str) -> list[TroubleView]:
         """Attempts at a sweep's jobs that faults ended, the newest kinds first."""
         return cast("list[TroubleView]", await self.get(at("sweeps", sweep_id, "troubles")))
-
-    async def compare_sweeps(self, sweep_id: str, other_id: str) -> SweepComparison:
-        """Two sweeps side by side, in pairs where they share seeds."""
-        path = at("sweeps", sweep_id, "compare", other_id)
-        return cast("SweepComparison", await self.get(path))
-
-    async def export_sweep(self, sweep_id: str, target: Path) -> None:
-        """Writes a sweep with its jobs, journals and artifacts into one ZIP file, or nothing."""
-        await self.download(at("sweeps", sweep_id, "archive"), target)
-
-    async def import_sweep(self, source: Path) -> ImportedView:
-        """Imports an exported sweep, whose scores count when they were found again. For admins."""
-        return cast("ImportedView", await self.upload("/v1/archives", source, "application/zip"))
 
     def sweep_events(self, sweep_id: str, *, after: int = 0) -> AsyncGenerator[Event, None]:
         """What happens to a sweep and its jobs, from the beginning; waits for more.

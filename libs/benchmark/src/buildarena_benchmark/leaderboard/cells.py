@@ -47,7 +47,6 @@ class Cell:
         cancelled: Jobs that somebody cancelled.
         flagged: Scored trials that a flag makes failures or, under the published policy, omits.
         flags: Scored trials by flag; one may have several.
-        imported: Jobs that came from another service's archive, unverified ones included.
         by_runner: Jobs with a trial that a runner ran, unverified ones included.
         unverified: Jobs that wait for their verification, or were refuted: they count in nothing
             else.
@@ -85,7 +84,6 @@ class Cell:
     cancelled: int
     flagged: int
     flags: Mapping[str, int]
-    imported: int
     by_runner: int
     unverified: int
     refuted: int
@@ -193,7 +191,6 @@ def summarise_tallies(
         cancelled=outcomes.get(Outcome.CANCELLED, 0),
         flagged=_number(tally for tally in scored if _is_flagged(tally, policy)),
         flags=_counts((flag, tally.number) for tally in scored for flag in set(tally.flags)),
-        imported=_number(tally for tally in all_tallies if tally.imported),
         by_runner=_number(tally for tally in all_tallies if tally.by_runner),
         unverified=_number(all_tallies) - ended,
         refuted=_number(tally for tally in all_tallies if REFUTED.name in tally.flags),

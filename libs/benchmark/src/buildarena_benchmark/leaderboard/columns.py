@@ -67,4 +67,3 @@ OUTPUT_TOKENS: Final = Column(
 )
 REQUESTS: Final = Column(name="requests_mean", heading="requests", latex=r"\# LLM Requests↓")
 COST: Final = Column(name="cost_usd_mean", heading="USD", digits=4)
-COST_PER_SUCCESS: Final = Column(name="cost_per_success_usd", heading="USD a success", digits=4)

@@ -47,7 +47,6 @@ class EndedJob:
         actions: Actions, refused ones included.
         refused_actions: Refused actions.
         finished_at: When it ended.
-        imported: Whether it came from another service's archive.
         by_runner: Whether a runner ran one of its trials.
         unverified: Whether it waits for its verification, or was refuted: it counts nowhere.
     """
@@ -77,7 +76,6 @@ class EndedJob:
     actions: int = 0
     refused_actions: int = 0
     finished_at: datetime | None = None
-    imported: bool = False
     by_runner: bool = False
     unverified: bool = False
 

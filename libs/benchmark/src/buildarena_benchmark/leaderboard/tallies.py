@@ -56,7 +56,6 @@ class Tally:
         reason: Class of their failure, if any.
         success: Whether they met the task's criterion in the exact world.
         flags: Remarks on their scores.
-        imported: Whether they came from another service's archive.
         by_runner: Whether runners ran trials of theirs.
         unverified: Whether they wait for their verification, or were refuted.
         indicators: (N,) float64, of each trial in the exact world, as `EndedJob.as_published`.
@@ -78,7 +77,6 @@ class Tally:
     reason: str | None
     success: bool
     flags: tuple[str, ...]
-    imported: bool
     by_runner: bool
     unverified: bool
     indicators: Floats
@@ -178,8 +176,8 @@ def total_of(values: Integers) -> Total:
     return Total(known=len(known), sum=int(known.sum()))
 
 
-Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool, bool]
-"""What trials of one tally share: outcome to flags, imported, by_runner, unverified."""
+Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool]
+"""What trials of one tally share: outcome to flags, by_runner, unverified."""
 
 
 def tallied(trials: Iterable[EndedJob]) -> list[Tally]:
@@ -196,14 +194,13 @@ def _kind(trial: EndedJob) -> Kind:
         trial.reason,
         trial.success,
         trial.flags,
-        trial.imported,
         trial.by_runner,
         trial.unverified,
     )
 
 
 def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
-    outcome, reason, success, flags, imported, by_runner, unverified = kind
+    outcome, reason, success, flags, by_runner, unverified = kind
     refusals: Counter[str] = Counter()
     for trial in trials:
         refusals.update(trial.refusals)
@@ -212,7 +209,6 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
         reason=reason,
         success=success,
         flags=flags,
-        imported=imported,
         by_runner=by_runner,
         unverified=unverified,
         indicators=np.array([trial.as_published for trial in trials], np.float64),

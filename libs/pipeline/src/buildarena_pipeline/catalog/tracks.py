@@ -15,8 +15,6 @@ EXTERNAL_WORKFLOW = "external"
 """What external agents play: their own."""
 FILE_WORKFLOW = "file"
 """What machines come by that were built elsewhere."""
-PILOTED_WORKFLOW = "piloted"
-"""What machines come by whose keys a person held while they were simulated."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,16 +143,6 @@ def file_track(simulator: str, version: str) -> Track:
         version: Its version, see `simulation_version`.
     """
     return _promptless(FILE_WORKFLOW, simulator, version)
-
-
-def piloted_track(simulator: str, version: str) -> Track:
-    """The track of people who drive: in the exact world, as nobody drives the same way twice.
-
-    Args:
-        simulator: Simulator name.
-        version: Its version, see `simulation_version`.
-    """
-    return _promptless(PILOTED_WORKFLOW, simulator, version)
 
 
 def _promptless(workflow: str, simulator: str, version: str) -> Track:

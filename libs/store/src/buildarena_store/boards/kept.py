@@ -41,7 +41,7 @@ from buildarena_store.derived_tables import board_cells
 from buildarena_store.rows import bound_texts
 from buildarena_store.tables import board_changes
 
-FORMAT: Final = 6
+FORMAT: Final = 7
 """Of rows; programs of different formats may use one database at once."""
 
 

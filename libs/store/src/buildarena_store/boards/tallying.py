@@ -153,7 +153,6 @@ _EXTERNAL: Final = func.coalesce(
     jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER, False
 )
 _PARTS: Final = cast(jobs.c.metrics["parts"], BigInteger)
-_IMPORTED: Final = jobs.c.imported_from.is_not(None)
 _CELL: Final = [
     jobs.c.track,
     jobs.c.task,
@@ -168,7 +167,6 @@ _GROUPS: Final = [
     func.coalesce(
         func.nullif(jobs.c.flags, literal_column("'null'::jsonb")), literal_column("'[]'::jsonb")
     ).label("flags"),
-    _IMPORTED.label("imported"),
     jobs.c.by_runner,
     (~COUNTS).label("unverified"),
     _EXTERNAL.label("external"),
@@ -251,7 +249,6 @@ def _tally_of(row: Row[Any], details: Details) -> Tally:
         reason=row.reason,
         success=row.success,
         flags=tuple(row.flags),
-        imported=row.imported,
         by_runner=row.by_runner,
         unverified=row.unverified,
         indicators=floats(row.indicators),

@@ -129,7 +129,6 @@ _COLUMNS: Final = [
     jobs.c.actions,
     jobs.c.refused_actions,
     jobs.c.finished_at,
-    jobs.c.imported_from.is_not(None).label("imported"),
     jobs.c.by_runner,
     (~COUNTS).label("unverified"),
     jobs.c.id.label("job_id"),
@@ -177,7 +176,6 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             actions=row.actions,
             refused_actions=row.refused_actions,
             finished_at=row.finished_at,
-            imported=row.imported,
             by_runner=row.by_runner,
             unverified=row.unverified,
         )

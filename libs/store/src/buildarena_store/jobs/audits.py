@@ -23,7 +23,6 @@ from sqlalchemy import (
     func,
     literal,
     null,
-    or_,
     select,
     text,
     true,
@@ -71,10 +70,9 @@ def runner_key(owner: str) -> str | None:
 def origin_of(job_id: str) -> dict[str, Any]:
     """Columns of a job that ends: who ran its trials, and whether it must be verified."""
     trials = exists().where(rollouts.c.job_id == job_id)
-    unproved = or_(jobs.c.imported_from.is_not(None), trials.where(rollouts.c.audited))
     return {
         "by_runner": trials.where(rollouts.c.runner.is_not(None)),
-        "audit": case((unproved, Audit.REQUIRED.value), else_=None),
+        "audit": case((trials.where(rollouts.c.audited), Audit.REQUIRED.value), else_=None),
     }
 
 

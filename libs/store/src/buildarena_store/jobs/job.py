@@ -118,7 +118,6 @@ class Job:
     actions: int
     refused_actions: int
     refusals: Mapping[str, int] | None
-    imported_from: str | None
     by_runner: bool
     audit: str | None
     verified_at: datetime | None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, any_, exists, func, select, text, update
+from sqlalchemy import ColumnElement, Connection, any_, exists, select, text, update
 
 from buildarena_store import events
 from buildarena_store.database import Database
@@ -13,7 +13,7 @@ from buildarena_store.errors import UnknownIdError
 from buildarena_store.jobs.adding import add_jobs
 from buildarena_store.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_store.jobs.filters import JobFilter, distinct_values
-from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, JobKey, NewJob
+from buildarena_store.jobs.job import JOB_COLUMNS, Job, JobFile, NewJob
 from buildarena_store.jobs.pages import Order, SortValue, read_page
 from buildarena_store.jobs.summaries import JobSummary, summarise
 from buildarena_store.jobs.transitions import REOPENED, transition
@@ -194,22 +194,6 @@ class Jobs:
         ]
         end_attempts(endings, AttemptResult.CANCELLED, None, connection=connection)
         return [ending.job_id for ending in endings]
-
-    def next_seed(self, key: JobKey, *, connection: Connection) -> int:
-        """The seed after all that jobs like this one have; 0 where there is none.
-
-        Args:
-            key: The job; its own seed plays no part.
-            connection: The transaction it is part of.
-        """
-        alike = (
-            jobs.c.task == key.task,
-            jobs.c.task_version == key.task_version,
-            jobs.c.model_hash == key.model_hash,
-            jobs.c.track == key.track,
-        )
-        last = connection.execute(select(func.max(jobs.c.seed)).where(*alike)).scalar()
-        return 0 if last is None else last + 1
 
     def retry(
         self, *which: ColumnElement[bool], connection: Connection, **values: Any

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
-from fastapi import Depends, FastAPI, Request, WebSocket
+from fastapi import Depends, FastAPI, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi.security.utils import get_authorization_scheme_param
 from sqlalchemy.exc import OperationalError
@@ -37,7 +37,7 @@ METRICS_PATH = "/v1/metrics"
 OPERATOR = "operator"
 """For whom the operator's open requests count."""
 READING = ("GET", "HEAD", "OPTIONS")
-_bearer = HTTPBearer(auto_error=False, description="An API key, as `buildarena key create` made it")
+_bearer = HTTPBearer(auto_error=False, description="An API key, of `buildarena admin key create`")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,34 +160,6 @@ async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None
     request.state.caller = caller
     _move(request.scope, caller)
     await _count(limits, who_asks(request), weight=weight_of(request.scope).units)
-    return caller
-
-
-async def caller_of_socket(socket: WebSocket, secret: str | None, *, weight: int) -> Caller:
-    """As `caller_of`, of who opened a socket and may submit; its first message has the key.
-
-    Args:
-        socket: The socket: a browser sends no headers of ours with one.
-        secret: The key.
-        weight: What the question weighs.
-
-    Raises:
-        ProblemError: As of `caller_of`.
-    """
-    limits: RateLimits = socket.app.state.rate_limits
-    given = None
-    if secret:
-        given = HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
-    address = address_of(socket.scope)
-    try:
-        caller = await _identify(
-            socket.app.state.context.settings, socket.app.state.key_checks, given
-        )
-    except ProblemError:
-        await _count(limits, f"refused:{address}")
-        raise
-    await _count(limits, caller.key_id or address, weight=weight)
-    caller.require("submit")
     return caller
 
 

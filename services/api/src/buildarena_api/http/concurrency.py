@@ -154,12 +154,9 @@ class ConcurrencyLimits:
     heavy: ConcurrencyLimit
     files: ConcurrencyLimit
     streams: ConcurrencyLimit
-    archives: ConcurrencyLimit
-    packages: ConcurrencyLimit
     trajectories: ConcurrencyLimit
     runner_waits: ConcurrencyLimit
     runner_outcomes: ConcurrencyLimit
-    drives: ConcurrencyLimit
 
 
 def usual_limits() -> ConcurrencyLimits:
@@ -175,16 +172,11 @@ def usual_limits() -> ConcurrencyLimits:
         # One process checks them, one after the other.
         files=ConcurrencyLimit("checks", per_caller=1, total=2, wait_s=30.0, in_turns=True),
         streams=ConcurrencyLimit("event streams", per_caller=32, total=512, retry_s=5),
-        archives=ConcurrencyLimit("archive transfers", per_caller=1, total=2, retry_s=5),
-        # One may have 64 MB in memory until it is stored.
-        packages=ConcurrencyLimit("packages", per_caller=1, total=4, wait_s=30.0, in_turns=True),
         # One may have 64 MB in memory until it is sent.
         trajectories=ConcurrencyLimit("trajectories", per_caller=4, total=12, wait_s=30.0),
         runner_waits=ConcurrencyLimit("waits for a trial", per_caller=64, total=1000),
         # One may have a hundred megabytes in memory until it is scored.
         runner_outcomes=ConcurrencyLimit("outcomes", per_caller=2, total=4, wait_s=30.0),
-        # Each has a process, of which two cores bear some twenty.
-        drives=ConcurrencyLimit("drives", per_caller=4, total=24, retry_s=10),
     )
 
 

@@ -35,14 +35,11 @@ class LocalOnlyMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on, or refuses it for where it comes from."""
-        refusal = self._refusal(scope) if scope["type"] in {"http", "websocket"} else None
+        refusal = self._refusal(scope) if scope["type"] == "http" else None
         if refusal is None:
             await self._app(scope, receive, send)
-        elif scope["type"] == "http":
-            status, detail = refusal
-            await send_problem(send, status, detail)
         else:
-            await send({"type": "websocket.close", "code": 1008})
+            await send_problem(send, *refusal)
 
     def _refusal(self, scope: Scope) -> tuple[int, str] | None:
         """The status and the reason, if the request is not to be served."""

@@ -8,7 +8,6 @@ from typing import Final
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-REQUESTS: Final = ("http", "websocket")
 HOST: Final = re.compile(rb"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\])(?::[0-9]{1,5})?")
 
 
@@ -29,7 +28,7 @@ class BasePathMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on without the base path."""
-        if scope["type"] not in REQUESTS:
+        if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         path: str = scope["path"]
@@ -68,7 +67,7 @@ class RootPathMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on; the router notes its route in the same scope."""
-        if scope["type"] not in REQUESTS:
+        if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         path = scope["path"]
@@ -95,7 +94,7 @@ class ForwardedHostMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on with the host that its client asked for."""
-        if scope["type"] in REQUESTS and self._trusts(scope):
+        if scope["type"] == "http" and self._trusts(scope):
             given = [value for name, value in scope["headers"] if name == b"x-forwarded-host"]
             if len(given) == 1 and HOST.fullmatch(given[0]):
                 headers = [header for header in scope["headers"] if header[0] != b"host"]

@@ -54,7 +54,6 @@ class Row(_View):
         "out"
     )
     flags: dict[str, int] = Field(description="Scored jobs by flag")
-    imported: int = Field(description="Jobs that came from another service's archive")
     by_runner: int = Field(description="Jobs with a trial that a runner ran")
     unverified: int = Field(
         description="Jobs that wait for their verification, or were refuted: they count nowhere"

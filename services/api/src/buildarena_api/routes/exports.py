@@ -88,7 +88,6 @@ class Result(BaseModel):
     cost_usd: float | None
     actions: int
     refused_actions: int
-    imported: bool
     by_runner: bool = Field(description="A runner ran one of its trials")
     unverified: bool = Field(
         description="It waits for its verification, or was refuted: it counts nowhere"

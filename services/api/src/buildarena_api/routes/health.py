@@ -75,7 +75,7 @@ def _database(probes: Probes) -> tuple[Check, WorkerCounts | None]:
     except PartFailedError as error:
         advice = "start Postgres, or correct BUILDARENA_DATABASE_URL"
         if isinstance(error.__cause__, SchemaVersionError):
-            advice = "run `buildarena migrate`"
+            advice = "run `buildarena admin migrate`"
         elif error.is_silent:
             advice = "look at Postgres' log, disk and locks; it accepts connections"
         return Check(name="database", ok=False, detail=str(error), advice=advice), None

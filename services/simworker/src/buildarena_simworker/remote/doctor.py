@@ -81,7 +81,7 @@ def _service(
     try:
         facts = api.facts(retry_for_s=RETRY_FOR_S)
     except RefusedError as error:
-        command = f"buildarena key create NAME --scope runner --simulator {simulator}"
+        command = f"buildarena admin key create NAME --scope runner --simulator {simulator}"
         advice = f"have an admin make one: {command}; set {KEY_VARIABLE} or --key-file"
         yield _check("key", str(error), advice)
         return

@@ -1,1 +1,0 @@
-"""Machines as a dataset: drawn by a seed, tried and scored, without a service."""

@@ -1,1 +1,0 @@
-"""Reports: what they are made of and how they are written."""

@@ -1,0 +1,38 @@
+#!/usr/bin/env bash
+# Plays one of the long scenarios at full size: scenario.sh NAME [OPTION...]. Figures go to .buildarena/.
+set -euo pipefail
+name=${1:-}
+shift || true
+python=.venv/bin/python
+game=services/simworker-besiege/tests
+export PYTHONPATH=$PWD:$PWD/tests
+
+run() {
+    local program=$1
+    shift
+    "$python" -m "scenarios.$program.run" --json ".buildarena/$program.json" "$@"
+}
+
+case $name in
+attack | soak | gameday | containers) run "$name" "$@" ;;
+hunt)
+    # The search's library brings 80 MB along, which nobody needs who does not hunt.
+    "$python" -c 'import ribs' 2>/dev/null || bash mk/install_tool.sh "$python" ribs
+    OMP_NUM_THREADS=1 "$python" -m scenarios.hunt.run "$@"
+    ;;
+chaos)
+    CHAOS_KILLS=20 CHAOS_JOBS=2000 CHAOS_EVERY_S=5 CHAOS_LEASE_S=10 CHAOS_COMMANDS_S=60 \
+        .venv/bin/pytest scenarios/chaos -s --timeout 3600 "$@"
+    ;;
+besiege)
+    BESIEGE_TASKS=all BESIEGE_KILLS=20 \
+        .venv/bin/pytest -n 2 --timeout=900 "$game/test_end_to_end.py" "$game/test_killed_runner.py" "$@"
+    PYTHONPATH=$PWD/tests:$PWD/$game/support "$python" "$game/many_faulty_runs.py" --runs 200 \
+        --json .buildarena/besiege-faults.json
+    "$python" tests/besiege/fuzz_files.py --files 10000
+    ;;
+*)
+    echo "no scenario '$name'; there are: attack besiege chaos containers gameday hunt soak" >&2
+    exit 2
+    ;;
+esac
