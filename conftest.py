@@ -30,7 +30,7 @@ VALKEY_DATABASES: Final = 16
 LONGEST: Final = ("tests/web/", "scenarios/chaos/", "tests/e2e/", "tests/cli/local/")
 """Tests of whole services; at the end of a run one of them would be waited for."""
 collect_ignore = [] if find_spec("ribs") else ["scenarios/hunt/test_hunt.py"]
-"""The hunt's library is installed by `make hunt` and `make test-nightly`."""
+"""The hunt's library is installed by `make scenario NAME=hunt` and `make test-nightly`."""
 LEFT_OUT: Final = ("install the Debian packages", "make web")
 MAX_ID: Final = 60
 """Characters of a parameter that its test's name has."""

@@ -17,7 +17,7 @@ PACKAGE = Path(__file__).parents[1] / "integrations/inspect/src/buildarena_inspe
 TASKS = PACKAGE / "tasks.py"
 VERSIONS = PACKAGE / "versions.json"
 HEAD = '''\
-"""Inspect's tasks, one for each of BuildArena's. `make inspect-tasks` writes this file."""
+"""Inspect's tasks, one for each of BuildArena's. `make generate NAME=inspect` writes this file."""
 
 from typing import Unpack
 

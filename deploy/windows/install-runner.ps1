@@ -18,7 +18,7 @@ param(
     # Versions of the game and of its Lua Scripting Mod, as the service names them.
     [Parameter(Mandatory)] [ValidatePattern('^[A-Za-z0-9._-]{1,40}$')] [string] $GameVersion,
     [Parameter(Mandatory)] [ValidatePattern('^[A-Za-z0-9._-]{1,40}$')] [string] $ModVersion,
-    # Folder of the wheels that `make dist` wrote; without it they come from the package index.
+    # Folder of the wheels that `make release` wrote; without it they come from the package index.
     [string] $Wheels,
     # File with the runner's key; without it the key is asked for.
     [string] $Key,
@@ -42,13 +42,13 @@ function Save-Constraints {
     # everything else in the versions that were tested.
     param([Parameter(Mandatory)] [string] $Folder)
     $ours = @(Get-ChildItem -LiteralPath $Folder -Filter 'buildarena*.whl')
-    if ($ours.Count -eq 0) { throw "$Folder has no wheels of BuildArena: name the folder that make dist wrote" }
+    if ($ours.Count -eq 0) { throw "$Folder has no wheels of BuildArena: name the folder that make release wrote" }
     $lines = @($ours | ForEach-Object {
         $name = $_.Name.Split('-')[0].Replace('_', '-')
         "$name @ $(([Uri] $_.FullName).AbsoluteUri)"
     })
     $tested = Join-Path $Folder 'constraints.txt'
-    if (-not (Test-Path -LiteralPath $tested)) { throw "$tested is not there: copy the whole folder that make dist wrote" }
+    if (-not (Test-Path -LiteralPath $tested)) { throw "$tested is not there: copy the whole folder that make release wrote" }
     $lines += @(Get-Content -LiteralPath $tested)
     [IO.File]::WriteAllLines($Constraints, [string[]] $lines)
 }
@@ -56,7 +56,7 @@ function Save-Constraints {
 function Get-Wheel {
     param([Parameter(Mandatory)] [string] $Folder, [Parameter(Mandatory)] [string] $Name)
     $found = @(Get-ChildItem -LiteralPath $Folder -Filter "$Name-*.whl")
-    if ($found.Count -ne 1) { throw "$Folder has $($found.Count) wheels of ${Name}: copy what make dist wrote into an empty folder" }
+    if ($found.Count -ne 1) { throw "$Folder has $($found.Count) wheels of ${Name}: copy what make release wrote into an empty folder" }
     $found[0].FullName
 }
 

@@ -35,10 +35,10 @@ def require_programs() -> None:
     had = {"docker-compose"} if _composer()[0] == "docker" else set()
     missing = sorted({p for name, p in NEEDED.items() if shutil.which(name) is None} - had)
     if os.geteuid() != 0:
-        sys.exit("make test-containers needs root: it runs a Docker engine and makes base images")
+        sys.exit("it needs root: it runs a Docker engine and makes base images")
     if missing:
         sys.exit(
-            f"make test-containers needs Debian's packages: apt-get install {' '.join(missing)}"
+            f"it needs Debian's packages: apt-get install {' '.join(missing)}"
         )
 
 

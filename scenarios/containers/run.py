@@ -1,4 +1,4 @@
-"""`make test-containers`: our images and compose file, used as an operator uses them.
+"""`make scenario NAME=containers`: our images and compose file, used as an operator uses them.
 
 Builds the images of this tree and of the commit before; brings the older ones up; runs 200 jobs
 through HTTPS while workers are scaled, containers killed and the database restarted; upgrades under

@@ -1,6 +1,6 @@
 """Hunts for exploits: machines that score without building what their task asks for.
 
-See docs/hunting.md. Run as `make hunt`, or `python -m scenarios.hunt.run --help`.
+See docs/hunting.md. Run as `make scenario NAME=hunt`, or `python -m scenarios.hunt.run --help`.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Reads, writes and reads again many damaged machine files; `make fuzz-besiege`."""
+"""Reads, writes and reads again many damaged machine files; `make scenario NAME=besiege`."""
 
 import argparse
 import random

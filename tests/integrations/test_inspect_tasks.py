@@ -20,9 +20,9 @@ def writer():
 
 
 def test_tasks_and_versions_are_those_of_the_catalogue(writer) -> None:
-    assert writer.TASKS.read_text() == writer.tasks_file(), "make inspect-tasks"
+    assert writer.TASKS.read_text() == writer.tasks_file(), "make generate NAME=inspect"
     present = writer.VERSIONS.read_text()
-    assert present == writer.versions_file(present), "make inspect-tasks"
+    assert present == writer.versions_file(present), "make generate NAME=inspect"
 
 
 def test_a_number_rises_by_one_for_each_change_and_never_falls(writer) -> None:

@@ -8,7 +8,7 @@ from support.machines.references import GOLDENS, REFERENCES, outcome
 
 EXPECTED: dict[str, dict[str, dict[str, Any]]] = json.loads(GOLDENS.read_text(encoding="utf-8"))
 
-# PyBullet takes several seconds a bridge; `make bench-simulation` runs every machine on both.
+# PyBullet takes several seconds a bridge; `make bench NAME=simulation` runs every machine on both.
 QUICK_ON_PYBULLET = (
     "engine-flame-at-the-waist",
     "rocket-two",

@@ -1,4 +1,4 @@
-"""A few runs in a game that misbehaves; `make besiege-faults` plays 200."""
+"""A few runs in a game that misbehaves; `make scenario NAME=besiege` plays 200."""
 
 import os
 import subprocess

@@ -1,6 +1,6 @@
 """Plays the kept sessions of tests/data/sessions.json again and writes what they read now.
 
-Run it after an intended change of prompts, tools or answers: `make kept-sessions`. Built-in models
+Run it after an intended change of prompts, tools or answers: `make generate NAME=sessions`. Built-in models
 are asked again; other replies are those that were kept.
 """
 

@@ -1,4 +1,4 @@
-"""Inspect's tasks, one for each of BuildArena's. `make inspect-tasks` writes this file."""
+"""Inspect's tasks, one for each of BuildArena's. `make generate NAME=inspect` writes this file."""
 
 from typing import Unpack
 

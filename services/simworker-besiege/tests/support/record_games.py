@@ -1,6 +1,6 @@
 """Writes tests/games.zip: what the game says of the runs that tests play, after our engine.
 
-`make besiege-games`, after an intended change of tasks, exports or physics.
+`make generate NAME=games`, after an intended change of tasks, exports or physics.
 The run's own script is run in a real Lua, its blocks moved by the engine's trajectory; the stand-in
 game says these lines again under the id of the run that it plays.
 """
