@@ -57,7 +57,6 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["machines", () => "/machine"],
   ["beginning of driving", () => "/drive"],
   ["drive room", () => `/drive?job=${ids.job}`],
-  ["challenges", () => "/challenges"],
   ["address that nobody has", () => "/nowhere"],
 ];
 

@@ -138,22 +138,6 @@ const drive = createRoute({
   component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/drive/DrivePage")),
 });
 
-const challenges = createRoute({
-  getParentRoute: () => root,
-  path: "/challenges",
-  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/challenges/ChallengesPage")),
-});
-const challenge = createRoute({
-  getParentRoute: () => root,
-  path: "/challenges/$name",
-  component: lazyRouteComponent(() => import("./pages/challenges/SeasonPage")),
-});
-const entry = createRoute({
-  getParentRoute: () => root,
-  path: "/challenges/$name/$entry",
-  component: lazyRouteComponent(() => import("./pages/challenges/EntryPage")),
-});
-
 export const router = createRouter({
   routeTree: root.addChildren([
     board,
@@ -173,9 +157,6 @@ export const router = createRouter({
     build,
     machine,
     drive,
-    challenges,
-    challenge,
-    entry,
   ]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,

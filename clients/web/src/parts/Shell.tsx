@@ -28,7 +28,6 @@ const PLACES = [
   { to: "/compare", label: "Compare" },
   { to: "/build", label: "Build" },
   { to: "/machine", label: "Machine" },
-  { to: "/challenges", label: "Challenges" },
 ] as const;
 
 /** Places that a published site has; all others need a running service. */
