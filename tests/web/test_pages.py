@@ -40,7 +40,7 @@ def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> N
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
         in_browser(
             stack.url,
-            ["e2e/build", "e2e/program", "e2e/strangers", "e2e/drive", "e2e/robust", "e2e/toy"],
+            ["e2e/build", "e2e/program", "e2e/strangers", "e2e/robust", "e2e/toy"],
         )
 
 

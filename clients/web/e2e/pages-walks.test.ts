@@ -55,8 +55,6 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["beginning of building", () => "/build"],
   ["build room", () => `/build?session=${ids.session}`],
   ["machines", () => "/machine"],
-  ["beginning of driving", () => "/drive"],
-  ["drive room", () => `/drive?job=${ids.job}`],
   ["address that nobody has", () => "/nowhere"],
 ];
 

@@ -11,7 +11,6 @@ import { board as boardOf, tasks as tasksOf } from "./api/queries";
 import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
 import { readBuildSearch } from "./pages/workbench/search";
-import { readDriveSearch } from "./pages/drive/search";
 import { readCompareSearch } from "./pages/compare/search";
 import { readJobSearch, readJobsSearch, readTranscriptsSearch } from "./api/jobs-search";
 import { Missing, NeedsService, RootError, Shell } from "./parts/Shell";
@@ -131,13 +130,6 @@ const machine = createRoute({
   component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/machine/MachinePage")),
 });
 
-const drive = createRoute({
-  getParentRoute: () => root,
-  path: "/drive",
-  validateSearch: readDriveSearch,
-  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/drive/DrivePage")),
-});
-
 export const router = createRouter({
   routeTree: root.addChildren([
     board,
@@ -156,7 +148,6 @@ export const router = createRouter({
     method,
     build,
     machine,
-    drive,
   ]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,

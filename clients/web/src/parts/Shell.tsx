@@ -189,7 +189,7 @@ export function NeedsService() {
     <>
       <Title order={1}>This needs a running service</Title>
       <Text mt="sm">
-        A published site shows what was done; it builds, drives and tries nothing. Go on with{" "}
+        A published site shows what was done; it builds and tries nothing. Go on with{" "}
         <Link to="/">the leaderboard</Link>, <Link to="/jobs">all jobs</Link> or <Link to="/tasks">all tasks</Link>.
       </Text>
     </>

@@ -152,14 +152,9 @@ function GlbButton({ job }: { job: JobDetail }) {
         Compare
       </Link>
       {!isSite && (
-        <>
-          <Link to="/drive" search={{ job: job.id }}>
-            Drive it
-          </Link>
-          <Link to="/build" search={{ task: job.task, remix: job.id }}>
-            Remix it
-          </Link>
-        </>
+        <Link to="/build" search={{ task: job.task, remix: job.id }}>
+          Remix it
+        </Link>
       )}
       <Button
         size="compact-sm"
