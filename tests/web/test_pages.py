@@ -36,7 +36,7 @@ def test_pages_work_in_a_browser(tmp_path, files, looks) -> None:
 
 
 @pytest.mark.nightly
-def test_people_build_and_bring_machines_and_strangers_do_nothing(tmp_path) -> None:
+def test_people_build_and_strangers_do_nothing(tmp_path) -> None:
     with running_stack(tmp_path, simulators=("pybullet", "mujoco")) as stack:
         in_browser(
             stack.url,

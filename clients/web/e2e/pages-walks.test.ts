@@ -54,7 +54,6 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["method", () => "/method"],
   ["beginning of building", () => "/build"],
   ["build room", () => `/build?session=${ids.session}`],
-  ["machines", () => "/machine"],
   ["address that nobody has", () => "/nowhere"],
 ];
 

@@ -31,7 +31,6 @@ async function pages() {
     task: "/tasks/support-1",
     model: "/models/builtin/expert",
     build: "/build",
-    machine: "/machine",
   };
 }
 

@@ -124,11 +124,6 @@ const build = createRoute({
   validateSearch: readBuildSearch,
   component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/workbench/BuildPage")),
 });
-const machine = createRoute({
-  getParentRoute: () => root,
-  path: "/machine",
-  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/machine/MachinePage")),
-});
 
 export const router = createRouter({
   routeTree: root.addChildren([
@@ -147,7 +142,6 @@ export const router = createRouter({
     model,
     method,
     build,
-    machine,
   ]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,

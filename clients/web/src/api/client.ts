@@ -40,7 +40,7 @@ export async function taken<Data>(asked: Promise<{ data?: Data; error?: unknown;
 }
 
 /** The answer to a file that is sent as it is. */
-export async function sentFile<Data>(path: string, query: Record<string, string>, file: File): Promise<Data> {
+export async function sentFile<Data>(path: string, query: Record<string, string>, file: BodyInit): Promise<Data> {
   let response: Response;
   try {
     response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, {

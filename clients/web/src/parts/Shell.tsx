@@ -27,7 +27,6 @@ const PLACES = [
   { to: "/tasks", label: "Tasks" },
   { to: "/compare", label: "Compare" },
   { to: "/build", label: "Build" },
-  { to: "/machine", label: "Machine" },
 ] as const;
 
 /** Places that a published site has; all others need a running service. */
