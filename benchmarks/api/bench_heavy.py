@@ -75,10 +75,9 @@ def hostile_paths(kind: str, session: str, seed: int) -> Iterator[str]:
             "comparison": (
                 f"/v1/leaderboard/compare?first={model}&second=made-up/model-1",
                 f"/v1/leaderboard/compare?first={name}&second={name}",
-                "/v1/sweeps/sweep_ended0/compare/sweep_ended1",
             ),
             "replay": (f"/v1/jobs/{session}/replay",),
-        }[kind][number % {"replay": 1, "text": 3, "comparison": 3}.get(kind, 5)]
+        }[kind][number % {"replay": 1, "text": 3, "comparison": 2}.get(kind, 5)]
 
 
 class Hostile:

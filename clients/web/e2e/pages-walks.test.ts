@@ -40,7 +40,6 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["sweeps", () => "/sweeps"],
   ["sweep", () => `/sweeps/${ids.sweep}`],
   ["new sweep", () => "/sweeps/new"],
-  ["two sweeps", () => "/sweeps/compare"],
   ["jobs", () => "/jobs"],
   ["transcripts", () => "/transcripts?text=block&of=prompts"],
   ["job", () => `/jobs/${ids.job}`],

@@ -56,15 +56,6 @@ const newSweep = createRoute({
   path: "/sweeps/new",
   component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/sweeps/NewSweepPage")),
 });
-const twoSweeps = createRoute({
-  getParentRoute: () => root,
-  path: "/sweeps/compare",
-  validateSearch: (raw: Record<string, unknown>): { a?: string; b?: string } => ({
-    a: typeof raw.a === "string" ? raw.a : undefined,
-    b: typeof raw.b === "string" ? raw.b : undefined,
-  }),
-  component: lazyRouteComponent(() => import("./pages/sweeps/TwoSweepsPage")),
-});
 const jobs = createRoute({
   getParentRoute: () => root,
   path: "/jobs",
@@ -130,7 +121,6 @@ export const router = createRouter({
     board,
     sweeps,
     newSweep,
-    twoSweeps,
     sweep,
     jobs,
     transcripts,

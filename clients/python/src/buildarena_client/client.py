@@ -197,7 +197,6 @@ class Client:
     retry_sweep = _call(Api.retry_sweep)
     sweep_results = _call(Api.sweep_results)
     sweep_troubles = _call(Api.sweep_troubles)
-    compare_sweeps = _call(Api.compare_sweeps)
     export_sweep = _call(Api.export_sweep)
     import_sweep = _call(Api.import_sweep)
     sweep_events = _iteration(Api.sweep_events)

@@ -9,7 +9,6 @@ import { every, isSite } from "./site";
 export type Board = Schema<"Board">;
 export type Figures = Schema<"Figures">;
 export type Caller = Schema<"CallerView">;
-export type SweepComparison = Schema<"SweepComparison">;
 export type Trouble = Schema<"TroubleView">;
 export type Row = Schema<"Row">;
 export type TaskBoard = Schema<"TaskBoard">;
@@ -100,13 +99,6 @@ export const sweepTroubles = (id: string) =>
     queryKey: ["sweep-troubles", id],
     refetchInterval: every(2 * LIVE_MS),
     queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
-  });
-
-export const sweepComparison = (first: string, second: string) =>
-  queryOptions({
-    queryKey: ["sweep-comparison", first, second],
-    queryFn: () =>
-      jsonOf<SweepComparison>(`/v1/sweeps/${encodeURIComponent(first)}/compare/${encodeURIComponent(second)}`),
   });
 
 /** Jobs that faults ended: they are in no average until they are retried. */

@@ -45,7 +45,6 @@ from buildarena_api.routes import (
     callers,
     catalogue,
     challenges,
-    comparisons,
     drives,
     events,
     evidence,
@@ -109,8 +108,7 @@ ORDINARY = (
     workers,
 )
 LIMITED_THEMSELVES = (
-    *(events, exports, archives, evidence, challenges, package_pictures),
-    *(comparisons, metrics),
+    *(events, exports, archives, evidence, challenges, package_pictures, metrics),
 )
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
 thread."""

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
         ImportedView,
         Result,
         SweepAccepted,
-        SweepComparison,
         SweepEstimate,
         SweepView,
         TroubleView,
@@ -117,11 +116,6 @@ class Sweeps(Sender):
     async def sweep_troubles(self, sweep_id: str) -> list[TroubleView]:
         """Attempts at a sweep's jobs that faults ended, the newest kinds first."""
         return cast("list[TroubleView]", await self.get(at("sweeps", sweep_id, "troubles")))
-
-    async def compare_sweeps(self, sweep_id: str, other_id: str) -> SweepComparison:
-        """Two sweeps side by side, in pairs where they share seeds."""
-        path = at("sweeps", sweep_id, "compare", other_id)
-        return cast("SweepComparison", await self.get(path))
 
     async def export_sweep(self, sweep_id: str, target: Path) -> None:
         """Writes a sweep with its jobs, journals and artifacts into one ZIP file, or nothing."""

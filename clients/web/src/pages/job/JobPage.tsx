@@ -148,9 +148,6 @@ function GlbButton({ job }: { job: JobDetail }) {
   return (
     <Group gap="xs">
       {error !== null && <ProblemNote error={error} />}
-      <Link to="/compare" search={{ a: job.id }}>
-        Compare
-      </Link>
       {!isSite && (
         <Link to="/build" search={{ task: job.task, remix: job.id }}>
           Remix it

@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl, urlencode
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-PATHS: Final = re.compile(r"/v1/(?:leaderboard(?:/.*)?|sweeps/[^/]+/compare/[^/]+)")
+PATHS: Final = re.compile(r"/v1/leaderboard(?:/.*)?")
 FORMER: Final[Mapping[str, str]] = MappingProxyType({"reading": "policy"})
 """Present names by former ones, of the queries of `PATHS`."""
 
