@@ -41,7 +41,6 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["sweep", () => `/sweeps/${ids.sweep}`],
   ["new sweep", () => "/sweeps/new"],
   ["jobs", () => "/jobs"],
-  ["transcripts", () => "/transcripts?text=block&of=prompts"],
   ["job", () => `/jobs/${ids.job}`],
   ["trial", () => `/jobs/${ids.job}?view=trial`],
   ["frame of a trial", () => `/embed/job/${ids.job}`],

@@ -12,7 +12,7 @@ import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
 import { readBuildSearch } from "./pages/workbench/search";
 import { readCompareSearch } from "./pages/compare/search";
-import { readJobSearch, readJobsSearch, readTranscriptsSearch } from "./api/jobs-search";
+import { readJobSearch, readJobsSearch } from "./api/jobs-search";
 import { Missing, NeedsService, RootError, Shell } from "./parts/Shell";
 
 function readTrack(raw: Record<string, unknown>): { track?: string } {
@@ -61,12 +61,6 @@ const jobs = createRoute({
   path: "/jobs",
   validateSearch: readJobsSearch,
   component: lazyRouteComponent(() => import("./pages/jobs/JobsPage")),
-});
-const transcripts = createRoute({
-  getParentRoute: () => root,
-  path: "/transcripts",
-  validateSearch: readTranscriptsSearch,
-  component: lazyRouteComponent(() => import("./pages/jobs/TranscriptsPage")),
 });
 const job = createRoute({
   getParentRoute: () => root,
@@ -123,7 +117,6 @@ export const router = createRouter({
     newSweep,
     sweep,
     jobs,
-    transcripts,
     job,
     embed,
     compare,
