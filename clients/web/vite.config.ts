@@ -56,7 +56,7 @@ export default defineConfig({
   },
   server: {
     fs: { allow: [here("../..")] },
-    proxy: { "/v1": { target: process.env.BUILDARENA_URL ?? "http://127.0.0.1:8000", ws: true } },
+    proxy: { "/v1": process.env.BUILDARENA_URL ?? "http://127.0.0.1:8000" },
   },
   test: { include: ["src/**/*.test.ts"] },
 });

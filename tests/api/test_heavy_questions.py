@@ -56,7 +56,6 @@ HEAVY_PATHS = {
     "/v1/leaderboard/manifest?task=lift-1&model=a": (5, "heavy"),
     "/v1/leaderboard/export": (20, "heavy"),
     "/v1/sweeps/sweep_1/results": (20, "heavy"),
-    "/v1/sweeps/sweep_1/compare/sweep_2": (20, "heavy"),
     "/v1/sweeps?limit=100": (5, "heavy"),
     "/v1/jobs/job_1/replay": (5, "heavy"),
     "/v1/jobs/job_1/scene?number=3": (3, "heavy"),

@@ -20,7 +20,7 @@ it("links, reads and listens below the path", async () => {
     const { protocol, pathname } = new URL(request.url());
     if (protocol.startsWith("http") && !pathname.startsWith(`${BASE}/`)) strays.push(pathname);
   });
-  for (const name of ["Sweeps", "Jobs", "Tasks", "Compare", "Build", "Machine", "Leaderboard"]) {
+  for (const name of ["Sweeps", "Jobs", "Tasks", "Compare", "Build", "Leaderboard"]) {
     await page.getByRole("navigation").getByRole("link", { name, exact: true }).click();
     await page.waitForURL(`**${BASE}/${name === "Leaderboard" ? "" : name.toLowerCase()}*`);
     await settled(page);

@@ -44,9 +44,8 @@ describe("failures", () => {
 
   it("are found by what was said, in the turn that said it", async () => {
     const { page, context } = await opened("/jobs");
-    await page.getByRole("link", { name: "Search transcripts" }).click();
-    await page.getByLabel("Words").fill("block");
-    await page.getByRole("button", { name: "Search", exact: true }).click();
+    await page.getByLabel("Said in transcripts").fill("block");
+    await page.keyboard.press("Enter");
     const hit = page.locator("article.turn").first();
     const [, turn] = /turn (\d+)/.exec((await hit.getByRole("link").textContent()) ?? "") ?? [];
     expect(await hit.locator("mark").count()).toBeGreaterThan(0);
@@ -55,14 +54,12 @@ describe("failures", () => {
     await context.close();
   });
 
-  it("are found by what roles were told, which their turns say when they are asked", async () => {
-    const { page, context } = await opened("/transcripts?text=drawing&of=prompts");
-    const hit = page.locator("article.turn").first();
-    await hit.getByText("was told before").waitFor();
-    await hit.getByRole("link").click();
+  it("have what roles were told, which their turns say when they are asked", async () => {
+    const { matches } = await ask<Schemas["TranscriptMatchesView"]>("/v1/transcripts?text=drawing&of=prompts");
+    const id = matches[0]?.job ?? "";
+    const { page, context } = await opened(`/jobs/${id}?turn=${matches[0]?.turn ?? ""}`);
     const told = page.locator("article[data-chosen] details.told");
     await told.waitFor();
-    const id = /job_[0-9a-f]+/.exec(page.url())?.[0] ?? "";
     const [first] = (await ask<Schemas["PromptsView"]>(`/v1/jobs/${id}/prompts`)).prompts;
     expect(await told.locator("pre").first().isVisible()).toBe(false);
     await told.locator("summary").click();

@@ -225,7 +225,6 @@ describe("sweeps", () => {
   it.each([
     ["/sweeps/new", 1280],
     ["/sweeps/new", 390],
-    ["/sweeps/compare", 1280],
     ["/tasks/lift-1", 390],
   ] as const)("%s at %d px has no serious fault", async (path, width) => {
     const { page, context } = await opened(path, URL_OF_SERVICE, width);

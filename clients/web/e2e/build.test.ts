@@ -1,6 +1,6 @@
 import type { Browser, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { ATTACH, act, expectNoSeriousFault, launched, opened, openSession, recolour, URL_OF_SERVICE } from "./browser";
+import { act, expectNoSeriousFault, launched, opened, openSession, recolour, URL_OF_SERVICE } from "./browser";
 
 const LONG_MS = 90_000;
 const TASK = "transport-1";
@@ -292,7 +292,7 @@ describe("building by hand", () => {
 });
 
 describe("in the dark, at 390", () => {
-  it.each(["/build", "/machine", "room"])("%s has no serious fault and does not scroll sideways", async (path) => {
+  it.each(["/build", "room"])("%s has no serious fault and does not scroll sideways", async (path) => {
     let where = path;
     if (path === "room") {
       const id = await openSession(`dark-${process.pid}`, 0, { kind: "human" });
@@ -307,57 +307,6 @@ describe("in the dark, at 390", () => {
       await expectNoSeriousFault(page);
       expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
     }
-    await page.close();
-  });
-});
-
-describe("a machine from a file", () => {
-  async function machineDocument(): Promise<string> {
-    const id = await openSession(`filed-${process.pid}`);
-    await act(id, "start", {});
-    await act(id, "attach_block_to", ATTACH(1, 4));
-    await fetch(`${URL_OF_SERVICE}/v1/sessions/${id}/submit`, { method: "POST" });
-    return (await fetch(`${URL_OF_SERVICE}/v1/jobs/${id}/machine`)).text();
-  }
-
-  it(
-    "is looked at, checked and tried",
-    async () => {
-      const page = await opened(browser, "/machine");
-      const drop = (name: string, buffer: Buffer) =>
-        page.locator("input[type=file]").setInputFiles({ name, mimeType: "application/octet-stream", buffer });
-      const text = await machineDocument();
-      await drop("bridge.json", Buffer.from(text));
-      await page.getByText("✓ it is a sound machine").waitFor();
-      await page.locator(".stage-3d canvas").waitFor();
-      await page.getByRole("button", { name: "Start the trial" }).click();
-      await page.locator("[data-outcome]").waitFor({ timeout: LONG_MS });
-      await expectNoSeriousFault(page);
-      for (const [name, content, says] of [
-        ["noise.bsg", "\u0000\u0001nothing", "neither a machine document"],
-        ["page.bsg", "<html><script>document.title='run'</script></html>", "page.bsg"],
-        ["shapes.glb", "glTF and no more than that", "glTF version"],
-        ["other.json", text.replaceAll("Small Wooden Block", "<img src=x onerror=alert(1)>"), "Small Wooden Block"],
-      ] as const) {
-        await drop(name, Buffer.from(content));
-        await expect.poll(() => page.getByRole("alert").textContent(), { timeout: 10_000 }).toContain(says);
-        expect(await page.getByRole("alert").textContent()).toContain(name);
-      }
-      expect(await page.title()).not.toBe("run");
-      await page.close();
-    },
-    LONG_MS * 2,
-  );
-
-  it("may be a GLB, which is looked at", async () => {
-    const page = await opened(browser, "/machine", 390);
-    const glb = Buffer.from(await (await fetch(`${URL_OF_SERVICE}/v1/modules/Powered%20Wheel.glb`)).arrayBuffer());
-    await page
-      .locator("input[type=file]")
-      .setInputFiles({ name: "wheel.glb", mimeType: "model/gltf-binary", buffer: glb });
-    await page.getByText("A GLB holds shapes only").waitFor();
-    await page.locator(".stage-3d canvas").waitFor();
-    expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
     await page.close();
   });
 });

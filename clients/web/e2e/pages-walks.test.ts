@@ -40,9 +40,7 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["sweeps", () => "/sweeps"],
   ["sweep", () => `/sweeps/${ids.sweep}`],
   ["new sweep", () => "/sweeps/new"],
-  ["two sweeps", () => "/sweeps/compare"],
   ["jobs", () => "/jobs"],
-  ["transcripts", () => "/transcripts?text=block&of=prompts"],
   ["job", () => `/jobs/${ids.job}`],
   ["trial", () => `/jobs/${ids.job}?view=trial`],
   ["frame of a trial", () => `/embed/job/${ids.job}`],
@@ -54,10 +52,6 @@ const PAGES: readonly (readonly [string, () => string])[] = [
   ["method", () => "/method"],
   ["beginning of building", () => "/build"],
   ["build room", () => `/build?session=${ids.session}`],
-  ["machines", () => "/machine"],
-  ["beginning of driving", () => "/drive"],
-  ["drive room", () => `/drive?job=${ids.job}`],
-  ["challenges", () => "/challenges"],
   ["address that nobody has", () => "/nowhere"],
 ];
 

@@ -23,7 +23,6 @@ function open(path: string, width = 1280, scheme: "light" | "dark" = "light"): P
 
 const PAGES: readonly (readonly [string, () => string])[] = [
   ["leaderboard", () => "/?paper=yes"],
-  ["transcripts", () => "/transcripts?text=block"],
   ["method", () => "/method"],
   ["sweeps", () => "/sweeps"],
   ["sweep", () => `/sweeps/${sweep}`],

@@ -152,7 +152,6 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
     ).json()) as { jobs: { id: string }[] };
     const [a, b] = [jobs[0]?.id ?? "", jobs[1]?.id ?? ""];
     const page = await opened(browser, `/compare?a=${a}&b=${b}`);
-    await page.getByRole("tab", { name: "Trials, by one clock" }).click();
     await page.locator("[data-trial=b] canvas").waitFor();
     await expectNoSeriousFault(page);
     const eyes = (): Promise<number[][]> =>

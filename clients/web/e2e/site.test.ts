@@ -71,7 +71,6 @@ describe.skipIf(WHOLE === "")("a published site", () => {
     ["the board", 390, () => "/?paper=yes"],
     ["a sweep", 390, () => `/sweeps/${site.sweeps[0] ?? ""}`],
     ["the sweeps", 1280, () => "/sweeps"],
-    ["two sweeps", 1280, () => `/sweeps/compare?a=${site.sweeps[0] ?? ""}&b=${site.sweeps[1] ?? ""}`],
     ["the jobs", 390, () => "/jobs"],
     ["a job", 1280, () => `/jobs/${built}`],
     ["a trial", 390, () => `/jobs/${built}?view=trial`],

@@ -12,7 +12,7 @@ const ask = async (path) => (await fetch(url + path)).json();
 const first = async (path) => (await ask(path)).jobs?.[0]?.id;
 
 async function pages() {
-  const [newest, other] = (await ask("/v1/sweeps")).sweeps;
+  const [newest] = (await ask("/v1/sweeps")).sweeps;
   const built =
     (await first("/v1/jobs?task=support-1&outcome=success&model=builtin/expert")) ??
     (await first("/v1/jobs?outcome=success"));
@@ -22,7 +22,6 @@ async function pages() {
     sweeps: "/sweeps",
     sweep: `/sweeps/${newest.id}`,
     "sweeps-new": "/sweeps/new",
-    "sweeps-compare": `/sweeps/compare?a=${newest.id}&b=${(other ?? newest).id}`,
     jobs: "/jobs",
     job: `/jobs/${built}`,
     trial: `/jobs/${built}?view=trial`,
@@ -31,7 +30,6 @@ async function pages() {
     task: "/tasks/support-1",
     model: "/models/builtin/expert",
     build: "/build",
-    machine: "/machine",
   };
 }
 

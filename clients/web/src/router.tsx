@@ -11,9 +11,8 @@ import { board as boardOf, tasks as tasksOf } from "./api/queries";
 import { BASE, isSite } from "./api/site";
 import { readSearch } from "./api/board-search";
 import { readBuildSearch } from "./pages/workbench/search";
-import { readDriveSearch } from "./pages/drive/search";
 import { readCompareSearch } from "./pages/compare/search";
-import { readJobSearch, readJobsSearch, readTranscriptsSearch } from "./api/jobs-search";
+import { readJobSearch, readJobsSearch } from "./api/jobs-search";
 import { Missing, NeedsService, RootError, Shell } from "./parts/Shell";
 
 function readTrack(raw: Record<string, unknown>): { track?: string } {
@@ -57,26 +56,11 @@ const newSweep = createRoute({
   path: "/sweeps/new",
   component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/sweeps/NewSweepPage")),
 });
-const twoSweeps = createRoute({
-  getParentRoute: () => root,
-  path: "/sweeps/compare",
-  validateSearch: (raw: Record<string, unknown>): { a?: string; b?: string } => ({
-    a: typeof raw.a === "string" ? raw.a : undefined,
-    b: typeof raw.b === "string" ? raw.b : undefined,
-  }),
-  component: lazyRouteComponent(() => import("./pages/sweeps/TwoSweepsPage")),
-});
 const jobs = createRoute({
   getParentRoute: () => root,
   path: "/jobs",
   validateSearch: readJobsSearch,
   component: lazyRouteComponent(() => import("./pages/jobs/JobsPage")),
-});
-const transcripts = createRoute({
-  getParentRoute: () => root,
-  path: "/transcripts",
-  validateSearch: readTranscriptsSearch,
-  component: lazyRouteComponent(() => import("./pages/jobs/TranscriptsPage")),
 });
 const job = createRoute({
   getParentRoute: () => root,
@@ -125,44 +109,14 @@ const build = createRoute({
   validateSearch: readBuildSearch,
   component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/workbench/BuildPage")),
 });
-const machine = createRoute({
-  getParentRoute: () => root,
-  path: "/machine",
-  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/machine/MachinePage")),
-});
-
-const drive = createRoute({
-  getParentRoute: () => root,
-  path: "/drive",
-  validateSearch: readDriveSearch,
-  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/drive/DrivePage")),
-});
-
-const challenges = createRoute({
-  getParentRoute: () => root,
-  path: "/challenges",
-  component: isSite ? NeedsService : lazyRouteComponent(() => import("./pages/challenges/ChallengesPage")),
-});
-const challenge = createRoute({
-  getParentRoute: () => root,
-  path: "/challenges/$name",
-  component: lazyRouteComponent(() => import("./pages/challenges/SeasonPage")),
-});
-const entry = createRoute({
-  getParentRoute: () => root,
-  path: "/challenges/$name/$entry",
-  component: lazyRouteComponent(() => import("./pages/challenges/EntryPage")),
-});
 
 export const router = createRouter({
   routeTree: root.addChildren([
     board,
     sweeps,
     newSweep,
-    twoSweeps,
     sweep,
     jobs,
-    transcripts,
     job,
     embed,
     compare,
@@ -171,11 +125,6 @@ export const router = createRouter({
     model,
     method,
     build,
-    machine,
-    drive,
-    challenges,
-    challenge,
-    entry,
   ]),
   // A file server knows one page only, so the rest of the address stands behind its #.
   history: isSite ? createHashHistory() : undefined,

@@ -40,18 +40,13 @@ export async function taken<Data>(asked: Promise<{ data?: Data; error?: unknown;
 }
 
 /** The answer to a file that is sent as it is. */
-export async function sentFile<Data>(
-  path: string,
-  query: Record<string, string>,
-  file: File,
-  type = "application/octet-stream",
-): Promise<Data> {
+export async function sentFile<Data>(path: string, query: Record<string, string>, file: BodyInit): Promise<Data> {
   let response: Response;
   try {
     response = await fetch(`${BASE}${path}?${new URLSearchParams(query).toString()}`, {
       method: "POST",
       body: file,
-      headers: { ...authorization(), "Content-Type": type },
+      headers: { ...authorization(), "Content-Type": "application/octet-stream" },
     });
   } catch {
     throw new ApiError(0, null, "no answer came: is it running, and is the network there?");

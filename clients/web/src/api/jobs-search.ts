@@ -35,24 +35,6 @@ export function readJobsSearch(raw: Record<string, unknown>): JobsSearch {
   };
 }
 
-/** What the address of a search through transcripts says. */
-export interface TranscriptsSearch {
-  text?: string;
-  task?: string;
-  model?: string;
-  /** What is searched, if not what was said and answered. */
-  of?: "prompts";
-}
-
-export function readTranscriptsSearch(raw: Record<string, unknown>): TranscriptsSearch {
-  const text = (value: unknown): string | undefined => {
-    const words = typeof value === "number" ? String(value) : value;
-    return typeof words === "string" && words !== "" ? words : undefined;
-  };
-  const of = raw.of === "prompts" ? raw.of : undefined;
-  return { text: text(raw.text), task: text(raw.task), model: text(raw.model), of };
-}
-
 /** What the address of a job says: how far it is built, which part is chosen, or that the trial is shown. */
 export interface JobSearch {
   step?: number;

@@ -1,6 +1,5 @@
 import { keepPreviousData, queryOptions } from "@tanstack/react-query";
 import type { BoardSearch } from "./board-search";
-import type { TranscriptsSearch } from "./jobs-search";
 import { client, jsonOf, taken, type Schema } from "./client";
 import type { paths } from "./contract";
 import { readSite } from "./kept";
@@ -9,7 +8,6 @@ import { every, isSite } from "./site";
 export type Board = Schema<"Board">;
 export type Figures = Schema<"Figures">;
 export type Caller = Schema<"CallerView">;
-export type SweepComparison = Schema<"SweepComparison">;
 export type Trouble = Schema<"TroubleView">;
 export type Row = Schema<"Row">;
 export type TaskBoard = Schema<"TaskBoard">;
@@ -17,7 +15,6 @@ export type OverallView = Schema<"OverallView">;
 export type SweepView = Schema<"SweepView">;
 export type Forecast = Schema<"ForecastView">;
 export type JobSummary = Schema<"JobSummaryView">;
-export type TranscriptMatch = Schema<"TranscriptMatchView">;
 export type JobView = Schema<"JobView">;
 export type JobDetail = Schema<"JobDetail">;
 export type TaskView = Schema<"TaskView">;
@@ -102,13 +99,6 @@ export const sweepTroubles = (id: string) =>
     queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
   });
 
-export const sweepComparison = (first: string, second: string) =>
-  queryOptions({
-    queryKey: ["sweep-comparison", first, second],
-    queryFn: () =>
-      jsonOf<SweepComparison>(`/v1/sweeps/${encodeURIComponent(first)}/compare/${encodeURIComponent(second)}`),
-  });
-
 /** Jobs that faults ended: they are in no average until they are retried. */
 export const deadLetters = (id: string) =>
   queryOptions({
@@ -127,14 +117,6 @@ export const jobSummary = (filters: JobFilters) =>
     queryFn: () => taken(client.GET("/v1/jobs/summary", { params: { query: filters } })),
     placeholderData: keepPreviousData,
     refetchInterval: every(2 * LIVE_MS),
-  });
-
-/** Turns of all jobs in which words stand. */
-export const transcriptSearch = ({ text = "", ...narrowed }: TranscriptsSearch) =>
-  queryOptions({
-    queryKey: ["transcripts", text, narrowed],
-    queryFn: () => taken(client.GET("/v1/transcripts", { params: { query: { text, ...narrowed } } })),
-    staleTime: 60_000,
   });
 
 export const jobPage = (filters: JobFilters) => client.GET("/v1/jobs", { params: { query: filters } });

@@ -27,8 +27,6 @@ const PLACES = [
   { to: "/tasks", label: "Tasks" },
   { to: "/compare", label: "Compare" },
   { to: "/build", label: "Build" },
-  { to: "/machine", label: "Machine" },
-  { to: "/challenges", label: "Challenges" },
 ] as const;
 
 /** Places that a published site has; all others need a running service. */
@@ -190,7 +188,7 @@ export function NeedsService() {
     <>
       <Title order={1}>This needs a running service</Title>
       <Text mt="sm">
-        A published site shows what was done; it builds, drives and tries nothing. Go on with{" "}
+        A published site shows what was done; it builds and tries nothing. Go on with{" "}
         <Link to="/">the leaderboard</Link>, <Link to="/jobs">all jobs</Link> or <Link to="/tasks">all tasks</Link>.
       </Text>
     </>

@@ -4,8 +4,7 @@ import { useClock, type Clock } from "./clock";
 import { Curves } from "./Curves";
 import { curvesOf } from "./curves";
 import { Film } from "./Film";
-import { pathOf, seenAlong } from "./flight";
-import { FlightMap } from "./FlightMap";
+import { seenAlong } from "./flight";
 import { Legend } from "./Legend";
 import { loadsAt, mostLoaded, mostOf } from "./loads";
 import { CameraLock } from "./lock";
@@ -37,7 +36,6 @@ interface TrialProps {
 /** A trial, played: scrubbed, slowed, joints coloured by what they bear, breaks marked. */
 export default function TrialView({ trial: recorded, ...others }: TrialProps) {
   const props = { ...others, trial: seenAlong(recorded, others.scenario) };
-  const planet = others.scenario.planet;
   const end = props.trial.times.at(-1) ?? 0;
   const { moment, addressOf } = props;
   const clock = useClock(end, props.begun, moment?.time);
@@ -50,14 +48,6 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
       <div ref={stage}>
         <TrialScene {...props} clock={clock} loads={loads} follow={follow} lock={lock} />
       </div>
-      {planet != null && (
-        <FlightMap
-          path={pathOf(recorded, planet.radius)}
-          times={recorded.times}
-          radius={planet.radius}
-          now={clock.shown}
-        />
-      )}
       <TimeLine clock={clock} end={end} breaks={props.trial.breaks} />
       <Group gap="md">
         <Switch

@@ -1,5 +1,5 @@
 import { expect, it } from "vitest";
-import { flightOf, pathOf, seenAlong } from "./flight";
+import { seenAlong } from "./flight";
 import type { Scenario } from "./Surroundings";
 import type { Trial } from "./trial";
 
@@ -47,26 +47,4 @@ it("rolls the ground by as far as the planet is round, and keeps what is upright
 it("leaves a trial on flat ground as it is", () => {
   const trial = around();
   expect(seenAlong(trial, { ...SCENARIO, planet: null })).toBe(trial);
-});
-
-it("sees the path from the side, its beginning on top", () => {
-  const path = pathOf(around(), RADIUS);
-  expect(path[0]?.map(Math.round)).toEqual([0, RADIUS + HEIGHT]);
-  for (const [x, y] of path) expect(Math.hypot(x, y)).toBeCloseTo(RADIUS + HEIGHT, 1);
-  expect(path[50]?.[1]).toBeCloseTo(-RADIUS - HEIGHT, 1);
-  expect(pathOf({ ...around(), times: new Float64Array(), positions: new Float32Array() }, RADIUS)).toEqual([]);
-});
-
-it("counts a recorded flight from the planet's centre, or along z where that is not known", () => {
-  const places = [
-    [0, 0, 10],
-    [610, 0, -600],
-  ];
-  const known = flightOf([0, 1], places, [0, 0, -600]);
-  expect([...known.distances]).toEqual([610, 610]);
-  expect(known.path.map((point) => point.map(Math.round))).toEqual([
-    [0, 610],
-    [610, 0],
-  ]);
-  expect([...flightOf([0, 1], places, null).distances]).toEqual([10, -600]);
 });

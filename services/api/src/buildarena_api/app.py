@@ -41,7 +41,6 @@ from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
     callers,
     catalogue,
-    comparisons,
     events,
     evidence,
     exports,
@@ -99,7 +98,7 @@ ORDINARY = (
     versions,
     workers,
 )
-LIMITED_THEMSELVES = (events, exports, evidence, comparisons, metrics)
+LIMITED_THEMSELVES = (events, exports, evidence, metrics)
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
 thread."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,

@@ -137,10 +137,6 @@ class Collected:
             self._put(f"/v1/sweeps/{sweep['id']}", document(sweep))
             troubles = ask(self._client, at("sweeps", sweep["id"], "troubles"))
             self._put(f"/v1/sweeps/{sweep['id']}/troubles", (troubles and Answer(troubles)) or None)
-        for first, second in itertools.product([sweep["id"] for sweep in sweeps], repeat=2):
-            content = ask(self._client, at("sweeps", first, "compare", second))
-            key = f"/v1/sweeps/{first}/compare/{second}"
-            self._put(key, None if content is None else Answer(content))
 
 
 def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:

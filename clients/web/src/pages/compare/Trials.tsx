@@ -1,7 +1,10 @@
 import { Group, SimpleGrid, Stack, Switch, Text } from "@mantine/core";
 import { useQueries } from "@tanstack/react-query";
+import { Link } from "@tanstack/react-router";
 import { useMemo, useState } from "react";
 import type { JobDetail } from "../../api/queries";
+import { number } from "../../format";
+import { OutcomeBadge } from "../../parts/Outcome";
 import { Empty, Loading } from "../../parts/States";
 import { useClock } from "../../scene/clock";
 import { Legend } from "../../scene/Legend";
@@ -12,8 +15,10 @@ import { seenAlong } from "../../scene/flight";
 import { TrialCurves, TrialScene } from "../../scene/TrialView";
 import { rolloutsOf, scene as sceneQuery, trial as trialQuery, type Scene } from "../job/queries";
 
+type Jobs = readonly [JobDetail, JobDetail];
+
 /** Two trials by one clock, seen by cameras that turn together. */
-export default function Trials({ jobs }: { jobs: readonly [JobDetail, JobDetail] }) {
+export default function Trials({ jobs }: { jobs: Jobs }) {
   const [a, b] = jobs.map((job) => rolloutsOf(job.artifacts).at(-1) ?? 0) as [number, number];
   const [firstScene, secondScene] = useQueries({ queries: [sceneQuery(jobs[0].id, a), sceneQuery(jobs[1].id, b)] });
   const [first, second] = useQueries({
@@ -35,10 +40,16 @@ export default function Trials({ jobs }: { jobs: readonly [JobDetail, JobDetail]
     seenAlong(first.data, firstScene.data.scenario),
     seenAlong(second.data, secondScene.data.scenario),
   ] as const;
-  return <InStep scenes={[firstScene.data, secondScene.data]} trials={trials} />;
+  return <InStep jobs={jobs} scenes={[firstScene.data, secondScene.data]} trials={trials} />;
 }
 
-function InStep({ scenes, trials }: { scenes: readonly [Scene, Scene]; trials: readonly [Trial, Trial] }) {
+interface Both {
+  jobs: Jobs;
+  scenes: readonly [Scene, Scene];
+  trials: readonly [Trial, Trial];
+}
+
+function InStep({ jobs, scenes, trials }: Both) {
   const lock = useMemo(() => new CameraLock(), []);
   const end = Math.max(...trials.map((trial) => trial.times.at(-1) ?? 0));
   const clock = useClock(end);
@@ -48,10 +59,14 @@ function InStep({ scenes, trials }: { scenes: readonly [Scene, Scene]; trials: r
       <SimpleGrid cols={{ base: 1, sm: 2 }}>
         {trials.map((trial, side) => {
           const { machine, scenario } = scenes[side] ?? scenes[0];
+          const job = jobs[side] ?? jobs[0];
           return (
             <div key={side} data-trial={side === 0 ? "a" : "b"}>
-              <Text size="sm" fw={650}>
-                {side === 0 ? "A" : "B"}
+              <Text size="sm" component="div" mb={4}>
+                <Link to="/jobs/$id" params={{ id: job.id }}>
+                  {job.task} by {job.model}, seed {job.seed}
+                </Link>{" "}
+                <OutcomeBadge value={job.outcome ?? job.state} size="sm" /> {number(job.indicator)}
               </Text>
               {machine === null ? (
                 <Empty title="It had no machine" />

@@ -148,18 +148,10 @@ function GlbButton({ job }: { job: JobDetail }) {
   return (
     <Group gap="xs">
       {error !== null && <ProblemNote error={error} />}
-      <Link to="/compare" search={{ a: job.id }}>
-        Compare
-      </Link>
       {!isSite && (
-        <>
-          <Link to="/drive" search={{ job: job.id }}>
-            Drive it
-          </Link>
-          <Link to="/build" search={{ task: job.task, remix: job.id }}>
-            Remix it
-          </Link>
-        </>
+        <Link to="/build" search={{ task: job.task, remix: job.id }}>
+          Remix it
+        </Link>
       )}
       <Button
         size="compact-sm"

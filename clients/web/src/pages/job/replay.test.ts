@@ -1,7 +1,6 @@
 import { describe, expect, it } from "vitest";
 import type { PartView } from "../../scene/machine";
 import { differing } from "../compare/ComparedModels";
-import { aligned } from "../compare/differing";
 import type { JobView } from "../../api/queries";
 import { toldIn } from "./live";
 import { rolloutsOf } from "./queries";
@@ -158,17 +157,6 @@ describe("addresses", () => {
 });
 
 describe("what differs", () => {
-  it("stands beside each other, what is equal too", () => {
-    expect(aligned(["a", "b", "c"], ["a", "x", "c", "d"])).toEqual([
-      { a: 0, b: 0, same: true },
-      { a: 1, b: 1, same: false },
-      { a: 2, b: 2, same: true },
-      { a: null, b: 3, same: false },
-    ]);
-    expect(aligned([], [])).toEqual([]);
-    expect(aligned(["a"], []).length).toBe(1);
-  });
-
   it("is told of jobs with one seed, task version and track alone", () => {
     const job = (id: string, seed: number, outcome: string, track = "t", version = "v") =>
       ({ id, seed, outcome, track, task: "x", task_version: version }) as JobView;

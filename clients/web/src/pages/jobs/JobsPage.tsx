@@ -1,6 +1,6 @@
 import { Button, Group, Stack, Text, Title } from "@mantine/core";
 import { useInfiniteQuery } from "@tanstack/react-query";
-import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
+import { getRouteApi, useNavigate } from "@tanstack/react-router";
 import { taken } from "../../api/client";
 import { jobPage } from "../../api/queries";
 import { every, isSite } from "../../api/site";
@@ -11,6 +11,7 @@ import type { Sorting } from "../../parts/sorting";
 import { Empty, Loading, Stale } from "../../parts/States";
 import type { JobsSearch } from "../../api/jobs-search";
 import { Filters } from "./Filters";
+import { Said } from "./Said";
 
 const route = getRouteApi("/jobs");
 const PAGE = 200;
@@ -48,21 +49,9 @@ export default function JobsPage() {
   };
   return (
     <Stack gap="md">
-      <Group justify="space-between">
-        <Title order={1}>Jobs</Title>
-        {!isSite && (
-          <Button
-            size="xs"
-            variant="default"
-            renderRoot={(props) => (
-              <Link to="/transcripts" search={{ task: search.task, model: search.model }} {...props} />
-            )}
-          >
-            Search transcripts
-          </Button>
-        )}
-      </Group>
+      <Title order={1}>Jobs</Title>
       <Filters search={search} />
+      {!isSite && <Said />}
       {query.isError && query.data === undefined && (
         <ProblemNote error={query.error} retry={() => void query.refetch()} />
       )}

@@ -1,6 +1,6 @@
-import { Badge, Button, Group, Stack, Text, Title } from "@mantine/core";
+import { Badge, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { getRouteApi, Link } from "@tanstack/react-router";
+import { getRouteApi } from "@tanstack/react-router";
 import type { StreamState } from "../../api/events";
 import { every, isSite } from "../../api/site";
 import { sweep as sweepQuery, type SweepView } from "../../api/queries";
@@ -78,16 +78,7 @@ function Head({ sweep, stream }: { sweep: SweepView; stream: StreamState }) {
             <span style={{ fontFamily: "monospace" }}>{sweep.id}</span>, submitted <Ago time={sweep.created_at} />
           </Text>
         </div>
-        <Group gap="xs">
-          <Button
-            size="xs"
-            variant="default"
-            renderRoot={(props) => <Link to="/sweeps/compare" search={{ a: sweep.id }} {...props} />}
-          >
-            Compare…
-          </Button>
-          <Actions sweep={sweep} />
-        </Group>
+        <Actions sweep={sweep} />
       </Group>
       <OutcomeBar sweep={sweep} size={16} />
     </Stack>

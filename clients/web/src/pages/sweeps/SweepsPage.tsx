@@ -29,16 +29,11 @@ export default function SweepsPage() {
     <Stack gap="md">
       <Group justify="space-between">
         <Title order={1}>Sweeps</Title>
-        <Group gap="xs">
-          <Button size="xs" variant="default" renderRoot={(props) => <Link to="/sweeps/compare" {...props} />}>
-            Compare two
+        {has(who, "submit") && (
+          <Button size="xs" renderRoot={(props) => <Link to="/sweeps/new" {...props} />}>
+            New sweep
           </Button>
-          {has(who, "submit") && (
-            <Button size="xs" renderRoot={(props) => <Link to="/sweeps/new" {...props} />}>
-              New sweep
-            </Button>
-          )}
-        </Group>
+        )}
       </Group>
       <Answered query={query}>
         {(page) =>

@@ -1,22 +1,14 @@
 import { Button, Stack, Text } from "@mantine/core";
 import { IconPlayerPlay } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
-import { jsonOf, sentFile } from "../../api/client";
-import type { JobView } from "../../api/queries";
 import { ProblemNote } from "../../parts/Problem";
-import type { SessionView } from "./session";
+import { triedAsItStands, type SessionView } from "./session";
 import { Tried } from "./Tried";
 
 /** A trial of the machine as it stands, which counts for nothing; the session goes on. */
 export function Practice({ view }: { view: SessionView }) {
-  const { job } = view;
   const trying = useMutation({
-    mutationFn: async () => {
-      const document = await jsonOf(`/v1/sessions/${job.id}/machine`);
-      const simulator = String(job.track.split("/")[1]?.replace(/-[^-]*$/, ""));
-      const file = new File([JSON.stringify(document)], "machine.json");
-      return sentFile<JobView>("/v1/machines/trials", { task: job.task, simulator }, file);
-    },
+    mutationFn: () => triedAsItStands(view, String(view.job.track.split("/")[1]?.replace(/-[^-]*$/, ""))),
   });
   return (
     <Stack gap="xs" align="start">

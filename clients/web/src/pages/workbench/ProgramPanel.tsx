@@ -2,11 +2,9 @@ import { Button, Group, Stack, Text, Textarea } from "@mantine/core";
 import { IconPlayerPlay } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
-import { client, taken } from "../../api/client";
 import { ProblemNote } from "../../parts/Problem";
 import { SimulatorSelect, useSimulator } from "../../parts/SimulatorSelect";
-import { triedFile } from "../machine/files";
-import type { Hand, SessionView } from "./session";
+import { triedAsItStands, type Hand, type SessionView } from "./session";
 import { Tried } from "./Tried";
 
 const SET = "set_controller";
@@ -71,14 +69,9 @@ export function ProgramPanel({ hand, view }: { hand: Hand; view: SessionView }) 
 }
 
 function LiveTrial({ view }: { view: SessionView }) {
-  const { id, task } = view.job;
   const choice = useSimulator();
   const trying = useMutation({
-    mutationFn: async () => {
-      const path = { session_id: id };
-      const machine = await taken(client.GET("/v1/sessions/{session_id}/machine", { params: { path } }));
-      return triedFile({ file: new File([JSON.stringify(machine)], "machine.json"), task, simulator: choice.value });
-    },
+    mutationFn: () => triedAsItStands(view, choice.value),
   });
   return (
     <Stack gap="xs" role="region" aria-label="Live trial">

@@ -17,7 +17,6 @@ import {
 import { useDisclosure } from "@mantine/hooks";
 import { IconArrowBackUp, IconArrowForwardUp, IconRocket } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { Link } from "@tanstack/react-router";
 import { lazy, Suspense, useEffect, useState } from "react";
 import { client, taken } from "../../api/client";
 import { task as taskQuery } from "../../api/queries";
@@ -77,14 +76,7 @@ export function Workroom({ view }: { view: SessionView }) {
             {bytes(view.limits.session_bytes)} · cancelled after {view.limits.idle_s / 3600} h without an action
           </Text>
         </div>
-        <Group gap="md">
-          {view.machines.length > 0 && (
-            <Link to="/drive" search={{ session: job.id }}>
-              Drive it
-            </Link>
-          )}
-          <SubmitButton view={view} />
-        </Group>
+        <SubmitButton view={view} />
       </Group>
       {task.data !== undefined && (
         <Spoiler maxHeight={56} showLabel="Read the whole task" hideLabel="Less of the task">

@@ -1,7 +1,8 @@
 import { queryOptions, useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useMemo, useState } from "react";
 import { after, inverseOf, NO_HISTORY, redone, undone, type Done, type History } from "./history";
-import { client, jsonOf, taken, type Schema } from "../../api/client";
+import { bytesOf, client, jsonOf, sentFile, taken, type Schema } from "../../api/client";
+import type { JobView } from "../../api/queries";
 
 export type SessionView = Schema<"SessionView">;
 export type Bench = Schema<"BenchMachineView">;
@@ -19,6 +20,12 @@ export const session = (id: string) =>
     queryKey: ["session", id],
     queryFn: () => jsonOf<SessionView>(`/v1/sessions/${encodeURIComponent(id)}`),
   });
+
+/** A trial of the machine as it stands, in the task's exact world and on no leaderboard; the session goes on. */
+export async function triedAsItStands({ job }: SessionView, simulator: string): Promise<JobView> {
+  const machine = await bytesOf(`/v1/sessions/${job.id}/machine`);
+  return sentFile<JobView>("/v1/machines/trials", { task: job.task, simulator }, machine);
+}
 
 /** The modules that a task offers. */
 export const modules = (task: string, version: string) =>
