@@ -85,7 +85,7 @@ def write_module() -> None:
         MODULE.write_text(module_text(json.loads(CONTRACT.read_bytes())), encoding="utf-8")
     elif not MODULE.exists():
         raise FileNotFoundError(
-            f"{MODULE} can't be written: there is no contract at {CONTRACT}; run `make build/openapi.json`"
+            f"{MODULE} can't be written: no contract at {CONTRACT}; run `make build/openapi.json`"
         )
 
 

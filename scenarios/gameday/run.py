@@ -1,4 +1,4 @@
-"""`make scenario NAME=gameday`: an hour with twelve faults under 2,000 jobs; who was told, when, and the books.
+"""`make scenario NAME=gameday`: an hour with twelve faults; who was told, when, and the books.
 
 A whole service with Prometheus, Alertmanager and our rules runs jobs that are submitted little by
 little, while processes are killed and hang, the broker forgets, the disk fills up, a clock and a

@@ -115,23 +115,6 @@ def test_the_stream_of_a_key_that_ended_ends(as_key, context, sweep_id, ending) 
         wait_until(lambda: gone.get("/v1/jobs").status_code == 401, 5, "the key is refused")
 
 
-def test_archives_are_bounded_per_key(as_key, sweep_id, context) -> None:
-    greedy, other = as_key(), as_key()
-    path = f"/v1/sweeps/{sweep_id}/archive"
-    # While the tables are locked, what reads them stays open.
-    with context.store.database.transaction() as locking, ThreadPoolExecutor(9) as threads:
-        locking.execute(text("LOCK TABLE sweeps, jobs IN ACCESS EXCLUSIVE MODE"))
-        asked = [threads.submit(greedy.get, path) for _ in range(8)]
-        wait_until(lambda: sum(one.done() for one in asked) == 7, 10, "seven are refused")
-        refused = [one.result() for one in asked if one.done()]
-        assert {answer.status_code for answer in refused} == {429}
-        assert all(int(answer.headers["retry-after"]) >= 1 for answer in refused)
-        assert other.get("/v1/tasks").status_code == 200
-        locking.rollback()
-        allowed = [one.result().status_code for one in asked if one.result() not in refused]
-    assert allowed == [200]
-
-
 def test_a_callers_exports_are_made_one_after_the_other(as_key, sweep_id, context) -> None:
     greedy, other = as_key(), as_key()
     path = f"/v1/sweeps/{sweep_id}/results"

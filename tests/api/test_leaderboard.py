@@ -353,16 +353,3 @@ def test_a_board_of_an_unknown_sweep_is_refused(api, played, route) -> None:
     answer = api.get(f"/v1/leaderboard{route}{joint}sweep=sweep_{'0' * 20}")
     assert answer.status_code == 404
     assert "sweep_" in answer.json()["detail"]
-
-
-def test_the_former_name_of_the_scoring_policy_is_read_for_one_release(api) -> None:
-    former = api.get("/v1/leaderboard?reading=published&track=")
-    assert former.headers["warning"] == '299 - "reading is now policy"'
-    assert former.headers["deprecation"].startswith("@")
-    former = api.get("/v1/leaderboard", params={"reading": "published"})
-    present = api.get("/v1/leaderboard", params={"policy": "published"})
-    assert former.json() == present.json()
-    assert present.json()["reading"] == present.json()["policy"] == "published"
-    assert "deprecation" not in present.headers
-    refused = api.get("/v1/leaderboard", params={"reading": "theirs"})
-    assert refused.status_code == 422

@@ -251,7 +251,7 @@ def test_refusals_name_the_offender_and_the_choices(context, elsewhere, tmp_path
         (("restore", place), "the database is not empty"),
         (("backup", "/proc/nowhere"), "can't be used for backups"),
     ):
-        refused = command(context, *words)
+        refused = command(context, "admin", *words)
         assert (refused.returncode, said in refused.stderr) == (1, True), refused.stderr
     newer = json.loads(manifest.read_text()) | {"schema": "2099_01_01_flight", "version": "9.0"}
     manifest.write_text(json.dumps(newer))

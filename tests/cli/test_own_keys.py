@@ -14,7 +14,7 @@ from buildarena_besiege import (
 )
 from buildarena_geometry.keys import KEYS
 
-CHALLENGE = Path(__file__).parents[1] / "data" / "challenge"
+CHALLENGE = Path(__file__).parents[1] / "data" / "own_keys"
 THREE, FIVE = (CHALLENGE / name / "machine_tuned.bsg" for name in ("three_blocks", "five_blocks"))
 SHORT_ORBIT = """
 name: short-orbit

@@ -1,8 +1,6 @@
 """What both clients say of a real service."""
 
-import zipfile
 from itertools import islice
-from pathlib import Path
 
 import pytest
 from support.clients.tenants import ADMIN
@@ -193,12 +191,6 @@ def test_a_sweep_is_waited_for(client, service, make) -> None:
     assert client.sweep_troubles(sweep) == []
 
 
-def test_a_sweep_is_exported(client, service, tmp_path) -> None:
-    client.export_sweep(service.sweep, tmp_path / "sweep.zip")
-    assert zipfile.is_zipfile(tmp_path / "sweep.zip")
-    assert [file.name for file in tmp_path.iterdir()] == ["sweep.zip"]
-
-
 def test_equal_jobs_are_one(client, service) -> None:
     job = client.submit_job("lift-1", "builtin/expert", seed=1, simulator="mujoco")
     assert job["id"] in service.jobs
@@ -262,8 +254,6 @@ def test_what_is_not_there_or_not_allowed(make, service) -> None:
     for ask in (admin.job, admin.machine, admin.replay, admin.artifacts, admin.session):
         with pytest.raises(NotFoundError):
             ask(NOBODY)
-    with pytest.raises(InvalidError, match=r"ZIP|archive"):
-        admin.import_sweep(Path(__file__))
     made = admin.post("/v1/keys", {"name": f"reads-{make.kind}", "scopes": ["read"]})
     reader = make(service.locked, made["secret"])
     assert reader.caller()["scope"] == "read"

@@ -38,7 +38,7 @@ AWAY = answer(503, b'{"detail": "away", "errors": []}', Retry_After="0")
 NOTHING_TWICE = {
     *("cancel_job", "retry_job", "verify_job", "verify_leaderboard", "add_task"),
     *("pause_sweep", "resume_sweep", "cancel_sweep", "retry_sweep", "set_sweep_budget"),
-    *("call_tool", "test_session", "submit_session", "import_sweep"),
+    *("call_tool", "test_session", "submit_session"),
 }
 """Methods that change something more when they are sent again."""
 GENERAL = {
@@ -145,7 +145,7 @@ def test_only_what_may_be_carried_out_twice_is_sent_twice(make, name, tmp_path) 
         if once:
             assert len(server.received) == 1, (said, server.lines)
             assert isinstance(raised.value, UnreachableError)
-        elif not streams and name not in {"export_sweep", "download_artifact"}:
+        elif not streams and name != "download_artifact":
             assert len(server.received) == 3, (said, server.lines)
             assert len(set(server.headers("Idempotency-Key"))) == 1
             assert len(set(server.received)) == 1
@@ -244,13 +244,13 @@ def test_a_download_is_there_whole_or_not_at_all(make, tmp_path, older) -> None:
         (answer(503), UnavailableError),
     ):
         with wrong_server(said) as server, pytest.raises(error):
-            make(server.url).export_sweep(SWEEP, target)
+            make(server.url).download("/v1/x", target)
         assert list(tmp_path.iterdir()) == before
         assert older is None or target.read_bytes() == older
     with wrong_server(BUSY, answer(200, b"PK01")) as server:
-        make(server.url).export_sweep(SWEEP, target)
+        make(server.url).download("/v1/x", target)
         with pytest.raises(FileNotFoundError):
-            make(server.url).export_sweep(SWEEP, tmp_path / "no" / "x")
+            make(server.url).download("/v1/x", tmp_path / "no" / "x")
     assert target.read_bytes() == b"PK01"
 
 

@@ -186,7 +186,7 @@ def test_each_workload_has_its_image_and_program(overlay) -> None:
     targets = re.findall(r"^FROM \S+ AS (\S+)$", DOCKERFILE.read_text(), re.MULTILINE)
     assert {image.split("/")[1].split(":")[0] for image in images.values()} <= set(targets)
     assert not [name for name in OURS if "command" in found[name]["spec"]["containers"][0]]
-    assert found["migrate"]["spec"]["containers"][0]["args"] == ["migrate"]
+    assert found["migrate"]["spec"]["containers"][0]["args"] == ["admin", "migrate"]
 
 
 @each_overlay

@@ -172,7 +172,7 @@ def test_each_service_signs_in_as_its_own_role(name) -> None:
     }
     if name == "roles":
         assert urls["database_url"] == "database_url"
-        made = {word.split("=")[0] for word in SERVICES[name]["command"][1:]}
+        made = {word.split("=")[0] for word in SERVICES[name]["command"][2:]}
         assert made == {*ROLES, OWNER}
     elif name == "postgres":
         assert set(urls.values()) == {"database_url_api"}, "for its health check"

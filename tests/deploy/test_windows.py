@@ -98,10 +98,10 @@ def test_scripts_call_what_there_is() -> None:
 def test_the_scripts_call_the_command() -> None:
     words = [" ".join(words) for words, _ in called()]
     assert sorted(words) == [
+        "admin worker simulate.besiege",
+        "admin worker simulate.besiege",
         "besiege calibrate",
         "besiege doctor",
-        "admin worker simulate.besiege",
-        "admin worker simulate.besiege",
     ]
 
 

@@ -1,7 +1,7 @@
 """Plays the kept sessions of tests/data/sessions.json again and writes what they read now.
 
-Run it after an intended change of prompts, tools or answers: `make generate NAME=sessions`. Built-in models
-are asked again; other replies are those that were kept.
+Run it after an intended change of prompts, tools or answers: `make generate NAME=sessions`.
+Built-in models are asked again; other replies are those that were kept.
 """
 
 import json

@@ -81,7 +81,6 @@ export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: Boa
 function Proof({ row }: { row: Row }) {
   const waiting = row.unverified - row.refuted;
   const parts = [
-    row.imported > 0 && `${row.imported} imported`,
     row.by_runner > 0 && `${row.by_runner} by a runner`,
     waiting > 0 && `${waiting} to be verified`,
     row.refuted > 0 && `${row.refuted} refuted`,

@@ -6,6 +6,7 @@ revision = "2026_11_27_what_goes"
 down_revision = "2026_11_27_summaries"
 branch_labels = None
 depends_on = None
+BREAKING = True
 
 TABLES = ("package_changes", "packages")
 COLUMNS = (("jobs", "imported_from"),)
