@@ -64,8 +64,7 @@ bench-requests: $(STAMP) ## Measures what a model request costs over aiohttp and
 bench-job: $(STAMP) ## Measures what a job costs beside its session and its simulation
 	@$(TEST_PYTHON) -m benchmarks.sessions.bench_job --json .buildarena/bench-job.json
 
-.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-agreement-throwing bench-processors bench-game bench-control bench-worlds bench-ceilings bench-repeats bench-trials \
-	game-evidence evidence-machines
+.PHONY: bench-simulation bench-agreement bench-agreement-workshop bench-agreement-throwing bench-processors bench-control bench-worlds bench-ceilings bench-repeats bench-trials
 
 bench-simulation: $(STAMP) ## Measures the simulation and the engines' agreement; JSON in .buildarena/
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_simulation --json .buildarena/bench-simulation.json
@@ -87,9 +86,6 @@ bench-agreement-throwing: $(STAMP) ## The same for 120 catapults
 bench-processors: $(STAMP) ## Compares 200 trials' bytes over kinds of processors; an hour
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_processors --json .buildarena/bench-processors.json
 
-bench-game: $(STAMP) ## What published trials in the real game say beside our engines
-	@$(TEST_PYTHON) -m benchmarks.simulation.bench_game --json .buildarena/bench-game.json
-
 bench-control: $(STAMP) ## What a controller costs: a tick, and a trial beside one by keys
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_control --json .buildarena/bench-control.json
 
@@ -101,12 +97,6 @@ bench-ceilings: $(STAMP) ## How much room indicators leave above the expert and 
 
 bench-repeats: $(STAMP) ## Whether 200 trials with programs repeat to the byte, and how far engines' senses are apart
 	@$(TEST_PYTHON) -m benchmarks.simulation.bench_repeats --json .buildarena/bench-repeats.json
-
-game-evidence: $(STAMP) ## Writes the tables of assumptions and of agreement with the game in the documents
-	@$(TEST_PYTHON) -m benchmarks.simulation.game_evidence
-
-evidence-machines: $(STAMP) ## Writes the machines of a first evening with the game, after a change of the expert
-	@$(TEST_PYTHON) -m support.machines.evidence
 
 .PHONY: bench-costs sizing
 

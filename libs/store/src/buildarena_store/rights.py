@@ -18,7 +18,6 @@ _ACCOUNTS = ("api_keys", "names")
 _SUBMITTED = (
     "budgets",
     "job_wants",
-    "evidence",
     "packages",
     "package_changes",
     "sweeps",

@@ -48,7 +48,6 @@ from buildarena_api.routes import (
     comparisons,
     drives,
     events,
-    evidence,
     exports,
     health,
     jobs,
@@ -109,7 +108,7 @@ ORDINARY = (
     workers,
 )
 LIMITED_THEMSELVES = (
-    *(events, exports, archives, evidence, challenges, package_pictures),
+    *(events, exports, archives, challenges, package_pictures),
     *(comparisons, metrics),
 )
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
@@ -240,7 +239,7 @@ def _add_middleware(app: FastAPI) -> None:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
         BodyLimitMiddleware,
-        unlimited={archives.IMPORT_PATH, evidence.PATH, challenges.PATH, challenges.CHECK_PATH},
+        unlimited={archives.IMPORT_PATH, challenges.PATH, challenges.CHECK_PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
         most=runner.max_request_bytes,

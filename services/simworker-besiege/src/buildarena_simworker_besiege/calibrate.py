@@ -33,8 +33,6 @@ BEFORE: Final = {
     "name_box": "Open the list of machine files in the game.",
     "set_ground": "Close the list of machine files.",
     "confirm": "Click the button that deletes the machine, so that the game asks for confirmation.",
-    "open_save": "Answer no, so that the game asks no more.",
-    "save_machine": "Open the game's box for saving a machine, and close it afterwards.",
 }
 """What must be done in the game before some places can be seen."""
 TRIAL_S: Final = 2.0

@@ -32,7 +32,6 @@ from buildarena_besiege.run import PreparedMachine, marked, prepared_machine
 from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point, besiege_turn
 from buildarena_geometry.rotations import multiply
-from buildarena_pipeline.evidence.trials import OWN, trial_named
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
@@ -195,9 +194,6 @@ def played_runs() -> dict[str, tuple[Machine, Scenario]]:
         task, machine = piloted_trial(name)
         runs[f"program-{name}"] = (machine, task.scenario)
     bridge = tried_machine("support-1")
-    for name in OWN:
-        trial = trial_named(name)
-        runs[f"evening-{name}"] = (trial.machine, trial.scenario)
     return {**runs, "calibration": tried_machine(), "calibration-support-1": bridge}
 
 

@@ -31,7 +31,7 @@ from buildarena_simworker_besiege.screen.calibration import Calibration
 from buildarena_simworker_besiege.screen.capture import difference, screenshot
 from buildarena_simworker_besiege.screen.game_start import start_game
 from buildarena_simworker_besiege.screen.input import ScreenInput
-from buildarena_simworker_besiege.screen.machine_list import load_by_name, save_by_name
+from buildarena_simworker_besiege.screen.machine_list import load_by_name
 from buildarena_simworker_besiege.screen.steps import ATTEMPTS, wait_for
 from buildarena_simworker_besiege.screen.view import View
 from buildarena_simworker_besiege.screen.window_types import Windows
@@ -128,22 +128,6 @@ class WindowDesktop:
         if run.set_ground:
             self._actions.click("set_ground")
             self._input.wait(0.5)
-
-    def save(self, name: str) -> bytes:
-        """Has the game save the machine that is loaded; the file is removed again.
-
-        Raises:
-            DesktopError: It does not.
-        """
-        folder = self._settings.machines_folder
-        if folder is None:
-            raise DesktopError("the folder of machine files is not set")
-        file = folder / f"{name}.bsg"
-        file.unlink(missing_ok=True)
-        try:
-            return save_by_name(self._actions, name, file)
-        finally:
-            file.unlink(missing_ok=True)
 
     def start(self, run: GameRun) -> None:
         """Starts, and shows the mod's log until the run's begin line is in it.
@@ -267,10 +251,6 @@ class WindowDesktop:
     def screenshot(self) -> bytes | None:
         """The whole screen."""
         return screenshot()
-
-    def window_picture(self, width: int) -> bytes:
-        """What the game's window alone shows (PNG), no wider than so many pixels."""
-        return self._view.small(width)
 
     def close(self) -> None:
         """Lets go of the keys, and ends the game if it was started here."""
