@@ -169,7 +169,7 @@ def test_without_the_extra_the_doctor_says_what_to_install(rig, tmp_path) -> Non
     [
         ({"MACHINES": "/nowhere"}, "folder of machine files"),
         ({"GAME": ""}, "versions"),
-        ({"DESKTOP": "headless", "COMMAND": ""}, "restart"),
+        ({"COMMAND": "/nowhere/besiege"}, "restart"),
     ],
 )
 def test_what_is_missing_is_named_with_advice(rig, changes, named) -> None:

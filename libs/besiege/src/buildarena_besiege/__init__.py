@@ -17,11 +17,8 @@ from buildarena_besiege.importing.machine import ImportedMachine, read_machine_f
 from buildarena_besiege.logs.game_log import GameLog, run_ids
 from buildarena_besiege.logs.level_check import level_finding
 from buildarena_besiege.logs.published import looks_published, published_trajectory
-from buildarena_besiege.logs.state_log import StateLog
 from buildarena_besiege.logs.stored import logged_trajectory
-from buildarena_besiege.logs.telemetry import read_telemetry, telemetry_log, telemetry_trajectory
 from buildarena_besiege.logs.trajectories import trajectory_of
-from buildarena_besiege.open_loop import TimedMachine, machine_with_timeline, timeline_of
 from buildarena_besiege.own_keys import lines_of_keys, with_own_keys
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start
@@ -34,8 +31,6 @@ __all__ = [
     "LogIncompleteError",
     "MachineFileError",
     "MachineNotPlayableError",
-    "StateLog",
-    "TimedMachine",
     "file_data_lines",
     "game_start",
     "level_file",
@@ -43,19 +38,14 @@ __all__ = [
     "lines_of_keys",
     "logged_trajectory",
     "looks_published",
-    "machine_with_timeline",
     "plain_machine_file",
     "prepare_run",
     "published_trajectory",
     "read_any_machine",
     "read_machine_file",
     "read_presses",
-    "read_telemetry",
     "read_tree_file",
     "run_ids",
-    "telemetry_log",
-    "telemetry_trajectory",
-    "timeline_of",
     "trajectory_of",
     "with_own_keys",
 ]

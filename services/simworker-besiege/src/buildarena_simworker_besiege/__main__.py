@@ -86,24 +86,22 @@ def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
     """The log is asked for while a machine prints: before, there is none to point at."""
     from buildarena_simworker_besiege.calibrate import ask_log, opened_terrain, printing_run
     from buildarena_simworker_besiege.screen.input import ScreenInput
-    from buildarena_simworker_besiege.screen.window import WindowDesktop
 
     desktop, _ = make_desktop(settings)
     try:
-        if isinstance(desktop, WindowDesktop):
-            desktop.print_lines(printing_run(opened_terrain(settings)))
-            _save(
-                ask_log(
-                    ScreenInput(settings.pace),
-                    _windows(settings),
-                    ask=input,
-                    tell=_say,
-                    before=calibration,
-                ),
-                settings,
-            )
-            desktop.stop()
-            desktop.clear()
+        desktop.print_lines(printing_run(opened_terrain(settings)))
+        _save(
+            ask_log(
+                ScreenInput(settings.pace),
+                _windows(settings),
+                ask=input,
+                tell=_say,
+                before=calibration,
+            ),
+            settings,
+        )
+        desktop.stop()
+        desktop.clear()
     finally:
         desktop.close()
 
@@ -116,10 +114,9 @@ def _try(settings: BesiegeSettings) -> int:
         played = try_out(desktop, settings.time_limits, _say, opened_terrain(settings))
         if played is None:
             return 1
-        if settings.desktop == "window":
-            before = load_calibration(settings.calibration_file)
-            present = installed(settings.folder)
-            _save(learnt(before, played, _windows(settings), present), settings)
+        before = load_calibration(settings.calibration_file)
+        present = installed(settings.folder)
+        _save(learnt(before, played, _windows(settings), present), settings)
     finally:
         desktop.close()
     return 0

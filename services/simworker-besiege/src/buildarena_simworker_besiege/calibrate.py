@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_besiege import GameLog, GameRun, prepare_run
+from buildarena_besiege import GameRun, prepare_run
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import TerrainBox
@@ -199,7 +199,7 @@ def learnt(
         present: What is installed.
     """
     area = _window(windows)
-    world = played.log.world if isinstance(played.log, GameLog) else None
+    world = played.log.world
     return replace(
         before,
         window=(area.width, area.height),

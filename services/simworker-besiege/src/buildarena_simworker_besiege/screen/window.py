@@ -13,7 +13,6 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import GameLog, GameRun, level_file, level_finding, trajectory_of
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
-from buildarena_simworker_besiege.desktop import RunLog
 from buildarena_simworker_besiege.errors import (
     DesktopError,
     GameGoneError,
@@ -81,11 +80,6 @@ class WindowDesktop:
         self._loaded_changed = 0.0
         self._panel_shown = False
         self._early_copies: list[str] = []
-
-    @property
-    def puts_down(self) -> bool:
-        """It has a button for that."""
-        return True
 
     def require_able(self, run: GameRun) -> None:
         """Checks that the calibrated game is played, with the run's level open or to be opened."""
@@ -164,9 +158,9 @@ class WindowDesktop:
             log.read(text)
         return log
 
-    def require_level(self, run: GameRun, log: RunLog) -> None:
+    def require_level(self, run: GameRun, log: GameLog) -> None:
         """Checks what the run's script measured: the level, and the size the game draws to."""
-        world = log.world if isinstance(log, GameLog) else None
+        world = log.world
         if world is None:
             return
         wanted = self._calibration.screen
@@ -184,9 +178,8 @@ class WindowDesktop:
                 f"{finding}; open it in the game"
             )
 
-    def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
+    def trajectory(self, log: GameLog, machine: Machine, scenario: Scenario) -> Trajectory:
         """The run's trajectory from its lines."""
-        assert isinstance(log, GameLog)  # noqa: S101 - it is of `new_log`
         game, mod = self._settings.game, self._settings.mod
         return trajectory_of(log, machine, scenario, game=game, mod=mod)
 

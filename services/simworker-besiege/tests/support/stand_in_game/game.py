@@ -37,7 +37,7 @@ class Settings:
 
 
 class Game:
-    """The state of the game; the window and the headless server move it."""
+    """The state of the game; the window moves it."""
 
     def __init__(self, settings: Settings, faults: Faults) -> None:
         self.settings, self.faults = settings, faults

@@ -1,4 +1,4 @@
-"""What the window's panels and the keyboard do, apart from any toolkit."""
+"""What the window's panels and the keyboard do, apart from tkinter."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
