@@ -12,7 +12,6 @@ from buildarena_besiege.errors import (
     MachineNotPlayableError,
 )
 from buildarena_besiege.exporting.level import level_file
-from buildarena_besiege.importing.file_data import file_data_lines
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_besiege.logs.game_log import GameLog, run_ids
 from buildarena_besiege.logs.level_check import level_finding
@@ -31,7 +30,6 @@ __all__ = [
     "LogIncompleteError",
     "MachineFileError",
     "MachineNotPlayableError",
-    "file_data_lines",
     "game_start",
     "level_file",
     "level_finding",

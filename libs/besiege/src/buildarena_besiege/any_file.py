@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec import structs
 
-from buildarena_besiege.importing.file_data import file_data_lines
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_geometry import KeyPress, Machine, module_set
 from buildarena_geometry.errors import DocumentError, TreeError
@@ -48,7 +47,7 @@ def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> 
     if looks_like_tree(content):
         return read_tree_file(data, where=where)
     machine = machine_of(content, where=where, version=dialect)
-    return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
+    return ImportedMachine(machine=machine)
 
 
 def read_presses(

@@ -21,11 +21,6 @@ from buildarena_besiege.exporting.script import (
     reference_lua,
     script_text,
 )
-from buildarena_besiege.importing.rewriting import (
-    has_file_data,
-    restored_records,
-    restored_text,
-)
 from buildarena_besiege.keys import (
     UPDATES_PER_S,
     bindings_of,
@@ -151,9 +146,6 @@ def plain_machine_file(
 ) -> bytes:
     """The machine file of a machine as it was built, for no trial; its keys play by themselves.
 
-    A machine that was read from a file goes back with everything that the file said of it, but for
-    a script that is not ours: it is there, under names by which no mod runs it.
-
     Args:
         machine: The machine.
         name: Stem of the file.
@@ -162,7 +154,6 @@ def plain_machine_file(
 
     Raises:
         MachineNotPlayableError: The game cannot take the machine.
-        MachineFileError: The machine's file data is not what a machine file says.
         ValueError: The name cannot be used.
     """
     _require_name(name)
@@ -174,13 +165,10 @@ def plain_machine_file(
     presses = tuple(machine.control_sequence if controls is None else controls)
     keys = bindings_of(machine, None)
     edges = key_edges(bound_presses(presses, machine))
-    records = restored_records(machine, block_records(machine, Guids(new_guid), keys=keys), keys)
-    header = header_lines(machine, records, presses, plain=True, of_file=has_file_data(machine))
+    records = block_records(machine, Guids(new_guid), keys=keys)
+    header = header_lines(machine, records, presses, plain=True)
     script = script_text(header, edges, cargo=None, cargo_reference="", telling=None)
-    text = restored_text(machine, name, records, script)
-    if text is None:
-        text = machine_text(name, AS_BUILT, records, script)
-    return text.encode("utf-8")
+    return machine_text(name, AS_BUILT, records, script).encode("utf-8")
 
 
 def prepared_machine(

@@ -19,7 +19,6 @@ from buildarena_benchmark import ValidationIssue
 from buildarena_besiege import (
     ImportedMachine,
     MachineFileError,
-    file_data_lines,
     read_machine_file,
     read_tree_file,
 )
@@ -124,8 +123,7 @@ def _content(data: bytes) -> ImportedMachine:
     content = _json(data)
     if looks_like_tree(content):
         return read_tree_file(data, where="the tree")
-    machine = Machine.from_document(_document(content))
-    return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
+    return ImportedMachine(machine=Machine.from_document(_document(content)))
 
 
 def _not_storable(machine: Machine) -> str | None:

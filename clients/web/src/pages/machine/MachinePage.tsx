@@ -144,15 +144,6 @@ function Findings({ check }: { check: Check }) {
           </List>
         </Alert>
       )}
-      {check.file_data.length > 0 && (
-        <Alert color="gray" py="xs" title="Stored with the machine, and in no trial">
-          <List size="sm" style={{ maxHeight: 200, overflow: "auto" }}>
-            {check.file_data.map((one) => (
-              <List.Item key={one}>{one}</List.Item>
-            ))}
-          </List>
-        </Alert>
-      )}
     </Stack>
   );
 }

@@ -161,8 +161,7 @@ def import_file(
     """Read a machine file of the game's or a construction tree, and tell what it says beyond.
 
     A construction tree, BesiegeField's format, is built entry by entry, each of them checked.
-    Keys and settings that a machine here does not have are stored with it, change no trial, and
-    stand in the game's file again when the machine is exported without a task.
+    Keys and settings that a machine here does not have are named and left out.
     """
     with shown_errors():
         imported = read_imported(file)
@@ -173,15 +172,12 @@ def import_file(
         facts = {
             "name": imported.name,
             **_facts(imported.machine),
-            "file_data": list(imported.file_data),
             "not_understood": list(imported.not_understood),
         }
         if as_json:
             print_json(facts)
             return
         _print_size(facts)
-        for line in imported.file_data:
-            say(f"stored: {line}")
         for remark in imported.not_understood:
             say(remark)
         if not imported.not_understood:
