@@ -4,7 +4,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
-from buildarena_besiege.any_file import read_any_machine, read_presses, read_tree_file
+from buildarena_besiege.any_file import read_any_machine, read_presses
 from buildarena_besiege.errors import (
     BesiegeError,
     LogIncompleteError,
@@ -42,7 +42,6 @@ __all__ = [
     "read_any_machine",
     "read_machine_file",
     "read_presses",
-    "read_tree_file",
     "run_ids",
     "trajectory_of",
     "with_own_keys",

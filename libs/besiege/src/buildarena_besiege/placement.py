@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Scenario
 
-CLEARANCE: Final = 0.05
-"""Height above the floor at which a file puts a machine down, units: nothing touches it yet."""
-
 START_HEIGHT: Final = 5.0
 """Height of a machine's origin where "set ground" puts it on the floor afterwards, units."""
 

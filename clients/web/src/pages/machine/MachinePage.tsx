@@ -38,7 +38,7 @@ export default function MachinePage() {
       </div>
       <DropZone
         icon={<IconFileUpload size={32} aria-hidden />}
-        title="Drop a machine document or a construction tree (JSON), a machine file of the game (.bsg) or a GLB here"
+        title="Drop a machine document (JSON), a machine file of the game (.bsg) or a GLB here"
         hint="Machines up to 2 MiB and 2,000 parts, GLB up to 16 MiB."
         label="Machine file"
         accept=".json,.bsg,.glb,application/json,model/gltf-binary"

@@ -35,8 +35,7 @@ TRIAL_PATH: Final = "/v1/machines/trials"
 FILE: Final[dict[str, Any]] = {
     "requestBody": {
         "required": True,
-        "description": "A machine document or a construction tree (JSON), or a machine file of "
-        "the game (.bsg)",
+        "description": "A machine document (JSON), or a machine file of the game (.bsg)",
         "content": {
             "application/octet-stream": {
                 "schema": {"type": "string", "format": "binary", "maxLength": MAX_BYTES}

@@ -147,10 +147,7 @@ def _game_file(machine: Machine, name: str, task: str | None, controls: Path | N
 def import_file(
     file: Annotated[
         Path,
-        typer.Argument(
-            help="A machine file of the game's (.bsg), or a construction tree (JSON).",
-            callback=to_read,
-        ),
+        typer.Argument(help="A machine file of the game's (.bsg).", callback=to_read),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Write the machine document (.json) to this file.")
@@ -158,9 +155,8 @@ def import_file(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Read a machine file of the game's or a construction tree, and tell what it says beyond.
+    """Read a machine file of the game's, and tell what it says beyond.
 
-    A construction tree, BesiegeField's format, is built entry by entry, each of them checked.
     Keys and settings that a machine here does not have are named and left out.
     """
     with shown_errors():
