@@ -50,7 +50,6 @@ HEAVY_PATHS = {
     "/v1/leaderboard/figures?sweep=invented": (20, "heavy"),
     "/v1/leaderboard/compare?first=a&second=b": (10, "heavy"),
     "/v1/leaderboard/compare?first=a&second=b&until=2025-01-01": (20, "heavy"),
-    "/v1/leaderboard/agreement?until=2025-01-01": (20, "heavy"),
     "/v1/leaderboard/changes?limit=1000": (10, "heavy"),
     "/v1/leaderboard/manifest": (20, "heavy"),
     "/v1/leaderboard/manifest?task=lift-1&model=a": (5, "heavy"),
@@ -319,7 +318,7 @@ def statements(context):
 
 
 @pytest.mark.nightly(keep=3)
-@pytest.mark.parametrize("kind", ["", "/figures", "/compare", "/agreement", "/manifest"])
+@pytest.mark.parametrize("kind", ["", "/figures", "/compare", "/manifest"])
 @pytest.mark.parametrize("name", INVENTED)
 @pytest.mark.usefixtures("board")
 def test_invented_names_fill_no_cache_and_cost_few_statements(

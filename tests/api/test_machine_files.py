@@ -73,22 +73,7 @@ def unknown_module() -> bytes:
     return json.dumps(content).encode()
 
 
-def tree(**entry: object) -> bytes:
-    first = {"type": 0, "id": 0, "parent": -1, "face_id": -1}
-    return json.dumps([first, {"type": 15, "id": 1, "parent": 0, "face_id": 0, **entry}]).encode()
-
-
-def test_a_construction_tree_is_looked_at_and_tried(api) -> None:
-    seen = check(api, tree()).json()
-    assert (seen["parts"], seen["faults"], seen["detached"]) == (2, [], [])
-    assert [block["id"] for block in seen["scene"]["blocks"]] == ["1", "2"]
-    assert attempt(api, tree()).status_code == 202
-
-
 HOSTILE = {
-    "a tree's missing parent": (tree(parent=7), "entry 1"),
-    "a tree's unknown type": (tree(type=4711), "entry 1"),
-    "a long tree": (b"[" + b'{"id": 1, "type": 0},' * 9000 + b'{"id": 1}]', "at most 2,000"),
     "nothing": (b"", "neither a machine document"),
     "noise": (bytes(range(256)) * 40, "neither a machine document"),
     "a list": (b"[]", "neither a machine document"),

@@ -7,10 +7,11 @@ import uuid
 
 import numpy as np
 import pytest
-from support.machine_files import published_files
+from support.machine_files import RICH, published_files
 from tests.besiege.foreign_files import block, foreign
 from tests.besiege.golden import golden, goldens, scenario_of
 from tests.besiege.playing import act, press, vehicle
+from tests.besiege.round_trips import round_trip
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import (
@@ -19,6 +20,7 @@ from buildarena_besiege import (
     read_any_machine,
     read_machine_file,
 )
+from buildarena_besiege.game_keys import is_game_key
 from buildarena_besiege.normal import normal_form
 from buildarena_geometry import DocumentError, Machine
 
@@ -347,3 +349,74 @@ def test_an_assembly_comes_back_with_its_sub_structures() -> None:
     (link,) = blind.connectors.values()
     assert (link.start, link.end) == (("A_1", "E"), ("B_1", "F"))
     assert Machine.from_document(blind.to_document()) == blind
+
+
+def test_what_a_persons_file_says_otherwise_is_named() -> None:
+    found = read_machine_file(RICH)
+    machine, thruster, wheel = found.not_understood[-3:]
+    for words in ("requiredMods 1d45bae7-", "tracker.enabled True", "tracker.sample_rate_hz 10"):
+        assert words in machine
+    assert thruster == (
+        "block 2 (Steering Thruster): bmt-left T, UpArrow, M3; bmt-right Keypad8, G, Keypad8; "
+        "bmt-fthrust 1.50 (simulated as 3); bmt-auto-brake False; bmt-toggle-mode true; "
+        "flipped True"
+    )
+    assert "bmt-automatic True (simulated as False)" in wheel
+    assert "Scale 2 1 1 (simulated as 1 1 1)" in wheel
+    assert found.not_understood[:-3] == (
+        "the machine's data 'author' is not understood",
+        "the machine's data 'groups' is not understood",
+        "the machine's data 'path' is not understood",
+        "the Lua script is not ours: what it does, and the keys it presses, are not read",
+        "block 1 (Starting Block): 'Settings' is not understood",
+        "block 3 (Powered Wheel): 'paint' is not understood",
+        "block 4: no module is of the game's type 57: left out",
+        "block 6 (Brace): 'bmt-hidden' is not understood",
+    )
+    assert found.own_keys == {
+        "2": {
+            "thrust_left": ("T", "UpArrow", "M3"),
+            "thrust_right": ("Keypad8", "G", "Keypad8"),
+        },
+        "3": {"spinning_forward": ("F",)},
+    }
+
+
+def test_nothing_of_a_strangers_file_stands_in_ours() -> None:
+    """Settings, mods and scripts of strangers would change a trial, and so its score."""
+    machine = read_machine_file(RICH).machine
+    scenario = builtin_tasks()["transport-1"].scenario
+    trial = prepare_run(machine, scenario, name="m", run_id="r").machine_file
+    for data in (trial, plain_machine_file(machine, name="m")):
+        for word in (
+            b"tracker",
+            b"1d45bae7",
+            b"1.50",
+            b"brass",
+            b'x="2',
+            b"Infinity",
+            b"os.execute",
+        ):
+            assert word not in data
+
+
+def test_what_somebody_changed_in_a_file_of_ours_is_named() -> None:
+    plain = plain_machine_file(vehicle(), name="m")
+    faster = plain.replace(
+        b'<Single key="bmt-speed">1.0</Single>', b'<Single key="bmt-speed">9</Single>', 1
+    )
+    assert faster != plain
+    (remark,) = read_machine_file(faster).not_understood
+    assert remark.endswith("bmt-speed 9 (simulated as 1)")
+
+
+def test_keys_have_the_games_names() -> None:
+    for name in ("T", "M3", "Keypad8", "F15", "Joystick16Button19", "LeftShift", "KeypadEnter"):
+        assert is_game_key(name)
+    for name in ("t", "F16", "M9", "Alpha10", "", "Tab "):
+        assert not is_game_key(name)
+
+
+@pytest.mark.parametrize("name", ["rich", *published_files()])
+def test_machines_of_files_come_back_from_ours(name) -> None:
+    assert round_trip(RICH if name == "rich" else published_files()[name])

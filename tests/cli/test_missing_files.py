@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 import pytest
-from support.machines.evidence import experts_machine
+from support.machines.experts import experts_machine
 from typer.core import TyperArgument
 from typer.main import get_command
 

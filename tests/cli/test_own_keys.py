@@ -66,7 +66,7 @@ def test_a_contestant_sees_which_way_each_key_pushes(task) -> None:
 
 
 def test_what_the_file_sets_otherwise_is_told() -> None:
-    lines = " ".join(read_any_machine(FIVE.read_bytes(), where="five").file_data)
+    lines = " ".join(read_any_machine(FIVE.read_bytes(), where="five").not_understood)
     assert "bmt-fthrust 1 (simulated as 3)" in lines
     assert "bmt-fthrust 3" not in lines
 
@@ -82,17 +82,18 @@ def test_a_key_that_no_block_has_is_refused_with_those_that_there_are(task) -> N
 
 def test_own_keys_take_none_that_is_used_already() -> None:
     text = THREE.read_text().replace("<String>M3<", "<String>UpArrow<")
-    machine, keys = with_own_keys(read_any_machine(text.encode(), where="three").machine)
+    imported = read_any_machine(text.encode(), where="three")
+    machine, keys = with_own_keys(imported)
     assert keys["UpArrow"] == "UpArrow"
     assert len(set(keys.values())) == len(keys) == 4
     assert machine.blocks["2"].bindings["thrust_left"] == ("UpArrow", keys["E"])
-    assert lines_of_keys(machine)[0].startswith("E: 2 thrust_left")
+    assert lines_of_keys(imported)[0].startswith("E: 2 thrust_left")
 
 
 def test_more_keys_than_there_are_are_refused() -> None:
     names = [f"F{k}" for k in range(1, 16)] + list("ABCDEFGHIJK")
     keys = "".join(f"<String>{name}</String>" for name in names)
     text = THREE.read_text().replace("<String>M4</String>", keys)
-    machine = read_any_machine(text.encode(), where="three").machine
+    imported = read_any_machine(text.encode(), where="three")
     with pytest.raises(MachineNotPlayableError, match=f"{len(KEYS)} are free"):
-        with_own_keys(machine)
+        with_own_keys(imported)

@@ -64,8 +64,6 @@ CALLED = {
     "get_artifact_by_name": "artifact",
     "get_trajectory": "trajectory",
     "export": "export_leaderboard",
-    "show_evidence": "evidence_table",
-    "agreement_table": "agreement",
     "forecast_sweep": "sweep_forecast",
     "stream_job": "job_events",
     "stream_sweep": "sweep_events",

@@ -4,7 +4,6 @@ from itertools import islice
 
 import pytest
 from support.clients.tenants import ADMIN
-from support.evenings import packed
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_client import (
@@ -97,7 +96,6 @@ def test_the_leaderboard_and_what_stands_beside_it(client, service) -> None:
     assert found["tasks"][0]["trials"] == [3, 3]
     require_shape(client.figures(), schemas.Figures)
     assert client.manifest(task=["lift-1"], model=["builtin/idle"])
-    require_shape(client.agreement(), schemas.AgreementTable)
     assert b"builtin/idle" in client.export_leaderboard("csv")
     page = client.changes(limit=2)
     assert len(page["changes"]) == 2
@@ -275,16 +273,3 @@ def test_the_key_and_the_url_may_stand_in_the_environment(make, service, monkeyp
         make()
     monkeypatch.delenv("BUILDARENA_KEY")
     assert make().caller()["scope"] == "admin"
-
-
-def test_evidence_of_the_game(client) -> None:
-    data = packed("doctor")
-    added = client.add_evidence(data)
-    require_shape(added, schemas.AddedEvidence)
-    assert client.evidence()[0]["id"] == added["id"]
-    assert client.evidence_table(added["id"][:12])["table"]["rows"]
-    assert client.evidence_file(added["id"]) == data
-    with pytest.raises(InvalidError):
-        client.add_evidence(b"no evidence")
-    with pytest.raises(NotFoundError):
-        client.evidence_table("0000")

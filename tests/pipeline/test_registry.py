@@ -94,19 +94,6 @@ def test_a_pack_that_lacks_a_file_is_refused(tmp_path: Path) -> None:
         PromptPacks().load("x")
 
 
-def test_a_pack_of_before_the_tree_workflows_has_their_texts_from_the_default_one(
-    tmp_path: Path,
-) -> None:
-    import shutil
-
-    from buildarena_pipeline.catalog.prompt_packs import builtin_folder
-
-    shutil.copytree(builtin_folder() / "default", tmp_path / "pack")
-    for file in [*(tmp_path / "pack").rglob("tree_*.md")]:
-        file.unlink()
-    assert read_pack(tmp_path / "pack", name="mine").digest == PromptPacks().load("default").digest
-
-
 PUBLISHED = """
 agents:
   planner: {system_message: Plan it.}

@@ -68,7 +68,7 @@ def test_everything_that_is_wrong_is_named_with_the_choices(context, submissions
     assert context.store.jobs.page(limit=1) == []
 
 
-@pytest.mark.parametrize("workflow", ["builder", "guidance-builder", "tree-single"])
+@pytest.mark.parametrize("workflow", ["builder", "guidance-builder"])
 def test_a_workflow_of_one_structure_is_refused_tasks_that_ask_for_two(
     submissions, workflow
 ) -> None:
@@ -78,14 +78,6 @@ def test_a_workflow_of_one_structure_is_refused_tasks_that_ask_for_two(
     assert issue.path == "tasks[1]"
     assert "lift-3 asks for several sub-structures" in issue.message
     assert issue.choices == ("five-role",)
-
-
-def test_a_workflow_that_writes_whole_machines_is_refused_tasks_that_give_one(submissions) -> None:
-    with pytest.raises(SubmissionError) as caught:
-        submissions.submit_sweep(spec(tasks=["repair-1"], workflow="tree-iterative"))
-    (issue,) = caught.value.issues
-    assert "repair-1 gives a machine" in issue.message
-    assert issue.choices == ("builder", "five-role", "guidance-builder")
 
 
 def test_an_oversized_sweep_is_refused(context, submissions) -> None:

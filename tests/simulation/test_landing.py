@@ -1,12 +1,12 @@
 """A cargo that lands on a machine bounces, and its blow breaks a beam, as in a log of the game.
 
 The game's figures are of a straight beam of seven blocks in support-1; see
-benchmarks/simulation/bench_game.py, whose sizes the trials have here.
+tests/support/landings.py, whose sizes the trials have here.
 """
 
 import numpy as np
 import pytest
-from benchmarks.simulation.bench_game import (
+from support.landings import (
     BEGINS_S,
     FALL_HEIGHT,
     cargo_path,

@@ -12,7 +12,6 @@ from game_rig import PROGRAMS, Rig, our_score, piloted_text, piloted_trial
 from sqlalchemy import text
 from support.stages import work
 
-from buildarena_api.leaderboard.agreement import agreement_rows
 from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_besiege import read_machine_file
 from buildarena_geometry import KeyPress, Machine
@@ -73,10 +72,6 @@ def test_each_category_is_played_scored_verified_and_compared(playing, rig) -> N
     assert {job.task: job.outcome for job in jobs} == dict.fromkeys(TASKS, "success")
     for job in jobs:
         _check(playing, job)
-    found = playing.store.results.boards.annotated(jobs[0].track)
-    rows = agreement_rows(found)
-    assert {row.task for row in rows} == set(TASKS)
-    assert all(row.same_verdict == 1.0 for row in rows)
     assert not list(rig.machines.iterdir())
     report = rig.report()
     assert (report["machine"], report["modifiers"]) == (None, [])

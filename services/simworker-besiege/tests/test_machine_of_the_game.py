@@ -12,8 +12,8 @@ from game_rig import Rig, short_trial, trial_of
 from steam_library import MOD_XML, library
 
 from buildarena_pipeline.runtime.simulators.simulator import SimulatorFaultError
+from buildarena_simworker_besiege import doctor
 from buildarena_simworker_besiege.commands import command_words
-from buildarena_simworker_besiege.doctor import examine
 from buildarena_simworker_besiege.errors import (
     DesktopError,
     GameChangedError,
@@ -77,10 +77,9 @@ def test_another_build_or_mod_than_the_calibrated_one_is_not_played(
 
 @pytest.mark.parametrize("command", ["/nowhere/besiege", 'C:\\Program "Files', "  "])
 def test_the_doctor_names_a_command_that_starts_nothing(tmp_path, command) -> None:
-    settings = BesiegeSettings(command=command, state=tmp_path, desktop="headless")
-    found = {one.name: one for one in examine(settings)}
-    assert not found["restart"].ok
-    assert "BUILDARENA_BESIEGE_COMMAND" in found["restart"].advice
+    found = doctor._command(BesiegeSettings(command=command, state=tmp_path))
+    assert not found.ok
+    assert "BUILDARENA_BESIEGE_COMMAND" in found.advice
 
 
 @pytest.mark.parametrize(
@@ -298,8 +297,6 @@ def test_a_lock_is_of_one_game_and_ends() -> None:
 
 def test_a_lease_goes_back_when_the_game_is_another(tmp_path, rig: Rig) -> None:
     class Changed:
-        puts_down = True
-
         def require_able(self, _run):
             found = installed(library(tmp_path, build="2"))
             found.require({"build": "1"})

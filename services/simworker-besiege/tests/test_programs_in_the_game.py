@@ -259,8 +259,8 @@ def test_a_machine_file_brings_its_program_and_keys_back() -> None:
     assert [b.bindings for b in back.machine.blocks.values()] == [
         b.bindings for b in machine.blocks.values()
     ]
-    assert (back.file_data, back.not_understood) == ((), ())
-    assert run.needs_script
+    assert back.not_understood == ()
+    assert back.own_keys == {}
 
 
 def test_presses_that_are_given_act_in_place_of_the_program() -> None:
@@ -268,7 +268,8 @@ def test_presses_that_are_given_act_in_place_of_the_program() -> None:
     run = prepare_run(
         machine, scenario, name="m", run_id="r", controls=[press("UpArrow", 0.5, 1.0)]
     )
-    assert run.key_changes == ((0.5, "UpArrow", True), (1.5, "UpArrow", False))
+    assert 'machine.new_key_emulator("UpArrow")' in run.script
+    assert "  {50, 1, true},\n  {150, 1, false}," in run.script
     assert "environment" not in run.script
 
 

@@ -16,7 +16,6 @@ from buildarena_simworker_besiege.errors import NotSetUpError
 from buildarena_simworker_besiege.log_sources import LogFile
 from buildarena_simworker_besiege.process import GameProcess
 from buildarena_simworker_besiege.screen.calibration import (
-    FOR_SAVING,
     POSITIONS,
     Calibration,
     load_calibration,
@@ -170,7 +169,7 @@ def test_without_the_extra_the_doctor_says_what_to_install(rig, tmp_path) -> Non
     [
         ({"MACHINES": "/nowhere"}, "folder of machine files"),
         ({"GAME": ""}, "versions"),
-        ({"DESKTOP": "headless", "COMMAND": ""}, "restart"),
+        ({"COMMAND": "/nowhere/besiege"}, "restart"),
     ],
 )
 def test_what_is_missing_is_named_with_advice(rig, changes, named) -> None:
@@ -207,17 +206,6 @@ def test_a_calibration_comes_back_as_it_was(tmp_path) -> None:
     assert load_calibration(file) == made
     assert load_calibration(file).digest == made.digest
     assert Calibration().digest != made.digest
-
-
-def test_a_calibration_of_before_there_were_places_for_saving_has_the_usual_ones(tmp_path) -> None:
-    file = tmp_path / "calibration.json"
-    places = {name: [0.5, 0.5] for name in POSITIONS if name not in FOR_SAVING}
-    file.write_text(json.dumps(spoiled(positions=places)))
-    positions = load_calibration(file).positions
-    assert {name: positions[name] for name in FOR_SAVING} == {
-        name: POSITIONS[name][0] for name in FOR_SAVING
-    }
-    assert positions["start"] == (0.5, 0.5)
 
 
 def spoiled(**changes: object) -> dict[str, object]:

@@ -5,7 +5,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from collections.abc import Set as AbstractSet
 from datetime import UTC, datetime
 from functools import cache
@@ -13,15 +13,12 @@ from itertools import groupby
 
 from support.player import Player
 from support.providers.scripted import Recording
-from support.providers.tree_engineer import TreeEngineer
 
 from buildarena_benchmark import CANARY
-from buildarena_pipeline.catalog.prompt_packs import PromptPacks
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.transcript import Turn
 from buildarena_store import RolloutRecord
-from buildarena_worker.builtin import CHARACTERS_PER_TOKEN
-from buildarena_worker.session.messages import Message, Request
+from buildarena_worker.session.messages import Message
 from buildarena_worker.workflow.rounds import Loop
 
 SESSIONS = (
@@ -32,13 +29,6 @@ SESSIONS = (
     ("flight-2", 0),
 )
 """Tasks, and how many simulated trials each session is told about."""
-TREES = (
-    ("tree-single", "transport-1"),
-    ("tree-iterative", "support-1"),
-    ("tree-hierarchical", "transport-1"),
-)
-"""Workflows of construction trees, and the task of each session."""
-
 HEAD = """# What a model sees
 
 <!-- {canary} -->
@@ -48,26 +38,6 @@ reads: its system message, what it reads first, and then what is new in each req
 indented. The expert's solutions are left out: of what it says, and of what is read of it later, a
 beginning stands here. `make docs` writes this page.
 """
-TREES_HEAD = """## Construction trees
-
-A session of each tree workflow, played by a stand-in that takes the form of a tree, the numbers of
-modules and points, and what the task asks for from these words alone; its machines succeed, and
-are left out as above.
-
-Tokens are characters / 4. Texts of the prompt pack, without what is filled in:
-
-| text | tokens |
-|---|---:|
-{texts}
-
-Requests of the sessions:
-
-| workflow | task | requests | input tokens | of these building points | output tokens |
-|---|---|---:|---:|---:|---:|
-{sessions}
-"""
-TOLD_ABOVE = ("# Task: ", "## Modules")
-"""How passages begin that an earlier session has, whole or nearly."""
 BEGINNING = 2
 """Lines of a solution, and requests of a builder, that stand here."""
 FORM = re.compile(r"^\s*(</?\w+>)?\s*$")
@@ -83,7 +53,6 @@ def page() -> str:
     for task, trials in SESSIONS:
         parts.append(f"## {task}\n")
         parts.extend(_session(task, trials))
-    parts.extend(_tree_sessions())
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -120,70 +89,6 @@ def _session(task: str, trials: int) -> Iterator[str]:
                 yield _block(message, solution)
         read[where] = len(request.messages)
         yield "\n".join(f"    {line}" for line in _left_out(_words(turn), solution)) + "\n"
-
-
-def _tree_sessions() -> Iterator[str]:
-    pack = PromptPacks().load("default")
-    texts = {**pack.roles, **pack.messages}
-    rows = [
-        f"| `{name}` | {_tokens(text)} |"
-        for name, text in texts.items()
-        if name.startswith("tree_")
-    ]
-    played = []
-    for workflow, task in TREES:
-        model = TreeEngineer()
-        turns = Player()(client=model, task=task, workflow=workflow).session.transcript.turns
-        played.append((workflow, task, model.requests, turns))
-    counts = [_counted(*session) for session in played]
-    yield TREES_HEAD.format(texts="\n".join(rows), sessions="\n".join(counts))
-    above: set[str] = set()
-    for workflow, task, requests, turns in played:
-        yield f"### {workflow}, {task}\n"
-        solution = {line.strip() for turn in turns for line in turn.text.splitlines()}
-        for turn, request in zip(turns, requests, strict=True):
-            yield f"#### {turn.stage}: {turn.role}\n"
-            for message in request.messages:
-                lines = _without_above(message.text, above).splitlines()
-                text = "\n".join(_left_out(lines, solution - {""}))
-                # A prompt holds a block of code of its own.
-                yield f"*{message.role}*\n\n````text\n{text}\n````\n"
-            said = _left_out(turn.text.splitlines(), solution)
-            yield "\n".join(f"    {line}" for line in said) + "\n"
-
-
-def _counted(workflow: str, task: str, requests: Sequence[Request], turns: Sequence[Turn]) -> str:
-    texts = [message.text for request in requests for message in request.messages]
-    points = [passage for text in texts for passage in _passages(text) if _is_points(passage)]
-    figures = (
-        len(requests),
-        _tokens("".join(texts)),
-        _tokens("".join(points)),
-        _tokens("".join(turn.text for turn in turns)),
-    )
-    return f"| `{workflow}` | {task} | {' | '.join(f'{figure:,}' for figure in figures)} |"
-
-
-def _tokens(text: str) -> int:
-    return len(text) // CHARACTERS_PER_TOKEN
-
-
-def _passages(text: str) -> list[str]:
-    return re.split(r"\n\n(?=## )", text)
-
-
-def _is_points(passage: str) -> bool:
-    return passage.startswith("## Building points")
-
-
-def _without_above(text: str, above: set[str]) -> str:
-    """A text without the passages that stand further above on the page already."""
-    parts = []
-    for passage in _passages(text):
-        is_above = passage in above or passage.startswith(TOLD_ABOVE)
-        parts.append(f"{passage.splitlines()[0]}\n\n[as above]" if is_above else passage)
-        above.add(passage)
-    return "\n\n".join(parts)
 
 
 def _words(turn: Turn) -> list[str]:

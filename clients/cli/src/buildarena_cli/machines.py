@@ -26,8 +26,7 @@ if TYPE_CHECKING:
 MachineFile = Annotated[
     Path,
     typer.Argument(
-        help="A machine document, an action log, a construction tree or the game's .bsg; "
-        "- reads standard input.",
+        help="A machine document, an action log or the game's .bsg; - reads standard input.",
         callback=to_read,
     ),
 ]
@@ -45,8 +44,7 @@ def read_machine(file: Path, dialect: str | None = None) -> Machine:
     """The machine of a file; what was not understood is printed to standard error.
 
     Args:
-        file: A machine file of the game's, a machine document, an action log or a construction
-            tree.
+        file: A machine file of the game's, a machine document or an action log.
         dialect: The version of the interface that an action log is from; found if left out.
 
     Raises:

@@ -158,7 +158,6 @@ class Client:
     changes = _call(Api.changes)
     verify_leaderboard = _call(Api.verify_leaderboard)
     manifest = _call(Api.manifest)
-    agreement = _call(Api.agreement)
     export_leaderboard = _call(Api.export_leaderboard)
 
     jobs = _iteration(Api.jobs)
@@ -209,8 +208,3 @@ class Client:
     submit_session = _call(Api.submit_session)
     check_machine = _call(Api.check_machine)
     try_machine = _call(Api.try_machine)
-
-    add_evidence = _call(Api.add_evidence)
-    evidence = _call(Api.evidence)
-    evidence_table = _call(Api.evidence_table)
-    evidence_file = _call(Api.evidence_file)

@@ -4,7 +4,7 @@ from buildarena_geometry import kernels as kernels  # before numpy
 
 # isort: split
 
-from buildarena_besiege.any_file import read_any_machine, read_presses, read_tree_file
+from buildarena_besiege.any_file import read_any_machine, read_presses
 from buildarena_besiege.errors import (
     BesiegeError,
     LogIncompleteError,
@@ -12,16 +12,12 @@ from buildarena_besiege.errors import (
     MachineNotPlayableError,
 )
 from buildarena_besiege.exporting.level import level_file
-from buildarena_besiege.importing.file_data import file_data_lines
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
 from buildarena_besiege.logs.game_log import GameLog, run_ids
 from buildarena_besiege.logs.level_check import level_finding
 from buildarena_besiege.logs.published import looks_published, published_trajectory
-from buildarena_besiege.logs.state_log import StateLog
 from buildarena_besiege.logs.stored import logged_trajectory
-from buildarena_besiege.logs.telemetry import read_telemetry, telemetry_log, telemetry_trajectory
 from buildarena_besiege.logs.trajectories import trajectory_of
-from buildarena_besiege.open_loop import TimedMachine, machine_with_timeline, timeline_of
 from buildarena_besiege.own_keys import lines_of_keys, with_own_keys
 from buildarena_besiege.run import GameRun, plain_machine_file, prepare_run
 from buildarena_besiege.starts import game_start
@@ -34,28 +30,19 @@ __all__ = [
     "LogIncompleteError",
     "MachineFileError",
     "MachineNotPlayableError",
-    "StateLog",
-    "TimedMachine",
-    "file_data_lines",
     "game_start",
     "level_file",
     "level_finding",
     "lines_of_keys",
     "logged_trajectory",
     "looks_published",
-    "machine_with_timeline",
     "plain_machine_file",
     "prepare_run",
     "published_trajectory",
     "read_any_machine",
     "read_machine_file",
     "read_presses",
-    "read_telemetry",
-    "read_tree_file",
     "run_ids",
-    "telemetry_log",
-    "telemetry_trajectory",
-    "timeline_of",
     "trajectory_of",
     "with_own_keys",
 ]

@@ -1,4 +1,4 @@
-"""Reads machines from files of any kind: the game's, documents, action logs, construction trees."""
+"""Reads machines from files of any kind: the game's, documents, action logs."""
 
 from __future__ import annotations
 
@@ -6,24 +6,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec import structs
 
-from buildarena_besiege.importing.file_data import file_data_lines
 from buildarena_besiege.importing.machine import ImportedMachine, read_machine_file
-from buildarena_geometry import KeyPress, Machine, module_set
-from buildarena_geometry.errors import DocumentError, TreeError
+from buildarena_geometry import KeyPress
+from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_of
 from buildarena_geometry.reading import read, shown
-from buildarena_geometry.trees import looks_like_tree, read_tree, tree_actions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 _LEADING: Final = b" \t\r\n\x00"
 _PUBLISHED_FIELDS: Final = {"time": "time_s", "hold_for": "hold_for_s"}
-_KEYS_NEEDED: Final = (
-    "wheels turn by themselves where the tree is from; here they turn while their keys are held"
-)
 _XML_BEGINNINGS: Final = (b"<", b"\xef\xbb\xbf<", b"\xff\xfe<", b"\xfe\xff\x00<", b"\x00<")
 
 
@@ -31,24 +26,18 @@ def read_any_machine(data: bytes, *, where: str, dialect: str | None = None) -> 
     """The machine of a file, told apart by content.
 
     Args:
-        data: A machine file of the game's (.bsg), or JSON: a machine document, an action log or a
-            construction tree.
+        data: A machine file of the game's (.bsg), or JSON: a machine document or an action log.
         where: What messages call the file.
         dialect: The version of the interface that an action log is from; found if left out.
 
     Raises:
         MachineFileError: It is XML, and not a machine file.
-        DocumentError: It is neither, the document is wrong, or an action of the log or tree is
-            refused.
+        DocumentError: It is neither, the document is wrong, or an action of the log is refused.
         ValueError: There is no such dialect.
     """
     if data.lstrip(_LEADING).startswith(_XML_BEGINNINGS):
         return read_machine_file(data)
-    content = _json(data, where)
-    if looks_like_tree(content):
-        return read_tree_file(data, where=where)
-    machine = machine_of(content, where=where, version=dialect)
-    return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
+    return ImportedMachine(machine=machine_of(_json(data, where), where=where, version=dialect))
 
 
 def read_presses(
@@ -83,26 +72,6 @@ def read_presses(
             raise DocumentError(f"{place}.key: expected {expected}")
         presses.append(press)
     return tuple(presses)
-
-
-def read_tree_file(data: bytes, *, where: str) -> ImportedMachine:
-    """The machine of a construction tree, built from all module types.
-
-    Args:
-        data: JSON, UTF-8.
-        where: What messages call the file.
-
-    Raises:
-        DocumentError: It is none, or an entry can't be built; the message names it.
-    """
-    machine = Machine(catalogue=module_set("all"))
-    try:
-        for _ in tree_actions(read_tree(data.decode("utf-8-sig")), machine):
-            pass
-    except TreeError as error:
-        raise DocumentError(f"{where}: {error}") from error
-    driven = any(block.module.motor is not None for block in machine.blocks.values())
-    return ImportedMachine(machine=machine, not_understood=(_KEYS_NEEDED,) if driven else ())
 
 
 def _json(data: bytes, where: str) -> object:

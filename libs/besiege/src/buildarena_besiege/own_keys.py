@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from buildarena_besiege.errors import MachineNotPlayableError
-from buildarena_besiege.importing.blocks import keys_of
-from buildarena_besiege.importing.file_data import part_data
 from buildarena_besiege.names import key_entries
 from buildarena_geometry.feedback.words import caption
 from buildarena_geometry.keys import KEYS
@@ -14,24 +12,24 @@ from buildarena_geometry.keys import KEYS
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
+    from buildarena_besiege.importing.machine import ImportedMachine
     from buildarena_geometry import Machine
     from buildarena_geometry.blocks import Block
 
 
-def with_own_keys(machine: Machine) -> tuple[Machine, Mapping[str, str]]:
+def with_own_keys(imported: ImportedMachine) -> tuple[Machine, Mapping[str, str]]:
     """A copy whose actions have keys of ours in place of the file's own that ours lack.
 
     Args:
-        machine: As it was read from a machine file.
+        imported: As it was read from a file.
 
     Returns:
         The machine, and the key of ours for each of the file's own; keys of ours stay.
 
     Raises:
         MachineNotPlayableError: It has more keys than there are.
-        MachineFileError: Its file data is wrong.
     """
-    bound = list(_bound(machine))
+    bound = list(_bound(imported))
     used = [key for _, _, key in bound if key in KEYS]
     others = [key for key in dict.fromkeys(key for _, _, key in bound) if key not in KEYS]
     free = [key for key in KEYS if key not in used]
@@ -40,7 +38,7 @@ def with_own_keys(machine: Machine) -> tuple[Machine, Mapping[str, str]]:
             f"the machine has {len(others)} keys that machines here lack; {len(free)} are free"
         )
     ours = dict(zip(others, free, strict=False))
-    keyed = machine.copy()
+    keyed = imported.machine.copy()
     for block, action, key in bound:
         if key in ours:
             keyed.act(
@@ -49,22 +47,20 @@ def with_own_keys(machine: Machine) -> tuple[Machine, Mapping[str, str]]:
     return keyed, {**{key: key for key in dict.fromkeys(used)}, **ours}
 
 
-def lines_of_keys(machine: Machine) -> tuple[str, ...]:
+def lines_of_keys(imported: ImportedMachine) -> tuple[str, ...]:
     """What each of the file's own keys does, a line each: which blocks it pushes which way."""
     does: dict[str, list[str]] = {}
-    for block, action, key in _bound(machine):
+    for block, action, key in _bound(imported):
         does.setdefault(key, []).append(f"{block.id} {action}{_pushed(block, action)}")
     return tuple(f"{key}: {', '.join(actions)}" for key, actions in does.items())
 
 
-def _bound(machine: Machine) -> Iterator[tuple[Block, str, str]]:
+def _bound(imported: ImportedMachine) -> Iterator[tuple[Block, str, str]]:
     """Each block, action and key of the file."""
-    for block in machine.blocks.values():
-        own = part_data(block)
-        entries = {} if own is None else {entry.key: entry for entry in own.block.entries}
-        for action, name in key_entries(block.module).items():
-            entry = entries.get(name)
-            keys = block.bindings.get(action, ()) if entry is None else keys_of(entry)
+    for block in imported.machine.blocks.values():
+        own = imported.own_keys.get(block.id, {})
+        for action in key_entries(block.module):
+            keys = own.get(action) or block.bindings.get(action, ())
             for key in dict.fromkeys(keys):
                 yield block, action, key
 

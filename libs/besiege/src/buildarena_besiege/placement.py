@@ -8,7 +8,7 @@ a turned machine with the wrong sign; this one does not.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from buildarena_besiege.errors import MachineNotPlayableError
@@ -20,9 +20,6 @@ from buildarena_simulation.scenario import SpanPlacement
 if TYPE_CHECKING:
     from buildarena_geometry import Machine
     from buildarena_simulation import Scenario
-
-CLEARANCE: Final = 0.05
-"""Height above the floor at which a file puts a machine down, units: nothing touches it yet."""
 
 START_HEIGHT: Final = 5.0
 """Height of a machine's origin where "set ground" puts it on the floor afterwards, units."""
@@ -78,12 +75,6 @@ def global_pose(machine: Machine, scenario: Scenario) -> GlobalPose:
     if long <= placement.gap + _TIE and wide >= long - _TIE:
         return GlobalPose(position=(-north, height, east), rotation=QUARTER_TURN)
     return GlobalPose(position=(-east, height, -north))
-
-
-def put_down(pose: GlobalPose, machine: Machine) -> GlobalPose:
-    """The pose at which a machine's lowest point is just above the floor."""
-    east, _, north = pose.position
-    return replace(pose, position=(east, CLEARANCE - float(machine.bounds[0][2]), north))
 
 
 def cargo_root(machine: Machine, drop_height: float) -> Vector:

@@ -21,11 +21,6 @@ from buildarena_besiege.exporting.script import (
     reference_lua,
     script_text,
 )
-from buildarena_besiege.importing.rewriting import (
-    has_file_data,
-    restored_records,
-    restored_text,
-)
 from buildarena_besiege.keys import (
     UPDATES_PER_S,
     bindings_of,
@@ -36,8 +31,7 @@ from buildarena_besiege.keys import (
     key_edges,
 )
 from buildarena_besiege.names import CARGO_ID
-from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose, put_down
-from buildarena_besiege.timeline import control_timeline, timeline_bytes
+from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
 from buildarena_simulation.constants import GRAVITY, MAX_PARTS
 from buildarena_simulation.scenario import GroundPlacement, ReleasedPlacement, SpanPlacement
@@ -46,7 +40,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from buildarena_besiege.exporting.machine_file import BlockRecord
-    from buildarena_besiege.keys import Edge
     from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation import Scenario
 
@@ -67,13 +60,7 @@ class GameRun:
         duration_s: Length of the trial by the script's own time, seconds.
         set_ground: Whether "set ground" must be clicked before the start.
         level: The level to be opened (.blv); None for the flat sandbox.
-        key_changes: What the script does to keys: time in seconds, key, whether it goes down.
         scenario: What the machine is put through.
-        needs_script: Whether a score needs what only the script does or reports: the cargo's
-            growing mass, which cannons burn, or what a program asks for.
-        block_ids: The ids of the file's blocks in its order, by their guids; the cargo's is
-            "Ballast".
-        bindings: The keys of each block's actions in this trial, by block id.
     """
 
     name: str
@@ -84,20 +71,7 @@ class GameRun:
     duration_s: float
     set_ground: bool
     level: bytes | None
-    key_changes: tuple[tuple[float, str, bool], ...]
-    needs_script: bool
     scenario: Scenario
-    block_ids: Mapping[str, str]
-    bindings: Mapping[str, Mapping[str, tuple[str, ...]]]
-
-    def timeline(self, machine: Machine) -> bytes:
-        """What its keys do, as a timeline of channels for the machine it was made of.
-
-        Raises:
-            MachineNotPlayableError: A key moves an action that no channel is known of.
-        """
-        numbers = {block_id: number for number, block_id in enumerate(self.block_ids.values(), 1)}
-        return timeline_bytes(control_timeline(machine, self.key_changes, self.bindings, numbers))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,7 +83,6 @@ class PreparedMachine:
         records: Its blocks.
         script: Its script.
         tracked: Ids of the blocks the script reports, the cargo apart.
-        edges: When the script presses and lets go of keys.
         piloted: Whether the machine's program acts in their place.
     """
 
@@ -117,7 +90,6 @@ class PreparedMachine:
     records: tuple[BlockRecord, ...]
     script: str
     tracked: tuple[str, ...] = ()
-    edges: tuple[Edge, ...] = ()
     piloted: bool = False
 
 
@@ -128,7 +100,6 @@ def prepare_run(
     name: str,
     run_id: str,
     controls: Sequence[KeyPress] | None = None,
-    on_ground: bool = False,
     new_guid: Callable[[], uuid.UUID] = uuid.uuid4,
 ) -> GameRun:
     """Prepares a machine for a trial in the game.
@@ -139,8 +110,6 @@ def prepare_run(
         name: Stem of the machine file: lower case letters, digits, "-" and "_".
         run_id: Of this run; part of every line of the log.
         controls: The control sequence; the machine's own if left out.
-        on_ground: Whether the file itself puts a machine onto the ground that starts there, for a
-            game that has no button for it.
         new_guid: Draws the blocks' guids.
 
     Raises:
@@ -154,11 +123,7 @@ def prepare_run(
     prepared = prepared_machine(
         machine, scenario, run_id=run_id, controls=controls, new_guid=new_guid
     )
-    starts_on_ground = not isinstance(scenario.placement, SpanPlacement)
-    pose = prepared.pose
-    if on_ground and starts_on_ground:
-        pose = put_down(pose, machine)
-    text = machine_text(name, pose, prepared.records, prepared.script)
+    text = machine_text(name, prepared.pose, prepared.records, prepared.script)
     return GameRun(
         name=name,
         run_id=run_id,
@@ -166,19 +131,9 @@ def prepare_run(
         script=prepared.script,
         tracked=prepared.tracked,
         duration_s=scenario.duration_s,
-        set_ground=starts_on_ground,
+        set_ground=not isinstance(scenario.placement, SpanPlacement),
         level=level_file(scenario) if scenario.terrain else None,
-        key_changes=tuple(
-            (edge.update / UPDATES_PER_S, edge.key, edge.down) for edge in prepared.edges
-        ),
         scenario=scenario,
-        needs_script=scenario.cargo is not None
-        or scenario.control.mode == "held"
-        or prepared.piloted,
-        block_ids={record.guid: record.part for record in prepared.records},
-        bindings=channel_keys(machine)
-        if prepared.piloted
-        else bindings_of(machine, scenario.control),
     )
 
 
@@ -191,9 +146,6 @@ def plain_machine_file(
 ) -> bytes:
     """The machine file of a machine as it was built, for no trial; its keys play by themselves.
 
-    A machine that was read from a file goes back with everything that the file said of it, but for
-    a script that is not ours: it is there, under names by which no mod runs it.
-
     Args:
         machine: The machine.
         name: Stem of the file.
@@ -202,7 +154,6 @@ def plain_machine_file(
 
     Raises:
         MachineNotPlayableError: The game cannot take the machine.
-        MachineFileError: The machine's file data is not what a machine file says.
         ValueError: The name cannot be used.
     """
     _require_name(name)
@@ -214,13 +165,10 @@ def plain_machine_file(
     presses = tuple(machine.control_sequence if controls is None else controls)
     keys = bindings_of(machine, None)
     edges = key_edges(bound_presses(presses, machine))
-    records = restored_records(machine, block_records(machine, Guids(new_guid), keys=keys), keys)
-    header = header_lines(machine, records, presses, plain=True, of_file=has_file_data(machine))
+    records = block_records(machine, Guids(new_guid), keys=keys)
+    header = header_lines(machine, records, presses, plain=True)
     script = script_text(header, edges, cargo=None, cargo_reference="", telling=None)
-    text = restored_text(machine, name, records, script)
-    if text is None:
-        text = machine_text(name, AS_BUILT, records, script)
-    return text.encode("utf-8")
+    return machine_text(name, AS_BUILT, records, script).encode("utf-8")
 
 
 def prepared_machine(
@@ -279,7 +227,6 @@ def prepared_machine(
         records=tuple(records),
         script=script,
         tracked=tracked,
-        edges=tuple(edges),
         piloted=piloted,
     )
 

@@ -37,8 +37,6 @@ class Block:
         bindings: the keys bound to each of its actions.
         structure: the sub-structure it belongs to in an assembly; "" elsewhere.
         note: the builder's own words about it.
-        file_data: its element of the game's machine file it was read from, as XML; "" where it was
-            not read from one. It says nothing of the machine here, and goes back into such a file.
     """
 
     id: str
@@ -50,7 +48,6 @@ class Block:
     bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     structure: str = ""
     note: str = ""
-    file_data: str = ""
 
     @property
     def center(self) -> NDArray[np.float64]:
@@ -139,8 +136,6 @@ class Connector:
         bindings: the keys bound to each of its actions.
         structure: the sub-structure its start belongs to in an assembly; "" elsewhere.
         note: the builder's own words about it.
-        file_data: its element of the game's machine file it was read from, as XML; "" where it was
-            not read from one. It says nothing of the machine here, and goes back into such a file.
     """
 
     id: str
@@ -154,7 +149,6 @@ class Connector:
     bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     structure: str = ""
     note: str = ""
-    file_data: str = ""
 
     @property
     def start_point(self) -> NDArray[np.float64]:

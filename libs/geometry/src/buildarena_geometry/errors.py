@@ -17,7 +17,3 @@ class DocumentError(GeometryError):
 
 class SequenceError(GeometryError):
     """Input of the replay command is not a list of actions; the message names the entry."""
-
-
-class TreeError(DocumentError):
-    """A construction tree is no machine; the message names the entry and what is allowed."""

@@ -139,7 +139,6 @@ class Machine:
             and mine.next_id == theirs.next_id
             and mine.structures == theirs.structures
             and mine.structures_made == theirs.structures_made
-            and mine.file_data == theirs.file_data
         )
 
     __hash__ = None  # type: ignore[assignment]  # it changes

@@ -62,8 +62,6 @@ class MachineState:
         control_sequence: in the order of entry.
         controller: the program that acts in place of the control sequence; "" without one.
         next_id: the number the next block or connector gets.
-        file_data: what the game's machine file that it was read from has beside its blocks, as
-            XML; "" where it was not read from one.
     """
 
     catalogue: Catalogue
@@ -76,7 +74,6 @@ class MachineState:
     control_sequence: tuple[KeyPress, ...] = ()
     controller: str = ""
     next_id: int = 1
-    file_data: str = ""
 
     @property
     def started(self) -> bool:

@@ -35,7 +35,6 @@ from buildarena_store.errors import (
     UploadError,
 )
 from buildarena_store.events import Event, Events
-from buildarena_store.evidence import EvidenceFiles, StoredEvidence
 from buildarena_store.jobs.external_calls import ExternalCall, ExternalCalls
 from buildarena_store.jobs.job import Job, JobKey, NewJob
 from buildarena_store.jobs.jobs import Jobs
@@ -83,7 +82,6 @@ __all__ = [
     "EndedKeyError",
     "Event",
     "Events",
-    "EvidenceFiles",
     "ExternalCall",
     "ExternalCalls",
     "Job",
@@ -117,7 +115,6 @@ __all__ = [
     "StaleLeaseError",
     "Store",
     "StoreError",
-    "StoredEvidence",
     "StoredTask",
     "Sweep",
     "SweepForecast",

@@ -18,7 +18,6 @@ _ACCOUNTS = ("api_keys", "names")
 _SUBMITTED = (
     "budgets",
     "job_wants",
-    "evidence",
     "sweeps",
     "sweep_jobs",
     "tasks",

@@ -8,7 +8,6 @@ from buildarena_store.accounts.budgets import Budgets
 from buildarena_store.accounts.keys import ApiKeys
 from buildarena_store.database import Database
 from buildarena_store.events import Events
-from buildarena_store.evidence import EvidenceFiles
 from buildarena_store.jobs.external_calls import ExternalCalls
 from buildarena_store.jobs.jobs import Jobs
 from buildarena_store.jobs.journal import Journal
@@ -46,7 +45,6 @@ class Store:
     keys: ApiKeys
     budgets: Budgets
     tasks: Tasks
-    evidence: EvidenceFiles
     events: Events
     workers: Workers
     metrics: Metrics
@@ -78,7 +76,6 @@ def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
         keys=ApiKeys(database),
         budgets=Budgets(database),
         tasks=Tasks(database),
-        evidence=EvidenceFiles(database),
         events=Events(database),
         workers=Workers(database),
         metrics=Metrics(database),

@@ -42,7 +42,6 @@ from buildarena_api.routes import (
     callers,
     catalogue,
     events,
-    evidence,
     exports,
     health,
     jobs,
@@ -98,7 +97,7 @@ ORDINARY = (
     versions,
     workers,
 )
-LIMITED_THEMSELVES = (events, exports, evidence, metrics)
+LIMITED_THEMSELVES = (events, exports, metrics)
 """Routes whose requests don't count among a caller's ordinary ones: they take long, or no
 thread."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
@@ -220,7 +219,6 @@ def _add_middleware(app: FastAPI) -> None:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
         BodyLimitMiddleware,
-        unlimited={evidence.PATH},
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
         most=runner.max_request_bytes,

@@ -19,13 +19,10 @@ from buildarena_benchmark import ValidationIssue
 from buildarena_besiege import (
     ImportedMachine,
     MachineFileError,
-    file_data_lines,
     read_machine_file,
-    read_tree_file,
 )
 from buildarena_geometry import DocumentError, Machine
 from buildarena_geometry.json_texts import TooDeepError, read_json
-from buildarena_geometry.trees import looks_like_tree
 from buildarena_simulation.constants import MAX_PARTS
 
 MAX_BYTES: Final = 2 << 20
@@ -76,8 +73,7 @@ class UploadChecker:
         """The machine of a file, told apart by content.
 
         Args:
-            data: A machine document or a construction tree (JSON), or a machine file of the game
-                (.bsg).
+            data: A machine document (JSON), or a machine file of the game (.bsg).
 
         Raises:
             ProblemError: It is none of these, is not sound, or can't be read within the bounds.
@@ -121,11 +117,7 @@ class _RefusedError(Exception):
 def _content(data: bytes) -> ImportedMachine:
     if data.lstrip(_BLANKS).startswith(b"<"):
         return read_machine_file(data)
-    content = _json(data)
-    if looks_like_tree(content):
-        return read_tree_file(data, where="the tree")
-    machine = Machine.from_document(_document(content))
-    return ImportedMachine(machine=machine, file_data=file_data_lines(machine))
+    return ImportedMachine(machine=Machine.from_document(_document(_json(data))))
 
 
 def _not_storable(machine: Machine) -> str | None:
@@ -159,7 +151,7 @@ def _document(content: object) -> dict[str, Any]:
     if not isinstance(content, dict) or "blocks" not in content:
         raise _RefusedError(
             "neither a machine document, a JSON object with blocks, joints and connectors, nor a "
-            "construction tree, a JSON list of blocks"
+            "machine file of the game (.bsg)"
         )
     count = _parts(content)
     if count > MAX_PARTS:

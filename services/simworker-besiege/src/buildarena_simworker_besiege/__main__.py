@@ -6,7 +6,6 @@ import argparse
 import json
 import sys
 from dataclasses import asdict
-from pathlib import Path
 
 from buildarena_simworker_besiege.doctor import examine
 from buildarena_simworker_besiege.errors import DesktopError, NotSetUpError
@@ -18,7 +17,7 @@ from buildarena_simworker_besiege.settings import BesiegeSettings
 
 
 def main() -> None:
-    """Calibrates, examines or tries out this machine's game."""
+    """Calibrates or examines this machine's game."""
     parser = argparse.ArgumentParser(prog="buildarena besiege", description=main.__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
     calibrate = commands.add_parser("calibrate", help="find out where to click, and try it")
@@ -33,17 +32,11 @@ def main() -> None:
     )
     doctor = commands.add_parser("doctor", help="what this machine lacks to play the game")
     doctor.add_argument("--json", action="store_true", help="print the findings as JSON")
-    evening = commands.add_parser("first-evening", help="play every step, and pack the evidence")
-    evening.add_argument("--out", type=Path, default=Path("first-evening"))
-    evening.add_argument("--steps", default="", help="names of steps, with commas between them")
-    evening.add_argument("--repeats", type=int, default=3)
     options = parser.parse_args()
     settings = BesiegeSettings()
     try:
         if options.command == "doctor":
             sys.exit(_doctor(settings, as_json=options.json))
-        if options.command == "first-evening":
-            sys.exit(_first_evening(settings, options))
         sys.exit(
             _calibrate(
                 settings, ask=not options.defaults, only_try=options.only_try, path=options.path
@@ -62,22 +55,6 @@ def _doctor(settings: BesiegeSettings, *, as_json: bool) -> int:
             advice = f" - {finding.advice}" if finding.advice else ""
             _say(f"{'ok' if finding.ok else '!!'}  {finding.name}: {finding.detail}{advice}")
     return 0 if all(finding.ok for finding in findings) else 1
-
-
-def _first_evening(settings: BesiegeSettings, options: argparse.Namespace) -> int:
-    from buildarena_pipeline.evidence import EvidenceError
-    from buildarena_simworker_besiege.first_evening import first_evening
-
-    names = [name.strip() for name in options.steps.split(",") if name.strip()]
-    _say("Hands off mouse and keyboard.")
-    try:
-        evidence = first_evening(
-            settings, options.out, steps=names, repeats=options.repeats, tell=_say
-        )
-    except EvidenceError as error:
-        sys.exit(f"error: {error}")
-    _say(f"wrote {options.out / 'evidence.zip'}: send it with `buildarena besiege evidence add`")
-    return 0 if all(step.state != "failed" for step in evidence.steps) else 1
 
 
 def _calibrate(settings: BesiegeSettings, *, ask: bool, only_try: bool, path: bool) -> int:
@@ -109,24 +86,22 @@ def _point_at_log(settings: BesiegeSettings, calibration: Calibration) -> None:
     """The log is asked for while a machine prints: before, there is none to point at."""
     from buildarena_simworker_besiege.calibrate import ask_log, opened_terrain, printing_run
     from buildarena_simworker_besiege.screen.input import ScreenInput
-    from buildarena_simworker_besiege.screen.window import WindowDesktop
 
     desktop, _ = make_desktop(settings)
     try:
-        if isinstance(desktop, WindowDesktop):
-            desktop.print_lines(printing_run(opened_terrain(settings)))
-            _save(
-                ask_log(
-                    ScreenInput(settings.pace),
-                    _windows(settings),
-                    ask=input,
-                    tell=_say,
-                    before=calibration,
-                ),
-                settings,
-            )
-            desktop.stop()
-            desktop.clear()
+        desktop.print_lines(printing_run(opened_terrain(settings)))
+        _save(
+            ask_log(
+                ScreenInput(settings.pace),
+                _windows(settings),
+                ask=input,
+                tell=_say,
+                before=calibration,
+            ),
+            settings,
+        )
+        desktop.stop()
+        desktop.clear()
     finally:
         desktop.close()
 
@@ -139,10 +114,9 @@ def _try(settings: BesiegeSettings) -> int:
         played = try_out(desktop, settings.time_limits, _say, opened_terrain(settings))
         if played is None:
             return 1
-        if settings.desktop == "window":
-            before = load_calibration(settings.calibration_file)
-            present = installed(settings.folder)
-            _save(learnt(before, played, _windows(settings), present), settings)
+        before = load_calibration(settings.calibration_file)
+        present = installed(settings.folder)
+        _save(learnt(before, played, _windows(settings), present), settings)
     finally:
         desktop.close()
     return 0

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_besiege import GameLog, GameRun, prepare_run
+from buildarena_besiege import GameRun, prepare_run
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import TerrainBox
@@ -33,8 +33,6 @@ BEFORE: Final = {
     "name_box": "Open the list of machine files in the game.",
     "set_ground": "Close the list of machine files.",
     "confirm": "Click the button that deletes the machine, so that the game asks for confirmation.",
-    "open_save": "Answer no, so that the game asks no more.",
-    "save_machine": "Open the game's box for saving a machine, and close it afterwards.",
 }
 """What must be done in the game before some places can be seen."""
 TRIAL_S: Final = 2.0
@@ -201,7 +199,7 @@ def learnt(
         present: What is installed.
     """
     area = _window(windows)
-    world = played.log.world if isinstance(played.log, GameLog) else None
+    world = played.log.world
     return replace(
         before,
         window=(area.width, area.height),

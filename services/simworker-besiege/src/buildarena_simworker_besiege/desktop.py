@@ -1,38 +1,12 @@
-"""What the runner asks of a game, whether it has a window or not."""
+"""What the runner asks of a game."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
-from buildarena_besiege import GameRun
+from buildarena_besiege import GameLog, GameRun
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
-
-
-class RunLog(Protocol):
-    """What a game printed about one run; `buildarena_besiege.GameLog` is one."""
-
-    @property
-    def begun(self) -> bool:
-        """Whether the run's first line was seen."""
-
-    @property
-    def ended(self) -> bool:
-        """Whether its last line was seen."""
-
-    @property
-    def time_s(self) -> float:
-        """The game's own time in the newest line, seconds."""
-
-    @property
-    def complaints(self) -> tuple[str, ...]:
-        """Lines that speak of an error of the script."""
-
-    def read(self, text: str) -> None:
-        """Adds what the game showed."""
-
-    def text(self) -> str:
-        """Every line that counts, to be stored."""
 
 
 class Desktop(Protocol):
@@ -40,10 +14,6 @@ class Desktop(Protocol):
 
     Each call returns when its effect was seen, and raises `DesktopError` when it was not.
     """
-
-    @property
-    def puts_down(self) -> bool:
-        """Whether it can put a machine onto the ground; otherwise its file must."""
 
     def require_able(self, run: GameRun) -> None:
         """Checks that this way of driving the game can do what the run needs.
@@ -60,12 +30,12 @@ class Desktop(Protocol):
         """Loads the run's machine file and puts the machine where it starts."""
 
     def start(self, run: GameRun) -> None:
-        """Starts the simulation; the log window, if there is one, shows the run's lines."""
+        """Starts the simulation; the log window shows the run's lines."""
 
-    def new_log(self, run: GameRun) -> RunLog:
+    def new_log(self, run: GameRun) -> GameLog:
         """An empty log that collects the run's lines."""
 
-    def require_level(self, run: GameRun, log: RunLog) -> None:
+    def require_level(self, run: GameRun, log: GameLog) -> None:
         """Checks what the run reports of its level, as soon as it does.
 
         Raises:
@@ -73,7 +43,7 @@ class Desktop(Protocol):
             ScreenError: The game draws to another size than when it was calibrated.
         """
 
-    def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
+    def trajectory(self, log: GameLog, machine: Machine, scenario: Scenario) -> Trajectory:
         """The run's trajectory from its log.
 
         Raises:
@@ -103,7 +73,7 @@ class Desktop(Protocol):
         """
 
     def screenshot(self) -> bytes | None:
-        """A picture of the screen (PNG); None where there is no screen."""
+        """A picture of the screen (PNG); None where there is none."""
 
     def close(self) -> None:
         """Releases every key, and ends a game that this runner started."""

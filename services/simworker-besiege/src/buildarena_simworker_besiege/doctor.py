@@ -12,7 +12,6 @@ from buildarena_simworker_besiege.installed import APP, MOD_FOLDERS, Installed, 
 from buildarena_simworker_besiege.screen.calibration import load_calibration
 from buildarena_simworker_besiege.screen.window_types import Wanted
 from buildarena_simworker_besiege.settings import BesiegeSettings
-from buildarena_simworker_besiege.toolkit.command_line import require_toolkit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,22 +45,15 @@ def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
         if settings.version
         else "set BUILDARENA_BESIEGE_GAME and BUILDARENA_BESIEGE_MOD as the service has them",
     )
-    if settings.driver == "toolkit":
-        detail = "its command can be run, and leaves its runs where they are looked for"
-        yield _tried("toolkit", detail, lambda: require_toolkit(settings))
-        return
     yield _machines(settings)
     yield _command(settings)
-    if settings.desktop == "window":
-        present = installed(settings.folder)
-        yield _mod(settings, present)
-        yield _build(settings, present)
-        yield _tried("display", "screen found", _display)
-        yield _tried("calibration", str(settings.calibration_file), lambda: _calibration(settings))
-        yield _tried(
-            "unchanged", "the game that was calibrated", lambda: _unchanged(settings, present)
-        )
-        yield _tried("window", str(_wanted(settings)), lambda: _window(settings))
+    present = installed(settings.folder)
+    yield _mod(settings, present)
+    yield _build(settings, present)
+    yield _tried("display", "screen found", _display)
+    yield _tried("calibration", str(settings.calibration_file), lambda: _calibration(settings))
+    yield _tried("unchanged", "the game that was calibrated", lambda: _unchanged(settings, present))
+    yield _tried("window", str(_wanted(settings)), lambda: _window(settings))
 
 
 def _machines(settings: BesiegeSettings) -> Finding:
@@ -78,10 +70,9 @@ def _machines(settings: BesiegeSettings) -> Finding:
 
 def _command(settings: BesiegeSettings) -> Finding:
     if not settings.command:
-        needed = settings.desktop == "headless"
         return Finding(
             name="restart",
-            ok=not needed,
+            ok=True,
             detail="the runner cannot start the game by itself",
             advice="set BUILDARENA_BESIEGE_COMMAND, so that a frozen game is restarted",
         )

@@ -10,9 +10,9 @@ from typing import Final
 
 import structlog
 
-from buildarena_besiege import GameRun, LogIncompleteError
+from buildarena_besiege import GameLog, GameRun, LogIncompleteError
 from buildarena_simulation import ControllerFailed, Trajectory
-from buildarena_simworker_besiege.desktop import Desktop, RunLog
+from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import (
     DesktopError,
     GameGoneError,
@@ -45,7 +45,7 @@ class Played:
     """
 
     run: GameRun
-    log: RunLog
+    log: GameLog
     trajectory: Trajectory | None
     pace: float
     faults: tuple[str, ...]
@@ -71,7 +71,7 @@ class RunFailedError(Exception):
 def play(
     desktop: Desktop,
     make_run: Callable[[int], GameRun],
-    read: Callable[[GameRun, RunLog], Trajectory],
+    read: Callable[[GameRun, GameLog], Trajectory],
     *,
     require_held: Callable[[], None],
     limits: TimeLimits,
@@ -122,7 +122,7 @@ def play(
 
 
 def _outcome(
-    read: Callable[[GameRun, RunLog], Trajectory], run: GameRun, game_log: RunLog
+    read: Callable[[GameRun, GameLog], Trajectory], run: GameRun, game_log: GameLog
 ) -> tuple[Trajectory | None, str]:
     """The trajectory of a log, or how the machine's program failed in a run that ended well."""
     try:
@@ -133,7 +133,7 @@ def _outcome(
 
 def _attempt(
     desktop: Desktop, run: GameRun, require_held: Callable[[], None], limits: TimeLimits
-) -> tuple[RunLog, float]:
+) -> tuple[GameLog, float]:
     desktop.prepare(run)
     require_held()
     desktop.load(run)
@@ -153,7 +153,7 @@ def _attempt(
 def _follow(
     desktop: Desktop,
     run: GameRun,
-    game_log: RunLog,
+    game_log: GameLog,
     require_held: Callable[[], None],
     limits: TimeLimits,
 ) -> None:
@@ -186,7 +186,7 @@ def _follow(
         time.sleep(POLL_S)
 
 
-def _is_over(game_log: RunLog, run: GameRun) -> bool:
+def _is_over(game_log: GameLog, run: GameRun) -> bool:
     return game_log.ended or game_log.time_s >= run.duration_s
 
 

@@ -91,15 +91,11 @@ class GameProcess:
             return
         self._note(pid, str(known.get("level", "")), started=self.started)
 
-    def start(
-        self, level: bytes | None, *, piped: bool = False, words: list[str] | None = None
-    ) -> subprocess.Popen[str]:
+    def start(self, level: bytes | None) -> subprocess.Popen[str]:
         """Starts it, with a level where the command opens one.
 
         Args:
             level: The level file's bytes; None for the sandbox.
-            piped: Whether its standard output is to be read through the returned process.
-            words: The command, when it is not just the set one.
 
         Raises:
             GameGoneError: There is no command, or it cannot be run.
@@ -108,13 +104,13 @@ class GameProcess:
             raise GameGoneError(
                 "the game does not run: start it, or set BUILDARENA_BESIEGE_COMMAND"
             )
-        command = words or self._settings.words(self.level_file(level))
+        command = self._settings.words(self._level_file(level))
         with self.output.open("ab") as log:
             try:
                 process = subprocess.Popen(
                     command,
                     stdin=subprocess.DEVNULL,
-                    stdout=subprocess.PIPE if piped else log,
+                    stdout=log,
                     stderr=log,
                     text=True,
                     encoding="utf-8",
@@ -136,7 +132,7 @@ class GameProcess:
         family = [] if process is None else [process]
         with suppress(psutil.NoSuchProcess):
             family += [] if process is None else process.children(recursive=True)
-        if self.can_start and self._settings.desktop == "window":
+        if self.can_start:
             family += [other for other in self._others() if other not in family]
         for member in family:
             with suppress(psutil.Error):
@@ -150,12 +146,10 @@ class GameProcess:
             self._child = None
         if self._child is not None:
             self._child.wait()
-            if self._child.stdout is not None:
-                self._child.stdout.close()
             self._child = None
         self._file.unlink(missing_ok=True)
 
-    def level_file(self, level: bytes | None) -> Path | None:
+    def _level_file(self, level: bytes | None) -> Path | None:
         """The level as a file for the game; None for the sandbox."""
         if level is None:
             return None

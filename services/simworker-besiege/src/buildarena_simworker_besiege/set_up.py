@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import NotSetUpError
 from buildarena_simworker_besiege.installed import installed
 from buildarena_simworker_besiege.screen.calibration import load_calibration
 from buildarena_simworker_besiege.settings import BesiegeSettings
 
+if TYPE_CHECKING:
+    from buildarena_simworker_besiege.screen.window import WindowDesktop
 
-def make_desktop(settings: BesiegeSettings) -> tuple[Desktop, Mapping[str, Any]]:
+
+def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str, Any]]:
     """The game, and what a manifest should say of how it is driven.
 
     Raises:
@@ -24,10 +26,6 @@ def make_desktop(settings: BesiegeSettings) -> tuple[Desktop, Mapping[str, Any]]
             f"there is no folder of machine files {folder}: set BUILDARENA_BESIEGE_FOLDER to the "
             "game's folder, or BUILDARENA_BESIEGE_MACHINES to the folder itself"
         )
-    if settings.desktop == "headless":
-        from buildarena_simworker_besiege.headless import HeadlessDesktop
-
-        return HeadlessDesktop(settings), {"desktop": "headless"}
     from buildarena_simworker_besiege.screen.input import ScreenInput
     from buildarena_simworker_besiege.screen.window import WindowDesktop
     from buildarena_simworker_besiege.screen.window_types import Wanted
@@ -38,7 +36,6 @@ def make_desktop(settings: BesiegeSettings) -> tuple[Desktop, Mapping[str, Any]]
     windows = open_windows(Wanted(title=settings.title, executable=settings.executable))
     desktop = WindowDesktop(settings, calibration, screen_input, windows)
     facts = {
-        "desktop": "window",
         "calibration": calibration.digest,
         "screen": "x".join(map(str, screen_input.screen_size())),
         "log": "window" if settings.log_file is None else "file",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -41,24 +41,6 @@ class BesiegeSettings(BaseSettings):
             "cannot open levels; default: the flat sandbox"
         ),
     ] = ""
-    desktop: Annotated[
-        Literal["window", "headless"],
-        Field(description="window: by mouse and keyboard; headless: over TCP"),
-    ] = "window"
-    driver: Annotated[
-        Literal["desktop", "toolkit"],
-        Field(
-            description="desktop: the game itself, by its window or over TCP; toolkit: the command "
-            "line of BuildArena 2.0's toolkit, which COMMAND names"
-        ),
-    ] = "desktop"
-    runs: Annotated[
-        Path | None,
-        Field(
-            description="Folder in which the toolkit makes one for each run, where COMMAND does "
-            "not name {folder}"
-        ),
-    ] = None
     title: Annotated[str, Field(description="Title of the game's window, whatever its case")] = (
         "Besiege"
     )
@@ -76,7 +58,6 @@ class BesiegeSettings(BaseSettings):
         Path | None,
         Field(description="File to which the game writes its log; default: the log window"),
     ] = None
-    port: Annotated[int, Field(description="First TCP port of a headless game", ge=1)] = 6890
     state: Annotated[
         Path, Field(description="Folder of the runner's own files: calibration, pid, screenshots")
     ] = Path.home() / ".buildarena" / "besiege"

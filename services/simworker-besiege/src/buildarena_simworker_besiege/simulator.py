@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 from buildarena_besiege import GameRun, MachineNotPlayableError, prepare_run
-from buildarena_pipeline.errors import StartupError
+from buildarena_pipeline.errors import PermanentError, StartupError
+from buildarena_pipeline.runtime.annotations import annotate
 from buildarena_pipeline.runtime.settings import Settings
 from buildarena_pipeline.runtime.simulators.installed import InstalledSimulator
 from buildarena_pipeline.runtime.simulators.simulator import (
@@ -22,12 +23,10 @@ from buildarena_pipeline.runtime.trials import refused
 from buildarena_simulation import MachineNotSimulable
 from buildarena_simworker_besiege.desktop import Desktop
 from buildarena_simworker_besiege.errors import NeedsPersonError, NotSetUpError
-from buildarena_simworker_besiege.game_simulator import GameSimulator
 from buildarena_simworker_besiege.placing import require_placed
 from buildarena_simworker_besiege.play import LAGGING, Played, RunFailedError, play
 from buildarena_simworker_besiege.set_up import make_desktop
 from buildarena_simworker_besiege.settings import BesiegeSettings
-from buildarena_simworker_besiege.toolkit.simulator import ToolkitSimulator
 
 PERSON_WAIT_S: Final = 60.0
 """How long a job waits that needs something which only a person can do, such as open a level."""
@@ -35,8 +34,8 @@ FAULT_WAIT_S: Final = 5.0
 """How long a job waits after a fault of the game."""
 
 
-class BesiegeSimulator(GameSimulator):
-    """Runs trials in the game by its desktop.
+class BesiegeSimulator:
+    """Runs trials in the game.
 
     Args:
         settings: Versions and folders.
@@ -44,13 +43,44 @@ class BesiegeSimulator(GameSimulator):
         facts: What else a manifest should hold: calibration, screen.
     """
 
+    name = BESIEGE
+    repeatable = False
+
     def __init__(
         self, settings: BesiegeSettings, desktop: Desktop, facts: Mapping[str, Any]
     ) -> None:
-        super().__init__(settings, facts)
+        self._settings = settings
         self._desktop = desktop
+        self._facts = facts
 
-    def _play(self, trial: TrialRequest) -> TrialResult:
+    @property
+    def versions(self) -> Mapping[str, Any]:
+        """What can change a trajectory."""
+        return {
+            "engine": BESIEGE,
+            "simulation": self._settings.version,
+            "game": self._settings.game,
+            "mod": self._settings.mod,
+            **self._facts,
+        }
+
+    def run(self, trial: TrialRequest) -> TrialResult:
+        """Plays the machine in the game; see `Simulator`."""
+        if trial.version != self._settings.version:
+            raise PermanentError(
+                f"the job was submitted for {BESIEGE}-{trial.version}, and this worker plays "
+                f"{BESIEGE}-{self._settings.version}: submit it again",
+                reason="game_version",
+            )
+        played = self._played(trial)
+        return TrialResult(
+            trajectory=played.trajectory,
+            versions={**self.versions, **_course(played), **refused(played.failure)},
+            files=_files(played, trial.number),
+            annotations=annotate(trial.task, trial.machine, trial.controls),
+        )
+
+    def _played(self, trial: TrialRequest) -> Played:
         name = _file_name(trial)
 
         def make_run(attempt: int) -> GameRun:
@@ -60,11 +90,10 @@ class BesiegeSimulator(GameSimulator):
                 name=name,
                 run_id=f"{trial.token}a{attempt}{uuid.uuid4().hex[:8]}",
                 controls=trial.controls,
-                on_ground=not self._desktop.puts_down,
             )
 
         try:
-            played = play(
+            return play(
                 self._desktop,
                 make_run,
                 lambda run, game_log: require_placed(
@@ -83,11 +112,6 @@ class BesiegeSimulator(GameSimulator):
             raise _fault(error, trial) from error
         except NotSetUpError as error:
             raise SimulatorFaultError(str(error), delay_s=FAULT_WAIT_S) from error
-        return TrialResult(
-            trajectory=played.trajectory,
-            versions={**self.versions, **_course(played), **refused(played.failure)},
-            files=_files(played, trial.number),
-        )
 
     def close(self) -> None:
         """Leaves no key held and no game that was started here."""
@@ -107,7 +131,7 @@ def describe(name: str) -> InstalledSimulator:
     )
 
 
-def besiege_simulator(settings: Settings) -> BesiegeSimulator | ToolkitSimulator:
+def besiege_simulator(settings: Settings) -> BesiegeSimulator:
     """The game of this machine.
 
     Raises:
@@ -120,8 +144,6 @@ def besiege_simulator(settings: Settings) -> BesiegeSimulator | ToolkitSimulator
             "Besiege and of its Lua Scripting Mod, as the service names them"
         )
     try:
-        if own.driver == "toolkit":
-            return ToolkitSimulator(own)
         desktop, facts = make_desktop(own)
     except NotSetUpError as error:
         raise StartupError(str(error)) from error

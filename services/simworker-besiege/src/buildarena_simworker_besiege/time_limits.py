@@ -13,7 +13,6 @@ class TimeLimits:
         start_s: Until a game that was started has its window, or its menu.
         effect_s: Until a click shows its effect.
         load_s: Until a machine is loaded.
-        answer_s: Until a headless game answers.
         begin_s: Until the first line of a run, after the start.
         stall_s: Without anything new while a machine runs.
     """
@@ -21,7 +20,6 @@ class TimeLimits:
     start_s: float = 240.0
     effect_s: float = 6.0
     load_s: float = 30.0
-    answer_s: float = 60.0
     begin_s: float = 15.0
     stall_s: float = 15.0
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from support.machines.building import BLOCK, built
-from support.machines.evidence import experts_machine
+from support.machines.experts import experts_machine
 
 from buildarena_benchmark import Score, Task, builtin_tasks, parse_custom_task, score
 from buildarena_besiege import game_start

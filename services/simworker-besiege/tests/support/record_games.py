@@ -26,15 +26,12 @@ from support.lua_game import LuaGame
 from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_besiege import GameLog, game_start
 from buildarena_besiege.exporting.probes import height_at
-from buildarena_besiege.logs.state_log import INTERVAL_S
 from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.run import PreparedMachine, marked, prepared_machine
 from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point, besiege_turn
 from buildarena_geometry.rotations import multiply
-from buildarena_pipeline.evidence.trials import OWN, trial_named
 from buildarena_simulation import Scenario, Trajectory, simulate
-from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 RUN = "golden"
 UPDATES_PER_SAMPLE = 4
@@ -150,18 +147,6 @@ def log_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
         yield line.text.removeprefix(f"{marked(RUN)},").rpartition(",")[0]
 
 
-def state_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
-    """What a game without a window says of the run every 0.2 s: all blocks in the file's order."""
-    step = round(INTERVAL_S * SAMPLE_RATE_HZ)
-    for sample in range(0, round(scenario.duration_s * SAMPLE_RATE_HZ) + 1, step):
-        words = []
-        for number in range(len(run.prepared.records)):
-            w, x, y, z = run.turn(number, sample)
-            figures = (*run.root(number, sample), x, y, z, w, 0.0)
-            words.append(f"Block{number}:" + ",".join(f"{value:.4f}" for value in figures) + "|")
-        yield "GameStat:" + "".join(words)
-
-
 def _matrix(quaternion: Any) -> np.ndarray:
     w, x, y, z = quaternion
     return np.array(
@@ -195,9 +180,6 @@ def played_runs() -> dict[str, tuple[Machine, Scenario]]:
         task, machine = piloted_trial(name)
         runs[f"program-{name}"] = (machine, task.scenario)
     bridge = tried_machine("support-1")
-    for name in OWN:
-        trial = trial_named(name)
-        runs[f"evening-{name}"] = (trial.machine, trial.scenario)
     return {**runs, "calibration": tried_machine(), "calibration-support-1": bridge}
 
 
@@ -219,10 +201,7 @@ def said_logs() -> Iterator[tuple[str, str]]:
         # No engine has a trajectory of a program that fails: it stands still.
         still = machine.with_controller(STILL) if name == "program-fails" else None
         run = recorded(machine, scenario, still)
-        said = list(log_lines(run, scenario))
-        if name == "transport-1-short":
-            said += state_lines(run, scenario)
-        yield name, "\n".join(said) + "\n"
+        yield name, "\n".join(log_lines(run, scenario)) + "\n"
 
 
 if __name__ == "__main__":

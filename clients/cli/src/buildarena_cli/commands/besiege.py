@@ -7,23 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from buildarena_cli.client import Client
-from buildarena_cli.commands import evidence
 from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
 from buildarena_cli.given_paths import to_read
 from buildarena_cli.lazy import new_group
 from buildarena_cli.machines import chosen_task, read_machine, shown_errors
-from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
-from buildarena_cli.terminal.output import (
-    columns,
-    emphasised,
-    number,
-    print_json,
-    print_table,
-    say,
-    warn,
-)
+from buildarena_cli.options import JsonOption
+from buildarena_cli.terminal.output import print_json, say, warn
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Task
@@ -31,7 +21,6 @@ if TYPE_CHECKING:
     from buildarena_simulation import Trajectory
 
 app = new_group("Play machines in the game Besiege.")
-app.add_typer(evidence.app, name="evidence")
 
 
 @app.command("level")
@@ -132,63 +121,6 @@ def calibrate(
 def doctor(*, as_json: JsonOption = False) -> None:
     """Show what this machine lacks to play the game; the exit code is 1 when anything does."""
     exec_module([*RUNNER, "doctor", *(["--json"] if as_json else [])])
-
-
-@app.command("first-evening")
-def first_evening(
-    *,
-    out: Annotated[
-        Path, typer.Option(help="Folder of the evening; steps that are done in it stay done.")
-    ] = Path("first-evening"),
-    steps: Annotated[
-        str, typer.Option(help="Only these steps, with commas between their names.")
-    ] = "",
-    repeats: Annotated[
-        int, typer.Option(help="How often each of the expert's machines is played.")
-    ] = 3,
-) -> None:
-    """Try this machine's game out step by step, and pack what it shows into one file.
-
-    A step that fails is noted, with its picture, and the next one goes on. After an interruption
-    the same command continues where it stopped; failed steps are tried again.
-    """
-    options = ["--out", str(out), "--steps", steps, "--repeats", str(repeats)]
-    exec_module([*RUNNER, "first-evening", *options])
-
-
-@app.command("agreement")
-def show_agreement(
-    track: Annotated[
-        str | None, typer.Option(help="A track of the game; the first there is if left out.")
-    ] = None,
-    *,
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-) -> None:
-    """Show how far our engines say the same as the game, task by task."""
-    client = Client(url)
-    if track is None:
-        known = client.get("/v1/leaderboard")["tracks"]
-        track = next((name for name in known if "/besiege-" in name), None)
-        if track is None:
-            raise CommandError("no job was scored in the game yet, so there is nothing to compare")
-    agreement = client.get("/v1/leaderboard/agreement", track=track)
-    if as_json:
-        print_json(agreement)
-        return
-    rows = [
-        (
-            row["task"],
-            f"{row['engine']} ({row['simulation_version']})",
-            str(row["trials"]),
-            f"{row['same_verdict']:.0%} ({row['low']:.0%} to {row['high']:.0%})",
-            number(row["kappa"], 2),
-            "" if row["near"] is None else f"{row['near']:.0%}",
-        )
-        for row in agreement["rows"]
-    ]
-    heads = ("task", "engine", "trials", "same verdict", "kappa", "indicator within a quarter")
-    print_table(columns(*heads), rows, title=emphasised(str(agreement["track"])))
 
 
 RUNNER = ("buildarena_simworker_besiege",)

@@ -8,7 +8,6 @@ from buildarena_client.endpoints.sending import Sender
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
-        AgreementTable,
         Board,
         BoardFilters,
         ChangePage,
@@ -86,10 +85,6 @@ class Boards(Sender):
             filters: Which entry: name ``task`` and ``model``.
         """
         return cast("list[ManifestEntry]", await self.get("/v1/leaderboard/manifest", **filters))
-
-    async def agreement(self, **filters: Unpack[BoardFilters]) -> AgreementTable:
-        """How far the engines say the same as the game, of the machines that it tried."""
-        return cast("AgreementTable", await self.get("/v1/leaderboard/agreement", **filters))
 
     async def export_leaderboard(
         self, kind: Literal["csv", "parquet", "latex"], **filters: Unpack[BoardFilters]

@@ -16,7 +16,7 @@ from buildarena_geometry.blocks import Block
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from buildarena_besiege.exporting.machine_file import FileRecord
+    from buildarena_besiege.exporting.machine_file import BlockRecord
     from buildarena_geometry import KeyPress, Machine
     from buildarena_geometry.blocks import Connector
     from buildarena_geometry.rotations import Quaternion, Vector
@@ -28,11 +28,10 @@ _DIGITS: Final = 5  # decimals of a coordinate that count
 
 def header_lines(
     machine: Machine,
-    records: Sequence[FileRecord],
+    records: Sequence[BlockRecord],
     presses: Sequence[KeyPress],
     *,
     plain: bool = False,
-    of_file: bool = False,
     piloted: bool = False,
 ) -> list[str]:
     """The comment lines of a machine's script.
@@ -42,7 +41,6 @@ def header_lines(
         records: Its blocks in the file.
         presses: The control sequence it is played with.
         plain: Whether it is for no trial.
-        of_file: Whether the machine was read from a file, whose data stands in this one.
         piloted: Whether its program acts, which has keys of its own in the file.
     """
     state = machine.state
@@ -66,7 +64,6 @@ def header_lines(
         "structures_made": state.structures_made,
         "next_id": state.next_id,
         **({"plain": True} if plain else {}),
-        **({"of_file": True} if of_file else {}),
         **({"controller": machine.controller} if machine.controller else {}),
         **({"piloted": True} if piloted else {}),
     }
@@ -99,7 +96,7 @@ def _shown(numbers: tuple[float, ...]) -> str:
     return " ".join(f"{round(number, _DIGITS) + 0.0:.{_DIGITS}f}" for number in numbers)
 
 
-def _part(part: Block | Connector, record: FileRecord) -> dict[str, Any]:
+def _part(part: Block | Connector, record: BlockRecord) -> dict[str, Any]:
     common: dict[str, Any] = {"id": part.id}
     if part.structure:
         common["structure"] = part.structure

@@ -6,7 +6,7 @@ import html
 import math
 import uuid
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.entries import (
@@ -30,47 +30,22 @@ if TYPE_CHECKING:
     from buildarena_geometry.rotations import Quaternion, Vector
 
 BSG_VERSION: Final = "1.4"
-INDENT: Final = "    "
+_INDENT: Final = "    "
 _NO_SCALE: Final = (1.0, 1.0, 1.0)
 _GUID_ATTEMPTS: Final = 100
 
 
-class FileRecord(Protocol):
-    """One block of a machine file, in Besiege's components."""
-
-    @property
-    def part(self) -> str:
-        """The id of the block or connector in our machine.
-
-        "Ballast" for the cargo, "" for a block that is no part of the machine.
-        """
-
-    @property
-    def guid(self) -> str:
-        """The game's own id of it."""
-
-    @property
-    def position(self) -> Vector:
-        """Where its root is, units."""
-
-    @property
-    def rotation(self) -> Quaternion:
-        """How it is turned, (w, x, y, z)."""
-
-    @property
-    def entries(self) -> tuple[Entry, ...]:
-        """Its data but for the script's two; empty where its own file says them."""
-
-    def lines(self, indent: str) -> Iterator[str]:
-        """Its element in a machine file."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockRecord:
-    """A block as a machine of ours says it; see `FileRecord`.
+    """One block of a machine file, in Besiege's components.
 
     Attributes:
+        part: the id of the block or connector in our machine; "Ballast" for the cargo.
         module: what it is.
+        guid: the game's own id of it.
+        position: where its root is, units.
+        rotation: how it is turned, (w, x, y, z).
+        entries: its data but for the script's two.
         scale: along its own axes.
     """
 
@@ -98,7 +73,7 @@ class BlockRecord:
 
     def lines(self, indent: str) -> Iterator[str]:
         """Its element in a machine file."""
-        inner, innermost = indent + INDENT, indent + INDENT * 2
+        inner, innermost = indent + _INDENT, indent + _INDENT * 2
         yield f'{indent}<Block id="{self.module.besiege_id}" guid="{self.guid}">'
         yield f"{inner}<Transform>"
         yield f"{innermost}<Position {_coordinates(self.position)} />"
@@ -107,7 +82,7 @@ class BlockRecord:
         yield f"{inner}</Transform>"
         yield f"{inner}<Data>"
         for entry in self.all_entries:
-            yield from entry_lines(entry, innermost)
+            yield from _entry_lines(entry, innermost)
         yield f"{inner}</Data>"
         yield f"{indent}</Block>"
 
@@ -181,7 +156,7 @@ def parts_in_file_order(machine: Machine) -> list[Block | Connector]:
     return sorted(machine.state.parts, key=lambda part: (part.id != first, _number(part)))
 
 
-def machine_text(name: str, pose: GlobalPose, records: Sequence[FileRecord], script: str) -> str:
+def machine_text(name: str, pose: GlobalPose, records: Sequence[BlockRecord], script: str) -> str:
     """A machine file's text.
 
     Args:
@@ -194,19 +169,19 @@ def machine_text(name: str, pose: GlobalPose, records: Sequence[FileRecord], scr
         '<?xml version="1.0" encoding="utf-8"?>',
         "<!--Besiege machine save file.-->",
         f'<Machine version="1" bsgVersion="{BSG_VERSION}" name="{_escaped(name)}">',
-        f"{INDENT}<!--The machine's position and rotation.-->",
-        f"{INDENT}<Global>",
-        f"{INDENT * 2}<Position {_coordinates(pose.position)} />",
-        f"{INDENT * 2}<Rotation {_turn(pose.rotation)} />",
-        f"{INDENT}</Global>",
-        f"{INDENT}<!--The machine's additional data or modded data.-->",
-        f"{INDENT}<Data>",
-        *(line for entry in global_entries(script) for line in entry_lines(entry, INDENT * 2)),
-        f"{INDENT}</Data>",
-        f"{INDENT}<!--The machine's blocks.-->",
-        f"{INDENT}<Blocks>",
-        *(line for record in records for line in record.lines(INDENT * 2)),
-        f"{INDENT}</Blocks>",
+        f"{_INDENT}<!--The machine's position and rotation.-->",
+        f"{_INDENT}<Global>",
+        f"{_INDENT * 2}<Position {_coordinates(pose.position)} />",
+        f"{_INDENT * 2}<Rotation {_turn(pose.rotation)} />",
+        f"{_INDENT}</Global>",
+        f"{_INDENT}<!--The machine's additional data or modded data.-->",
+        f"{_INDENT}<Data>",
+        *(line for entry in global_entries(script) for line in _entry_lines(entry, _INDENT * 2)),
+        f"{_INDENT}</Data>",
+        f"{_INDENT}<!--The machine's blocks.-->",
+        f"{_INDENT}<Blocks>",
+        *(line for record in records for line in record.lines(_INDENT * 2)),
+        f"{_INDENT}</Blocks>",
         "</Machine>",
         "",
     ]
@@ -215,17 +190,13 @@ def machine_text(name: str, pose: GlobalPose, records: Sequence[FileRecord], scr
 
 def global_entries(script: str) -> tuple[Entry, ...]:
     """The machine's own data: the script and where the mod keeps it, and the mods it needs."""
-    return (*script_entries(script), ("StringArray", "requiredMods", ()))
-
-
-def script_entries(script: str) -> tuple[Entry, ...]:
-    """The script and where the mod keeps it."""
     return (
         ("StringArray", "lua_files", "LuaRoot/main.lua"),
         ("StringArray", "lua_data", script),
         ("StringArray", "lua_modules_names", "default"),
         ("StringArray", "lua_modules_paths", "LuaRoot/main.lua"),
         ("Boolean", "lua", True),
+        ("StringArray", "requiredMods", ()),
     )
 
 
@@ -276,14 +247,14 @@ def _require_finite(records: Sequence[BlockRecord]) -> None:
             raise MachineNotPlayableError(f"Block {record.part} has no place in the game's world.")
 
 
-def entry_lines(entry: Entry, indent: str) -> Iterator[str]:
+def _entry_lines(entry: Entry, indent: str) -> Iterator[str]:
     """An entry's element."""
     kind, key, value = entry
     opening = f'{indent}<{kind} key="{_escaped(key)}">'
     if kind == "Vector3" and isinstance(value, tuple):
         yield opening
         for axis, number in zip("XYZ", value, strict=True):
-            yield f"{indent}{INDENT}<{axis}>{number!r}</{axis}>"
+            yield f"{indent}{_INDENT}<{axis}>{number!r}</{axis}>"
         yield f"{indent}</{kind}>"
     elif value == ():
         yield f'{indent}<{kind} key="{_escaped(key)}" />'

@@ -107,10 +107,10 @@ def part_of(block: FileBlock, catalogue: Catalogue, remarks: Remarks) -> Part | 
         return None
     for remark in _entry_remarks(block, module):
         remarks.add(f"{where}: {remark}")
-    return read_part(block, module)
+    return _read_part(block, module)
 
 
-def read_part(block: FileBlock, module: Module) -> Part:
+def _read_part(block: FileBlock, module: Module) -> Part:
     """A block of a file as one of our modules.
 
     Raises:
@@ -135,8 +135,14 @@ def read_part(block: FileBlock, module: Module) -> Part:
     )
 
 
-def differences(block: FileBlock, module: Module) -> Iterator[str]:
-    """What a file says of a block beyond what a part of ours says: entries with their values."""
+def differences(block: FileBlock, module: Module, *, piloted: bool) -> Iterator[str]:
+    """The known entries of a block whose values a part of ours does not have.
+
+    Args:
+        block: The block.
+        module: What it is.
+        piloted: Whether a program of ours acts by keys of its own, which are no difference.
+    """
     usual = {key: value for _, key, value in module.besiege_data}
     lists, silent = set(key_entries(module).values()), _known_entries(module)
     if _is_scaled(block):
@@ -145,10 +151,11 @@ def differences(block: FileBlock, module: Module) -> Iterator[str]:
         if entry.key in silent or (entry.key == "flipped" and module.spins):
             continue
         if entry.key in lists:
-            if any(key not in KEYS for key in keys_of(entry)):
+            if not piloted and any(key not in KEYS for key in keys_of(entry)):
                 yield entry.told
         elif entry.key not in usual:
-            yield entry.told
+            if entry.key in SETTINGS:
+                yield entry.told
         elif not _is(entry.text, usual[entry.key]):
             yield f"{entry.told} (simulated as {usual[entry.key]})"
 
@@ -199,6 +206,7 @@ def _entry_remarks(block: FileBlock, module: Module) -> Iterator[str]:
     usual = {key: value for _, key, value in module.besiege_data}
     lists, known = set(key_entries(module).values()), _known_entries(module)
     seen: set[str] = set()
+    yield from (f"{shown(tag)} is not understood" for tag in block.strays)
     for entry in block.entries:
         if entry.key in seen:
             yield f"{shown(entry.key)} stands there twice"

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from buildarena_besiege.errors import MachineFileError
-from buildarena_besiege.importing.additions import says_more, take_trials_key_out
 from buildarena_besiege.importing.blocks import (
     CARGO_LEFT_OUT,
     Part,
     Remarks,
+    differences,
+    keys_of,
     part_of,
-)
-from buildarena_besiege.importing.file_data import (
-    STORED_SCRIPT,
-    file_data_lines,
-    is_scripts,
-    with_file_data,
 )
 from buildarena_besiege.importing.own_header import (
     HeaderError,
@@ -30,7 +25,7 @@ from buildarena_besiege.importing.own_header import (
 )
 from buildarena_besiege.importing.seats import Faces, Seat, ends_of, faces_of, mounts_of
 from buildarena_besiege.importing.xml_file import FileMachine, parse_file, shown
-from buildarena_besiege.names import CARGO, MACHINE_SETTINGS
+from buildarena_besiege.names import CARGO, MACHINE_SETTINGS, key_entries
 from buildarena_geometry import Machine, module_set
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
@@ -40,7 +35,7 @@ from buildarena_geometry.rotations import subtract
 from buildarena_geometry.state import sub_structure_letter
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from buildarena_geometry.documents.log import LoggedState
     from buildarena_geometry.modules.module import Catalogue
@@ -57,13 +52,14 @@ class ImportedMachine:
         machine: The machine.
         name: What the file calls it.
         not_understood: What of the file is left out or not known, a sentence each.
-        file_data: What the file says beyond the machine and is stored with it, a sentence each.
+        own_keys: The file's own lists of keys, by block and action, where they have keys that
+            machines here lack.
     """
 
     machine: Machine
     name: str = ""
     not_understood: tuple[str, ...] = ()
-    file_data: tuple[str, ...] = ()
+    own_keys: Mapping[str, Mapping[str, tuple[str, ...]]] = field(default_factory=dict)
 
 
 def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> ImportedMachine:
@@ -71,8 +67,7 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
 
     A file of ours comes back as the machine it was made from, as long as its blocks are where they
     were. Of any other file the connections are found by places: a block sits on the face its root
-    touches. What it says beyond that is stored with the machine as file data, and written again by
-    `plain_machine_file`; the cargo and unknown blocks are no parts of the machine, and named.
+    touches. What it says beyond that is named and left out, as are the cargo and unknown blocks.
 
     Args:
         data: The file.
@@ -88,18 +83,49 @@ def read_machine_file(data: bytes, *, catalogue: Catalogue | None = None) -> Imp
     catalogue = catalogue or smallest_set({part.module.name for part in parts})
     if not any(part.module.kind == "start" for part in parts):
         raise MachineFileError("the file has no starting block (type 0)")
-    machine = None
+    logged = None
+    piloted = False
     if header is not None:
-        machine = _as_described(header, file, parts, catalogue, remarks)
-    if machine is None:
-        machine = _as_placed(parts, file, catalogue, header, remarks)
-    restored = Machine.restored(machine)
+        logged = _as_described(header, file, parts, catalogue, remarks)
+    if header is not None and logged is not None:
+        ids = {part.number: header["parts"][part.guid]["id"] for part in parts}
+        piloted = header.get("piloted") is True
+    else:
+        seated = _Placed(parts, remarks)
+        logged, ids = _placed_machine(seated.document(), catalogue, header, remarks), seated.ids
+    _note_differences(file, parts, remarks, piloted=piloted)
     return ImportedMachine(
-        machine=restored,
+        machine=Machine.restored(logged),
         name=file.name,
         not_understood=remarks.all(),
-        file_data=file_data_lines(restored),
+        own_keys={} if piloted else _own_keys(file, parts, ids),
     )
+
+
+def _note_differences(
+    file: FileMachine, parts: Sequence[Part], remarks: Remarks, *, piloted: bool
+) -> None:
+    """Notes what the file says otherwise than the machine."""
+    settings = [entry for entry in file.entries if entry.key in MACHINE_SETTINGS and entry.value]
+    if settings:
+        remarks.add(f"the machine: {'; '.join(entry.told for entry in settings)}")
+    for part in parts:
+        sentences = list(differences(file.blocks[part.number - 1], part.module, piloted=piloted))
+        if sentences:
+            remarks.add(f"{part.name}: {'; '.join(sentences)}")
+
+
+def _own_keys(
+    file: FileMachine, parts: Sequence[Part], ids: Mapping[int, str]
+) -> dict[str, dict[str, tuple[str, ...]]]:
+    own: dict[str, dict[str, tuple[str, ...]]] = {}
+    for part in parts:
+        lists = {entry.key: keys_of(entry) for entry in file.blocks[part.number - 1].entries}
+        for action, name in key_entries(part.module).items():
+            keys = lists.get(name, ())
+            if any(key not in KEYS for key in keys):
+                own.setdefault(ids[part.number], {})[action] = keys
+    return own
 
 
 def _without_cargo(
@@ -129,12 +155,10 @@ def _without_cargo(
 def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
     if file.version not in _VERSIONS:
         remarks.add(f"bsgVersion {shown(file.version)} is read as {_VERSIONS[-1]}")
-    for sentence in file.renamed:
-        remarks.add(sentence)
     for tag in file.strays:
         remarks.add(f"the machine's {shown(tag)} is not understood")
     for entry in file.entries:
-        if entry.key not in MACHINE_SETTINGS and not _is_stored_script(entry.key):
+        if entry.key not in MACHINE_SETTINGS and not _is_scripts(entry.key):
             remarks.add(f"the machine's data {shown(entry.key or entry.text)} is not understood")
     script = next(
         (text_entry.text for text_entry in file.entries if text_entry.key == "lua_data"), ""
@@ -149,8 +173,9 @@ def _header(file: FileMachine, remarks: Remarks) -> dict[str, Any] | None:
     return header
 
 
-def _is_stored_script(key: str) -> bool:
-    return is_scripts(key.removeprefix(STORED_SCRIPT))
+def _is_scripts(key: str) -> bool:
+    """Whether an entry of a machine's data belongs to its Lua script."""
+    return key.strip().lower().startswith("lua")
 
 
 def _as_described(
@@ -167,31 +192,10 @@ def _as_described(
         )
         return None
     try:
-        logged = described_machine(header, parts, catalogue)
+        return described_machine(header, parts, catalogue)
     except HeaderError as error:
         remarks.add(f"the script's own description is not believed: {error}")
         return None
-    ids = {part.number: header["parts"][part.guid]["id"] for part in parts}
-    machine = Machine.restored(logged)
-    if header.get("of_file") is not True and not says_more(file, header, machine, ids):
-        return logged
-    if header.get("plain") is not True:
-        take_trials_key_out(file, machine, ids)
-    return with_file_data(logged, file, ids, remarks, scripted_by_us=True)
-
-
-def _as_placed(
-    parts: Sequence[Part],
-    file: FileMachine,
-    catalogue: Catalogue,
-    header: dict[str, Any] | None,
-    remarks: Remarks,
-) -> LoggedState:
-    """The machine of a file that describes nothing but its blocks' places."""
-    placed = _Placed(parts, remarks)
-    logged = _placed_machine(placed.document(), catalogue, header, remarks)
-    ours = header is not None
-    return with_file_data(logged, file, placed.ids, remarks, scripted_by_us=ours)
 
 
 def _placed_machine(

@@ -9,10 +9,8 @@ from __future__ import annotations
 import io
 import math
 import re
-import uuid
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
-from xml.etree import ElementTree as ET
 
 import defusedxml.ElementTree as SafeTree
 from defusedxml import DefusedXmlException
@@ -23,7 +21,7 @@ from buildarena_geometry.rotations import NO_ROTATION, ORIGIN, SHORTEST_QUATERNI
 from buildarena_simulation.constants import MAX_PARTS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
     from xml.etree.ElementTree import Element
 
     from buildarena_geometry.rotations import Quaternion, Vector
@@ -38,8 +36,8 @@ MAX_ENTRIES: Final = 200
 """Most entries of one block, or of the machine itself."""
 
 _KNOWN: Final = frozenset({"Global", "Data", "Blocks"})
+_OF_BLOCKS: Final = frozenset({"Transform", "Data"})
 _LARGEST_BLOCK_TYPE: Final = 1_000_000
-_GUID: Final = re.compile(r"[0-9A-Za-z_{}()-]{1,64}", re.ASCII)
 _NUMBER: Final = re.compile(
     r"[+-]?(\d{1,400}(\.\d{0,400})?|\.\d{1,400})([eE][+-]?\d{1,4})?", re.ASCII
 )
@@ -89,7 +87,7 @@ class FileBlock:
         rotation: (w, x, y, z).
         scale: along its own axes.
         entries: its data.
-        element: all of it, without the blanks between its elements.
+        strays: tags beside those of every block.
     """
 
     number: int
@@ -99,7 +97,7 @@ class FileBlock:
     rotation: Quaternion
     scale: Vector
     entries: tuple[FileEntry, ...] = ()
-    element: Element = field(repr=False, compare=False)
+    strays: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,10 +109,8 @@ class FileMachine:
         version: of the format.
         rotation: (w, x, y, z) of the whole machine in the world, Besiege's components.
         entries: the machine's own data.
-        blocks: in the file's order, each with a guid of its own.
-        element: the rest: the file's root, its blocks taken out.
+        blocks: in the file's order.
         strays: tags beside those of every machine file.
-        renamed: which blocks got another guid, and why.
     """
 
     name: str
@@ -122,9 +118,7 @@ class FileMachine:
     rotation: Quaternion
     entries: tuple[FileEntry, ...]
     blocks: tuple[FileBlock, ...]
-    element: Element = field(repr=False, compare=False)
     strays: tuple[str, ...] = ()
-    renamed: tuple[str, ...] = ()
 
 
 def parse_file(data: bytes) -> FileMachine:
@@ -133,41 +127,23 @@ def parse_file(data: bytes) -> FileMachine:
     Raises:
         MachineFileError: It is no machine file, or breaks a bound.
     """
-    root = parsed(data)
+    root = _parsed(data)
     if root.tag != "Machine":
         raise MachineFileError(f"the file's root is {shown(root.tag)}, not Machine")
-    without_blanks(root)
-    rooms = root.findall("Blocks")
-    blocks = [block for room in rooms for block in room]
+    blocks = [block for room in root.findall("Blocks") for block in room]
     if not blocks:
         raise MachineFileError("the file has no blocks")
     if len(blocks) > MAX_PARTS:
         raise MachineFileError(f"the file has {len(blocks)} blocks; at most {MAX_PARTS} are read")
-    renamed = tuple(with_own_guids(blocks))
     placed = root.find("Global")
-    machine = FileMachine(
+    return FileMachine(
         name=root.get("name", "")[:200],
         version=root.get("bsgVersion", ""),
         rotation=NO_ROTATION if placed is None else _rotation(placed, "Global"),
-        entries=read_entries(root, "the machine's Data"),
-        blocks=tuple(read_block(block, number) for number, block in enumerate(blocks, start=1)),
-        element=root,
+        entries=_read_entries(root, "the machine's Data"),
+        blocks=tuple(_read_block(block, number) for number, block in enumerate(blocks, start=1)),
         strays=tuple(_strays(root)),
-        renamed=renamed,
     )
-    for room in rooms:
-        for block in list(room):
-            room.remove(block)
-            block.tail = None
-    return machine
-
-
-def without_blanks(element: Element) -> None:
-    """Takes the blanks between a file's elements out; the text of its values stays as it is."""
-    for part in element.iter():
-        if len(part) and part.text is not None:
-            part.text = part.text.strip() or None
-        part.tail = (part.tail or "").strip() or None
 
 
 def number_of(text: str, where: str) -> float:
@@ -196,7 +172,7 @@ def shown(text: object) -> str:
     return literal if len(str(text)) <= 60 else f"{literal[:-1]}…'"  # noqa: PLR2004
 
 
-def parsed(data: bytes) -> Element:
+def _parsed(data: bytes) -> Element:
     """The root of an XML text of a stranger's.
 
     Raises:
@@ -228,29 +204,11 @@ def parsed(data: bytes) -> Element:
     return root
 
 
-def with_own_guids(blocks: Sequence[Element]) -> Iterator[str]:
-    """Gives blocks whose guid is another's, or none that a file can repeat, one of their own.
-
-    The new ones depend on nothing but the file: it is read alike each time.
-    """
-    used: set[str] = set()
-    for number, block in enumerate(blocks, start=1):
-        guid, own, draws = block.get("guid", ""), block.get("guid", ""), 0
-        while not _GUID.fullmatch(own) or own.lower() in used:
-            own = str(uuid.uuid5(uuid.NAMESPACE_OID, f"{number} {draws} {guid}"))
-            draws += 1
-        used.add(own.lower())
-        if own != guid:
-            block.set("guid", own)
-            if guid:
-                yield f"block {number}: the guid {shown(guid)} cannot be its own: it gets another"
-
-
-def read_block(element: Element, number: int) -> FileBlock:
+def _read_block(element: Element, number: int) -> FileBlock:
     """A block's values.
 
     Args:
-        element: The block, without blanks between its elements.
+        element: The block.
         number: Which of its file's blocks it is, from 1.
 
     Raises:
@@ -272,8 +230,8 @@ def read_block(element: Element, number: int) -> FileBlock:
         position=_vector(place, "Position", where, ORIGIN),
         rotation=_rotation(place, where),
         scale=_vector(place, "Scale", where, (1.0, 1.0, 1.0)),
-        entries=read_entries(element, where),
-        element=element,
+        entries=_read_entries(element, where),
+        strays=tuple(str(part.tag) for part in element if part.tag not in _OF_BLOCKS),
     )
 
 
@@ -296,7 +254,7 @@ def _rotation(place: Element, where: str) -> Quaternion:
     return (w / length, x / length, y / length, z / length)
 
 
-def read_entries(holder: Element, where: str) -> tuple[FileEntry, ...]:
+def _read_entries(holder: Element, where: str) -> tuple[FileEntry, ...]:
     """The entries of a block's or a machine's data, and the texts between them.
 
     Raises:
@@ -317,17 +275,12 @@ def read_entries(holder: Element, where: str) -> tuple[FileEntry, ...]:
     return tuple(entries)
 
 
-def text_of(element: Element) -> str:
-    """An element as XML; reading it gives the same element."""
-    # A carriage return stays one only as a reference.
-    return ET.tostring(element, encoding="unicode").replace("\r", "&#13;")
-
-
 def _strays(root: Element) -> Iterator[str]:
     """What stands beside or between that which every machine file has."""
     yield from (str(part.tag) for part in root if part.tag not in _KNOWN)
     for part in (root, *root.iter("Blocks")):
-        yield from (text for text in (part.text, *(inner.tail for inner in part)) if text)
+        texts = ((text or "").strip() for text in (part.text, *(inner.tail for inner in part)))
+        yield from filter(None, texts)
 
 
 def _entry(element: Element) -> FileEntry:

@@ -1,1 +1,1 @@
-"""From what the game logs to trajectories: our scripts' lines, published CSV, a headless game's."""
+"""From what the game logs to trajectories: our scripts' lines, and published CSV."""

@@ -1,4 +1,4 @@
-"""From the stored log of a trial in the game to its trajectory, however the game was driven."""
+"""From the stored log of a trial in the game to its trajectory."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from buildarena_besiege.logs.game_log import GameLog
-from buildarena_besiege.logs.state_log import StateLog
-from buildarena_besiege.logs.telemetry import telemetry_trajectory
 from buildarena_besiege.logs.trajectories import trajectory_of
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
@@ -20,7 +18,7 @@ def logged_trajectory(
 
     Args:
         text: The log.
-        versions: The rollout's: game, mod, run, and how the game was driven.
+        versions: The rollout's: game, mod and run.
         machine: What was played.
         scenario: What it was put through.
 
@@ -28,12 +26,6 @@ def logged_trajectory(
         LogIncompleteError: It does not tell enough.
     """
     run, game, mod = (str(versions.get(name)) for name in ("run", "game", "mod"))
-    if versions.get("desktop") == "headless":
-        states = StateLog(run)
-        states.read(text)
-        return states.trajectory(machine, scenario, game=game, mod=mod)
-    if versions.get("driver") == "toolkit":
-        return telemetry_trajectory(text, machine, scenario, game=game, mod=mod)
     lines = GameLog(run)
     lines.read(text)
     return trajectory_of(lines, machine, scenario, game=game, mod=mod)

@@ -68,7 +68,6 @@ class Samples:
         destroyed: (T, N) bool, whether the game destroyed the block; None where not reported.
         cargo: (T, 3) Besiege's components, units; None without cargo.
         mass: (T,) the cargo's; None without cargo.
-        quaternions: (T, N, 4) world_from_block, if the log has them.
         of_roots: Whether positions are those of the blocks' roots; otherwise of their centres.
         piloting: What a program sensed and asked for; None where none acted.
     """
@@ -79,7 +78,6 @@ class Samples:
     destroyed: NDArray[np.bool_] | None = None
     cargo: NDArray[np.float64] | None = None
     mass: NDArray[np.float64] | None = None
-    quaternions: NDArray[np.float64] | None = None
     of_roots: bool = True
     piloting: Piloting | None = None
     settings: Mapping[str, Setting] = field(default_factory=dict)
@@ -236,13 +234,11 @@ def _poses(
     """(T, N, 3) centres, (T, N, 4) quaternions, and where the latter come from."""
     ids, places = samples.block_ids, _ours(samples.positions)
     placed = placed_quaternions(machine, ids, turn)
-    quaternions, source = samples.quaternions, "the log"
-    if quaternions is None:
-        rotations = None if pieces is None else _rotations(machine, ids, turn, places, pieces)
-        if rotations is None:
-            quaternions, source = np.repeat(placed[None], len(places), axis=0), "as placed"
-        else:
-            quaternions, source = turned(rotations, placed), "fitted to the blocks' places"
+    rotations = None if pieces is None else _rotations(machine, ids, turn, places, pieces)
+    if rotations is None:
+        quaternions, source = np.repeat(placed[None], len(places), axis=0), "as placed"
+    else:
+        quaternions, source = turned(rotations, placed), "fitted to the blocks' places"
     if not samples.of_roots:
         return places, quaternions, source
     return centers_of(machine, ids, places, quaternions), quaternions, source

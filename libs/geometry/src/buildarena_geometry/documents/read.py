@@ -13,7 +13,7 @@ from buildarena_geometry.documents.log import ActionRecord, LoggedState
 from buildarena_geometry.documents.write import DOCUMENT_VERSION
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.feedback.words import listing
-from buildarena_geometry.json_values import check_controller, is_storable
+from buildarena_geometry.json_values import check_controller
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
 from buildarena_geometry.modules.sets import module_set, modules_of_action, smallest_set
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from buildarena_geometry.modules.module import Catalogue, Module
 
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
-MAX_FILE_DATA = 4 << 20
-"""Most characters of the file data of a machine and its parts; 2,000 blocks have some 2 million."""
 
 
 class _Entry(Form, frozen=True, kw_only=True):
@@ -42,7 +40,6 @@ class _Entry(Form, frozen=True, kw_only=True):
     bindings: dict[str, tuple[str, ...]] | None = None
     structure: Text | None = None
     note: Text | None = None
-    file_data: str | None = None
 
     @property
     def pose(self) -> Pose:
@@ -82,7 +79,6 @@ class _Document(Form, frozen=True, kw_only=True):
     available: dict[str, Any]
     log: tuple[ActionRecord, ...]
     controller: str | None = None
-    file_data: str | None = None
 
 
 def read_machine(
@@ -131,7 +127,6 @@ def _state(
 ) -> MachineState:
     if document.version != DOCUMENT_VERSION:
         refuse("version", f"version {DOCUMENT_VERSION}", document.version)
-    _check_file_data(document)
     _check_controller(document)
     blocks = _read_blocks(document.blocks, catalogue)
     structures = {structure.letter: structure for structure in document.structures}
@@ -155,20 +150,7 @@ def _state(
         control_sequence=document.control_sequence,
         controller=document.controller or "",
         next_id=document.next_id,
-        file_data=document.file_data or "",
     )
-
-
-def _check_file_data(document: _Document) -> None:
-    entries: tuple[_Entry, ...] = (*document.blocks, *document.connectors)
-    texts = [document.file_data, *(entry.file_data for entry in entries)]
-    characters = sum(len(text) for text in texts if text)
-    if characters > MAX_FILE_DATA:
-        raise MisfitError(
-            f".file_data: expected at most {MAX_FILE_DATA} characters in all, found {characters}"
-        )
-    if not all(is_storable(text) for text in texts if text):
-        raise MisfitError(".file_data: expected texts without NUL characters and lone surrogates")
 
 
 def _check_controller(document: _Document) -> None:
@@ -232,7 +214,6 @@ def _block(entry: _BlockEntry, module: Module, place: str) -> Block:
         bindings=_bindings(entry, module, place),
         structure=entry.structure or "",
         note=entry.note or "",
-        file_data=entry.file_data or "",
     )
 
 
@@ -271,7 +252,6 @@ def _read_connectors(
             bindings=_bindings(entry, module, place),
             structure=entry.structure or "",
             note=entry.note or "",
-            file_data=entry.file_data or "",
         )
     return connectors
 

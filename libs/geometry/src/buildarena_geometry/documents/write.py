@@ -2,8 +2,7 @@
 
 The parts decide what the machine is, and are checked like a machine's; the log is its history.
 Quaternions and positions are written in full, so a machine that is read back equals the one that
-was written, bit for bit. `file_data` is there only where a machine was read from the game's file,
-`controller` only where it has one.
+was written, bit for bit. `controller` is there only where it has one.
 """
 
 from __future__ import annotations
@@ -49,7 +48,6 @@ def machine_document(machine: LoggedState) -> dict[str, Any]:
             for record in machine.records
         ],
         **({"controller": state.controller} if state.controller else {}),
-        **_file_data(state.file_data),
     }
 
 
@@ -65,7 +63,6 @@ def _block_entry(block: Block) -> dict[str, Any]:
         "bindings": {action: list(keys) for action, keys in block.bindings.items()},
         "structure": block.structure,
         "note": block.note,
-        **_file_data(block.file_data),
     }
 
 
@@ -83,10 +80,4 @@ def _connector_entry(link: Connector) -> dict[str, Any]:
         **({"bindings": keys} if keys else {}),
         "structure": link.structure,
         "note": link.note,
-        **_file_data(link.file_data),
     }
-
-
-def _file_data(text: str) -> dict[str, str]:
-    # Documents of machines that were read from no file keep their bytes.
-    return {"file_data": text} if text else {}

@@ -3,7 +3,7 @@
 A pack of our layout is a folder of Markdown files: ``planner.md`` … are the roles' system
 messages, files under ``messages/`` are the frames of what the roles read, with ``$name``
 places. A pack of the published layout has ``prompt.yaml`` and maybe ``levels.yaml``; what it does
-not say is taken from the default pack, as are texts of the tree workflows that a pack lacks.
+not say is taken from the default pack.
 """
 
 from __future__ import annotations
@@ -29,9 +29,6 @@ ROLES = (
     "controller",
     "solo",
     "analyst",
-    "tree_designer",
-    "tree_inspector",
-    "tree_planner",
 )
 MESSAGES = (
     "plan",
@@ -61,14 +58,6 @@ MESSAGES = (
     "round_failed",
     "advice",
     "example",
-    "tree_design",
-    "tree_again",
-    "tree_inspect",
-    "tree_edit",
-    "tree_part",
-    "tree_join",
-    "tree_untried",
-    "tree_tried",
 )
 PUBLISHED_ROLES = {
     "planner": "planner",
@@ -77,8 +66,6 @@ PUBLISHED_ROLES = {
     "builder": "builder",
     "guidance": "guidance",
 }
-_OF_TREES = "tree_"
-"""How the names of texts begin that packs of before the tree workflows lack."""
 PUBLISHED_LEVELS = {"soft": 1, "medium": 2, "hard": 3}
 
 
@@ -163,8 +150,6 @@ def read_pack(folder: Path, *, name: str) -> PromptPack:
 
 def _text(folder: Path, file: str, name: str) -> str:
     path = folder / file
-    if path.name.startswith(_OF_TREES) and not path.exists():
-        path = builtin_folder() / "default" / file
     try:
         return path.read_text(encoding="utf-8").strip()
     except OSError as error:

@@ -24,7 +24,6 @@ class WorkflowSource:
         class_name: Name of the class there.
         digest: Hash of the file, part of the track; "" for installed modules.
         one_structure: Whether it builds one structure and never puts several together.
-        from_nothing: Whether it writes whole machines, and never builds on one that a task gives.
     """
 
     name: str
@@ -32,7 +31,6 @@ class WorkflowSource:
     class_name: str
     digest: str = ""
     one_structure: bool = False
-    from_nothing: bool = False
 
 
 BUILTIN: Final = (
@@ -50,27 +48,6 @@ BUILTIN: Final = (
         place="buildarena_worker.workflow.builder",
         class_name="Builder",
         one_structure=True,
-    ),
-    WorkflowSource(
-        name="tree-single",
-        place="buildarena_worker.workflow.tree_single",
-        class_name="TreeSingle",
-        one_structure=True,
-        from_nothing=True,
-    ),
-    WorkflowSource(
-        name="tree-iterative",
-        place="buildarena_worker.workflow.tree_iterative",
-        class_name="TreeIterative",
-        one_structure=True,
-        from_nothing=True,
-    ),
-    WorkflowSource(
-        name="tree-hierarchical",
-        place="buildarena_worker.workflow.tree_hierarchical",
-        class_name="TreeHierarchical",
-        one_structure=True,
-        from_nothing=True,
     ),
 )
 DEFAULT_WORKFLOW: Final = BUILTIN[0].name

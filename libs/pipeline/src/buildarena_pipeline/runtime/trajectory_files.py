@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from buildarena_pipeline.errors import PipelineError
-from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import PRESSES
@@ -30,8 +29,6 @@ MAX_FACTS_BYTES: Final = 4 << 20
 MAX_COLUMNS: Final = 32
 MAX_SENSED_BYTES: Final = 30_000
 """Of an instant of a program: a hundred sensors, all joints, gates and marks, and what it asks."""
-LATE_SAMPLES: Final = 5
-"""A headless game tells of every 0.2 s, and may begin one such interval late."""
 MAX_TEXT: Final = 120
 MAX_SETTINGS: Final = 64
 
@@ -52,9 +49,7 @@ def require(condition: object, message: str) -> None:
         raise OutcomeRefusedError(message)
 
 
-def require_bounded(
-    data: bytes, simulator: str, scenario: Scenario, blocks: int, *, piloted: bool
-) -> int:
+def require_bounded(data: bytes, scenario: Scenario, blocks: int, *, piloted: bool) -> int:
     """Looks at a file's own account of itself, before anything is unpacked.
 
     Returns:
@@ -68,8 +63,7 @@ def require_bounded(
     except (pa.ArrowException, OSError, ValueError) as error:
         raise OutcomeRefusedError(f"these bytes are not a trajectory: {error}"[:500]) from error
     rows, whole = int(metadata.num_rows), scenario.sample_count
-    late = LATE_SAMPLES if simulator == BESIEGE else 0
-    require(whole - late <= rows <= whole, f"it has {rows:,} instants, not {whole:,}")
+    require(rows == whole, f"it has {rows:,} instants, not {whole:,}")
     require(metadata.num_row_groups == 1, "a trajectory has one row group")
     require(metadata.num_columns <= MAX_COLUMNS, "a trajectory has fewer columns")
     facts = sum(len(key) + len(value) for key, value in (metadata.metadata or {}).items())

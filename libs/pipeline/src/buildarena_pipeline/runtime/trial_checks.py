@@ -86,7 +86,7 @@ def checked_trajectory(
     """
     world = scenario.world(seed)
     piloted = bool(machine.controller) and controls is None
-    count = require_bounded(data, simulator, world, len(machine.blocks), piloted=piloted)
+    count = require_bounded(data, world, len(machine.blocks), piloted=piloted)
     try:
         same("schema", schema_of(data), PILOTED_SCHEMA if piloted else SCHEMA_VERSION)
         trajectory = read_trajectory(data)

@@ -18,7 +18,6 @@ MAX_SENTENCE: Final = 400
 FaultReason = Literal[
     "simulator_fault",
     "game_version",
-    "needs_script",
     "unreadable_trial",
     "outcome_refused",
     "internal_error",

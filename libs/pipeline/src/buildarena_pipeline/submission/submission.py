@@ -268,14 +268,10 @@ class Submissions:
         issues = []
         for path, name in tasks.items():
             task = found[name]
-            if kind.one_structure and task.constraints.min_sub_structures > 1:
-                why = f"asks for several sub-structures, and the workflow {workflow!r} builds one"
-                able = [other for other, one in self._workflows.items() if not one.one_structure]
-            elif kind.from_nothing and task.beginning is not None:
-                why = f"gives a machine, and the workflow {workflow!r} writes whole ones"
-                able = [other for other, one in self._workflows.items() if not one.from_nothing]
-            else:
+            if not kind.one_structure or task.constraints.min_sub_structures <= 1:
                 continue
+            why = f"asks for several sub-structures, and the workflow {workflow!r} builds one"
+            able = [other for other, one in self._workflows.items() if not one.one_structure]
             issues.append(
                 ValidationIssue(path=path, message=f"{name} {why}", choices=tuple(sorted(able)))
             )

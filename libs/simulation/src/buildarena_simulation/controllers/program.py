@@ -94,15 +94,6 @@ class Program:
         source = layout_source(layout).encode("latin-1", "replace")
         self._guarded(lambda: self._driver["senses_are"](source))
 
-    def sense_nothing(self) -> None:
-        """Lets the program see no senses: it fails where it reads one, and `looked` is true."""
-        self._driver["sense_nothing"]()
-
-    @property
-    def looked(self) -> bool:
-        """Whether it tried to read a sense where there are none."""
-        return bool(self._driver["looked"]())
-
     def answer(self, tick: int, time_s: float, values: Sequence[float]) -> dict[str, float]:
         """What the program answers at a tick: names and numbers, as it gave them.
 

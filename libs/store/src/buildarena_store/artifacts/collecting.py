@@ -16,7 +16,6 @@ from sqlalchemy import Connection, select, text, union
 
 from buildarena_store.artifacts.storing import ArtifactStore, StoredArtifact
 from buildarena_store.database import Database
-from buildarena_store.evidence_tables import evidence
 from buildarena_store.tables import job_artifacts, rollouts
 
 LOCK: Final = 0x67617262  # "garb"
@@ -30,7 +29,6 @@ REFERENCES: Final = (
     job_artifacts.c.hash,
     rollouts.c.machine_hash,
     rollouts.c.trajectory_hash,
-    evidence.c.hash,
 )
 """The columns that refer to artifacts."""
 

@@ -2,12 +2,11 @@
 
 from buildarena_store.boards.cells import BoardCells, CellFeed
 from buildarena_store.boards.kept import Mark
-from buildarena_store.boards.reading import Annotated, BoardChange, Boards, Round
+from buildarena_store.boards.reading import BoardChange, Boards, Round
 from buildarena_store.boards.tallying import CellRecord
 from buildarena_store.boards.trials import CellId, TrialFilter
 
 __all__ = [
-    "Annotated",
     "BoardCells",
     "BoardChange",
     "Boards",

@@ -13,7 +13,6 @@ from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import SCORED, EndedJob
 from buildarena_store.boards.cells import BoardCells
 from buildarena_store.boards.trials import (
-    COUNTS,
     RANKED,
     TrialFilter,
     read_trials,
@@ -63,24 +62,6 @@ class Round:
     indicator: float
     parts: int | None
     flags: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Annotated:
-    """A trial in the game, and what one of our engines says of the same machine.
-
-    Attributes:
-        engine: The engine.
-        version: The engine's simulation version.
-        game: Success and indicator in the game.
-        ours: Success and indicator on the engine.
-    """
-
-    task: str
-    engine: str
-    version: str
-    game: tuple[bool, float]
-    ours: tuple[bool, float]
 
 
 class Boards:
@@ -167,33 +148,6 @@ class Boards:
         query = query.order_by(board_changes.c.id.desc()).limit(limit)
         with self._database.transaction() as connection:
             return [value_of(BoardChange, row) for row in connection.execute(query)]
-
-    def annotated(self, track: str) -> list[Annotated]:
-        """Every trial of a track that our engines annotated, whose scores count."""
-        said = func.jsonb_each(rollouts.c.annotations).table_valued("key", "value")
-        query = (
-            select(jobs.c.task, rollouts.c.success, rollouts.c.indicator, said.c.key, said.c.value)
-            .select_from(
-                jobs.join(rollouts, rollouts.c.job_id == jobs.c.id).join(said, text("true"))
-            )
-            .where(
-                jobs.c.track == track,
-                rollouts.c.finished_at.is_not(None),
-                COUNTS,
-            )
-            .order_by(jobs.c.task, said.c.key, jobs.c.id, rollouts.c.number)
-        )
-        with self._database.transaction() as connection:
-            return [
-                Annotated(
-                    task=row.task,
-                    engine=row.key,
-                    version=str(row.value["simulation"]),
-                    game=(bool(row.success), float(row.indicator or 0.0)),
-                    ours=(bool(row.value["success"]), float(row.value["indicator"])),
-                )
-                for row in connection.execute(query)
-            ]
 
     def manifest_values(
         self, track: str, task: str, task_version: str, model: str

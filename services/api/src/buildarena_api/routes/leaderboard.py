@@ -15,7 +15,6 @@ from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.http.weights import HEAVIEST, rows, weighs
-from buildarena_api.leaderboard.agreement import AgreementTable, agreement_rows
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown, weight_of_board
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
@@ -201,16 +200,6 @@ def _usual(every: Mapping[CellId, tuple[str, int]], field: str, name: str) -> li
         raise unknown(field, name, choices)
     usual = max(sorted(jobs), key=jobs.__getitem__)
     return [id_ for id_ in every if id_.configuration == usual]
-
-
-@router.get("/leaderboard/agreement", responses=problem_responses(404, 422, 503))
-@weighs(weight_of_board)
-def agreement_table(context: ContextDep, selection: SelectionDep) -> AgreementTable:
-    """How far our engines say the same as the game, task by task, of the machines it tried."""
-    if selection.track is None:
-        return AgreementTable(track=None, rows=[])
-    found = context.store.results.boards.annotated(selection.track)
-    return AgreementTable(track=selection.track, rows=agreement_rows(found))
 
 
 @router.get(

@@ -35,8 +35,7 @@ TRIAL_PATH: Final = "/v1/machines/trials"
 FILE: Final[dict[str, Any]] = {
     "requestBody": {
         "required": True,
-        "description": "A machine document or a construction tree (JSON), or a machine file of "
-        "the game (.bsg)",
+        "description": "A machine document (JSON), or a machine file of the game (.bsg)",
         "content": {
             "application/octet-stream": {
                 "schema": {"type": "string", "format": "binary", "maxLength": MAX_BYTES}
@@ -70,9 +69,6 @@ class MachineCheckView(BaseModel):
     faults: list[str] = Field(description="Why it cannot be put through a trial")
     broken_rule: str | None = Field(description="The rule of the task that it breaks, if any")
     remarks: list[str] = Field(description="What of the file is left out or not known")
-    file_data: list[str] = Field(
-        description="What the game's file says beyond the machine: stored with it, in no trial"
-    )
     detached: list[str] = Field(description="Blocks without a path to the starting block")
     parts: int = Field(description="Blocks and connectors")
     mass: float = Field(description="Mass units")
@@ -104,7 +100,6 @@ def check_machine(
         faults=[] if upload.fault is None else [upload.fault],
         broken_rule=None if task is None else _broken_rule(context, machine, task),
         remarks=list(content.not_understood),
-        file_data=list(content.file_data),
         detached=list(machine.detached),
         parts=machine.part_count,
         mass=machine.mass,

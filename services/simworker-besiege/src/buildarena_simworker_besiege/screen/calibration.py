@@ -28,14 +28,9 @@ POSITIONS: Final = MappingProxyType(
         "start": ((0.021, 0.016), "the button that starts and stops the simulation"),
         "delete": ((0.707, 0.038), "the button that deletes the machine"),
         "confirm": ((0.538, 0.586), "the button that confirms the deletion"),
-        "open_save": ((0.236, 0.035), "the button that opens the box for saving a machine"),
-        "save_machine": ((0.638, 0.209), "the button that saves the machine under its name"),
     }
 )
 """Default position and description of everything that is clicked, in the order of asking."""
-
-FOR_SAVING: Final = ("open_save", "save_machine")
-"""Clicked only where the game saves a machine; calibrations of earlier releases lack them."""
 
 PIXELS: Final = MappingProxyType(
     {
@@ -115,8 +110,6 @@ def load_calibration(file: Path) -> Calibration:
     if not isinstance(content, dict) or content.get("version") != CALIBRATION_VERSION:
         raise NotSetUpError(f"{file} is no calibration of this version: {advice}")
     places = content.get("positions")
-    if isinstance(places, dict):
-        places = {**{name: list(POSITIONS[name][0]) for name in FOR_SAVING}, **places}
     if not isinstance(places, dict) or set(places) != set(POSITIONS):
         wanted = ", ".join(POSITIONS)
         raise NotSetUpError(f"{file}: positions must name just {wanted}: {advice}")

@@ -28,15 +28,6 @@ def screenshot() -> bytes:
     return data.getvalue()
 
 
-def small_picture(area: Area, width: int) -> bytes:
-    """A part of the screen as PNG, in colours, no wider than so many pixels."""
-    image = _grabbed(area.box).convert("RGB")
-    image.thumbnail((width, width))
-    data = io.BytesIO()
-    image.save(data, "PNG", optimize=True)
-    return data.getvalue()
-
-
 def is_black(image: Image) -> bool:
     """Whether nothing is to be seen, as while the screen is locked or asleep."""
     return not any(image.convert("L").histogram()[_VISIBLE:])

@@ -1,9 +1,8 @@
-"""Loading and saving a machine by its name, in the game's list of machine files."""
+"""Loading a machine by its name, in the game's list of machine files."""
 
 from __future__ import annotations
 
 import unicodedata
-from pathlib import Path
 
 from buildarena_simworker_besiege.screen.actions import ScreenActions
 from buildarena_simworker_besiege.screen.input import SELECT
@@ -29,41 +28,6 @@ def load_by_name(actions: ScreenActions, name: str) -> None:
         timeout_s=actions.limits.load_s,
         attempts=1,
     )
-
-
-def save_by_name(actions: ScreenActions, name: str, file: Path) -> bytes:
-    """Has the game save the machine that is loaded; the list is closed afterwards.
-
-    Args:
-        actions: Mouse and keyboard.
-        name: What it is saved as.
-        file: Where the game then has it.
-
-    Returns:
-        The file, which the game wrote whole.
-
-    Raises:
-        StepFailedError: The box for saving does not open, or no whole file appears.
-    """
-    actions.opened("open the box for saving", "open_save", "name_box")
-    _type_name(actions, name)
-    actions.step(
-        f"save the machine {name}",
-        lambda: actions.click("save_machine"),
-        lambda: None if _is_whole(file) else "no whole file of this name appeared",
-        timeout_s=actions.limits.load_s,
-        attempts=1,
-    )
-    actions.input.press("escape")
-    actions.input.wait(0.3)
-    return file.read_bytes()
-
-
-def _is_whole(file: Path) -> bool:
-    try:
-        return file.read_bytes().rstrip().endswith(b"</Machine>")
-    except OSError:
-        return False
 
 
 def shown_text(text: str) -> str:

@@ -10,7 +10,6 @@ from buildarena_simworker_besiege.screen.capture import (
     difference,
     is_black,
     picture,
-    small_picture,
 )
 from buildarena_simworker_besiege.screen.window_types import Area, Windows
 
@@ -68,10 +67,6 @@ class View:
     def whole(self) -> Image:
         """All that the window shows."""
         return picture(self._window())
-
-    def small(self, width: int) -> bytes:
-        """All that the window shows as PNG, no wider than so many pixels."""
-        return small_picture(self._window(), width)
 
     def size_finding(self) -> str | None:
         """What is wrong with the window's size; None where it is as calibrated, and shows much."""

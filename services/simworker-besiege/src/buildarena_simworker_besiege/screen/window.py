@@ -13,7 +13,6 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import GameLog, GameRun, level_file, level_finding, trajectory_of
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
-from buildarena_simworker_besiege.desktop import RunLog
 from buildarena_simworker_besiege.errors import (
     DesktopError,
     GameGoneError,
@@ -31,7 +30,7 @@ from buildarena_simworker_besiege.screen.calibration import Calibration
 from buildarena_simworker_besiege.screen.capture import difference, screenshot
 from buildarena_simworker_besiege.screen.game_start import start_game
 from buildarena_simworker_besiege.screen.input import ScreenInput
-from buildarena_simworker_besiege.screen.machine_list import load_by_name, save_by_name
+from buildarena_simworker_besiege.screen.machine_list import load_by_name
 from buildarena_simworker_besiege.screen.steps import ATTEMPTS, wait_for
 from buildarena_simworker_besiege.screen.view import View
 from buildarena_simworker_besiege.screen.window_types import Windows
@@ -82,11 +81,6 @@ class WindowDesktop:
         self._panel_shown = False
         self._early_copies: list[str] = []
 
-    @property
-    def puts_down(self) -> bool:
-        """It has a button for that."""
-        return True
-
     def require_able(self, run: GameRun) -> None:
         """Checks that the calibrated game is played, with the run's level open or to be opened."""
         installed(self._settings.folder).require(self._calibration.installed)
@@ -129,22 +123,6 @@ class WindowDesktop:
             self._actions.click("set_ground")
             self._input.wait(0.5)
 
-    def save(self, name: str) -> bytes:
-        """Has the game save the machine that is loaded; the file is removed again.
-
-        Raises:
-            DesktopError: It does not.
-        """
-        folder = self._settings.machines_folder
-        if folder is None:
-            raise DesktopError("the folder of machine files is not set")
-        file = folder / f"{name}.bsg"
-        file.unlink(missing_ok=True)
-        try:
-            return save_by_name(self._actions, name, file)
-        finally:
-            file.unlink(missing_ok=True)
-
     def start(self, run: GameRun) -> None:
         """Starts, and shows the mod's log until the run's begin line is in it.
 
@@ -180,9 +158,9 @@ class WindowDesktop:
             log.read(text)
         return log
 
-    def require_level(self, run: GameRun, log: RunLog) -> None:
+    def require_level(self, run: GameRun, log: GameLog) -> None:
         """Checks what the run's script measured: the level, and the size the game draws to."""
-        world = log.world if isinstance(log, GameLog) else None
+        world = log.world
         if world is None:
             return
         wanted = self._calibration.screen
@@ -200,9 +178,8 @@ class WindowDesktop:
                 f"{finding}; open it in the game"
             )
 
-    def trajectory(self, log: RunLog, machine: Machine, scenario: Scenario) -> Trajectory:
+    def trajectory(self, log: GameLog, machine: Machine, scenario: Scenario) -> Trajectory:
         """The run's trajectory from its lines."""
-        assert isinstance(log, GameLog)  # noqa: S101 - it is of `new_log`
         game, mod = self._settings.game, self._settings.mod
         return trajectory_of(log, machine, scenario, game=game, mod=mod)
 
@@ -267,10 +244,6 @@ class WindowDesktop:
     def screenshot(self) -> bytes | None:
         """The whole screen."""
         return screenshot()
-
-    def window_picture(self, width: int) -> bytes:
-        """What the game's window alone shows (PNG), no wider than so many pixels."""
-        return self._view.small(width)
 
     def close(self) -> None:
         """Lets go of the keys, and ends the game if it was started here."""

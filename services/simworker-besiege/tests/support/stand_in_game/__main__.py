@@ -10,14 +10,14 @@ from stand_in_game.faults import FaultError, Faults, read_faults
 from stand_in_game.game import Game, Settings
 from stand_in_game.levels import Level
 from stand_in_game.report import Report
+from stand_in_game.window import Window
 
 _PR_SET_NAME = 15
 
 
 def main() -> int:
     """Starts the game with the options of the command line."""
-    # A game without a window is given options of its own, which it passes over.
-    options, _ = _parser().parse_known_args()
+    options = _parser().parse_args()
     faults = []
     try:
         if options.faults_once is not None and options.faults_once.exists():
@@ -35,13 +35,6 @@ def main() -> int:
         level=options.level or None,
     )
     game, report = Game(settings, Faults(faults)), Report(options.report)
-    # Each imported where it is used: a headless game runs where there is no toolkit.
-    if options.headless:
-        from stand_in_game.headless import Headless
-
-        return Headless(game, report, ip=options.ip, port=options.port).run()
-    from stand_in_game.window import Window
-
     _take_name()
     Window(game, options.machines, report, title=options.title_screen).run()
     return 0
@@ -63,9 +56,6 @@ def _parser() -> argparse.ArgumentParser:
     add("--faults-once", type=Path, metavar="FILE", help="faults of this start; then deleted")
     add("--report", type=Path, metavar="FILE", help="kept up to date with what the game does")
     add("--log-file", type=Path, metavar="FILE", help="write the log there as well")
-    add("--headless", action="store_true", help="no window: the protocol of BesiegeField")
-    add("--ip", default="127.0.0.1", help="headless: where it listens")
-    add("--port", type=int, default=6890, help="headless: where it listens")
     return parser
 
 

@@ -10,8 +10,6 @@ POINTS: Final = (
     "open_folder",
     "name_box",
     "open_machine",
-    "open_save",
-    "save_machine",
     "set_ground",
     "lua_panel",
     "start",

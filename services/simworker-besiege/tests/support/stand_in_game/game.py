@@ -9,7 +9,6 @@ from stand_in_game.faults import Fault, Faults
 from stand_in_game.golden import UPDATES_PER_S, GameFileError, Run, read_run
 from stand_in_game.levels import Level
 from stand_in_game.log_window import LogWindow
-from stand_in_game.saving import saved_file
 
 GRAVITY: Final = -32.81
 _LONGEST_FRAME_S: Final = 0.25
@@ -38,7 +37,7 @@ class Settings:
 
 
 class Game:
-    """The state of the game; the window and the headless server move it."""
+    """The state of the game; the window moves it."""
 
     def __init__(self, settings: Settings, faults: Faults) -> None:
         self.settings, self.faults = settings, faults
@@ -47,7 +46,6 @@ class Game:
         self.level = Level(settings.level)
         self.screen = settings.screen
         self.machine_name: str | None = None
-        self.file = b""
         self.run: Run | None = None
         self.grounded = self.simulating = False
         self.message = ""
@@ -62,15 +60,9 @@ class Game:
         except GameFileError as error:
             self.message = str(error)
             return False
-        self.file = path.read_bytes()
         self.machine_name, self.message, self.grounded = path.stem, "", False
         self.counts["loads"] += 1
         return True
-
-    def save(self, path: Path) -> None:
-        """Saves the machine that is loaded, as the game writes files."""
-        if self.file:
-            path.write_bytes(saved_file(self.file, path.stem))
 
     def set_ground(self) -> None:
         """Puts the machine on the floor."""

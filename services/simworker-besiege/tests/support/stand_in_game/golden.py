@@ -1,7 +1,6 @@
 """What is known of the runs that the stand-in can play: golden logs, found by the run's script.
 
-A golden log has each line once, without the run's mark in front and the check sum behind; lines of
-a game without a window stand below them.
+A golden log has each line once, without the run's mark in front and the check sum behind.
 """
 
 import re
@@ -35,14 +34,12 @@ class Run:
         mark: what every line of this run begins with.
         lines: by update, what is printed then.
         last: the run's last update; its end is told again and again from then on.
-        states: what a game without a window says every 0.2 s.
         probes: where the script measures the ground, east and north.
     """
 
     mark: str
     lines: dict[int, list[str]]
     last: int
-    states: tuple[str, ...]
     probes: tuple[tuple[float, float], ...] = ()
 
     def printed(self, update: int, world: str) -> list[str]:
@@ -85,22 +82,18 @@ def read_run(path: Path, games: Path) -> Run:
         for name in archive.namelist():
             first, *rest = archive.read(name).decode().splitlines()
             if first == f"b,{begin}":
-                states = tuple(line for line in rest if line.startswith("GameStat:"))
-                lines = [line for line in rest if not line.startswith("GameStat:")]
-                return _run(mark, [first, *lines], states, _probes(script))
+                return _run(mark, [first, *rest], _probes(script))
     raise GameFileError(f"no game was recorded of {path.stem}, whose log begins with {begin!r}")
 
 
-def _run(
-    mark: str, lines: list[str], states: tuple[str, ...], probes: tuple[tuple[float, float], ...]
-) -> Run:
+def _run(mark: str, lines: list[str], probes: tuple[tuple[float, float], ...]) -> Run:
     by_update: dict[int, list[str]] = {}
     for line in lines:
         kind, update, *_ = line.split(",")
         if kind == "w":  # of the level in which it was recorded
             continue
         by_update.setdefault(0 if kind == "b" else int(update), []).append(line)
-    return Run(mark=mark, lines=by_update, last=max(by_update), states=states, probes=probes)
+    return Run(mark=mark, lines=by_update, last=max(by_update), probes=probes)
 
 
 def _probes(script: str) -> tuple[tuple[float, float], ...]:

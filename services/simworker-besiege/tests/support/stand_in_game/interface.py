@@ -1,4 +1,4 @@
-"""What the window's panels and the keyboard do, apart from any toolkit."""
+"""What the window's panels and the keyboard do, apart from tkinter."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -71,8 +71,6 @@ class Interface:
     machines: Path
     screen: Screen
     load_panel: bool = False
-    saving: bool = False
-    """Whether the panel is open for saving."""
     loading: bool = False
     confirm: bool = False
     lua_panel: bool = False
@@ -172,23 +170,10 @@ class Interface:
             return
         self._strike("open_folder")
         if not self.dialog:
-            self.load_panel, self.saving = not self.load_panel, False
-
-    def _open_save(self) -> None:
-        if self.game.simulating or self.game.run is None:
-            return
-        self._strike("open_save")
-        if not self.dialog:
-            self.load_panel, self.saving = not self.load_panel, True
+            self.load_panel = not self.load_panel
 
     def _open_machine(self) -> None:
         if self.loading:
-            return
-        if self.saving:
-            self._strike("save_machine")
-            if not self.dialog:
-                self.game.save(self.machines / f"{self.name_box.text}.bsg")
-                self.load_panel, self.focus = False, None
             return
         seconds = self.game.settings.load_s / self.game.settings.speed
         for fault in self._strike("open_machine"):
@@ -306,7 +291,6 @@ _CLICKS: dict[str, Callable[[Interface], None]] = {
     "start": Interface.toggle_simulation,
     "open_folder": Interface._open_folder,
     "open_machine": Interface._open_machine,
-    "open_save": Interface._open_save,
     "set_ground": Interface._set_ground,
     "delete": Interface._delete,
     "confirm": Interface._confirmed,

@@ -27,7 +27,6 @@ def around(x: float, y: float, width: float, height: float) -> Box:
 TOOLBAR: Final = {
     "start": around(0.021, 0.016, 0.036, 0.030),
     "open_folder": around(0.202, 0.035, 0.034, 0.040),
-    "open_save": around(0.236, 0.035, 0.030, 0.040),
     "set_ground": around(0.403, 0.0185, 0.060, 0.032),
     "delete": around(0.707, 0.038, 0.034, 0.040),
 }

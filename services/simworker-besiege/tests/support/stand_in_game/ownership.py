@@ -1,4 +1,4 @@
-"""Says whose a window is, as games' toolkits do and tkinter does not."""
+"""Says whose a window is, as games do and tkinter does not."""
 
 from __future__ import annotations
 

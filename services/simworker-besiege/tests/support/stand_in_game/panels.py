@@ -29,7 +29,6 @@ MACHINE: Final = Box(0.400, 0.450, 0.700, 0.700)
 ON_GROUND: Final = Box(0.400, 0.600, 0.700, 0.850)
 _WORDS: Final = {
     "open_folder": "Load",
-    "open_save": "Save",
     "set_ground": "Set ground",
     "delete": "Clear",
     "open_machine": "Open",
@@ -85,7 +84,7 @@ class Panels:
         if simulating:
             self._text(0.06, 0.035, f"{shown.game.time_s:6.2f} s", color="#f2ead8")
             return
-        for name in ("open_folder", "open_save", "set_ground", "delete"):
+        for name in ("open_folder", "set_ground", "delete"):
             on = (name == "open_folder" and shown.load_panel) or (
                 name == "set_ground" and shown.game.grounded
             )
@@ -97,15 +96,14 @@ class Panels:
 
     def _load(self, shown: Interface) -> None:
         self._box(LOAD_PANEL, "#e6dcc6")
-        self._text(0.385, 0.155, "Save the machine" if shown.saving else "Load a machine")
+        self._text(0.385, 0.155, "Load a machine")
         focused = shown.focus == "name"
         self._box(LOAD_ITEMS["name_box"], "#fffdf6", edge="#d07a26" if focused else "#8a8172")
         if shown.name_box.selected:
             self._box(Box(0.386, 0.203, 0.566, 0.228), "#bcd3f0", edge="")
         caret = "|" if focused else ""
         self._text(0.390, 0.215, shown.name_box.text + caret)
-        word = "Save" if shown.saving else "Open"
-        self._button(LOAD_ITEMS["open_machine"], "…" if shown.loading else word)
+        self._button(LOAD_ITEMS["open_machine"], "…" if shown.loading else "Open")
         known = sorted(path.stem for path in shown.machines.glob("*.bsg"))[:7]
         for row, name in enumerate(known):
             self._text(0.390, 0.262 + 0.021 * row, name, font=self._small)

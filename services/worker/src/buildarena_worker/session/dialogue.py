@@ -47,7 +47,6 @@ class Role:
         system: Its system message.
         tools: Tools it may use.
         act: Carries out its tool calls.
-        carry_out: Carries out what it writes without a call; the actions are part of its turn.
         brief: What it reads first, in place of the dialogue's opening.
         forgets: Whether it reads no more than the opening and what came since it was last told
             something: it only carries out, and somebody else keeps the whole in mind.
@@ -57,7 +56,6 @@ class Role:
     system: str
     tools: Sequence[ToolDefinition] = ()
     act: Act | None = None
-    carry_out: Callable[[str], Sequence[ActionResult]] | None = None
     brief: str = ""
     forgets: bool = False
 
@@ -111,7 +109,7 @@ class Dialogue:
         return isinstance(last, _Utterance) and any(action.ok for action in last.actions)
 
     def turn(self, role: Role) -> Completion:
-        """Lets a role speak and carries out the tool it calls, or what it writes.
+        """Lets a role speak and carries out the tool it calls.
 
         Raises:
             ConstructionFailedError: The role raised an objection.
@@ -125,13 +123,12 @@ class Dialogue:
         )
         actions = _carry_out(role, reply)
         self._thread.append(_Utterance(role=role.name, reply=reply, actions=actions))
-        written = () if reply.calls or role.carry_out is None else role.carry_out(reply.text)
         self._session.record(
             phase=self._phase,
             sub_structure=self._sub_structure,
             role=role.name,
             completion=reply,
-            actions=[*actions, *written],
+            actions=actions,
         )
         for action in actions:
             if action.name == OBJECTION.name and action.ok:

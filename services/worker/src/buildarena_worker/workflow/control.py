@@ -95,27 +95,6 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
     return best_rollout(records, task)
 
 
-def try_out(session: Session, machine: Machine) -> str:
-    """How a machine does in one of the task's test trials, driven by its controller.
-
-    Returns:
-        The result in words; "" where the controller had no usable program.
-
-    Raises:
-        SessionEnded: A simulation must be done first.
-    """
-    dialogue, controller = _dialogue(session, machine)
-    try:
-        program = _program(dialogue, controller, machine, session, keeps=False)
-    except _ProgramError:
-        return ""
-    assert program is not None, "nothing is kept before a trial"  # noqa: S101 - ours
-    session.tested = True
-    session.tests_used += 1
-    record = session.host.simulate(program.machine, program.presses, final=False)
-    return session.told(record, session.host.trajectory(record))
-
-
 def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
     """The controller, and the dialogue in which it reads of a machine."""
     pack, task = session.pack, session.task

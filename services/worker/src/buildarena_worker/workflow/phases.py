@@ -46,22 +46,8 @@ def plan_phase(session: Session) -> Plan:
     Raises:
         ConstructionFailedError: No usable plan within the turns.
     """
-    limits = session.task.constraints
-    return plan_by(session, "planner", parts=(limits.min_sub_structures, limits.max_sub_structures))
-
-
-def plan_by(session: Session, system: str, *, parts: tuple[int, int]) -> Plan:
-    """Lets a planner write a plan, again while it can't be read or is not allowed.
-
-    Args:
-        session: The session.
-        system: The planner's system message, by its name in the prompt pack.
-        parts: The fewest and the most sub-structures that the plan may have.
-
-    Raises:
-        ConstructionFailedError: No usable plan within the turns.
-    """
     pack, task = session.pack, session.task
+    limits = task.constraints
     opening = pack.say(
         "plan",
         task=task.name,
@@ -69,13 +55,13 @@ def plan_by(session: Session, system: str, *, parts: tuple[int, int]) -> Plan:
         modules=modules_of(session),
     )
     dialogue = Dialogue(session, phase="plan", opening=opening)
-    planner = looking_up(session, Role(name="planner", system=pack.roles[system]))
+    planner = looking_up(session, Role(name="planner", system=pack.roles["planner"]))
     error = PlanError("nothing was said")
     for _ in range(PLAN_TURNS):
         text = speak(dialogue, planner).text
         try:
             plan = read_plan(text)
-            _check_plan(plan, *parts)
+            _check_plan(plan, limits.min_sub_structures, limits.max_sub_structures)
         except PlanError as unusable:
             error = unusable
             dialogue.remark(planner, pack.say("plan_again", error=str(error)))

@@ -1,6 +1,5 @@
 """`buildarena machine`: machines on this computer, without any server."""
 
-from buildarena_cli.commands.machine import timelines
 from buildarena_cli.commands.machine.files import check, export, import_file
 from buildarena_cli.commands.machine.trials import render, simulate
 from buildarena_cli.lazy import new_group
@@ -11,4 +10,3 @@ app.command("export")(export)
 app.command("import")(import_file)
 app.command("simulate")(simulate)
 app.command("render")(render)
-app.add_typer(timelines.app, name="control")

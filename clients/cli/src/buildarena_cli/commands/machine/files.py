@@ -147,10 +147,7 @@ def _game_file(machine: Machine, name: str, task: str | None, controls: Path | N
 def import_file(
     file: Annotated[
         Path,
-        typer.Argument(
-            help="A machine file of the game's (.bsg), or a construction tree (JSON).",
-            callback=to_read,
-        ),
+        typer.Argument(help="A machine file of the game's (.bsg).", callback=to_read),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Write the machine document (.json) to this file.")
@@ -158,11 +155,9 @@ def import_file(
     *,
     as_json: JsonOption = False,
 ) -> None:
-    """Read a machine file of the game's or a construction tree, and tell what it says beyond.
+    """Read a machine file of the game's, and tell what it says beyond.
 
-    A construction tree, BesiegeField's format, is built entry by entry, each of them checked.
-    Keys and settings that a machine here does not have are stored with it, change no trial, and
-    stand in the game's file again when the machine is exported without a task.
+    Keys and settings that a machine here does not have are named and left out.
     """
     with shown_errors():
         imported = read_imported(file)
@@ -173,15 +168,12 @@ def import_file(
         facts = {
             "name": imported.name,
             **_facts(imported.machine),
-            "file_data": list(imported.file_data),
             "not_understood": list(imported.not_understood),
         }
         if as_json:
             print_json(facts)
             return
         _print_size(facts)
-        for line in imported.file_data:
-            say(f"stored: {line}")
         for remark in imported.not_understood:
             say(remark)
         if not imported.not_understood:

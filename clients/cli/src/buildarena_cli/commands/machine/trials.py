@@ -19,6 +19,7 @@ from buildarena_cli.machines import (
     controlled,
     film,
     progress_bar,
+    read_imported,
     read_machine,
     shown_errors,
 )
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from buildarena_benchmark import Score, Task
+    from buildarena_besiege import ImportedMachine
     from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation import Piloting, Trajectory
 
@@ -113,11 +115,11 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
         single = [option for option, value in options.items() if value is not None]
         if seeds is not None and single:
             raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
-        chosen, machine = chosen_task(task), read_machine(file, dialect)
+        chosen, imported = chosen_task(task), read_imported(file, dialect)
+        machine, presses = _with_presses(imported, keys, file)
         if controller is not None:
             machine = controlled(machine, controller)
         _require_program(machine, trace)
-        machine, presses = _with_presses(machine, keys)
         broken = broken_constraint(chosen, machine)
         if broken is not None:
             warn(f"not simulated: {broken[0]}: {broken[1]}")
@@ -195,16 +197,19 @@ def _write_trace(time_s: NDArray[np.float64], piloting: Piloting, file: Path) ->
             rows.writerow([f"{value:.6g}" for value in (float(time_s[tick]), *values)])
 
 
-def _with_presses(machine: Machine, keys: Path | None) -> tuple[Machine, Sequence[KeyPress] | None]:
+def _with_presses(
+    imported: ImportedMachine, keys: Path | None, file: Path
+) -> tuple[Machine, Sequence[KeyPress] | None]:
     """The machine with its file's own keys, and what is pressed in place of its own sequence."""
-    from buildarena_besiege import file_data_lines, lines_of_keys, read_presses, with_own_keys
+    from buildarena_besiege import lines_of_keys, read_presses, with_own_keys
 
+    for remark in imported.not_understood:
+        warn(f"{file}: {remark}")
     if keys is None:
-        return machine, None
-    settings = [line for line in file_data_lines(machine) if "simulated as" in line]
-    for line in (*lines_of_keys(machine), *settings):
+        return imported.machine, None
+    for line in lines_of_keys(imported):
         warn(line)
-    machine, own = with_own_keys(machine)
+    machine, own = with_own_keys(imported)
     try:
         data = keys.read_bytes()
     except OSError as error:

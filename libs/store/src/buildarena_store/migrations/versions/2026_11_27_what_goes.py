@@ -8,7 +8,7 @@ branch_labels = None
 depends_on = None
 BREAKING = True
 
-TABLES = ("package_changes", "packages")
+TABLES = ("package_changes", "packages", "evidence")
 COLUMNS = (("jobs", "imported_from"),)
 
 

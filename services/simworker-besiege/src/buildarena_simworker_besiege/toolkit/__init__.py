@@ -1,1 +1,0 @@
-"""The game played by the command line of BuildArena 2.0's toolkit, in place of its window."""
