@@ -9,7 +9,6 @@ from typing import Final
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.requests import Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.admission import (
@@ -37,31 +36,11 @@ SECURITY_HEADERS = {
 log = structlog.get_logger(__name__)
 
 
-async def whole_body(request: Request, most: int, what: str) -> bytes:
-    """The body of a route that reads it in pieces, as long as it is of an acceptable size.
-
-    Args:
-        request: Whose path is one of `BodyLimitMiddleware`'s unlimited ones.
-        most: The most bytes that it may have.
-        what: What it is, for the message.
-
-    Raises:
-        ProblemError: 413, while it still comes.
-    """
-    data = bytearray()
-    async for chunk in request.stream():
-        data += chunk
-        if len(data) > most:
-            raise ProblemError(413, f"{what} has at most {most:,} bytes")
-    return bytes(data)
-
-
 class BodyLimitMiddleware:
     """Middleware around the application: only whole and bounded bodies reach it.
 
     Args:
         app: The application.
-        unlimited: Paths of routes that read their bodies in pieces, and bound them.
         documents: Paths of routes that read something else than JSON, and bound its depth.
         pieces: Whether a path is one of a route that takes pieces of files.
         max_bytes: Largest request body accepted.
@@ -74,7 +53,6 @@ class BodyLimitMiddleware:
         self,
         app: ASGIApp,
         *,
-        unlimited: Collection[str] = (),
         documents: Collection[str] = (),
         pieces: Callable[[str], bool] = lambda _: False,
         max_bytes: int = MAX_BYTES,
@@ -84,7 +62,6 @@ class BodyLimitMiddleware:
     ) -> None:
         self._app = app
         self._most, self._admit, self._buffers = most, admit, buffers
-        self._unlimited = frozenset(unlimited)
         self._documents = frozenset(documents)
         self._pieces = pieces
         self._max_bytes = max_bytes
@@ -101,10 +78,7 @@ class BodyLimitMiddleware:
             return
         try:
             await self._admit(scope)
-            if scope["path"] in self._unlimited:
-                await self._app(scope, paced, safe_send)
-            else:
-                await self._pass_whole(scope, headers, paced, safe_send)
+            await self._pass_whole(scope, headers, paced, safe_send)
         except ProblemError as error:
             await _drain(receive)
             closing = {**(error.headers or {}), "Connection": "close"}
