@@ -57,7 +57,7 @@ def hostile_paths(kind: str, session: str, seed: int) -> Iterator[str]:
                 "/v1/jobs?limit=1000",
                 f"/v1/jobs?limit=1000&model={model}",
                 "/v1/jobs?limit=1000&sort=indicator",
-                f"/v1/jobs?limit=1000&since={since}",
+                "/v1/jobs?limit=1000",
                 f"/v1/jobs?limit=999&task={name}",
             ),
             "text": (

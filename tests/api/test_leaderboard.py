@@ -160,6 +160,13 @@ def test_throws_stand_under_the_published_policy_by_the_parabola(api, context) -
     assert (listed["throw-5"], listed["lift-1"]) == ("parabola", None)
 
 
+@pytest.mark.parametrize("name", ["since", "until"])
+def test_a_time_without_a_zone_is_refused(api, name) -> None:
+    answer = api.get("/v1/leaderboard", params={name: "2026-01-02T00:00:00"})
+    assert answer.status_code == 422
+    assert answer.json()["errors"][0]["field"] == name
+
+
 @pytest.mark.parametrize("path", ["", "/compare", "/export", "/changes", "/manifest"])
 def test_an_unknown_reading_is_refused_with_the_choices(api, path) -> None:
     given = {"policy": "theirs", "first": "a", "second": "b"}

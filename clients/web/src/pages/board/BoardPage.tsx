@@ -122,7 +122,7 @@ function TaskByTask({ board, search }: { board: Board; search: BoardSearch }) {
               <Title order={3} size="h5" mb={4}>
                 {task.task}
               </Title>
-              <TaskTable task={shown(task, search)} search={search} />
+              <TaskTable task={shown(task, search)} />
               {search.paper === "yes" && <Peers task={task} />}
             </div>
           ))}

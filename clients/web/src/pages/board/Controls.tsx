@@ -1,4 +1,4 @@
-import { Chip, Group, MultiSelect, Select, Stack, Switch, Text, TextInput } from "@mantine/core";
+import { Chip, Group, MultiSelect, Select, Stack, Switch, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useNavigate } from "@tanstack/react-router";
 import { tasks, type Board } from "../../api/queries";
@@ -41,7 +41,6 @@ export function Controls({ board, search }: { board: Board; search: BoardSearch 
           set({ task: task.length > 0 ? task : undefined });
         }}
       />
-      {!isSite && <Days search={search} set={set} />}
       <Stack gap={3}>
         <Text size="sm" fw={500} id="reading">
           Flagged results
@@ -79,30 +78,5 @@ export function Controls({ board, search }: { board: Board; search: BoardSearch 
         />
       </Stack>
     </Group>
-  );
-}
-
-function Days({ search, set }: { search: BoardSearch; set: (change: Partial<BoardSearch>) => void }) {
-  return (
-    <>
-      <TextInput
-        type="date"
-        label="Ended from"
-        value={search.since ?? ""}
-        w={150}
-        onChange={(event) => {
-          set({ since: event.currentTarget.value || undefined });
-        }}
-      />
-      <TextInput
-        type="date"
-        label="Ended before"
-        value={search.until ?? ""}
-        w={150}
-        onChange={(event) => {
-          set({ until: event.currentTarget.value || undefined });
-        }}
-      />
-    </>
   );
 }

@@ -75,7 +75,7 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
           key: entry.key,
           label: entry.label,
           cells: board.tasks.map((task) => (
-            <Cell key={task.task} task={task} entry={entry} figure={figure} entries={entries} search={search} />
+            <Cell key={task.task} task={task} entry={entry} figure={figure} entries={entries} />
           )),
         }))}
       >
@@ -90,10 +90,9 @@ interface CellOf {
   entry: Entry;
   figure: Figure;
   entries: readonly Entry[];
-  search: BoardSearch;
 }
 
-function Cell({ task, entry, figure, entries, search }: CellOf) {
+function Cell({ task, entry, figure, entries }: CellOf) {
   const row = cellOf(task, entry);
   const value = valueOf(row, figure);
   if (row === undefined || value === null) {
@@ -107,7 +106,7 @@ function Cell({ task, entry, figure, entries, search }: CellOf) {
     <Link
       className="heat-cell"
       to="/jobs"
-      search={jobsBehind(row, search)}
+      search={jobsBehind(row)}
       style={shade(figure === "cost" ? 1 - share : share)}
       title={`${entry.label} on ${task.task}: ${successes(row.successes)} of ${row.trials} succeeded, ${interval}${row.flagged > 0 ? `; ${row.flagged} flagged` : ""}`}
     >
