@@ -26,13 +26,10 @@ const board = createRoute({
   path: "/",
   validateSearch: readSearch,
   // What changes the board itself: how it is shown asks for nothing.
-  loaderDeps: ({ search: { track, task, category, policy, since, until } }) => ({
+  loaderDeps: ({ search: { track, task, category } }) => ({
     track,
     task,
     category,
-    policy,
-    since,
-    until,
   }),
   // Asked for while the page's script is on its way; what fails is told by the page, which asks again.
   loader: ({ deps }) => {

@@ -1,4 +1,4 @@
-export type Figure = "success" | "indicator" | "cost";
+export type Figure = "success" | "indicator";
 
 /** What the address of the board says; everything else follows from it. */
 export interface BoardSearch {
@@ -6,15 +6,9 @@ export interface BoardSearch {
   task?: string[];
   /** Categories of tasks; without, models are ranked over the paper's nine. */
   category?: string[];
-  policy?: "ours" | "published";
-  since?: string;
-  until?: string;
   figure?: Figure;
   baselines?: "no";
-  paper?: "yes";
 }
-
-const DAY = /^\d{4}-\d{2}-\d{2}$/;
 
 function text(value: unknown): string | undefined {
   return typeof value === "string" && value !== "" ? value : undefined;
@@ -31,17 +25,11 @@ function oneOf<Choice extends string>(value: unknown, ...choices: Choice[]): Cho
 
 /** Reads an address as far as it makes sense; strangers' addresses are input too. */
 export function readSearch(raw: Record<string, unknown>): BoardSearch {
-  const since = text(raw.since);
-  const until = text(raw.until);
   return {
     track: text(raw.track),
     task: list(raw.task),
     category: list(raw.category),
-    policy: oneOf(raw.policy ?? raw.reading, "ours", "published"),
-    since: since !== undefined && DAY.test(since) ? since : undefined,
-    until: until !== undefined && DAY.test(until) ? until : undefined,
-    figure: oneOf(raw.figure, "success", "indicator", "cost"),
+    figure: oneOf(raw.figure, "success", "indicator"),
     baselines: oneOf(raw.baselines, "no"),
-    paper: oneOf(raw.paper, "yes"),
   };
 }

@@ -2,16 +2,12 @@ import type { JobFilters } from "./queries";
 
 const TEXTS = [
   ...(["task", "model", "sweep", "state", "outcome", "reason", "flag"] as const),
-  ...(["track", "task_version", "configuration", "since", "until", "text"] as const),
+  ...(["track", "task_version", "configuration", "text"] as const),
 ] as const;
-const NUMBERS = ["cost_min_usd", "cost_max_usd", "duration_min_s", "duration_max_s"] as const;
 const SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"] as const;
 
 /** What the address of a list of jobs says. */
-export type JobsSearch = Pick<
-  JobFilters,
-  (typeof TEXTS)[number] | (typeof NUMBERS)[number] | "category" | "sort" | "order"
->;
+export type JobsSearch = Pick<JobFilters, (typeof TEXTS)[number] | "category" | "sort" | "order">;
 
 /** Reads an address; the API refuses what no job can have, and says what would be valid. */
 export function readJobsSearch(raw: Record<string, unknown>): JobsSearch {
@@ -20,15 +16,11 @@ export function readJobsSearch(raw: Record<string, unknown>): JobsSearch {
     const value = typeof raw[name] === "number" ? String(raw[name]) : raw[name];
     return typeof value === "string" && value !== "" ? [[name, value]] : [];
   });
-  const numbers = NUMBERS.flatMap((name) => {
-    const value = Number(raw[name] === "" ? NaN : (raw[name] ?? NaN));
-    return value >= 0 && Number.isFinite(value) ? [[name, value]] : [];
-  });
   const categories = (Array.isArray(raw.category) ? raw.category : [raw.category]).filter(
     (one) => typeof one === "string" && one !== "",
   );
   return {
-    ...(Object.fromEntries([...texts, ...numbers]) as JobsSearch),
+    ...(Object.fromEntries(texts) as JobsSearch),
     ...(categories.length > 0 ? { category: categories as string[] } : {}),
     ...(SORTS.some((sort) => sort === raw.sort) ? { sort: raw.sort as JobsSearch["sort"] } : {}),
     ...(raw.order === "asc" ? { order: "asc" } : {}),

@@ -2,7 +2,6 @@ import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import type { Row, TaskBoard } from "../api/queries";
 import { SCORE, sharedRanks } from "./ranks";
-import type { BoardSearch } from "../api/board-search";
 import { jobsBehind } from "./jobs-behind";
 import { count, dollars, measured, number, percent, places, successes } from "../format";
 import { Interval } from "./Interval";
@@ -22,7 +21,7 @@ const VALUES: Values<Row> = {
 };
 
 /** All models on one task, the best first. */
-export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: BoardSearch }) {
+export function TaskTable({ task }: { task: TaskBoard }) {
   const ties = sharedRanks(task.rows);
   const { rows, head } = useSorting(task.rows, VALUES);
   const several = new Set(task.rows.map((row) => row.model)).size < task.rows.length;
@@ -66,7 +65,6 @@ export function TaskTable({ task, search = {} }: { task: TaskBoard; search?: Boa
             <TaskRow
               key={`${row.model} ${row.configuration}`}
               row={row}
-              search={search}
               tied={row.rank !== null && ties.has(row.rank)}
               several={several}
             />
@@ -88,13 +86,13 @@ function Proof({ row }: { row: Row }) {
   return parts.length > 0 && <small className="dimmed">{parts.join(", ")}</small>;
 }
 
-function TaskRow({ row, search, tied, several }: { row: Row; search: BoardSearch; tied: boolean; several: boolean }) {
+function TaskRow({ row, tied, several }: { row: Row; tied: boolean; several: boolean }) {
   const success = `${successes(row.successes)} of ${row.trials}`;
   return (
     <Table.Tr>
       <Table.Td>
         <Group gap={6} wrap="nowrap">
-          <Link className="quiet" to="/jobs" search={jobsBehind(row, search)}>
+          <Link className="quiet" to="/jobs" search={jobsBehind(row)}>
             {row.model}
             {several && <small> ({row.configuration.slice(0, 8)})</small>}
           </Link>

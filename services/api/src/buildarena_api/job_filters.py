@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import datetime
-from decimal import Decimal
 from typing import Annotated, Final
 
 from fastapi import Depends, Query
 
 from buildarena_api.dependencies import ContextDep, IdPrefix, Track
 from buildarena_api.http.problems import ProblemError
-from buildarena_api.leaderboard.filters import require_zones, unknown
+from buildarena_api.leaderboard.filters import unknown
 from buildarena_api.schemas import AnyJobState, AnyOutcome
 from buildarena_benchmark import ValidationIssue
 from buildarena_benchmark.scorers.registry import known_flags
@@ -22,16 +20,10 @@ from buildarena_store.jobs.filters import JobFilter
 SEARCHED: Final[Mapping[str, int]] = {
     "text": 10,
     "flag": 10,
-    "duration_min_s": 10,
-    "duration_max_s": 10,
     "indicator_min": 2,
     "indicator_max": 2,
-    "cost_min_usd": 2,
-    "cost_max_usd": 2,
 }
 """What filters weigh for which jobs are searched, beyond their rows."""
-
-Amount = Annotated[float | None, Query(ge=0, le=1e12, allow_inf_nan=False)]
 
 
 def weight_of_search(query: Mapping[str, str]) -> int:
@@ -53,8 +45,6 @@ def job_filter(
     configuration: Annotated[
         str | None, Query(description="Of the model: hash of its decoding and limits too")
     ] = None,
-    since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
-    until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
     state: Annotated[AnyJobState | None, Query()] = None,
     outcome: Annotated[AnyOutcome | None, Query()] = None,
     reason: Annotated[str | None, Query(description="Class of the failure")] = None,
@@ -65,10 +55,6 @@ def job_filter(
     indicator_max: Annotated[
         float | None, Query(allow_inf_nan=False, description="Only with at most this indicator")
     ] = None,
-    cost_min_usd: Amount = None,
-    cost_max_usd: Amount = None,
-    duration_min_s: Amount = None,
-    duration_max_s: Amount = None,
     text: Annotated[
         str | None,
         Query(
@@ -83,10 +69,9 @@ def job_filter(
     """What the parameters mean.
 
     Raises:
-        ProblemError: A time has no zone, or a category is unknown.
+        ProblemError: A category is unknown.
         NotFoundError: The sweep is unknown.
     """
-    require_zones(since=since, until=until)
     if sweep is not None:
         context.store.sweeps.get(sweep)
     return JobFilter(
@@ -96,13 +81,7 @@ def job_filter(
         id_prefix=id_prefix,
         indicator_min=indicator_min,
         indicator_max=indicator_max,
-        cost_min_usd=None if cost_min_usd is None else Decimal(str(cost_min_usd)),
-        cost_max_usd=None if cost_max_usd is None else Decimal(str(cost_max_usd)),
-        duration_min_s=duration_min_s,
-        duration_max_s=duration_max_s,
         text=text,
-        since=since,
-        until=until,
         equals={
             "task": task,
             "task_version": task_version,

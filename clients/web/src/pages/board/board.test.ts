@@ -1,5 +1,4 @@
 import { describe, expect, it } from "vitest";
-import { boardQuery } from "../../api/queries";
 import { exportPath } from "./Exports";
 import { sharedRanks } from "../../parts/ranks";
 import { drawnParts, partsOf } from "./Failures";
@@ -11,34 +10,22 @@ import { shade, shareOf } from "./shades";
 
 describe("readSearch", () => {
   it("reads every switch, and one task as a list", () => {
-    const raw = { track: "t", task: "lift-1", policy: "published", since: "2026-01-02", figure: "cost", paper: "yes" };
+    const raw = { track: "t", task: "lift-1", figure: "indicator", baselines: "no" };
     expect(readSearch(raw)).toMatchObject({ ...raw, task: ["lift-1"] });
   });
 
-  it.each([
-    { policy: "mine" },
-    { reading: "mine" },
-    { since: "yesterday" },
-    { task: [1, null, ""] },
-    { figure: {} },
-    { track: 7 },
-  ])("drops what makes no sense: %j", (raw) => {
+  it.each([{ task: [1, null, ""] }, { figure: {} }, { track: 7 }])("drops what makes no sense: %j", (raw) => {
     expect(Object.values(readSearch(raw)).filter((value) => value !== undefined)).toEqual([]);
   });
 });
 
 describe("exports", () => {
   it("ask for exactly what is shown", () => {
-    const path = exportPath("a/b&c", { task: ["x", "y"], policy: "published", figure: "cost" }, "csv");
+    const path = exportPath("a/b&c", { task: ["x", "y"], figure: "indicator" }, "csv");
     const words = new URL(path, "http://here").searchParams;
     expect(words.getAll("task")).toEqual(["x", "y"]);
     expect(words.get("track")).toBe("a/b&c");
-    expect(words.get("policy")).toBe("published");
     expect(words.has("figure")).toBe(false);
-  });
-
-  it("send days with a zone", () => {
-    expect(boardQuery({ since: "2026-01-02" })).toEqual({ since: "2026-01-02T00:00:00Z" });
   });
 });
 
@@ -112,11 +99,10 @@ describe("kinds in a drawing", () => {
   });
 });
 describe("a cell", () => {
-  it("opens exactly the jobs that the service names, within the board's days", () => {
+  it("opens exactly the jobs that the service names", () => {
     const jobs = "/v1/jobs?task=a%26b&model=builtin%2Fx&track=t%2F1&task_version=v&configuration=c";
-    expect(jobsBehind({ jobs }, { since: "2026-01-02" })).toEqual({
+    expect(jobsBehind({ jobs })).toEqual({
       ...{ task: "a&b", model: "builtin/x", track: "t/1", task_version: "v", configuration: "c", state: "done" },
-      since: "2026-01-02T00:00:00Z",
     });
   });
 });

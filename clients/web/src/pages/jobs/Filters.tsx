@@ -1,4 +1,4 @@
-import { Button, Collapse, Group, NumberInput, Select, Stack, TextInput } from "@mantine/core";
+import { Button, Collapse, Group, Select, Stack, TextInput } from "@mantine/core";
 import { useDisclosure } from "@mantine/hooks";
 import { useQuery } from "@tanstack/react-query";
 import { useNavigate } from "@tanstack/react-router";
@@ -11,7 +11,7 @@ const LONGEST = 34;
 const OUTCOMES = ["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled"];
 const STATES = ["queued", "running", "on_hold", "done"];
 /** What stands below "More filters". */
-const FURTHER = ["flag", "sweep", "since", "until", "cost_min_usd", "cost_max_usd", "duration_min_s", "duration_max_s"];
+const FURTHER = ["text", "flag", "sweep"] as const;
 /** What only links set: each can be taken away. */
 const LINKED = ["category", "track", "task_version", "configuration"] as const;
 
@@ -23,7 +23,7 @@ export function Filters({ search }: { search: JobsSearch }) {
   const set = (change: Change): void => {
     void navigate({ search: (before) => ({ ...before, ...change }), replace: true, resetScroll: false });
   };
-  const further = FURTHER.filter((name) => search[name as keyof JobsSearch] !== undefined).length;
+  const further = FURTHER.filter((name) => search[name] !== undefined).length;
   const [opened, more] = useDisclosure(further > 0);
   const known = { tasks: useQuery(tasks()), models: useQuery(models()) };
   const counted = useQuery(jobSummary({ ...search, reason: undefined, sort: undefined, order: undefined })).data;
@@ -120,12 +120,6 @@ function Further({ search, set, flags }: Set & { flags: readonly string[] }) {
           set({ sweep: value ?? undefined });
         }}
       />
-      <Day name="since" label="Ended from" {...{ search, set }} />
-      <Day name="until" label="Ended before" {...{ search, set }} />
-      <Amount name="cost_min_usd" label="Cost from, $" each={1} {...{ search, set }} />
-      <Amount name="cost_max_usd" label="Cost to, $" each={1} {...{ search, set }} />
-      <Amount name="duration_min_s" label="Took from, min" each={60} {...{ search, set }} />
-      <Amount name="duration_max_s" label="Took to, min" each={60} {...{ search, set }} />
     </Group>
   );
 }
@@ -145,51 +139,6 @@ function Text({ search, set }: Set) {
       onChange={(event) => {
         setText(event.currentTarget.value);
       }}
-      onBlur={take}
-      onKeyDown={(event) => {
-        if (event.key === "Enter") take();
-      }}
-    />
-  );
-}
-
-function Day({ name, label, search, set }: Set & { name: "since" | "until"; label: string }) {
-  return (
-    <TextInput
-      type="date"
-      label={label}
-      value={(search[name] ?? "").slice(0, 10)}
-      w={150}
-      onChange={(event) => {
-        const day = event.currentTarget.value;
-        set({ [name]: day === "" ? undefined : `${day}T00:00:00Z` });
-      }}
-    />
-  );
-}
-
-interface AmountOf extends Set {
-  name: "cost_min_usd" | "cost_max_usd" | "duration_min_s" | "duration_max_s";
-  label: string;
-  /** How many of the address's units one of the field's is. */
-  each: number;
-}
-
-function Amount({ name, label, each, search, set }: AmountOf) {
-  const given = search[name];
-  const [value, setValue] = useState<number | string>(given == null ? "" : given / each);
-  const take = (): void => {
-    set({ [name]: value === "" ? undefined : Number(value) * each });
-  };
-  return (
-    <NumberInput
-      label={label}
-      value={value}
-      min={0}
-      allowNegative={false}
-      hideControls
-      w={132}
-      onChange={setValue}
       onBlur={take}
       onKeyDown={(event) => {
         if (event.key === "Enter") take();

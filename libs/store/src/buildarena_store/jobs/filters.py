@@ -5,17 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
-from decimal import Decimal
 from typing import Any, Final
 
 from sqlalchemy import (
     ColumnElement,
     Connection,
-    Numeric,
     Text,
     TextClause,
-    extract,
     func,
     literal_column,
     or_,
@@ -26,13 +22,10 @@ from sqlalchemy import (
 from buildarena_store.ids import begins_with
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
-from buildarena_store.tables import COST_OR_NULL, jobs, sweep_jobs
+from buildarena_store.tables import jobs, sweep_jobs
 
-COST_USD: Final = literal_column(COST_OR_NULL.text, Numeric(14, 6))
-"""What nobody counted is no cost of 0. As the index has it, word for word."""
 MAX_SORTED: Final = 40_000
 """Jobs that are sorted for a page; of more, the first are found along the order's index."""
-_DURATION_S: Final = extract("epoch", jobs.c.finished_at - jobs.c.started_at)
 _ID_PART: Final = re.compile(r"[job_0-9a-f]+", re.IGNORECASE)
 """What can stand in an id."""
 
@@ -48,13 +41,7 @@ class JobFilter:
         id_prefix: Only jobs whose id begins like this.
         indicator_min: Only jobs with this indicator or a greater one.
         indicator_max: Only jobs with this indicator or a smaller one.
-        cost_min_usd: Only jobs that cost as much or more, in US dollars, as far as that is known.
-        cost_max_usd: Only jobs that cost as much or less.
-        duration_min_s: Only jobs that took as long or longer, from start to end.
-        duration_max_s: Only jobs that took as long or shorter.
         text: Only jobs in whose id, task, model, reason or detail it stands, in any case.
-        since: Only jobs that ended then or later.
-        until: Only jobs that ended before.
         equals: Column values to match.
     """
 
@@ -64,13 +51,7 @@ class JobFilter:
     id_prefix: str | None = None
     indicator_min: float | None = None
     indicator_max: float | None = None
-    cost_min_usd: Decimal | None = None
-    cost_max_usd: Decimal | None = None
-    duration_min_s: float | None = None
-    duration_max_s: float | None = None
     text: str | None = None
-    since: datetime | None = None
-    until: datetime | None = None
     equals: Mapping[str, str | int | None] = field(default_factory=dict)
 
 
@@ -113,36 +94,16 @@ def conditions_but_text(wanted: JobFilter) -> list[ColumnElement[bool]]:
         found.append(jobs.c.flags.contains([wanted.flag]))
     if wanted.id_prefix is not None:
         found.append(begins_with(jobs.c.id, wanted.id_prefix))
-    found += _within(jobs.c.indicator, wanted.indicator_min, wanted.indicator_max)
-    found += _within(COST_USD, wanted.cost_min_usd, wanted.cost_max_usd)
-    found += _within(_DURATION_S, wanted.duration_min_s, wanted.duration_max_s)
+    if wanted.indicator_min is not None:
+        found.append(jobs.c.indicator >= wanted.indicator_min)
+    if wanted.indicator_max is not None:
+        found.append(jobs.c.indicator <= wanted.indicator_max)
     if wanted.tasks is not None:
         found.append(jobs.c.task == func.any(bound_texts(wanted.tasks)))
-    if wanted.since is not None:
-        found.append(jobs.c.finished_at >= wanted.since)
-    if wanted.until is not None:
-        # No job ends before it was made: a list by that time can begin there.
-        found += [jobs.c.finished_at < wanted.until, jobs.c.created_at < wanted.until]
-    if _means_ended(wanted):
+    if wanted.equals.get("state") == JobState.DONE or wanted.equals.get("outcome") is not None:
         # Said so that an order's index of ended jobs alone can serve.
         found.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
     return found
-
-
-def _within(
-    column: ColumnElement[Any], least: float | Decimal | None, most: float | Decimal | None
-) -> list[ColumnElement[bool]]:
-    found = [] if least is None else [column >= least]
-    return found if most is None else [*found, column <= most]
-
-
-def _means_ended(wanted: JobFilter) -> bool:
-    """Whether only jobs that have ended can be meant."""
-    durations = wanted.duration_min_s, wanted.duration_max_s
-    ended = wanted.since, wanted.until, wanted.equals.get("outcome"), *durations
-    return any(value is not None for value in ended) or (
-        wanted.equals.get("state") == JobState.DONE
-    )
 
 
 def ways_to_hold(connection: Connection, wanted: str) -> list[ColumnElement[bool]]:

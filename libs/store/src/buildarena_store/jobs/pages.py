@@ -12,6 +12,7 @@ from typing import Any, Final, Literal
 from sqlalchemy import (
     ColumnElement,
     Connection,
+    Numeric,
     Row,
     Text,
     and_,
@@ -22,7 +23,6 @@ from sqlalchemy import (
 )
 
 from buildarena_store.jobs.filters import (
-    COST_USD,
     MAX_SORTED,
     JobFilter,
     conditions_but_text,
@@ -31,17 +31,18 @@ from buildarena_store.jobs.filters import (
 from buildarena_store.jobs.job import JOB_COLUMNS, Job
 from buildarena_store.rows import bound_texts
 from buildarena_store.states import JobState
-from buildarena_store.tables import jobs, sweep_jobs
+from buildarena_store.tables import COST_OR_NULL, jobs, sweep_jobs
 
 Sort = Literal["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"]
 SortValue = datetime | float | Decimal | str | int | None
 
+# What nobody counted is no cost of 0. As the index has it, word for word.
 _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
     {
         "created": jobs.c.created_at,
         "finished": jobs.c.finished_at,
         "indicator": jobs.c.indicator,
-        "cost": COST_USD,
+        "cost": literal_column(COST_OR_NULL.text, Numeric(14, 6)),
         "task": jobs.c.task,
         "model": jobs.c.model,
         "seed": jobs.c.seed,
