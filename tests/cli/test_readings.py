@@ -64,7 +64,7 @@ def test_a_board_is_read_as_asked(url) -> None:
 
 @pytest.mark.parametrize(
     "words",
-    ["leaderboard", "compare a b", "export --out x.csv", "report sweep_x --out x.md"],
+    ["leaderboard", "compare a b", "export --out x.csv"],
 )
 def test_an_unknown_reading_is_a_usage_error_that_names_the_choices(url, words) -> None:
     done = run_cli(url, *words.split(), "--policy", "theirs")
@@ -92,26 +92,6 @@ def test_comparisons_and_exports_are_read_as_asked(url, tmp_path) -> None:
     tex = tmp_path / "board.tex"
     printed(url, "export", "--out", str(tex))
     assert r"\textbf{$\geq$1500.0}" in tex.read_text()
-
-
-@pytest.mark.ci
-def test_reports_are_read_as_asked_and_tell_what_flags_say(url, sweep, tmp_path) -> None:
-    for ending in ("md", "html", "pdf"):
-        printed(url, "report", sweep, "--out", str(tmp_path / f"ours.{ending}"))
-    text = (tmp_path / "ours.md").read_text()
-    assert "## Flags" in text
-    assert "≥ 1,500.0" in text
-    assert "too few data" in text
-    assert "Disqualified jobs count as failures" in text
-    flagged = [line for line in text.splitlines() if "does" in line and "span" in line]
-    assert "are failures" in flagged[0]
-    assert "≥ 1,500.0" in (tmp_path / "ours.html").read_text()
-    assert (tmp_path / "ours.pdf").read_bytes()[:5] == b"%PDF-"
-    out = tmp_path / "published.md"
-    printed(url, "report", sweep, "--out", str(out), "--policy", "published")
-    text = out.read_text()
-    assert "are left out" in text
-    assert "≥ 1,500.0" not in text
 
 
 @pytest.mark.usefixtures("sweep")

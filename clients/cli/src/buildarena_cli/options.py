@@ -68,7 +68,6 @@ PolicyOption = Annotated[
     PolicyName,
     typer.Option(
         "--policy",
-        "--reading",  # its former name
         help="How flags are read: disqualified trials fail, or what the published evaluation "
         "calls hacked is left out.",
     ),
