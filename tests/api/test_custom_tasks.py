@@ -46,7 +46,7 @@ def board_of(api, **params: object) -> dict[str, dict[str, object]]:
     return {task["task"]: task for task in answer.json()["tasks"]}
 
 
-def test_an_own_task_has_its_own_indicator_and_no_published_figures(api, end_all) -> None:
+def test_an_own_task_has_its_own_indicator(api, end_all) -> None:
     upload(api, OWN)
     sweep(api, "support-1", "narrow-gap")
     end_all(150.0)
@@ -54,10 +54,8 @@ def test_an_own_task_has_its_own_indicator_and_no_published_figures(api, end_all
     assert list(tasks) == ["support-1", "narrow-gap"]
     own = tasks["narrow-gap"]
     assert (own["custom"], own["indicator"], own["unit"]) == (True, "worth", "points")
-    assert own["published"] == []
     assert [row["rank"] for row in own["rows"]] == [1, 2]
     assert not tasks["support-1"]["custom"]
-    assert tasks["support-1"]["published"]
 
 
 def test_results_of_two_versions_do_not_mix(api, end_all) -> None:
@@ -112,9 +110,7 @@ def test_exports_hold_own_tasks(api, end_all) -> None:
     end_all(150.0)
     text = api.get("/v1/leaderboard/export").text
     rows = [row for row in csv.DictReader(io.StringIO(text)) if row["task"] == "narrow-gap"]
-    assert {(row["source"], row["indicator"], row["unit"]) for row in rows} == {
-        ("measured", "worth", "points")
-    }
+    assert {(row["indicator"], row["unit"]) for row in rows} == {("worth", "points")}
     latex = api.get("/v1/leaderboard/export", params={"format": "latex"}).text
     assert "% Measured: tasks that the paper does not have" in latex
     assert r"\multirow{2}{*}{narrow-gap}" in latex

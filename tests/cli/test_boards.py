@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from buildarena_cli.terminal import boards
-from buildarena_cli.terminal.boards import overview, published_table
+from buildarena_cli.terminal.boards import overview
 
 TASKS = [f"{kind}-{level}" for kind in ("transport", "support", "lift") for level in (1, 2, 3)]
 MODELS = ["builtin/expert", "openai/gpt-5", "x/" + "long-name-" * 3]
@@ -36,14 +36,12 @@ def board(models: list[str], tasks: list[str]) -> dict[str, Any]:
                 "indicator": "height" if task.startswith("lift") else "distance",
                 "unit": "units",
                 "rows": [row(n, model, task) for n, model in enumerate(models, 1)],
-                "published": [],
             }
             for task in tasks
         ],
         "overall": [
             {"model": model, "configuration": "c", "rank": n} for n, model in enumerate(models, 1)
         ],
-        "published": [],
         "policy": "ours",
         "flags": [],
     }
@@ -111,25 +109,3 @@ def test_what_was_not_tried_is_a_dash(shown, capsys) -> None:
     assert last.split()[0] == "-"
     assert last.split()[-3:] == ["-", "-", "-"]
     assert shown
-
-
-def test_other_benchmarks_figures_are_a_table_apart(capsys) -> None:
-    peers = [
-        {
-            "peer": "BesiegeField",
-            "peer_task": "catapult",
-            "model": "A Model",
-            "workflow": workflow,
-            "indicator_mean": mean,
-            "indicator_best": 21.95,
-            "indicator_std": 8.68,
-        }
-        for workflow, mean in (("single_agent", 2.3), ("hierarchical", 9.83))
-    ]
-    published_table({"task": "throw-1", "published": [], "peers": peers})
-    text = capsys.readouterr().out
-    assert "catapult of BesiegeField, as published" in text
-    assert "never ranked with ours" in text
-    assert "A Model (hierarchical)" in text
-    assert "9.8" in text
-    assert "throw-1, as published" not in text

@@ -36,7 +36,7 @@ beforeAll(async () => {
 afterAll(() => browser.close());
 
 const PAGES: readonly (readonly [string, () => string])[] = [
-  ["board", () => "/?paper=yes"],
+  ["board", () => "/"],
   ["sweeps", () => "/sweeps"],
   ["sweep", () => `/sweeps/${ids.sweep}`],
   ["new sweep", () => "/sweeps/new"],

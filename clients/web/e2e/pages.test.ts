@@ -22,7 +22,7 @@ function open(path: string, width = 1280, scheme: "light" | "dark" = "light"): P
 }
 
 const PAGES: readonly (readonly [string, () => string])[] = [
-  ["leaderboard", () => "/?paper=yes"],
+  ["leaderboard", () => "/"],
   ["method", () => "/method"],
   ["sweeps", () => "/sweeps"],
   ["sweep", () => `/sweeps/${sweep}`],

@@ -68,7 +68,7 @@ describe.skipIf(WHOLE === "")("a published site", () => {
 
   const PAGES: readonly (readonly [string, number, () => string])[] = [
     ["the board", 1280, () => "/"],
-    ["the board", 390, () => "/?paper=yes"],
+    ["the board", 390, () => "/?figure=indicator"],
     ["a sweep", 390, () => `/sweeps/${site.sweeps[0] ?? ""}`],
     ["the sweeps", 1280, () => "/sweeps"],
     ["the jobs", 390, () => "/jobs"],
@@ -183,10 +183,10 @@ describe.skipIf(WHOLE === "")("a published site", () => {
   });
 
   it("keeps what its switches lead to, and says what it lacks", async () => {
-    const { page, faults } = await opened(WHOLE, "/?task=support-1&policy=published");
+    const { page, faults } = await opened(WHOLE, "/?task=support-1&baselines=no");
     expect(await page.locator("a.heat-cell").count()).toBeGreaterThan(0);
-    await page.getByText("count as failures").click();
-    await page.waitForFunction(() => !location.hash.includes("policy"));
+    await page.getByRole("switch", { name: "Baselines" }).click({ force: true });
+    await page.waitForFunction(() => !location.hash.includes("baselines"));
     await page.goto(`${WHOLE}#/?task=${encodeURIComponent('["support-1","lift-1"]')}`);
     await page.getByText("other choices need a running service").waitFor();
     await page.goto(`${WHOLE}#/compare?models=no%2Fone,builtin%2Fidle`);

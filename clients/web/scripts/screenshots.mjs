@@ -18,7 +18,7 @@ async function pages() {
     (await first("/v1/jobs?outcome=success"));
   const failed = (await first("/v1/jobs?outcome=unsuccessful")) ?? built;
   return {
-    board: "/?paper=yes",
+    board: "/",
     sweeps: "/sweeps",
     sweep: `/sweeps/${newest.id}`,
     "sweeps-new": "/sweeps/new",

@@ -114,20 +114,3 @@ export function moment(time: string): string {
   moments ??= new Intl.DateTimeFormat("en-GB", { dateStyle: "medium", timeStyle: "short" });
   return moments.format(new Date(time));
 }
-
-/** Rules of a task's document in words: `{max_sub_structures: 4}` is "Sub structures: at most 4". What is not set is no rule. */
-export function ruleLines(value: unknown, name = ""): string[] {
-  if (value === null || value === undefined || (Array.isArray(value) && value.length === 0)) return [];
-  if (typeof value === "object" && !Array.isArray(value)) {
-    return Object.entries(value).flatMap(([inner, of]) => ruleLines(of, inner));
-  }
-  const bound = name.startsWith("max_") ? "at most " : name.startsWith("min_") ? "at least " : "";
-  const what = words(name.replace(/^(max|min)_/, ""));
-  const said = Array.isArray(value) ? value.map(asText).join(", ") : asText(value);
-  return [`${what.charAt(0).toUpperCase()}${what.slice(1)}: ${bound}${said}`];
-}
-
-function asText(value: unknown): string {
-  if (typeof value === "boolean") return value ? "yes" : "no";
-  return typeof value === "string" ? value : typeof value === "number" ? String(value) : ruleLines(value).join(", ");
-}

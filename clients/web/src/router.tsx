@@ -26,11 +26,10 @@ const board = createRoute({
   path: "/",
   validateSearch: readSearch,
   // What changes the board itself: how it is shown asks for nothing.
-  loaderDeps: ({ search: { track, task, category, policy } }) => ({
+  loaderDeps: ({ search: { track, task, category } }) => ({
     track,
     task,
     category,
-    policy,
   }),
   // Asked for while the page's script is on its way; what fails is told by the page, which asks again.
   loader: ({ deps }) => {

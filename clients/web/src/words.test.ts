@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import { refusal, headline, ApiError } from "./api/problem";
 import { readEvent } from "./api/events";
-import { bytes, dollars, duration, measured, moment, number, percent, places, ruleLines, trackLabel } from "./format";
+import { bytes, dollars, duration, measured, moment, number, percent, places, trackLabel } from "./format";
 import { chosenTurns, callLine, type Turn } from "./pages/job/transcript";
 import { goalOf } from "./pages/tasks/goal";
 
@@ -90,16 +90,6 @@ describe("goalOf", () => {
     expect(goalOf("# T\n\n**Goal.** Carry\nit.\n\n**Rules.** x")).toBe("Carry it.");
     expect(goalOf("Build  it")).toBe("Build it");
   });
-});
-
-it("rules of a task are told in words", () => {
-  const rules = { max_sub_structures: 4, min_wheels: 2, modules: ["A", "B"], mass: null, ends: { target: [12, 20] } };
-  expect(ruleLines(rules)).toEqual([
-    "Sub structures: at most 4",
-    "Wheels: at least 2",
-    "Modules: A, B",
-    "Target: 12, 20",
-  ]);
 });
 
 it("a date is one that nobody takes for another", () => {

@@ -12,13 +12,12 @@ from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import (
     cost_table,
     performance_table,
-    published_overall,
     published_rows,
 )
 from buildarena_benchmark.statistics import difference_interval
 
-MARKS = Path(__file__).parents[2] / "data" / "leaderboard" / "paper_marks.csv"
 OPEN_WEIGHT = {"Qwen3.5-9B", "Qwen3.5-27B", "Ministral-14B"}
+MARKS = Path(__file__).parents[2] / "data" / "leaderboard" / "paper_marks.csv"
 # The paper underlines 19.3, though 19.0 of the same column is less.
 MISMARKED = {
     ("support-2", "output_tokens_mean", "DeepSeek-3.1", "second"),
@@ -62,24 +61,6 @@ def test_our_tables_mark_what_the_paper_marks(table) -> None:
             if row["figure"] in COLUMNS[table]
         }
     assert found ^ marks <= MISMARKED
-
-
-def test_the_order_is_the_papers_where_it_states_one() -> None:
-    models, ranking = published_overall()
-    place = dict(zip(models, ranking.mean_rank, strict=True))
-    order = sorted(models, key=place.__getitem__)
-    # "GPT-5 and Grok-4 show competitive performance"; open-weight models "remain substantially
-    # below the top proprietary models (GPT-5, Grok-4)".
-    assert order[:2] == ["GPT-5", "Grok-4"]
-    ranks = dict(zip(models, ranking.rank, strict=True))
-    assert (ranks["GPT-5"], ranks["Grok-4"]) == (1, 2)
-    assert all(ranks[model] > 2 for model in OPEN_WEIGHT)
-
-
-def test_the_middle_of_the_field_shares_a_rank() -> None:
-    models, ranking = published_overall()
-    shared = [m for m, rank in zip(models, ranking.rank, strict=True) if rank == 3]
-    assert set(shared) >= {"Claude-4", "GPT-4o", "Seed-1.6", "Qwen3.5-27B"}
 
 
 def test_at_64_samples_only_about_a_third_of_the_pairs_differ() -> None:

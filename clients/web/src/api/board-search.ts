@@ -1,4 +1,4 @@
-export type Figure = "success" | "indicator" | "cost";
+export type Figure = "success" | "indicator";
 
 /** What the address of the board says; everything else follows from it. */
 export interface BoardSearch {
@@ -6,10 +6,8 @@ export interface BoardSearch {
   task?: string[];
   /** Categories of tasks; without, models are ranked over the paper's nine. */
   category?: string[];
-  policy?: "ours" | "published";
   figure?: Figure;
   baselines?: "no";
-  paper?: "yes";
 }
 
 function text(value: unknown): string | undefined {
@@ -31,9 +29,7 @@ export function readSearch(raw: Record<string, unknown>): BoardSearch {
     track: text(raw.track),
     task: list(raw.task),
     category: list(raw.category),
-    policy: oneOf(raw.policy ?? raw.reading, "ours", "published"),
-    figure: oneOf(raw.figure, "success", "indicator", "cost"),
+    figure: oneOf(raw.figure, "success", "indicator"),
     baselines: oneOf(raw.baselines, "no"),
-    paper: oneOf(raw.paper, "yes"),
   };
 }

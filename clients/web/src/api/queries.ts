@@ -28,7 +28,6 @@ export function boardQuery(search: BoardSearch): Record<string, string | string[
   if (search.track !== undefined) query.track = search.track;
   if (search.task !== undefined && search.task.length > 0) query.task = search.task;
   if (search.category !== undefined && search.category.length > 0) query.category = search.category;
-  if (search.policy !== undefined) query.policy = search.policy;
   return query;
 }
 

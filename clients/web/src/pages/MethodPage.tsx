@@ -108,10 +108,7 @@ export default function MethodPage() {
                   That a simulated machine works in the world, or in the game: engines approximate it, each in its own
                   way.
                 </>
-                <>
-                  That ours and the paper’s figures compare: the paper’s were measured in the game. They appear beside
-                  ours, and are ranked among themselves.
-                </>
+                <>That ours and the paper’s figures compare: the paper’s were measured in the game.</>
                 <>That a rank says how useful a model is for anything but building these machines in this way.</>
               </Points>
             </Section>

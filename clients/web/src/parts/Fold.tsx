@@ -1,21 +1,10 @@
-import { startTransition, useState, type CSSProperties, type ReactNode } from "react";
+import { startTransition, useState, type ReactNode } from "react";
 
 /** What opens when its title is pressed, and is made only then: tables of thousands of cells are mostly not read. */
-export function Fold({
-  title,
-  size = 13,
-  style,
-  children,
-}: {
-  title: string;
-  size?: number;
-  style?: CSSProperties;
-  children: ReactNode;
-}) {
+export function Fold({ title, children }: { title: string; children: ReactNode }) {
   const [opened, setOpened] = useState(false);
   return (
     <details
-      style={style}
       onToggle={(event) => {
         if (event.currentTarget.open)
           startTransition(() => {
@@ -23,7 +12,7 @@ export function Fold({
           });
       }}
     >
-      <summary style={{ cursor: "pointer", fontSize: size }}>{title}</summary>
+      <summary style={{ cursor: "pointer", fontSize: 13 }}>{title}</summary>
       {opened && children}
     </details>
   );

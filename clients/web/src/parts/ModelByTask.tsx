@@ -8,15 +8,13 @@ interface Row {
   cells: readonly ReactNode[];
 }
 
-/** A table of models by tasks that scrolls sideways; `children` are further rows. */
+/** A table of models by tasks that scrolls sideways. */
 export function ModelByTask({
   heads,
   rows,
-  children,
 }: {
   heads: readonly { task: string; head: ReactNode }[];
   rows: readonly Row[];
-  children?: ReactNode;
 }) {
   return (
     <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Model by task, scrolls sideways">
@@ -48,7 +46,6 @@ export function ModelByTask({
               ))}
             </tr>
           ))}
-          {children}
         </tbody>
       </table>
     </div>

@@ -6,20 +6,11 @@ export interface Curve {
   values: Float64Array;
 }
 
-function distances(positions: Float32Array, stride: number, count: number): Float64Array {
+function distances(positions: Float32Array, count: number): Float64Array {
   const [x, y] = [positions[0] ?? 0, positions[1] ?? 0];
   return Float64Array.from({ length: count }, (_, i) =>
-    Math.hypot((positions[i * stride] ?? 0) - x, (positions[i * stride + 1] ?? 0) - y),
+    Math.hypot((positions[3 * i] ?? 0) - x, (positions[3 * i + 1] ?? 0) - y),
   );
-}
-
-function heights(trial: Trial): Float64Array {
-  const blocks = trial.blockIds.length;
-  return Float64Array.from({ length: trial.times.length }, (_, i) => {
-    let sum = 0;
-    for (let block = 0; block < blocks; block += 1) sum += trial.positions[(i * blocks + block) * 3 + 2] ?? 0;
-    return sum / Math.max(1, blocks);
-  });
 }
 
 /** A blow in a collapse is many times a joint's strength, and would flatten all that led to it. */
@@ -33,7 +24,7 @@ function largestLoads(loads: Float32Array, joints: number, count: number): Float
   });
 }
 
-/** What a trial is judged by, over time: loads, heights, distances, the cargo. */
+/** What a trial is judged by, over time: loads, and the cargo. */
 export function curvesOf(trial: Trial): Curve[] {
   const count = trial.times.length;
   const curves: Curve[] = [];
@@ -44,16 +35,8 @@ export function curvesOf(trial: Trial): Curve[] {
       values: largestLoads(trial.loads, trial.peaks.length, count),
     });
   }
-  curves.push(
-    { name: "Mean height of the machine", unit: "units", values: heights(trial) },
-    {
-      name: "Distance of the starting block",
-      unit: "units",
-      values: distances(trial.positions, trial.blockIds.length * 3, count),
-    },
-  );
   if (trial.cargo !== null) {
-    curves.push({ name: "Distance of the cargo", unit: "units", values: distances(trial.cargo.positions, 3, count) });
+    curves.push({ name: "Distance of the cargo", unit: "units", values: distances(trial.cargo.positions, count) });
     curves.push({ name: "Mass of the cargo", unit: "mass units", values: trial.cargo.mass });
   }
   return curves;

@@ -13,7 +13,6 @@ from buildarena_api.app import POOL_SIZE, create_app
 from buildarena_api.http.access import check_binding
 from buildarena_api.http.own_pool import POOL_TIMEOUT_S
 from buildarena_api.http.serving import serve
-from buildarena_benchmark.leaderboard import published_overall
 from buildarena_environment.processes import end_with_parent
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.errors import StartupError
@@ -83,7 +82,6 @@ def _settle() -> None:
     makes many objects. What the first board would load is loaded before, so that it is part of it;
     what only comparisons need is loaded later, as that takes as long as the first board.
     """
-    published_overall()
     import_module("scipy.optimize")
     gc.collect()
     gc.freeze()

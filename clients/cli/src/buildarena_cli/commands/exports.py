@@ -66,8 +66,8 @@ def export(
 ) -> None:
     """Write the leaderboard to a file, or jobs as a dataset.
 
-    The leaderboard holds the paper's figures, marked as published. With --dataset a folder gets
-    every job that has ended: Parquet with a card, which the `datasets` library loads.
+    With --dataset a folder gets every job that has ended: Parquet with a card, which the
+    `datasets` library loads.
     """
     if not dataset:
         of_datasets = {

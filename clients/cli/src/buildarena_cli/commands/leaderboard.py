@@ -21,7 +21,7 @@ from buildarena_cli.options import (
     TrackOption,
     UrlOption,
 )
-from buildarena_cli.terminal.boards import overall_table, overview, published_table, task_table
+from buildarena_cli.terminal.boards import overall_table, overview, task_table
 from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
 
 COMPARED = ("first", "second", "diff %", "95 %", "pairs", "p success", "p indicator")
@@ -52,7 +52,6 @@ def leaderboard(
     track: Annotated[
         str | None, typer.Option("--track", help="Only this track; as JSON the first without.")
     ] = None,
-    published: Annotated[bool, typer.Option(help="Also show the paper's figures.")] = False,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
@@ -81,23 +80,20 @@ def leaderboard(
     for place, board in enumerate(filled):
         if place:
             say()
-        _show(board, details=bool(task), published=published)
+        _show(board, details=bool(task))
 
 
-def _show(board: dict[str, Any], *, details: bool, published: bool) -> None:
+def _show(board: dict[str, Any], *, details: bool) -> None:
     say(f"Track {board['track']}")
     if board["verdict"] is not None and board["overall"]:
         say(board["verdict"]["sentence"])
     if not details:
         say()
-        overview(board, published=published)
+        overview(board)
     else:
         for task in board["tasks"]:
             say()
             task_table(task)
-            if published:
-                say()
-                published_table(task)
     if len(board["tasks"]) > 1 and board["overall"]:
         say()
         overall_table(board)

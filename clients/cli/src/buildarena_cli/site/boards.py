@@ -11,8 +11,6 @@ from buildarena_cli.client import Client, at
 from buildarena_cli.site.asking import Answer, Answers, ask, document, question
 from buildarena_cli.site.scope import Job, Scope
 
-SCORING_POLICIES: Final = (None, "published")
-"""How pages ask for our scoring policy, and for the other."""
 EXPORTS: Final = {"csv": "csv", "parquet": "parquet", "latex": "tex"}
 MAX_COMPARED: Final = 20
 """Models of a track whose comparisons are stored: each with each other is requested."""
@@ -61,10 +59,8 @@ class Collected:
         parts: list[dict[str, Any]] = [{}, *({"task": name} for name in tasks)]
         parts += [{"category": scope} for scope in scopes]
         # Pages ask without a track first, and get that of the scope or the first.
-        for track, policy, part in itertools.product(
-            (None, *self._scope.tracks), SCORING_POLICIES, parts
-        ):
-            asked = {"track": track, "policy": policy, **part}
+        for track, part in itertools.product((None, *self._scope.tracks), parts):
+            asked = {"track": track, **part}
             self._put(question(BOARD, asked), self._board(asked))
             self._put(question(f"{BOARD}/figures", asked), self._held(f"{BOARD}/figures", asked))
             for form, ending in EXPORTS.items():
@@ -151,7 +147,7 @@ def questions(scope: Scope) -> Iterator[int]:
     tasks = len({job["task"] for job in scope.ended}) + 1
     models = min(MAX_COMPARED, len({job["model"] for job in scope.ended}))
     tracks = len(scope.tracks)
-    yield len(SCORING_POLICIES) * tasks * (2 * (tracks + 1) + len(EXPORTS) * tracks)
+    yield tasks * (2 * (tracks + 1) + len(EXPORTS) * tracks)
     yield models * (models - 1) * (tracks + 1)
     yield 2 * tasks + 2
     yield len(scope.sweeps) * (len(scope.sweeps) + 2)

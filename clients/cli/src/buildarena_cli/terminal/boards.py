@@ -47,9 +47,7 @@ ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
 }
 """The columns of a row on a task: what each shows of the API's answer."""
 RESULTS = ("success", "95 %", "indicator")
-PUBLISHED = ("model", *RESULTS, "parts", "requests", "tokens")
 LEAVING = ("requests", "parts", "tokens", "USD", "best", "score", "of it 95 %", "95 %", "indicator")
-PEERS = columns("model", "mean", "best", "spread", numeric=("mean", "best", "spread"))
 OVERALL = columns(
     *("#", "model", "place", "mean rank", "score", "success", "USD", "front"),
     numeric=("#", "place", "mean rank", "score", "success", "USD"),
@@ -65,12 +63,11 @@ class _Row(NamedTuple):
     by_task: Mapping[str, Mapping[str, Any]]
 
 
-def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
+def overview(board: Mapping[str, Any]) -> None:
     """Prints models x tasks: success with its interval, indicator; and the overall rank.
 
     Args:
         board: The API's answer.
-        published: Whether the paper's figures are printed below ours.
     """
     ranks = {(row["model"], row["configuration"]): row["rank"] for row in board["overall"]}
     rows: dict[tuple[str, str], dict[str, Any]] = {}
@@ -87,10 +84,6 @@ def overview(board: Mapping[str, Any], *, published: bool = False) -> None:
             for key, name in zip(ordered, names, strict=True)
         ],
     )
-    if published:
-        say()
-        say("As published: measured in the game, never ranked with ours")
-        _print_matrix(tasks, _published_rows(board))
     say()
     for text in _legend(board):
         say(text)
@@ -110,25 +103,6 @@ def task_table(task: Mapping[str, Any]) -> None:
             *_imports(task["rows"]),
         ],
     )
-
-
-def published_table(task: Mapping[str, Any]) -> None:
-    """Prints the paper's figures of one task."""
-    title = f"{task['task']}, as published: measured in the game, never ranked with ours"
-    if task["published"]:
-        _print_rows(PUBLISHED, task["published"], title=title)
-    for peer, peer_task in dict.fromkeys((r["peer"], r["peer_task"]) for r in task["peers"]):
-        rows = [
-            (
-                harmless(f"{row['model']} ({row['workflow']})"),
-                *(number(row[name]) for name in ("indicator_mean", "indicator_best")),
-                number(row["indicator_std"]),
-            )
-            for row in task["peers"]
-            if (row["peer"], row["peer_task"]) == (peer, peer_task)
-        ]
-        title = f"{peer_task} of {peer}, as published: its task and world, never ranked with ours"
-        print_table(PEERS, rows, title=title)
 
 
 def _print_rows(
@@ -182,7 +156,7 @@ def _spread(low: float | None, high: float | None, *, too_few: bool) -> str:
 
 
 def _is_censored(row: Mapping[str, Any]) -> bool:
-    """Whether figures are at least what they say; never those of the paper."""
+    """Whether figures are at least what they say."""
     return bool(row.get("censored"))
 
 
@@ -192,16 +166,6 @@ def _rank(rank: int | None) -> str:
 
 def _interval(low: float | None, high: float | None) -> str:
     return NOTHING if low is None or high is None else f"{100 * low:.0f}-{100 * high:.0f} %"
-
-
-def _published_rows(board: Mapping[str, Any]) -> list[_Row]:
-    rows: dict[str, dict[str, Any]] = {}
-    for task in board["tasks"]:
-        for row in task["published"]:
-            rows.setdefault(row["model"], {})[task["task"]] = row
-    ranks = {row["model"]: row["rank"] for row in board["published"]}
-    ordered = sorted(rows, key=lambda name: (ranks.get(name) is None, ranks.get(name), name))
-    return [_Row(_rank(ranks.get(name)), name, rows[name]) for name in ordered]
 
 
 def _print_matrix(tasks: Sequence[str], rows: Sequence[_Row]) -> None:

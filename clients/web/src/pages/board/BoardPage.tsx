@@ -2,17 +2,14 @@ import { Anchor, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link } from "@tanstack/react-router";
 import { lazy, memo, Suspense, useDeferredValue, useMemo } from "react";
-import { board, type Board, type TaskBoard } from "../../api/queries";
-import { Fold } from "../../parts/Fold";
+import { board, type Board } from "../../api/queries";
 import { Later } from "../../parts/Later";
 import { Section } from "../../parts/Section";
 import { Answered, Empty, Loading } from "../../parts/States";
-import { TaskTable } from "../../parts/TaskTable";
 import { Controls } from "./Controls";
 import { Exports } from "./Exports";
 import { HeatMap } from "./HeatMap";
 import { Overall } from "./Overall";
-import { Peers } from "./Peers";
 import { rankedOver, scopeOf } from "./scope";
 import { ScopeChips } from "./ScopeChips";
 import { Verdict } from "./Verdict";
@@ -40,10 +37,6 @@ export default function BoardPage() {
       </Answered>
     </Stack>
   );
-}
-
-function shown(task: TaskBoard, search: BoardSearch): TaskBoard {
-  return search.baselines === "no" ? { ...task, rows: task.rows.filter((row) => !row.baseline) } : task;
 }
 
 /** So few cells are made at once: each step of a board costs a paint. */
@@ -92,7 +85,9 @@ const Found = memo(function Found({ found, search }: { found: Board; search: Boa
             )}
           </Section>
           <Later rows={8} now={now}>
-            <TaskByTask board={found} search={search} />
+            <Section title="Model by task">
+              <HeatMap board={found} search={search} />
+            </Section>
             <Later rows={8} now={now}>
               <Suspense fallback={<Loading rows={8} />}>
                 <BoardPlots board={found} search={search} />
@@ -110,24 +105,3 @@ const Found = memo(function Found({ found, search }: { found: Board; search: Boa
     </>
   );
 });
-
-function TaskByTask({ board, search }: { board: Board; search: BoardSearch }) {
-  return (
-    <Section title="Model by task">
-      <HeatMap board={board} search={search} />
-      <Fold title="Every figure, task by task" size={14} style={{ marginTop: 12 }}>
-        <Stack gap="lg" mt="md">
-          {board.tasks.map((task) => (
-            <div key={task.task}>
-              <Title order={3} size="h5" mb={4}>
-                {task.task}
-              </Title>
-              <TaskTable task={shown(task, search)} />
-              {search.paper === "yes" && <Peers task={task} />}
-            </div>
-          ))}
-        </Stack>
-      </Fold>
-    </Section>
-  );
-}

@@ -5,11 +5,10 @@ import { Section } from "../../parts/Section";
 import { Answered } from "../../parts/States";
 import { Costs } from "./Costs";
 import { entriesOf } from "./entries";
-import { Failures } from "./Failures";
-import { Radar } from "./Radar";
+import { Endings } from "./Failures";
 import type { BoardSearch } from "../../api/board-search";
 
-/** What the board means: cost against performance, dimensions, how jobs end. */
+/** What the board means: cost against performance, how jobs end. */
 export default function BoardPlots({ board, search }: { board: Board; search: BoardSearch }) {
   const query = useQuery(figures(search));
   const entries = entriesOf(board, search.baselines !== "no");
@@ -20,10 +19,7 @@ export default function BoardPlots({ board, search }: { board: Board; search: Bo
           <Section title="Cost and performance">
             <Costs figures={found} entries={entries} />
           </Section>
-          <Section title="Difficulty dimensions">
-            <Radar figures={found} entries={entries} />
-          </Section>
-          <Failures figures={found} entries={entries} search={search} />
+          <Endings figures={found} entries={entries} search={search} />
         </SimpleGrid>
       )}
     </Answered>

@@ -1,4 +1,4 @@
-import { Chip, Group, MultiSelect, Select, Stack, Switch, Text } from "@mantine/core";
+import { Group, MultiSelect, Select, Switch } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useNavigate } from "@tanstack/react-router";
 import { tasks, type Board } from "../../api/queries";
@@ -41,42 +41,14 @@ export function Controls({ board, search }: { board: Board; search: BoardSearch 
           set({ task: task.length > 0 ? task : undefined });
         }}
       />
-      <Stack gap={3}>
-        <Text size="sm" fw={500} id="reading">
-          Flagged results
-        </Text>
-        <Chip.Group
-          value={search.policy ?? "ours"}
-          onChange={(policy) => {
-            set({ policy: policy === "published" ? "published" : undefined });
-          }}
-        >
-          <Group gap={6} role="radiogroup" aria-labelledby="reading">
-            <Chip value="ours" size="sm" radius="sm">
-              count as failures
-            </Chip>
-            <Chip value="published" size="sm" radius="sm">
-              as the paper
-            </Chip>
-          </Group>
-        </Chip.Group>
-      </Stack>
-      <Stack gap={6}>
-        <Switch
-          label="Baselines"
-          checked={search.baselines !== "no"}
-          onChange={(event) => {
-            set({ baselines: event.currentTarget.checked ? undefined : "no" });
-          }}
-        />
-        <Switch
-          label="The paper’s figures"
-          checked={search.paper === "yes"}
-          onChange={(event) => {
-            set({ paper: event.currentTarget.checked ? "yes" : undefined });
-          }}
-        />
-      </Stack>
+      <Switch
+        label="Baselines"
+        checked={search.baselines !== "no"}
+        mb={6}
+        onChange={(event) => {
+          set({ baselines: event.currentTarget.checked ? undefined : "no" });
+        }}
+      />
     </Group>
   );
 }

@@ -70,67 +70,62 @@ export function drawnParts(parts: readonly Part[]): Part[] {
   });
 }
 
-/** How jobs end, and why actions are refused. */
-export function Failures({
-  figures,
-  entries,
-  search,
-}: {
+type Counts = Figures["failures"][number] & { label: string };
+
+function rowsOf(figures: Figures, entries: readonly Entry[]): Counts[] {
+  return entries.flatMap((entry) => {
+    const found = figures.failures.find((one) => keyOf(one) === entry.key);
+    return found === undefined ? [] : [{ ...found, label: entry.label }];
+  });
+}
+
+interface Drawn {
   figures: Figures;
   entries: readonly Entry[];
-  search: BoardSearch;
-}) {
+}
+
+/** How jobs end. */
+export function Endings({ figures, entries, search }: Drawn & { search: BoardSearch }) {
   const router = useRouter();
-  const hrefOf = (row: Figures["failures"][number], ended: string): string | undefined => {
+  const hrefOf = (row: Counts, ended: string): string | undefined => {
     const jobs = jobsEndedSo(row, ended, figures.track, search);
     if (jobs === null) return undefined;
     return router.history.createHref(router.buildLocation({ to: "/jobs", search: jobs }).href);
   };
-  const rows = entries.flatMap((entry) => {
-    const found = figures.failures.find((one) => keyOf(one) === entry.key);
-    return found === undefined ? [] : [{ ...found, label: entry.label }];
-  });
-  const refused = rows.filter((row) => row.refused_actions > 0);
+  const rows = rowsOf(figures, entries);
   return (
-    <>
-      <Section title="How jobs end, and why they fail">
-        <Text size="sm" className="dimmed">
-          A bar opens the jobs behind it.
-        </Text>
+    <Section title="How jobs end, and why they fail">
+      <Text size="sm" className="dimmed">
+        A bar opens the jobs behind it.
+      </Text>
+      <Shares
+        name="How jobs end"
+        what="jobs"
+        parts={partsOf(
+          rows.map((row) => ({ label: row.label, counts: row.outcomes, hrefOf: (name) => hrefOf(row, name) })),
+        )}
+        labels={rows.map((row) => row.label)}
+      />
+    </Section>
+  );
+}
+
+/** Why actions are refused. */
+export function Refusals({ figures, entries }: Drawn) {
+  const rows = rowsOf(figures, entries).filter((row) => row.refused_actions > 0);
+  return (
+    <Section title="Why actions are refused">
+      {rows.length === 0 ? (
+        <Text size="sm">No action was refused.</Text>
+      ) : (
         <Shares
-          name="How jobs end"
-          what="jobs"
-          parts={partsOf(
-            rows.map((row) => ({ label: row.label, counts: row.outcomes, hrefOf: (name) => hrefOf(row, name) })),
-          )}
+          name="Why actions are refused"
+          what="actions"
+          parts={partsOf(rows.map((row) => ({ label: row.label, counts: row.refusals })))}
           labels={rows.map((row) => row.label)}
         />
-      </Section>
-      <Section title="Why actions are refused">
-        {refused.length === 0 ? (
-          <Text size="sm">No action was refused.</Text>
-        ) : (
-          <>
-            <Shares
-              name="Why actions are refused"
-              what="actions"
-              parts={partsOf(refused.map((row) => ({ label: row.label, counts: row.refusals })))}
-              labels={refused.map((row) => row.label)}
-            />
-            <DataTable
-              name="Refused of all actions"
-              columns={["Model", "Actions", "Refused", "Share"]}
-              rows={rows.map((row) => [
-                row.label,
-                count(row.actions),
-                count(row.refused_actions),
-                percent(row.actions === 0 ? null : row.refused_actions / row.actions, 1),
-              ])}
-            />
-          </>
-        )}
-      </Section>
-    </>
+      )}
+    </Section>
   );
 }
 

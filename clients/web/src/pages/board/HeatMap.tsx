@@ -1,7 +1,7 @@
 import { Chip, Group, Text } from "@mantine/core";
 import { Link, useNavigate } from "@tanstack/react-router";
 import type { Board, Row, TaskBoard } from "../../api/queries";
-import { dollars, measured, number, percent, successes } from "../../format";
+import { measured, number, percent, successes } from "../../format";
 import { ModelByTask } from "../../parts/ModelByTask";
 import { cellOf, entriesOf, type Entry } from "./entries";
 import type { BoardSearch, Figure } from "../../api/board-search";
@@ -11,13 +11,12 @@ import { shade, shareOf } from "./shades";
 const FIGURES: readonly { value: Figure; label: string }[] = [
   { value: "success", label: "Success" },
   { value: "indicator", label: "Indicator" },
-  { value: "cost", label: "Cost" },
 ];
 
 function valueOf(row: Row | undefined, figure: Figure): number | null {
   if (row === undefined) return null;
   if (figure === "success") return row.success_rate;
-  return figure === "indicator" ? row.indicator_mean : row.cost_usd_mean;
+  return row.indicator_mean;
 }
 
 /** How well each model does on each task; every cell opens the jobs behind it. */
@@ -29,9 +28,10 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
     <>
       <Group justify="space-between" mb="xs">
         <Text size="sm" className="dimmed">
-          {figure === "success" && "Share of counted jobs that succeeded. "}
-          {figure === "indicator" && "Mean performance indicator, in each task’s unit. "}
-          {figure === "cost" && "Mean dollars a job. "}A cell opens the jobs behind it.
+          {figure === "success"
+            ? "Share of counted jobs that succeeded. "
+            : "Mean performance indicator, in each task’s unit. "}
+          A cell opens the jobs behind it.
         </Text>
         <Chip.Group
           value={figure}
@@ -78,9 +78,7 @@ export function HeatMap({ board, search }: { board: Board; search: BoardSearch }
             <Cell key={task.task} task={task} entry={entry} figure={figure} entries={entries} />
           )),
         }))}
-      >
-        {search.paper === "yes" && <Ghosts board={board} figure={figure} />}
-      </ModelByTask>
+      />
     </>
   );
 }
@@ -100,14 +98,14 @@ function Cell({ task, entry, figure, entries }: CellOf) {
   }
   const values = entries.map((other) => valueOf(cellOf(task, other), figure));
   const share = figure === "success" ? value : (shareOf(value, values) ?? 0);
-  const shown = { success: percent(value), indicator: number(value), cost: dollars(value) }[figure];
+  const shown = figure === "success" ? percent(value) : number(value);
   const interval = `95 % interval ${percent(row.success_low)} to ${percent(row.success_high)}`;
   return (
     <Link
       className="heat-cell"
       to="/jobs"
       search={jobsBehind(row)}
-      style={shade(figure === "cost" ? 1 - share : share)}
+      style={shade(share)}
       title={`${entry.label} on ${task.task}: ${successes(row.successes)} of ${row.trials} succeeded, ${interval}${row.flagged > 0 ? `; ${row.flagged} flagged` : ""}`}
     >
       <span>
@@ -120,31 +118,4 @@ function Cell({ task, entry, figure, entries }: CellOf) {
       </small>
     </Link>
   );
-}
-
-function Ghosts({ board, figure }: { board: Board; figure: Figure }) {
-  const ranked = board.published.map((row) => row.model);
-  const names = [...new Set([...ranked, ...board.tasks.flatMap((task) => task.published.map((row) => row.model))])];
-  return names.map((name) => (
-    <tr key={name} className="ghost">
-      <th scope="row" style={{ textAlign: "left" }}>
-        <Text size="sm" fs="italic" style={{ whiteSpace: "nowrap" }}>
-          {name} (paper)
-        </Text>
-      </th>
-      {board.tasks.map((task) => {
-        const row = task.published.find((one) => one.model === name);
-        const value =
-          row === undefined || figure === "cost" ? null : figure === "success" ? row.success_rate : row.indicator_mean;
-        return (
-          <td key={task.task}>
-            <span className="heat-cell heat-empty">
-              {value === null ? "–" : figure === "success" ? percent(value) : number(value)}
-              {row !== undefined && <small>of {row.trials}</small>}
-            </span>
-          </td>
-        );
-      })}
-    </tr>
-  ));
 }

@@ -30,8 +30,7 @@ const VALUES: Values<OverallView> = {
 export function Overall({ board, search }: { board: Board; search: BoardSearch }) {
   const overall = board.overall.filter((row) => search.baselines !== "no" || !row.baseline);
   const labels = new Map(entriesOf(board, true).map((entry) => [entry.key, entry.label]));
-  const published = search.paper === "yes" ? board.published : [];
-  const most = Math.max(1, ...[...overall, ...published].map((row) => row.rank_high ?? 1));
+  const most = Math.max(1, ...overall.map((row) => row.rank_high ?? 1));
   const { rows, head } = useSorting(overall, VALUES);
   const [ticked, setTicked] = useState<readonly string[]>([]);
   const names = namesOf(board);
@@ -40,7 +39,6 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
     setTicked(ticked.includes(key) ? ticked.filter((one) => one !== key) : [...ticked, key].slice(-2));
   };
   const ties = sharedRanks(overall);
-  const paperTies = sharedRanks(published);
   return (
     <>
       <Ticked models={ticked.flatMap((key) => names.get(key) ?? [])} board={board} search={search} />
@@ -89,23 +87,6 @@ export function Overall({ board, search }: { board: Board; search: BoardSearch }
                   tick(keyOf(row));
                 }}
               />
-            ))}
-            {published.map((row) => (
-              <Table.Tr key={`paper ${row.model}`} className="ghost">
-                <Table.Td>
-                  <Group gap={6} className="name-and-badges">
-                    {row.model}
-                    <Badge variant="outline" color="gray" size="sm" tt="none" styles={{ root: { color: "inherit" } }}>
-                      paper
-                    </Badge>
-                  </Group>
-                </Table.Td>
-                <Place row={row} most={most} tied={paperTies.has(row.rank)} />
-                <Table.Td className="figures">{number(row.mean_rank, 2)}</Table.Td>
-                <Table.Td colSpan={5} className="dimmed">
-                  ranked by the paper’s own trials, among its models only
-                </Table.Td>
-              </Table.Tr>
             ))}
           </Table.Tbody>
         </Table>

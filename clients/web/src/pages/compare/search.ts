@@ -1,7 +1,7 @@
 import { readSearch, type BoardSearch } from "../../api/board-search";
 
 /** What of a board's address a comparison of models keeps: the same jobs are compared that the board counts. */
-export type Scoped = Pick<BoardSearch, "track" | "category" | "task" | "policy">;
+export type Scoped = Pick<BoardSearch, "track" | "category" | "task">;
 
 /** What is compared: two jobs, or two models on the jobs of a board. */
 export interface CompareSearch extends Scoped {
@@ -13,8 +13,8 @@ export interface CompareSearch extends Scoped {
 const NAMES = ["a", "b", "models"] as const;
 
 /** A board's choice of jobs, without what only changes how the board looks. */
-export function scoped({ track, category, task, policy }: BoardSearch): Scoped {
-  return { track, category, task, policy };
+export function scoped({ track, category, task }: BoardSearch): Scoped {
+  return { track, category, task };
 }
 
 export function readCompareSearch(raw: Record<string, unknown>): CompareSearch {

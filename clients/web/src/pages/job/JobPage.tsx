@@ -13,7 +13,7 @@ import { Section } from "../../parts/Section";
 import { Answered, Empty } from "../../parts/States";
 import { BuildPart } from "./BuildPart";
 import { JobFacts, JobHead } from "./JobFacts";
-import { JobRecords } from "./JobRecords";
+import { JobFiles } from "./JobFiles";
 import { useLive } from "./live";
 import { prompts as promptsQuery, replay as replayQuery, rolloutsOf, transcript as transcriptQuery } from "./queries";
 import { TrialPart } from "./TrialPart";
@@ -35,7 +35,7 @@ export default function JobPage() {
           <Live state={state} />
           <JobFacts job={job} />
           <Room job={job} />
-          <JobRecords job={job} />
+          <JobFiles job={job} />
         </Stack>
       )}
     </Answered>

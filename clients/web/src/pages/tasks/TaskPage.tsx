@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { board, task as taskQuery, type TaskDetail } from "../../api/queries";
-import { measured, number, ruleLines } from "../../format";
+import { measured, number } from "../../format";
 import { JobsSummary } from "../../parts/JobsSummary";
 import { Markdown } from "../../parts/Markdown";
 import { Section } from "../../parts/Section";
@@ -13,7 +13,6 @@ import { TrackSelect } from "../../parts/TrackSelect";
 import type { Scenario } from "../../scene/Surroundings";
 import { Machines } from "./Machines";
 
-const Distribution = lazy(() => import("./Distribution"));
 const ScenarioView = lazy(() => import("../../scene/ScenarioView"));
 const route = getRouteApi("/tasks/$name");
 
@@ -52,16 +51,13 @@ export default function TaskPage() {
                 <Markdown text={task.statement} />
               </Section>
             </div>
-            <Stack style={{ flex: "1 1 380px", minWidth: 0 }} gap="lg">
+            <div style={{ flex: "1 1 380px", minWidth: 0 }}>
               <Section title="Scenario">
                 <Suspense fallback={<Loading rows={8} />}>
                   <ScenarioView scenario={task.document.scenario as Scenario} />
                 </Suspense>
               </Section>
-              <Section title="Constraints and scoring">
-                <Rules task={task} />
-              </Section>
-            </Stack>
+            </div>
           </Group>
           <Machines task={task} />
         </Stack>
@@ -78,23 +74,16 @@ function Standings({ task }: { task: TaskDetail }) {
       {(found) => {
         const ranked = found.tasks.find((one) => one.task === task.name);
         return (
-          <>
-            <Section title="Models" aside={<Tracks known={found.tracks} chosen={found.track} />}>
-              {ranked === undefined || ranked.rows.length === 0 ? (
-                <Empty title="No job of this task has ended on this track" />
-              ) : (
-                <Stack gap="sm">
-                  <JobsSummary search={{ task: task.name, track: found.track ?? undefined, state: "done" }} />
-                  <TaskTable task={ranked} />
-                </Stack>
-              )}
-            </Section>
-            {found.track !== null && (
-              <Suspense fallback={<Loading rows={5} />}>
-                <Distribution task={task} track={found.track} />
-              </Suspense>
+          <Section title="Models" aside={<Tracks known={found.tracks} chosen={found.track} />}>
+            {ranked === undefined || ranked.rows.length === 0 ? (
+              <Empty title="No job of this task has ended on this track" />
+            ) : (
+              <Stack gap="sm">
+                <JobsSummary search={{ task: task.name, track: found.track ?? undefined, state: "done" }} />
+                <TaskTable task={ranked} />
+              </Stack>
             )}
-          </>
+          </Section>
         );
       }}
     </Answered>
@@ -109,26 +98,5 @@ function Tracks({ known, chosen }: { known: readonly string[]; chosen: string | 
       chosen={chosen}
       onTrack={(track) => void navigate({ search: { track }, replace: true, resetScroll: false })}
     />
-  );
-}
-
-function Rules({ task }: { task: TaskDetail }) {
-  const { constraints, scoring } = task.document as Record<string, unknown>;
-  const parts = { "What may be built": constraints, "What counts": scoring, Difficulty: task.difficulty };
-  return (
-    <Stack gap="sm">
-      {Object.entries(parts).map(([title, part]) => (
-        <div key={title}>
-          <Text size="sm" fw={600}>
-            {title}
-          </Text>
-          <ul className="rules">
-            {ruleLines(part).map((line) => (
-              <li key={line}>{line}</li>
-            ))}
-          </ul>
-        </div>
-      ))}
-    </Stack>
   );
 }

@@ -27,7 +27,6 @@ from buildarena_benchmark.leaderboard.ended_jobs import (
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.making import summaries_made_by
 from buildarena_benchmark.leaderboard.overall import OverallRow
-from buildarena_benchmark.leaderboard.peers import PeerRow, peer_rows
 from buildarena_benchmark.leaderboard.plot_data import (
     FailureRow,
     cost_bins,
@@ -37,7 +36,6 @@ from buildarena_benchmark.leaderboard.plot_data import (
 )
 from buildarena_benchmark.leaderboard.published import (
     PublishedRow,
-    published_overall,
     published_rows,
 )
 from buildarena_benchmark.leaderboard.standings import TestCache
@@ -71,7 +69,6 @@ __all__ = [
     "EndedJob",
     "FailureRow",
     "OverallRow",
-    "PeerRow",
     "PublishedRow",
     "Tally",
     "TaskBoard",
@@ -88,10 +85,8 @@ __all__ = [
     "counted_trials",
     "failure_row",
     "failure_rows",
-    "peer_rows",
     "performance_table",
     "plain_table",
-    "published_overall",
     "published_rows",
     "ranked_board",
     "summaries_made_by",

@@ -10,20 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
-from itertools import combinations
 from types import MappingProxyType
 
-import numpy as np
-
-from buildarena_benchmark.statistics import (
-    Ranking,
-    Sample,
-    adjusted,
-    combined,
-    exact_interval,
-    pair_tests,
-    rank_models,
-)
+from buildarena_benchmark.statistics import exact_interval
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,31 +55,6 @@ def published_rows() -> Mapping[str, Sequence[PublishedRow]]:
         row = _row(line)
         rows.setdefault(row.task, []).append(row)
     return MappingProxyType({task: tuple(task_rows) for task, task_rows in rows.items()})
-
-
-@cache
-def published_overall() -> tuple[Sequence[str], Ranking]:
-    """The paper's models in its order, and their ranking over its nine tasks.
-
-    Mean ranks are of success rates and indicators. The paper gives no spread of its indicators,
-    so who is better beyond chance rests on the success rates alone.
-    """
-    tasks = published_rows()
-    models = [row.model for row in next(iter(tasks.values()))]
-    by_name = [{row.model: row for row in rows} for rows in tasks.values()]
-    table = [[rows[model] for model in models] for rows in by_name]
-    success = np.array([[row.success_rate for row in rows] for rows in table])
-    indicator = np.array([[row.indicator_mean for row in rows] for rows in table])
-    tests = combined(
-        [pair_tests(list(combinations([_trials(row) for row in rows], 2))) for rows in table]
-    )
-    return models, rank_models((success, indicator), tests, adjusted([tests])[0])
-
-
-def _trials(row: PublishedRow) -> Sample:
-    """The trials behind the counts, by success alone."""
-    success = (np.arange(row.trials) < row.successes).astype(float)
-    return Sample.of(np.stack([success, success], axis=1))
 
 
 def _row(line: Mapping[str, str]) -> PublishedRow:

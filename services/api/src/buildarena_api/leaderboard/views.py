@@ -16,9 +16,6 @@ from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
     Cell,
-    peer_rows,
-    published_overall,
-    published_rows,
     verdict_of,
 )
 from buildarena_benchmark.scorers.registry import known_flags
@@ -104,36 +101,6 @@ class Row(_View):
     manifest: str = Field(description="Path of the versions behind its score")
 
 
-class PublishedView(_View):
-    """The paper's figures: a reference, never ranked with ours."""
-
-    model: str
-    snapshot: str
-    matches: list[str] = Field(description="Our models with the same snapshot")
-    trials: int
-    successes: float
-    success_rate: float
-    success_low: float
-    success_high: float
-    indicator_mean: float
-    parts_mean: float
-    input_tokens_mean: float | None
-    output_tokens_mean: float | None
-    requests_mean: float | None
-
-
-class PeerView(_View):
-    """What another benchmark published of its task, in its world: never ranked with ours."""
-
-    peer: str = Field(description="The other benchmark")
-    peer_task: str = Field(description="What it calls its task")
-    model: str
-    workflow: str
-    indicator_mean: float
-    indicator_best: float
-    indicator_std: float
-
-
 class TaskBoard(_View):
     """All models on one task, the best first."""
 
@@ -144,10 +111,6 @@ class TaskBoard(_View):
     indicator: str
     unit: str
     rows: list[Row]
-    published: list[PublishedView]
-    peers: list[PeerView] = Field(
-        default=[], description="What other benchmarks published of the task most like this one"
-    )
 
 
 class OverallView(_View):
@@ -169,7 +132,6 @@ class OverallView(_View):
     cost_usd_mean: float | None
     output_tokens_mean: float | None
     pareto: bool = Field(description="No other model is both better and cheaper")
-    dimensions: dict[str, float] = Field(description="Score, 0 to 1, by difficulty dimension")
 
 
 class FlagView(_View):
@@ -182,16 +144,6 @@ class FlagView(_View):
 
 
 FLAGS = [FlagView.model_validate(flag, from_attributes=True) for flag in known_flags().values()]
-
-
-class PublishedOverall(_View):
-    """The paper's models ranked over its nine tasks, among themselves."""
-
-    model: str
-    mean_rank: float
-    rank: int
-    rank_low: int
-    rank_high: int
 
 
 class VerdictView(_View):
@@ -221,7 +173,6 @@ class Board(UnderPolicy):
     overall: list[OverallView] = Field(default=[])
     ranked: list[str] = Field(default=[], description="Tasks that `overall` is over")
     verdict: VerdictView | None = Field(default=None, description="null when `overall` has no row")
-    published: list[PublishedOverall] = Field(default=[])
 
 
 class ChangeView(_View):
@@ -306,8 +257,6 @@ def board_view(
                 outdated=found.outdated,
                 **_figure(task, policy),
                 rows=[row(ranked, found.task) for ranked in found.rows],
-                published=_published(found.task, registry),
-                peers=_peers(found.task),
             )
             for found, task in ((found, tasks[found.task]) for found in board.tasks)
         ],
@@ -322,7 +271,6 @@ def board_view(
         ],
         ranked=list(board.ranked),
         verdict=None if verdict is None else VerdictView.model_validate(verdict),
-        published=published_ranking(),
     )
 
 
@@ -333,41 +281,3 @@ def _figure(task: Task | None, policy: ScoringPolicy) -> dict[str, str]:
     if policy == ScoringPolicy.PUBLISHED and task.published_metric is not None:
         return {"indicator": task.published_metric, "unit": ""}
     return {"indicator": task.indicator.name, "unit": task.indicator.unit}
-
-
-def published_ranking() -> list[PublishedOverall]:
-    """The paper's models, the best first."""
-    models, ranking = published_overall()
-    rows = [
-        PublishedOverall(
-            model=model,
-            mean_rank=float(ranking.mean_rank[i]),
-            rank=int(ranking.rank[i]),
-            rank_low=int(ranking.low[i]),
-            rank_high=int(ranking.high[i]),
-        )
-        for i, model in enumerate(models)
-    ]
-    return sorted(rows, key=lambda row: row.mean_rank)
-
-
-def _published(task: str, registry: ModelRegistry) -> list[PublishedView]:
-    by_snapshot: dict[str, list[str]] = {}
-    for entry in registry.models.values():
-        by_snapshot.setdefault(entry.model, []).append(entry.name)
-    return [
-        PublishedView.model_validate(
-            {
-                **{name: getattr(row, name) for name in row.__dataclass_fields__},
-                "matches": by_snapshot.get(row.snapshot, []),
-            }
-        )
-        for row in published_rows().get(task, ())
-    ]
-
-
-def _peers(task: str) -> list[PeerView]:
-    return [
-        PeerView.model_validate({name: getattr(row, name) for name in PeerView.model_fields})
-        for row in peer_rows().get(task, ())
-    ]

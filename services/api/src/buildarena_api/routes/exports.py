@@ -17,7 +17,7 @@ from buildarena_api.http.concurrency import limited
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
-from buildarena_api.leaderboard.views import Board, PublishedView, Row, board_view
+from buildarena_api.leaderboard.views import Board, Row, board_view
 from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
@@ -113,7 +113,7 @@ async def export(
     *,
     format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
 ) -> Response:
-    """The leaderboard as a file; the paper's figures are in it as rows of source `published`."""
+    """The leaderboard as a file; the LaTeX one has the paper's tables beside ours."""
     track, tracks = selection.track, selection.tracks
 
     def render(board: RankedBoard) -> bytes:
@@ -177,9 +177,8 @@ def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], B
 
 def _columns() -> list[str]:
     names = [name for name in Row.model_fields if name not in PLACES]
-    extra = [name for name in PublishedView.model_fields if name not in Row.model_fields]
-    about = ("source", "track", "task_version", "indicator", "unit")
-    return list(dict.fromkeys(["task", "model", *about, *names, *extra]))
+    about = ("track", "task_version", "indicator", "unit")
+    return list(dict.fromkeys(["task", "model", *about, *names]))
 
 
 def _flat(board: Board) -> list[dict[str, Any]]:
@@ -193,12 +192,9 @@ def _flat(board: Board) -> list[dict[str, Any]]:
             "indicator": task.indicator,
             "unit": task.unit,
         }
-        for source, rows in (("measured", task.rows), ("published", task.published)):
-            for row in rows:
-                values = row.model_dump(mode="json", exclude=set(PLACES))
-                if source == "published":
-                    head = {**head, "track": None, "task_version": None}
-                records.append({"source": source, **head, **values})
+        records += [
+            {**head, **row.model_dump(mode="json", exclude=set(PLACES))} for row in task.rows
+        ]
     return [{name: _plain(record.get(name)) for name in _columns()} for record in records]
 
 
@@ -227,7 +223,7 @@ def _parquet(rows: Sequence[dict[str, Any]]) -> bytes:
 
 def _kind(name: str) -> type:
     """What a column holds, be it optional or not; text for all that is not a plain number."""
-    fields = {**PublishedView.model_fields, **Row.model_fields}
+    fields = Row.model_fields
     annotation = fields[name].annotation if name in fields else str
     choices = get_args(annotation) if get_origin(annotation) is UnionType else (annotation,)
     return next((choice for choice in choices if choice in (int, float, bool)), str)
