@@ -56,7 +56,10 @@ def test_figures_are_those_of_the_trials(api, context, policy) -> None:
     board = api.get("/v1/leaderboard", params={"policy": policy}).json()
     for name in ("mean_rank", "cost_usd_mean", "success_rate_mean", "pareto"):
         assert [row[name] for row in found["front"]] == [row[name] for row in board["overall"]]
-    assert [row["model"] for row in found["dimensions"]] == [row["model"] for row in found["front"]]
+    ranked = [row["model"] for row in board["overall"] if row["rank"] is not None]
+    assert [row["model"] for row in found["dimensions"]] == ranked
+    scores = [score for row in found["dimensions"] for score in row["dimensions"].values()]
+    assert all(0 <= score <= 1 for score in scores)
     assert any(row["pareto"] for row in found["front"])
     known = {"If-None-Match": answer.headers["etag"]}
     again = api.get("/v1/leaderboard/figures", params={"policy": policy}, headers=known)
