@@ -14,8 +14,8 @@ from buildarena_besiege import (
 )
 from buildarena_geometry.keys import KEYS
 
-CHALLENGE = Path(__file__).parents[1] / "data" / "own_keys"
-THREE, FIVE = (CHALLENGE / name / "machine_tuned.bsg" for name in ("three_blocks", "five_blocks"))
+MACHINES = Path(__file__).parents[1] / "data" / "own_keys"
+THREE, FIVE = (MACHINES / name / "machine_tuned.bsg" for name in ("three_blocks", "five_blocks"))
 SHORT_ORBIT = """
 name: short-orbit
 title: Up

@@ -1,11 +1,9 @@
 """The dashboard in a real browser, against the whole service."""
 
-import subprocess
-
 import httpx
 import pytest
 from pydantic import SecretStr
-from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
+from support.documents.pages import LOOKS, in_browser, needs_pages
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from support.servers.stacks import finished, running_stack
 
@@ -25,14 +23,11 @@ pytestmark = needs_pages
 @pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
 @pytest.mark.parametrize("looks", LOOKS)
 def test_pages_work_in_a_browser(tmp_path, files, looks) -> None:
-    report = tmp_path / "report.md"
     with running_stack(tmp_path) as stack:
         with httpx.Client(base_url=stack.url) as client:
             sweep_id = client.post("/v1/sweeps", json=SWEEP).raise_for_status().json()["id"]
             finished(client, sweep_id)
-        write = [BUILDARENA, "report", sweep_id, "--out", str(report), "--url", stack.url]
-        subprocess.run(write, check=True, timeout=60)
-        in_browser(stack.url, [files], BUILDARENA_WEB_REPORT=str(report), **looks)
+        in_browser(stack.url, [files], **looks)
 
 
 @pytest.mark.nightly

@@ -4,8 +4,7 @@ import type { components } from "../src/api/contract";
 import { ask, launched, settled, type Visit, visit } from "./browser";
 
 // The questions that people open the pages with, and in how many clicks from the front page they are
-// answered. The fifth, "show this machine to somebody who has no service", takes one command:
-// `buildarena job page ID`, whose file tests/notebooks/test_service.py reads.
+// answered.
 
 type Schemas = components["schemas"];
 

@@ -1,4 +1,3 @@
-import { readFileSync } from "node:fs";
 import type { Browser, BrowserContext, Page } from "playwright-core";
 import { afterAll, beforeAll, describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
@@ -7,7 +6,6 @@ import { count, dollars, number, percent, places } from "../src/format";
 
 type Schemas = components["schemas"];
 
-const REPORT = process.env.BUILDARENA_WEB_REPORT ?? "";
 const TASK = "support-1";
 /** No worker of the tests' service runs this simulator, so its jobs wait once they are built. */
 const WAITING = { tasks: [TASK], models: ["builtin/expert"], simulator: "pybullet" };
@@ -16,35 +14,6 @@ let browser: Browser;
 
 function opened(path: string, url = URL_OF_SERVICE, width = 1280): Promise<Visit> {
   return visit(browser, path, { url, width, scheme: width < 800 ? "dark" : "light" });
-}
-
-/** The rows of a Markdown table that follows a heading, by column. */
-function reported(heading: string): Record<string, string>[] {
-  const after = readFileSync(REPORT, "utf8").split(`## ${heading}\n`)[1] ?? "";
-  const lines =
-    after
-      .split("\n## ")[0]
-      ?.split("\n")
-      .filter((line) => line.startsWith("|")) ?? [];
-  const cells = (line: string): string[] =>
-    line
-      .split("|")
-      .slice(1, -1)
-      .map((cell) => cell.trim().replaceAll("\\", ""));
-  const columns = cells(lines[0] ?? "");
-  return lines
-    .slice(2)
-    .map((line) => Object.fromEntries(cells(line).map((cell, index) => [`${index} ${columns[index] ?? ""}`, cell])));
-}
-
-/** Equal as far as both tell: what one rounds to fewer places, the other may have more exactly. */
-function agree(page: string, report: string): boolean {
-  const told = [page, report].map((text) => text.replace(/[^\d.,-]/g, "").replaceAll(",", ""));
-  const [one, another] = told.map(Number);
-  if (told.some((text) => text === "") || one === undefined || another === undefined)
-    return told[0] === told[1] || told.every((text) => text === "" || text === "-");
-  const digits = Math.min(...told.map((text) => text.split(".")[1]?.length ?? 0));
-  return Math.abs(one - another) <= 0.5 * 10 ** -digits + 1e-9;
 }
 
 beforeAll(async () => {
@@ -153,43 +122,6 @@ describe("every figure of the board", () => {
         )
         .sort(),
     );
-  });
-
-  it("is the report's", async () => {
-    const overall = await textsOf(page, "section[aria-label=Overall] table");
-    const ranking = reported("Ranking");
-    expect(ranking).toHaveLength(overall.length);
-    for (const row of ranking) {
-      const shown = overall.find((one) => one[0]?.includes(row["0 model"] ?? "?"));
-      expect(shown?.[1]?.replace("tied", "")).toBe(row["1 rank"]);
-      const ends = (row["2 95 % of place"] ?? "").split("-");
-      expect(shown?.[2]).toBe([...new Set(ends)].join("–"));
-      for (const [column, name] of [
-        [3, "3 mean rank"],
-        [4, "4 score"],
-        [5, "5 success"],
-        [6, "6 USD"],
-      ] as const) {
-        expect(
-          agree(shown?.[column] ?? "", row[name] ?? ""),
-          `${row["0 model"] ?? ""} ${name}: ${shown?.[column] ?? ""} and ${row[name] ?? ""}`,
-        ).toBe(true);
-      }
-    }
-    const cells = await textsOf(ofTask, `table[aria-label="Models on ${TASK}"]`);
-    const performance = reported("Performance");
-    expect(performance).toHaveLength(cells.length);
-    for (const row of performance) {
-      const shown = cells.find((one) => one[0]?.startsWith(row["1 model"] ?? "?")) ?? [];
-      expect(shown[1]?.replace(" tied", "")).toBe(row["2 rank"]);
-      expect(shown[3]).toContain(`(${(row["3 of scored"] ?? "").replace("/", " of ")})`);
-      expect(agree((shown[3] ?? "").split("(")[0] ?? "", row["5 success"] ?? "")).toBe(true);
-      expect(agree(/^[≥\d.,–-]+/.exec((shown[4] ?? "").replace("≥ ", ""))?.[0] ?? "", row["8 indicator"] ?? "")).toBe(
-        true,
-      );
-      expect(agree(/^-?[\d.]*/.exec(shown[5] ?? "")?.[0] ?? "", row["10 score"] ?? "")).toBe(true);
-      expect(agree(shown[6] ?? "", row["11 best"] ?? "")).toBe(true);
-    }
   });
 
   it("has a cell that opens exactly its jobs", async () => {
