@@ -37,9 +37,7 @@ def require_programs() -> None:
     if os.geteuid() != 0:
         sys.exit("it needs root: it runs a Docker engine and makes base images")
     if missing:
-        sys.exit(
-            f"it needs Debian's packages: apt-get install {' '.join(missing)}"
-        )
+        sys.exit(f"it needs Debian's packages: apt-get install {' '.join(missing)}")
 
 
 class Engine:
