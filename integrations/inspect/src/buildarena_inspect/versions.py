@@ -16,7 +16,7 @@ from buildarena_simulation import SIMULATION_VERSION, engine_version
 INTERFACE: Final = "A"
 """The X of `N-X`: the next letter when a task's arguments or its log change for who uses them."""
 FILE: Final = "versions.json"
-"""By task: N, and what it is the number of. `make generate NAME=inspect` raises N where that changed."""
+"""By task: N, and what it numbers. `make generate NAME=inspect` raises N where that changed."""
 
 
 def inspect_version(tasks: Sequence[str]) -> str:
