@@ -1,6 +1,6 @@
 import { keepPreviousData, queryOptions } from "@tanstack/react-query";
 import type { BoardSearch } from "./board-search";
-import { client, jsonOf, taken, type Schema } from "./client";
+import { client, taken, type Schema } from "./client";
 import type { paths } from "./contract";
 import { readSite } from "./kept";
 import { every, isSite } from "./site";
@@ -128,15 +128,6 @@ export const jobFiles = (id: string) =>
   queryOptions({
     queryKey: ["job-files", id],
     queryFn: () => taken(client.GET("/v1/jobs/{job_id}/artifacts", { params: { path: { job_id: id } } })),
-  });
-
-/** An artifact's content never changes under its hash, so it is read once. */
-export const artifact = <Data>(id: string, name: string, hash: string | undefined) =>
-  queryOptions({
-    queryKey: ["artifact", hash],
-    enabled: hash !== undefined,
-    staleTime: Infinity,
-    queryFn: () => jsonOf<Data>(`/v1/jobs/${encodeURIComponent(id)}/artifacts/${encodeURIComponent(name)}`),
   });
 
 export const tasks = () =>

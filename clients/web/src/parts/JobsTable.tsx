@@ -22,9 +22,6 @@ const VALUES: Values<JobView> = {
   finished: (job) => job.finished_at,
 };
 
-/** The names of the columns, as the service sorts by them. */
-export type JobSort = "task" | "model" | "seed" | "outcome" | "indicator" | "cost" | "finished";
-
 interface Listed {
   jobs: readonly JobView[];
   onEnd?: () => void;

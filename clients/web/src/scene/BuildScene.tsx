@@ -1,7 +1,6 @@
 import { useMemo } from "react";
 import { Box3 } from "three";
 import { Ghosts } from "./Ghosts";
-import type { CameraLock } from "./lock";
 import { boundsOf, machineOf, type PartView, type PlacedView } from "./machine";
 import { asPlaced, Parts } from "./Parts";
 import { Shadows } from "./Shadows";
@@ -17,24 +16,12 @@ interface BuildSceneProps {
   onChoose?: (id: string) => void;
   subject: string;
   label: string;
-  height?: number;
-  lock?: CameraLock;
 }
 
 const NONE: readonly PlacedView[] = [];
 
 /** A machine as it stands after a step. */
-export default function BuildScene({
-  parts,
-  ghosts = NONE,
-  whole,
-  chosen,
-  onChoose,
-  subject,
-  label,
-  height = 420,
-  lock,
-}: BuildSceneProps) {
+export default function BuildScene({ parts, ghosts = NONE, whole, chosen, onChoose, subject, label }: BuildSceneProps) {
   const machine = useMemo(() => machineOf(parts.values()), [parts]);
   const bounds = useMemo(() => {
     const ends = boundsOf(machineOf(whole.values()));
@@ -44,7 +31,7 @@ export default function BuildScene({
     return new Box3().copy(ends).union(boundsOf(machine)).union(tried);
   }, [machine, whole, ghosts]);
   return (
-    <Stage bounds={bounds} height={height} label={label} subject={subject} lock={lock}>
+    <Stage bounds={bounds} height={420} label={label} subject={subject}>
       <Surroundings scenario={null} floor={bounds.isEmpty() ? 0 : bounds.min.z} />
       <Shadows machine={machine} pose={asPlaced} ground={bounds.isEmpty() ? 0 : bounds.min.z} />
       <Parts machine={machine} pose={asPlaced} chosen={chosen} onChoose={onChoose} />
