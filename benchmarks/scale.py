@@ -150,7 +150,6 @@ def measure_boards(settings: dict[str, str], database: Database, times: int) -> 
             changed.append(ask(client, "/v1/leaderboard"))
         other = {
             "other_track": ask(client, "/v1/leaderboard", track=TRACKS[1]),
-            "other_reading": ask(client, "/v1/leaderboard", policy="published"),
             "figures": ask(client, "/v1/leaderboard/figures"),
             "half_a_year": ask(client, "/v1/leaderboard", since="2025-06-01T00:00:00Z"),
             "sweep": ask(client, "/v1/leaderboard", sweep="sweep_ended0"),

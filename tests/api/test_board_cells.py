@@ -24,7 +24,7 @@ from buildarena_benchmark.leaderboard import (
 )
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_store import TrialFilter
-from buildarena_store.boards.kept import FORMAT, keep_summaries
+from buildarena_store.boards.kept import FORMAT, keep_summary
 from buildarena_store.derived_tables import board_cells, board_state
 from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
 
@@ -40,7 +40,7 @@ FLAGS = (
     ["refuted"],
 )
 TASKS = ("lift-1", "support-1", "somebodys-own")
-BOARD = {"track": TRACKS[0], "policy": ScoringPolicy.OURS}
+BOARD = {"track": TRACKS[0]}
 
 
 def random_job(rng: random.Random, number: int) -> dict[str, object]:
@@ -117,7 +117,7 @@ def disturb(context, rng: random.Random, number: int) -> None:
 
 def random_query(rng: random.Random) -> dict[str, object]:
     """Parameters of a board, as readers choose them."""
-    found = {"track": rng.choice(TRACKS), "policy": rng.choice([*ScoringPolicy])}
+    found = {"track": rng.choice(TRACKS)}
     further = {
         "task": rng.sample(sorted(builtin_tasks()), 8),
         "model": ["made-up/0", "external/1"],
@@ -142,7 +142,6 @@ def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, objec
         models=frozenset(params["model"]) if "model" in params else None,
         since=params.get("since"),
         until=params.get("until"),
-        policy=params["policy"],
         overall=None if "task" in params else frozenset(builtin_tasks()),
     )
     own = [trial for trial in every if trial.track == params["track"]]
@@ -157,7 +156,6 @@ def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, objec
         board,
         track=params["track"],
         tracks=tracks,
-        policy=query.policy,
         registry=registry,
         catalogue=context.tasks,
     )
@@ -171,7 +169,9 @@ def expected(context, params: dict[str, object]) -> tuple[bytes, dict[str, objec
         and (query.models is None or trial.model in query.models)
     ]
     bins = cost_bins(
-        trials, policy=query.policy, categories={task.name: task.category for task in tasks}
+        trials,
+        policy=ScoringPolicy.OURS,
+        categories={task.name: task.category for task in tasks},
     )
     figures = {
         "failures": sorted(
@@ -288,10 +288,9 @@ def test_a_process_that_starts_reads_cells_that_another_made(context, process, m
 
 def test_a_process_that_starts_makes_no_summaries(context, process, monkeypatch) -> None:
     fill(context)
-    kept = {policy: asked(process(), BOARD | {"policy": policy}) for policy in ScoringPolicy}
+    kept = asked(process(), BOARD)
     monkeypatch.setattr("buildarena_store.boards.tallying.summarise_tallies", None)
-    for policy, board in kept.items():
-        assert asked(process(), BOARD | {"policy": policy}) == board
+    assert asked(process(), BOARD) == kept
 
 
 @pytest.mark.parametrize(
@@ -309,9 +308,7 @@ def test_summaries_that_would_be_others_today_are_made_again(context, process, o
     wrong = select(func.min(cast(board_cells.c.summaries, Text))).scalar_subquery()
     values = {"summarised": values[others], "summaries": cast(wrong, JSON), "samples": b""}
     execute(context, update(board_cells).values(**values))
-    for policy in ScoringPolicy:
-        params = BOARD | {"policy": policy}
-        assert asked(process(), params) == expected(context, params)
+    assert asked(process(), BOARD) == expected(context, BOARD)
     with context.store.database.statement() as connection:
         today = ours == literal(f"{summaries_made_by()} ") + here
         kept = connection.execute(select(func.count()).where(today)).scalar_one()
@@ -326,10 +323,10 @@ def test_summaries_of_a_cell_that_changed_meanwhile_are_not_kept(context) -> Non
     execute(context, update(jobs).values(indicator=81.0))
     cells.feed(None)
     with context.store.database.transaction() as connection:
-        keep_summaries(connection, old.summarised())
-    ((_, cell),) = cells.summaries(ids[:1], ScoringPolicy.PUBLISHED)
+        keep_summary(connection, old.summarised())
+    ((_, cell),) = cells.summaries(ids[:1])
     assert cell.indicator_best in {81.0, None}
-    assert cell == next(iter(cells.read(ids[:1]))).summary(ScoringPolicy.PUBLISHED)
+    assert cell == next(iter(cells.read(ids[:1]))).summarise()
 
 
 def test_a_change_that_nobody_took_in_is_found_by_the_next_process(context, process) -> None:

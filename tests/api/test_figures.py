@@ -33,9 +33,8 @@ def test_figures_without_jobs_are_empty(api) -> None:
 
 
 @pytest.mark.usefixtures("played")
-@pytest.mark.parametrize("policy", [*ScoringPolicy])
-def test_figures_are_those_of_the_trials(api, context, policy) -> None:
-    answer = api.get("/v1/leaderboard/figures", params={"policy": policy})
+def test_figures_are_those_of_the_trials(api, context) -> None:
+    answer = api.get("/v1/leaderboard/figures")
     found = answer.json()
     trials: list[EndedJob] = context.store.results.boards.trials(TrialFilter())
     wanted = {
@@ -50,10 +49,10 @@ def test_figures_are_those_of_the_trials(api, context, policy) -> None:
     assert any("construction_failed: objection" in row["outcomes"] for row in found["failures"])
     (cost,) = found["cost"]
     categories = {"support-1": cost["category"]}
-    bins = cost_bins(trials, policy=policy, categories=categories)[cost["category"]]
+    bins = cost_bins(trials, policy=ScoringPolicy.OURS, categories=categories)[cost["category"]]
     assert [one["trials"] for one in cost["bins"]] == [one.trials for one in bins]
     assert [one["mean"] for one in cost["bins"]] == [one.mean for one in bins]
-    board = api.get("/v1/leaderboard", params={"policy": policy}).json()
+    board = api.get("/v1/leaderboard").json()
     for name in ("mean_rank", "cost_usd_mean", "success_rate_mean", "pareto"):
         assert [row[name] for row in found["front"]] == [row[name] for row in board["overall"]]
     ranked = [row["model"] for row in board["overall"] if row["rank"] is not None]
@@ -62,7 +61,7 @@ def test_figures_are_those_of_the_trials(api, context, policy) -> None:
     assert all(0 <= score <= 1 for score in scores)
     assert any(row["pareto"] for row in found["front"])
     known = {"If-None-Match": answer.headers["etag"]}
-    again = api.get("/v1/leaderboard/figures", params={"policy": policy}, headers=known)
+    again = api.get("/v1/leaderboard/figures", headers=known)
     assert again.status_code == 304
 
 
@@ -80,6 +79,6 @@ def test_figures_follow_what_changed_and_what_is_chosen(api, context) -> None:
     assert next(iter(idle["outcomes"])).startswith("cancelled")
 
 
-@pytest.mark.parametrize("bad", [{"track": "x"}, {"task": "x"}, {"policy": "mine"}])
+@pytest.mark.parametrize("bad", [{"track": "x"}, {"task": "x"}])
 def test_unknown_choices_are_refused(api, bad) -> None:
     assert api.get("/v1/leaderboard/figures", params=bad).status_code == 422

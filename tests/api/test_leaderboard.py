@@ -96,40 +96,25 @@ def expert_of(answer) -> dict:
     return next(row for row in rows if row["model"] == "builtin/expert")
 
 
-def test_each_reading_of_flags_can_be_asked_for(api, played) -> None:
+def test_a_disqualified_trial_counts_as_a_failure(api, played) -> None:
     played(10, flags=["no_wheels"])
-    ours = board(api, task="support-1")
-    row = expert_of(ours)
-    assert (ours["policy"], row["flagged"], row["flags"]) == ("ours", 5, {"no_wheels": 5})
+    row = expert_of(board(api, task="support-1"))
+    assert (row["flagged"], row["flags"]) == (5, {"no_wheels": 5})
     assert (row["trials"], row["successes"], row["indicator_mean"]) == (5, 0, 0.0)
-    assert board(api, task="support-1", policy="ours") == ours
-    published = board(api, task="support-1", policy="published")
-    row = expert_of(published)
-    assert (published["policy"], row["flagged"]) == ("published", 5)
-    assert (row["trials"], row["success_rate"]) == (0, None)
 
 
-def test_throws_stand_under_the_published_policy_by_the_parabola(api, context) -> None:
+def test_throws_stand_by_their_distance(api, context) -> None:
     sweep = {"tasks": ["throw-1"], "models": ["builtin/expert"], "seeds": [0, 1]}
-    sweep_id = api.post("/v1/sweeps", json={"name": "throws", **sweep}).json()["id"]
+    assert api.post("/v1/sweeps", json={"name": "throws", **sweep}).status_code == 202
     for parabola in (120.0, None):
         metrics = {"parts": 7, "parabola": parabola, "robustness": 1.0, "robust_indicator": 50.0}
         finish(context, claim(context), "success", 55.0, metrics=metrics)
     before = (datetime.now(UTC) - timedelta(hours=1)).isoformat()
     for period in ({}, {"since": before}):
-        (ours,) = board(api, task="throw-1", **period)["tasks"]
-        row = ours["rows"][0]
-        assert (ours["indicator"], ours["unit"]) == ("distance", "units")
+        (task,) = board(api, task="throw-1", **period)["tasks"]
+        row = task["rows"][0]
+        assert (task["indicator"], task["unit"]) == ("distance", "units")
         assert (row["indicator_mean"], row["score"] is None) == (50.0, False)
-        (published,) = board(api, task="throw-1", policy="published", **period)["tasks"]
-        row = published["rows"][0]
-        assert (published["indicator"], published["unit"]) == ("parabola", "")
-        assert (row["indicator_mean"], row["indicator_best"]) == ((120.0 + 55.0) / 2, 120.0)
-        assert (row["successes"], row["score"]) == (2, None)
-    results = api.get(f"/v1/sweeps/{sweep_id}/results").json()
-    assert {result["published"] for result in results} == {120.0, None}
-    listed = {task["name"]: task["published_metric"] for task in api.get("/v1/tasks").json()}
-    assert (listed["throw-5"], listed["lift-1"]) == ("parabola", None)
 
 
 @pytest.mark.parametrize("name", ["since", "until"])
@@ -139,15 +124,6 @@ def test_a_time_without_a_zone_is_refused(api, name) -> None:
     assert answer.json()["errors"][0]["field"] == name
 
 
-@pytest.mark.parametrize("path", ["", "/compare", "/export", "/changes", "/manifest"])
-def test_an_unknown_reading_is_refused_with_the_choices(api, path) -> None:
-    given = {"policy": "theirs", "first": "a", "second": "b"}
-    answer = api.get(f"/v1/leaderboard{path}", params=given)
-    (error,) = answer.json()["errors"]
-    assert (answer.status_code, error["field"]) == (422, "policy")
-    assert error["choices"] == ["ours", "published"]
-
-
 def test_a_bridge_that_carries_everything_is_shown_as_at_least_its_load(api, played) -> None:
     ids = played(10, flags=["never_fell"], indicator=1500.0)
     row = expert_of(board(api, task="support-1"))
@@ -155,7 +131,6 @@ def test_a_bridge_that_carries_everything_is_shown_as_at_least_its_load(api, pla
     assert {api.get(f"/v1/jobs/{id_}").json()["censored"] for id_ in ids} == {True}
     flags = {flag["name"]: flag for flag in board(api)["flags"]}
     assert flags["never_fell"]["disqualifying"] is False
-    assert flags["never_fell"]["published"] is True
     assert flags["unstable"]["disqualifying"] is True
     assert all(flag["meaning"].endswith(".") for flag in flags.values())
 
@@ -179,13 +154,11 @@ def test_too_few_successes_are_said_to_be_too_few(api, played) -> None:
         assert (row["indicator_low"], row["indicator_high"]) == (None, None)
 
 
-def test_a_comparison_reads_flags_as_asked(api, played) -> None:
+def test_a_comparison_counts_disqualified_trials_as_failures(api, played) -> None:
     played(flags=["start_too_high"])
     pair = {"first": "builtin/expert", "second": "builtin/random"}
     answer = api.get("/v1/leaderboard/compare", params=pair).json()
-    assert (answer["policy"], answer["tasks"][0]["successes"]) == ("ours", [0, 0])
-    answer = api.get("/v1/leaderboard/compare", params={**pair, "policy": "published"}).json()
-    assert (answer["policy"], answer["tasks"]) == ("published", [])
+    assert answer["tasks"][0]["successes"] == [0, 0]
 
 
 def test_a_reader_who_has_the_answer_gets_none_until_something_changes(api, context, played):

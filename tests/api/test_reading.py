@@ -20,7 +20,7 @@ def test_an_empty_leaderboard_is_an_empty_page(api) -> None:
     lists = {"tracks": [], "tasks": [], "overall": [], "ranked": []}
     answer = api.get("/v1/leaderboard").json()
     assert {"does_not_span", "not_driven", "unstable"} <= {f["name"] for f in answer.pop("flags")}
-    nobody = {"track": None, "policy": "ours", "verdict": None}
+    nobody = {"track": None, "verdict": None}
     assert answer == {**nobody, **lists}
 
 

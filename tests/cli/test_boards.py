@@ -43,7 +43,6 @@ def board(models: list[str], tasks: list[str]) -> dict[str, Any]:
         "overall": [
             {"model": model, "configuration": "c", "rank": n} for n, model in enumerate(models, 1)
         ],
-        "policy": "ours",
         "flags": [],
     }
 

@@ -238,7 +238,6 @@ def test_disqualified_jobs_can_be_left_out(url, context, tmp_path):
         (["--track", "none/such"], (1, "none/such")),
         (["--license", "appache-2.0"], (2, "did you mean apache-2.0")),
         (["--level", "1"], (2, "--level is for leaderboards")),
-        (["--policy", "published"], (2, "--policy is for leaderboards")),
     ],
 )
 def test_nonsense_is_refused_and_leaves_nothing(url, context, tmp_path, words, refusal):

@@ -1,11 +1,11 @@
-"""Both readings of flags, and what is only known to be at least, wherever figures are shown."""
+"""Flags, and what is only known to be at least, wherever figures are shown."""
 
 import csv
 import json
 
 import pytest
 from sqlalchemy import insert, select, update
-from support.clients.commands import printed, run_cli
+from support.clients.commands import printed
 
 from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store.tables import jobs, rollouts
@@ -36,19 +36,12 @@ def sweep(context, submissions) -> str:
     return str(done.sweep.id)
 
 
-def rows_of(url: str, *words: str) -> dict[str, dict]:
-    answer = json.loads(printed(url, "leaderboard", "--json", *words))
-    return {row["model"]: row for row in answer["tasks"][0]["rows"]}
-
-
 @pytest.mark.usefixtures("sweep")
-def test_a_board_is_read_as_asked(url) -> None:
-    ours = rows_of(url)
-    assert list(ours) == ["openai/gpt-5", "xai/grok-4", "builtin/random"]
-    assert ours["builtin/random"]["successes"] == 0
-    published = rows_of(url, "--policy", "published")
-    assert published["openai/gpt-5"]["trials"] == 0
-    assert published["builtin/random"]["successes"] == 6
+def test_a_board_counts_disqualified_trials_as_failures(url) -> None:
+    answer = json.loads(printed(url, "leaderboard", "--json"))
+    rows = {row["model"]: row for row in answer["tasks"][0]["rows"]}
+    assert list(rows) == ["openai/gpt-5", "xai/grok-4", "builtin/random"]
+    assert rows["builtin/random"]["successes"] == 0
     text = printed(url, "leaderboard", "--task", "support-1")
     assert text.count("≥ 1,500.0") == 2  # the mean and the best
     assert "xai/grok-4" in text
@@ -58,37 +51,21 @@ def test_a_board_is_read_as_asked(url) -> None:
     assert "flags: 6 does_not_span, 6 never_fell" in overview
     assert "  never_fell: The bridge carried everything" in overview
     assert "not_driven" not in overview
-    assert "left out" not in overview
-    assert "left out" in printed(url, "leaderboard", "--policy", "published")
-
-
-@pytest.mark.parametrize(
-    "words",
-    ["leaderboard", "compare a b", "export --out x.csv"],
-)
-def test_an_unknown_reading_is_a_usage_error_that_names_the_choices(url, words) -> None:
-    done = run_cli(url, *words.split(), "--policy", "theirs")
-    assert done.returncode == 2
-    assert "'theirs'" in done.stderr
-    assert "'ours'" in done.stderr
-    assert "'published'" in done.stderr
 
 
 @pytest.mark.usefixtures("sweep")
-def test_comparisons_and_exports_are_read_as_asked(url, tmp_path) -> None:
+def test_comparisons_and_exports_count_them_as_failures_too(url, tmp_path) -> None:
     words = ["compare", "openai/gpt-5", "builtin/random", "--json"]
     (task,) = json.loads(printed(url, *words))["tasks"]
     assert task["successes"] == [6, 0]
-    assert json.loads(printed(url, *words, "--policy", "published"))["tasks"] == []
-    for policy, trials in (("ours", "6"), ("published", "0")):
-        out = tmp_path / f"{policy}.csv"
-        printed(url, "export", "--out", str(out), "--policy", policy)
-        with out.open() as file:
-            rows = {row["model"]: row for row in csv.DictReader(file)}
-        assert (rows["openai/gpt-5"]["trials"], rows["openai/gpt-5"]["flags"]) == (
-            trials,
-            '{"never_fell": 6}',
-        )
+    out = tmp_path / "board.csv"
+    printed(url, "export", "--out", str(out))
+    with out.open() as file:
+        rows = {row["model"]: row for row in csv.DictReader(file)}
+    assert (rows["openai/gpt-5"]["trials"], rows["openai/gpt-5"]["flags"]) == (
+        "6",
+        '{"never_fell": 6}',
+    )
     tex = tmp_path / "board.tex"
     printed(url, "export", "--out", str(tex))
     assert r"\textbf{$\geq$1500.0}" in tex.read_text()

@@ -90,7 +90,7 @@ def test_the_leaderboard_and_what_stands_beside_it(client, service) -> None:
     board = client.leaderboard()
     require_shape(board, schemas.Board)
     require_shape(board["tasks"][0]["rows"][0], schemas.Row)
-    assert client.leaderboard(sweep=[service.sweep], model=["builtin/idle"], policy="published")
+    assert client.leaderboard(sweep=[service.sweep], model=["builtin/idle"])
     found = client.compare("builtin/expert", "builtin/idle", task=["lift-1"])
     require_shape(found, schemas.Comparison)
     assert found["tasks"][0]["trials"] == [3, 3]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -54,23 +53,6 @@ TasksOption = Annotated[
 ModelsOption = Annotated[
     list[str] | None,
     typer.Option("--model", help="Only these models.", autocompletion=complete_model),
-]
-
-
-class PolicyName(StrEnum):
-    """Scoring policies; see `buildarena_benchmark.flags.ScoringPolicy`, which is slow to load."""
-
-    OURS = "ours"
-    PUBLISHED = "published"
-
-
-PolicyOption = Annotated[
-    PolicyName,
-    typer.Option(
-        "--policy",
-        help="How flags are read: disqualified trials fail, or what the published evaluation "
-        "calls hacked is left out.",
-    ),
 ]
 TrackOption = Annotated[str | None, typer.Option("--track", help="Track; default: the first.")]
 AfterOption = Annotated[str | None, typer.Option("--after", help="Cursor of the previous page.")]

@@ -7,7 +7,7 @@ describe("keyOf", () => {
 
   it("is the spelling of a site's index: decoded, the parameters in order", () => {
     expect(key("/v1/leaderboard")).toBe("/v1/leaderboard");
-    expect(key("/v1/leaderboard?track=a%2Fb&policy=published")).toBe("/v1/leaderboard?policy=published&track=a/b");
+    expect(key("/v1/leaderboard?track=a%2Fb&model=m")).toBe("/v1/leaderboard?model=m&track=a/b");
     expect(key("/v1/leaderboard?task=b&task=a")).toBe("/v1/leaderboard?task=a&task=b");
     expect(key("/v1/leaderboard/compare?first=x+y%26z")).toBe("/v1/leaderboard/compare?first=x y&z");
     expect(key("/v1/jobs/j/artifacts/a%20b")).toBe("/v1/jobs/j/artifacts/a b");

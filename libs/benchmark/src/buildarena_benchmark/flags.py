@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from enum import StrEnum
-from typing import Final
 
 from buildarena_benchmark.scorers.registry import known_flags
 
 
 class ScoringPolicy(StrEnum):
-    """The scoring policy: how flags are read; the values are what the API and the commands take.
+    """The scoring policy: how flags are read.
 
     Attributes:
         OURS: A disqualified trial is a failure, and a failure has an indicator of 0; other flags
@@ -22,9 +21,6 @@ class ScoringPolicy(StrEnum):
 
     OURS = "ours"
     PUBLISHED = "published"
-
-
-SCORING_POLICIES: Final = tuple(policy.value for policy in ScoringPolicy)
 
 
 def is_disqualified(flags: Collection[str]) -> bool:

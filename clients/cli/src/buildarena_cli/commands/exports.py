@@ -14,8 +14,6 @@ from buildarena_cli.ids import whole_id
 from buildarena_cli.options import (
     DEFAULT_URL,
     ModelsOption,
-    PolicyName,
-    PolicyOption,
     TasksOption,
     TrackOption,
     UrlOption,
@@ -49,7 +47,6 @@ def export(
     task: TasksOption = None,
     level: LevelOption = None,
     model: ModelsOption = None,
-    policy: PolicyOption = PolicyName.OURS,
     track: TrackOption = None,
     sweep: SweepsOption = None,
     success_only: Annotated[
@@ -77,10 +74,9 @@ def export(
             "--license": licence,
         }
         _require_none(of_datasets, "goes with --dataset only")
-        _board(out, url, task=task, level=level, model=model, policy=policy.value, track=track)
+        _board(out, url, task=task, level=level, model=model, track=track)
         return
-    of_boards = {"--level": level, "--policy": policy is not PolicyName.OURS}
-    _require_none(of_boards, "is for leaderboards, not for datasets")
+    _require_none({"--level": level}, "is for leaderboards, not for datasets")
     _dataset(
         Client(url),
         out,

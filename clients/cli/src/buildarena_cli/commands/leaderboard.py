@@ -13,8 +13,6 @@ from buildarena_cli.options import (
     JsonOption,
     ModelName,
     ModelsOption,
-    PolicyName,
-    PolicyOption,
     TasksOption,
     TrackOption,
     UrlOption,
@@ -46,7 +44,6 @@ def leaderboard(
     category: CategoryOption = None,
     model: ModelsOption = None,
     since: SinceOption = None,
-    policy: PolicyOption = PolicyName.OURS,
     track: Annotated[
         str | None, typer.Option("--track", help="Only this track; as JSON the first without.")
     ] = None,
@@ -63,7 +60,6 @@ def leaderboard(
         "category": category,
         "model": model,
         "since": None if since is None else f"{since.isoformat()}Z",
-        "policy": policy.value,
     }
     client = Client(url)
     board = client.get("/v1/leaderboard", track=track, **asked)
@@ -102,7 +98,6 @@ def compare(
     second: ModelName,
     *,
     task: TasksOption = None,
-    policy: PolicyOption = PolicyName.OURS,
     track: TrackOption = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
@@ -117,7 +112,6 @@ def compare(
         first=first,
         second=second,
         task=task,
-        policy=policy.value,
         track=track,
     )
     if as_json:

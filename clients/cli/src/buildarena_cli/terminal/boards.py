@@ -255,7 +255,7 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
         *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
         "* baseline; # is the overall rank, shared by statistically tied models",
         *_remarks(rows),
-        *_policy(board, rows),
+        *_meanings(board, rows),
         *_of_runners(rows),
     ]
 
@@ -292,15 +292,12 @@ def _flags(rows: Sequence[Mapping[str, Any]]) -> Counter[str]:
     return counts
 
 
-def _policy(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What the board's flags say, and what was done about them."""
+def _meanings(board: Mapping[str, Any], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the board's flags say."""
     counts = _flags(rows)
-    remarks = [
+    return [
         f"  {flag['name']}: {flag['meaning']}" for flag in board["flags"] if counts[flag["name"]]
     ]
-    if board["policy"] != "ours":
-        remarks.append("what the published evaluation calls hacked is left out, as it does itself")
-    return remarks
 
 
 def _of_runners(rows: Sequence[Mapping[str, Any]]) -> list[str]:

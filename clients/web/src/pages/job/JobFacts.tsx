@@ -111,7 +111,7 @@ function Flags({ job }: { job: JobDetail }) {
             </Badge>
             <Text size="sm">
               {meanings.get(name)?.meaning ?? ""}
-              {meanings.get(name)?.disqualifying ? " It counts as a failure under our scoring policy." : ""}
+              {meanings.get(name)?.disqualifying ? " It counts as a failure." : ""}
             </Text>
           </Group>
         </Alert>

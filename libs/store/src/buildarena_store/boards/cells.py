@@ -26,12 +26,11 @@ from sqlalchemy import (
     update,
 )
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Cell
 from buildarena_store.boards.kept import (
     FORMAT,
     Mark,
-    keep_summaries,
+    keep_summary,
     mark_columns,
     read_rows,
     row_of,
@@ -56,7 +55,7 @@ class CellFeed:
 
     Attributes:
         mark: Give it to read on from here.
-        cells: Cells that changed, with summaries as far as these were made, or all; none has its
+        cells: Cells that changed, with their summary if it was made, or all; none has its
             tallies, and those with no jobs are gone.
         whole: Whether it is all there is.
         task_versions: How many versions of tasks were ever uploaded.
@@ -91,7 +90,7 @@ class BoardCells:
         state = mark or self._settled()
         with self._reading() as connection:
             now, task_versions, changed = _look(connection, state)
-            fresh = read_rows(connection, changed, policies=tuple(ScoringPolicy))
+            fresh = read_rows(connection, changed, summaries=True)
             made = _made(connection, sorted(changed - {record.id for record in fresh}))
             kept = [] if mark else read_rows(connection, None)
         if made:
@@ -120,26 +119,23 @@ class BoardCells:
                 found = read_rows(connection, some, tallies=True, details=details, only_fresh=False)
             yield from found
 
-    def summaries(
-        self, ids: Collection[CellId], policy: ScoringPolicy
-    ) -> Iterator[tuple[CellId, Cell]]:
+    def summaries(self, ids: Collection[CellId]) -> Iterator[tuple[CellId, Cell]]:
         """What boards show of cells, as of the last feed or later; cells without jobs have none.
 
         Those that another release made are made again, and kept.
 
         Args:
             ids: Which.
-            policy: How flags are read.
         """
         ordered = sorted(ids)
         for start in range(0, len(ordered), MAX_STORED_AT_ONCE):
             some = ordered[start : start + MAX_STORED_AT_ONCE]
             with self._database.statement() as connection:
-                found = read_rows(connection, some, policies=[policy], only_fresh=False)
-            old = [record.id for record in found if record.jobs and not record.summaries]
+                found = read_rows(connection, some, summaries=True, only_fresh=False)
+            old = [record.id for record in found if record.jobs and record.summary is None]
             for record in (*found, *(self._summarised(old) if old else ())):
-                if record.summaries:
-                    yield record.id, record.summaries[policy]
+                if record.summary is not None:
+                    yield record.id, record.summary
 
     def of(self, wanted: TrialFilter) -> list[CellRecord]:
         """Cells of just the jobs that are meant: they are made for this question alone."""
@@ -153,7 +149,7 @@ class BoardCells:
         records = [record.summarised() for record in sorted(read, key=lambda one: one.id)]
         with self._keeping() as connection:
             for record in records:
-                keep_summaries(connection, record)
+                keep_summary(connection, record)
         return records
 
     @contextmanager

@@ -25,7 +25,6 @@ from sqlalchemy import (
 from sqlalchemy.dialects.postgresql import Insert, insert
 from sqlalchemy.types import UserDefinedType
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import summaries_made_by
 from buildarena_store.boards.packing import (
     pack_details,
@@ -33,7 +32,7 @@ from buildarena_store.boards.packing import (
     unpack_details,
     unpack_tallies,
 )
-from buildarena_store.boards.summaries import pack_summaries, unpack_summaries
+from buildarena_store.boards.summaries import pack_summary, unpack_summary
 from buildarena_store.boards.tallying import CellRecord
 from buildarena_store.boards.trials import CellId
 from buildarena_store.database import AS_THEY_ARE
@@ -41,7 +40,7 @@ from buildarena_store.derived_tables import board_cells
 from buildarena_store.rows import bound_texts
 from buildarena_store.tables import board_changes
 
-FORMAT: Final = 7
+FORMAT: Final = 8
 """Of rows; programs of different formats may use one database at once."""
 
 
@@ -89,7 +88,7 @@ def read_rows(
     *,
     tallies: bool = False,
     details: bool = False,
-    policies: Collection[ScoringPolicy] = (),
+    summaries: bool = False,
     only_fresh: bool = True,
 ) -> list[CellRecord]:
     """Cells as rows have them; of some that changed, only those made after the change.
@@ -99,7 +98,7 @@ def read_rows(
         ids: Which; None for all.
         tallies: With their tallies.
         details: With what these are made of.
-        policies: With these of their summaries, unless these are others than would be made today.
+        summaries: With their summaries, unless these are others than would be made today.
         only_fresh: Leave out those that changed since.
     """
     here = board_cells.c
@@ -109,7 +108,7 @@ def read_rows(
         columns += [here.tallies, here.figures]
     if details:
         columns.append(here.details)
-    if policies:
+    if summaries:
         of_today = here.summarised == literal(f"{summaries_made_by()} ") + here.snapshot
         columns += [case((of_today, here.summaries)).label("summaries"), here.samples]
     query = select(*columns).where(here.format == FORMAT)
@@ -135,9 +134,9 @@ def read_rows(
             details=unpack_details(row.tallies, row.details) if details else (),
             snapshot=row.snapshot,
         )
-        if policies:
-            made = unpack_summaries(record.name, row.summaries, row.samples, policies)
-            record = replace(record, summaries=made)
+        if summaries:
+            made = unpack_summary(record.name, row.summaries, row.samples)
+            record = replace(record, summary=made)
         found.append(record)
     return found
 
@@ -160,8 +159,8 @@ def row_of(record: CellRecord, mark: Mark) -> dict[str, Any]:
     }
 
 
-def keep_summaries(connection: Connection, record: CellRecord) -> None:
-    """Keeps a record's summaries, unless its row is another one by now."""
+def keep_summary(connection: Connection, record: CellRecord) -> None:
+    """Keeps a record's summary, unless its row is another one by now."""
     own = {"format": FORMAT, **record.id._asdict(), "snapshot": record.snapshot}
     here = (board_cells.c[name] == value for name, value in own.items())
     values = _summary_columns(record, record.snapshot)
@@ -169,7 +168,7 @@ def keep_summaries(connection: Connection, record: CellRecord) -> None:
 
 
 def _summary_columns(record: CellRecord, snapshot: str) -> dict[str, Any]:
-    said, samples = pack_summaries(record.summaries)
+    said, samples = pack_summary(record.summary)
     return {
         "summaries": said,
         "samples": samples,

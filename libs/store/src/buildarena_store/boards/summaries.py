@@ -6,13 +6,12 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 # isort: split
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, Final
 
 import numpy as np
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Cell, CellName
 from buildarena_benchmark.statistics import Sample
 
@@ -24,39 +23,27 @@ _COLUMNS: Final = 3
 """Of a sample: success, indicator, how many trials."""
 
 
-def pack_summaries(summaries: Mapping[ScoringPolicy, Cell]) -> tuple[dict[str, Any], bytes]:
-    """What a cell's summaries say by scoring policy, and their samples, one after another."""
-    said: dict[str, Any] = {}
-    samples = []
-    for policy, cell in summaries.items():
-        said[policy] = {name: getattr(cell, name) for name in _SAID} | {
-            "newest": cell.newest.isoformat() if cell.newest else None,
-            "figures_hash": cell.figures_hash.hex(),
-            "distinct": len(cell.sample.times),
-        }
-        samples.append(np.column_stack([cell.sample.figures, cell.sample.times]).tobytes())
-    return said, b"".join(samples)
+def pack_summary(cell: Cell | None) -> tuple[dict[str, Any] | None, bytes]:
+    """What a cell's summary says, and its sample; nothing of a cell without one."""
+    if cell is None:
+        return None, b""
+    said = {name: getattr(cell, name) for name in _SAID} | {
+        "newest": cell.newest.isoformat() if cell.newest else None,
+        "figures_hash": cell.figures_hash.hex(),
+    }
+    return said, np.column_stack([cell.sample.figures, cell.sample.times]).tobytes()
 
 
-def unpack_summaries(
-    name: CellName,
-    said: Mapping[str, Any] | None,
-    samples: bytes,
-    policies: Collection[ScoringPolicy],
-) -> dict[ScoringPolicy, Cell]:
-    """A row's summaries under some scoring policies; none of a row that has none."""
-    summaries, start = {}, 0
-    for policy, one in (said or {}).items():
-        values = one["distinct"] * _COLUMNS
-        if policy in policies:
-            columns = np.frombuffer(samples, np.float64, values, start).reshape(-1, _COLUMNS)
-            newest = one["newest"]
-            summaries[ScoringPolicy(policy)] = Cell(
-                **{field: getattr(name, field) for field in _OF_CELL},
-                **{field: one[field] for field in _SAID},
-                newest=datetime.fromisoformat(newest) if newest else None,
-                figures_hash=bytes.fromhex(one["figures_hash"]),
-                sample=Sample(figures=columns[:, :2].copy(), times=columns[:, 2].copy()),
-            )
-        start += values * np.dtype(np.float64).itemsize
-    return summaries
+def unpack_summary(name: CellName, said: Mapping[str, Any] | None, samples: bytes) -> Cell | None:
+    """A row's summary; None of a row that has none."""
+    if not said:
+        return None
+    columns = np.frombuffer(samples, np.float64).reshape(-1, _COLUMNS)
+    newest = said["newest"]
+    return Cell(
+        **{field: getattr(name, field) for field in _OF_CELL},
+        **{field: said[field] for field in _SAID},
+        newest=datetime.fromisoformat(newest) if newest else None,
+        figures_hash=bytes.fromhex(said["figures_hash"]),
+        sample=Sample(figures=columns[:, :2].copy(), times=columns[:, 2].copy()),
+    )

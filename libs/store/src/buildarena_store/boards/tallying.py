@@ -8,7 +8,7 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any, Final
 
@@ -30,7 +30,6 @@ from sqlalchemy import (
     select,
 )
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
     DETAILS,
     ROBUST_INDICATOR,
@@ -64,7 +63,7 @@ class CellRecord:
         tallies: What its figures are made of.
         details: Of each tally, what its totals are made of; not read with others than those of a
             period.
-        summaries: What boards show of it, as far as it was made.
+        summary: What boards show of it, if that was made.
         snapshot: When its row was so, in the database's words; empty of one that is not a row's.
     """
 
@@ -75,7 +74,7 @@ class CellRecord:
     newest: datetime | None
     tallies: Sequence[Tally]
     details: Sequence[Details] = ()
-    summaries: Mapping[ScoringPolicy, Cell] = field(default_factory=dict)
+    summary: Cell | None = None
     snapshot: str = ""
 
     @property
@@ -88,15 +87,13 @@ class CellRecord:
             decoding=self.decoding,
         )
 
-    def summary(self, policy: ScoringPolicy) -> Cell:
+    def summarise(self) -> Cell:
         """What boards show of it; made of its tallies."""
-        return summarise_tallies(self.name, self.tallies, policy=policy)
+        return summarise_tallies(self.name, self.tallies)
 
     def summarised(self) -> CellRecord:
-        """The same with its summaries, if it has jobs."""
-        if not self.jobs:
-            return self
-        return replace(self, summaries={policy: self.summary(policy) for policy in ScoringPolicy})
+        """The same with its summary, if it has jobs."""
+        return replace(self, summary=self.summarise()) if self.jobs else self
 
     def without_tallies(self) -> CellRecord:
         """The same without what takes memory."""

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
     Board,
     BoardQuery,
@@ -55,7 +54,7 @@ class Cells:
         self._versions: Mapping[str, str] = {}
         self._weights: Weights = {}
         self._heads: dict[str, dict[CellKey, CellRecord]] = {}
-        self._summaries: dict[tuple[CellId, ScoringPolicy], Cell] = {}
+        self._summaries: dict[CellId, Cell] = {}
         self._generations: dict[str, int] = {}
         self._tests = TestCache()
 
@@ -113,23 +112,19 @@ class Cells:
             kept=self,
         )
 
-    def summaries(self, ids: Sequence[CellId], policy: ScoringPolicy) -> dict[CellId, Cell]:
+    def summaries(self, ids: Sequence[CellId]) -> dict[CellId, Cell]:
         """Summaries of whole cells; those that are not known are made."""
-        missing = [id_ for id_ in ids if (id_, policy) not in self._summaries]
-        for id_, cell in self._store.summaries(missing, policy):
-            self._summaries[id_, policy] = cell
-        return {
-            id_: self._summaries[id_, policy] for id_ in ids if (id_, policy) in self._summaries
-        }
+        missing = [id_ for id_ in ids if id_ not in self._summaries]
+        self._summaries.update(self._store.summaries(missing))
+        return {id_: self._summaries[id_] for id_ in ids if id_ in self._summaries}
 
     def _take(self, record: CellRecord) -> None:
         id_, heads = record.id, self._heads.setdefault(record.id.track, {})
-        for policy in ScoringPolicy:
-            asked_for = self._summaries.pop((id_, policy), None)
-            if asked_for is not None and policy in record.summaries:
-                self._summaries[id_, policy] = record.summaries[policy]
+        asked_for = self._summaries.pop(id_, None)
+        if asked_for is not None and record.summary is not None:
+            self._summaries[id_] = record.summary
         if record.jobs:
-            heads[id_[1:]] = replace(record, summaries={})
+            heads[id_[1:]] = replace(record, summary=None)
         else:
             heads.pop(id_[1:], None)
 
@@ -153,7 +148,7 @@ class Shown:
         ids = [
             CellId(self.asked.track, *key) for keys in self.chosen.shown.values() for key in keys
         ]
-        self._summaries = self.kept.summaries(ids, self.asked.query.policy)
+        self._summaries = self.kept.summaries(ids)
 
     def board(self) -> Board:
         """Summarises and ranks what was asked for."""
@@ -164,7 +159,7 @@ class Shown:
         }
         return ranked_board(
             self.chosen,
-            lambda key: self._cell(CellId(track, *key), query.policy),
+            lambda key: self._cell(CellId(track, *key)),
             outdated,
             overall=query.overall,
             weights=self.weights,
@@ -198,11 +193,11 @@ class Shown:
         record = self._part().get(id_)
         return record.jobs if record else 0
 
-    def _cell(self, id_: CellId, policy: ScoringPolicy) -> Cell | None:
+    def _cell(self, id_: CellId) -> Cell | None:
         if not self.asked.is_partial:
             return self._summaries.get(id_)
         record = self._part().get(id_)
-        return None if record is None else record.summary(policy)
+        return None if record is None else record.summarise()
 
     def _part(self) -> Mapping[CellId, CellRecord]:
         """Cells of just the jobs that were asked for."""

@@ -15,7 +15,6 @@ from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.weights import HEAVIEST
 from buildarena_api.leaderboard.cache import BoardCache, Question
 from buildarena_benchmark import ValidationIssue, builtin_tasks, paper_tasks
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import BoardQuery
 
 PARTIAL: Final = ("sweep", "since", "until")
@@ -80,13 +79,6 @@ def select_board(
     ] = None,
     since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
     until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
-    policy: Annotated[
-        ScoringPolicy,
-        Query(
-            description="How flags are read: ours counts disqualified trials as failures, "
-            "published leaves out what the published evaluation calls hacked"
-        ),
-    ] = ScoringPolicy.OURS,
 ) -> Selection:
     """What the parameters ask for.
 
@@ -127,7 +119,6 @@ def select_board(
         models=boards.known_models(model) if model else None,
         since=since,
         until=until,
-        policy=policy,
         overall=_ranked_over(task, category),
     )
     track = track or (tracks[0] if tracks else None)

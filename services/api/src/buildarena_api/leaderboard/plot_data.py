@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_benchmark import Task
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board, OverallRow, Tally, cost_bins_of, failure_row
@@ -70,7 +69,7 @@ class DimensionsView(_View):
     dimensions: dict[str, float]
 
 
-class Figures(UnderPolicy):
+class Figures(BaseModel):
     """What a board's figures are drawn from."""
 
     track: str | None
@@ -85,7 +84,6 @@ def figures_view(
     board: Board,
     cells: Mapping[CellId, tuple[str, Sequence[Tally]]],
     *,
-    policy: ScoringPolicy,
     tasks: Mapping[str, Task],
 ) -> Figures:
     """The figures of a ranked board.
@@ -94,7 +92,6 @@ def figures_view(
         track: Its track.
         board: The board.
         cells: Its cells: model and tallies of each.
-        policy: The scoring policy: how flags were read.
         tasks: Every task by name.
     """
     by_task: dict[str, list[Tally]] = {}
@@ -103,11 +100,10 @@ def figures_view(
         by_task.setdefault(id_.task, []).extend(tallies)
         by_row.setdefault((model, id_.configuration), []).extend(tallies)
     categories = {name: task.category for name, task in tasks.items()}
-    found = cost_bins_of(by_task, policy=policy, categories=categories)
+    found = cost_bins_of(by_task, policy=ScoringPolicy.OURS, categories=categories)
     failures = [failure_row(*row, tallies) for row, tallies in sorted(by_row.items())]
     return Figures(
         track=track,
-        policy=policy,
         dimensions=[DimensionsView.model_validate(row) for row in _with_dimensions(board)],
         failures=[FailureView.model_validate(row) for row in failures],
         cost=[

@@ -10,9 +10,7 @@ from urllib.parse import quote_plus
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_benchmark import Task, builtin_tasks
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
     Cell,
@@ -46,10 +44,7 @@ class Row(_View):
     ended: int = Field(description="All ended jobs, also errored and cancelled ones")
     errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
     cancelled: int
-    flagged: int = Field(
-        description="Scored jobs that a flag makes failures or, under the published policy, leaves "
-        "out"
-    )
+    flagged: int = Field(description="Scored jobs that a flag makes failures")
     flags: dict[str, int] = Field(description="Scored jobs by flag")
     by_runner: int = Field(description="Jobs with a trial that a runner ran")
     unverified: int = Field(
@@ -137,8 +132,7 @@ class FlagView(_View):
     """A flag that scores can have."""
 
     name: str
-    disqualifying: bool = Field(description="Whether our policy counts its trials as failures")
-    published: bool = Field(description="Whether the published policy leaves its trials out")
+    disqualifying: bool = Field(description="Whether its trials count as failures")
     meaning: str
 
 
@@ -162,7 +156,7 @@ class VerdictView(_View):
     )
 
 
-class Board(UnderPolicy):
+class Board(BaseModel):
     """The leaderboard of one track."""
 
     track: str | None = Field(description="null when no job has ended")
@@ -205,7 +199,6 @@ def board_view(
     *,
     track: str,
     tracks: list[str],
-    policy: ScoringPolicy,
     registry: ModelRegistry,
     catalogue: TaskCatalog,
 ) -> Board:
@@ -247,14 +240,13 @@ def board_view(
     return Board(
         track=track,
         tracks=tracks,
-        policy=policy,
         tasks=[
             TaskBoard(
                 task=found.task,
                 version=found.version,
                 custom=found.task not in builtin_tasks(),
                 outdated=found.outdated,
-                **_figure(task, policy),
+                **_figure(task),
                 rows=[row(ranked, found.task) for ranked in found.rows],
             )
             for found, task in ((found, tasks[found.task]) for found in board.tasks)
@@ -273,10 +265,8 @@ def board_view(
     )
 
 
-def _figure(task: Task | None, policy: ScoringPolicy) -> dict[str, str]:
+def _figure(task: Task | None) -> dict[str, str]:
     """Name and unit of what rows give as their indicator."""
     if task is None:
         return {"indicator": "indicator", "unit": ""}
-    if policy == ScoringPolicy.PUBLISHED and task.published_metric is not None:
-        return {"indicator": task.published_metric, "unit": ""}
     return {"indicator": task.indicator.name, "unit": task.indicator.unit}

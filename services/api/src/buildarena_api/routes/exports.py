@@ -68,9 +68,6 @@ class Result(BaseModel):
     reason: str | None
     success: bool
     indicator: float
-    published: float | None = Field(
-        description="What a published evaluation scores it by; null where that is the indicator"
-    )
     robustness: float | None = Field(
         description="Share of varied worlds in which it succeeded; null where it was tried in none"
     )
@@ -123,7 +120,6 @@ async def export(
                 ranked,
                 track=track or "",
                 tracks=tracks,
-                policy=selection.query.policy,
                 registry=registry,
                 catalogue=exporting.context.tasks,
             ),

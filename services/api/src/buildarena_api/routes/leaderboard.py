@@ -18,7 +18,6 @@ from buildarena_api.http.weights import HEAVIEST, rows, weighs
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown, weight_of_board
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
-from buildarena_api.leaderboard.policies import UnderPolicy
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
@@ -67,7 +66,7 @@ class TaskDuelView(BaseModel):
     indicator_p: float | None
 
 
-class Comparison(UnderPolicy):
+class Comparison(BaseModel):
     """Two models on all tasks that both played."""
 
     track: str | None
@@ -121,7 +120,7 @@ def leaderboard(
     """Ranks the models of one track, on each task and overall; tracks are never mixed."""
     track, tracks = selection.track, selection.tracks
     if track is None:
-        return Board(track=None, tracks=[], tasks=[], policy=selection.query.policy)
+        return Board(track=None, tracks=[], tasks=[])
     answer = boards.answer(
         selection.question,
         "json " + " ".join(tracks),
@@ -130,7 +129,6 @@ def leaderboard(
                 board,
                 track=track,
                 tracks=tracks,
-                policy=selection.query.policy,
                 registry=registry,
                 catalogue=context.tasks,
             )
@@ -147,15 +145,15 @@ def leaderboard(
 @weighs(weight_of_board)
 def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any:
     """What the figures of a board are drawn from; reports are drawn from the same."""
-    track, policy = selection.track, selection.query.policy
+    track = selection.track
     if track is None:
-        return Figures(track=None, policy=policy, dimensions=[], failures=[], cost=[], front=[])
+        return Figures(track=None, dimensions=[], failures=[], cost=[], front=[])
     tasks = boards.tasks()
     answer = boards.answer_from_tallies(
         selection.question,
         "figures",
         lambda board, cells: (
-            figures_view(track, board, cells, policy=policy, tasks=tasks).model_dump_json().encode()
+            figures_view(track, board, cells, tasks=tasks).model_dump_json().encode()
         ),
     )
     return conditional(request, answer, "application/json")
@@ -177,11 +175,10 @@ def compare(
             boards.trials(selection.question, _usual(every, field, name))
             for field, name in (("first", first), ("second", second))
         ]
-        found = compare_models(*sides, policy=selection.query.policy)
+        found = compare_models(*sides)
         tasks = list(found.tasks) if found else []
     return Comparison(
         track=selection.track,
-        policy=selection.query.policy,
         first=first,
         second=second,
         tasks=[TaskDuelView.model_validate(task) for task in tasks],

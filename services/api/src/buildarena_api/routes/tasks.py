@@ -53,10 +53,6 @@ class TaskView(BaseModel):
     ceiling: float | None = Field(
         description="The greatest indicator there is; null where only what can be built bounds it"
     )
-    published_metric: str | None = Field(
-        description="The metric that boards read under the policy `published`; null where it is "
-        "the indicator"
-    )
     difficulty: dict[str, int] = Field(description="Weight of each difficulty dimension, if any")
     custom: bool = Field(description="Whether somebody uploaded it")
     created_at: datetime | None = Field(description="When this version was; null for built-in ones")
@@ -161,7 +157,6 @@ def _fields(entry: CatalogueEntry) -> dict[str, Any]:
         "indicator": task.indicator.name,
         "unit": task.indicator.unit,
         "ceiling": task.ceiling,
-        "published_metric": task.published_metric,
         "difficulty": dict(task.difficulty),
         "custom": entry.custom,
         "created_at": entry.created_at,
