@@ -85,10 +85,6 @@ def test_the_leaderboard_shows_shared_ranks(url) -> None:
     text = printed(url, "leaderboard", "--task", "support-1", "--task", "lift-1")
     assert "All tasks together" in text
     assert "openai/gpt-5" in text
-    filtered = json.loads(printed(url, "leaderboard", "--level", "2", "--json"))
-    assert [task["task"] for task in filtered["tasks"]] == ["support-2", "lift-2"]
-    later = printed(url, "leaderboard", "--since", "2100-01-01")
-    assert "No jobs have ended yet." in later
 
 
 @pytest.mark.ci

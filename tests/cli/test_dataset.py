@@ -204,8 +204,6 @@ def test_filters_take_what_they_say(url, context, tmp_path):
         ("--task", "support-1"): 2,
         ("--task", "support-1", "--sweep", second): 1,
         ("--success-only",): 1,
-        ("--success-only", "--not-disqualified"): 1,
-        ("--not-disqualified",): 3,
     }
     for number, (words, count) in enumerate(chosen.items()):
         out = tmp_path / str(number)
@@ -214,17 +212,12 @@ def test_filters_take_what_they_say(url, context, tmp_path):
     assert {row["model"] for row in rows(tmp_path / "7")} == {"builtin/expert"}
 
 
-def test_disqualified_jobs_can_be_left_out(url, context, tmp_path):
+def test_disqualified_jobs_say_so(url, context, tmp_path):
     id_ = play(url)
     work(context)
     execute(context, "UPDATE jobs SET flags = '[\"unstable\"]' WHERE id = :id", {"id": id_})
     printed(url, "export", "--dataset", "--out", str(tmp_path / "all"))
     assert rows(tmp_path / "all")[0]["disqualified"]
-    words = ["export", "--dataset", "--out", str(tmp_path / "none"), "--not-disqualified"]
-    left = run_cli(url, *words)
-    assert left.returncode == 1
-    assert left.stderr == "no job that has ended is among those that were asked for"
-    assert names(tmp_path) & {"none", ".none"} == set()
 
 
 @pytest.mark.nightly(keep=3)
@@ -237,7 +230,6 @@ def test_disqualified_jobs_can_be_left_out(url, context, tmp_path):
         (["--sweep", "../x"], (1, "is not the id of a sweep")),
         (["--track", "none/such"], (1, "none/such")),
         (["--license", "appache-2.0"], (2, "did you mean apache-2.0")),
-        (["--level", "1"], (2, "--level is for leaderboards")),
     ],
 )
 def test_nonsense_is_refused_and_leaves_nothing(url, context, tmp_path, words, refusal):

@@ -122,7 +122,7 @@ def test_every_queue_has_a_service_and_every_target_a_recipe() -> None:
 
 def test_only_settings_that_exist_are_set() -> None:
     known = {f"BUILDARENA_{name.upper()}" for name in Settings.model_fields} | {kernels.CHOICE}
-    client = {"BUILDARENA_URL", "BUILDARENA_KEY", "BUILDARENA_PROMETHEUS_URL"}
+    client = {"BUILDARENA_URL", "BUILDARENA_KEY"}
     proxy = {"BUILDARENA_SITE", "BUILDARENA_HTTPS_PORT", "BUILDARENA_TLS", "BUILDARENA_BASE_PATH"}
     for name, service in OURS.items():
         allowed = {"proxy": proxy, "tools": known | client}.get(name, known)

@@ -8,7 +8,6 @@ from typing import Annotated, Any, Final
 import typer
 
 from buildarena_cli.client import Client
-from buildarena_cli.commands.leaderboard import LevelOption
 from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.ids import whole_id
 from buildarena_cli.options import (
@@ -45,15 +44,11 @@ def export(
         bool, typer.Option("--dataset", help="Jobs with their transcripts, as a dataset.")
     ] = False,
     task: TasksOption = None,
-    level: LevelOption = None,
     model: ModelsOption = None,
     track: TrackOption = None,
     sweep: SweepsOption = None,
     success_only: Annotated[
         bool, typer.Option("--success-only", help="Only jobs that succeeded.")
-    ] = False,
-    not_disqualified: Annotated[
-        bool, typer.Option("--not-disqualified", help="Only jobs without a disqualifying flag.")
     ] = False,
     licence: Annotated[
         str | None,
@@ -70,13 +65,11 @@ def export(
         of_datasets = {
             "--sweep": sweep,
             "--success-only": success_only,
-            "--not-disqualified": not_disqualified,
             "--license": licence,
         }
         _require_none(of_datasets, "goes with --dataset only")
-        _board(out, url, task=task, level=level, model=model, track=track)
+        _board(out, url, task=task, model=model, track=track)
         return
-    _require_none({"--level": level}, "is for leaderboards, not for datasets")
     _dataset(
         Client(url),
         out,
@@ -85,7 +78,6 @@ def export(
         models=model or [],
         track=track,
         success_only=success_only,
-        not_disqualified=not_disqualified,
         licence=_known_licence(licence or UNKNOWN),
     )
 

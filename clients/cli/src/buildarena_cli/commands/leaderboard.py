@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Annotated, Any
 
 import typer
@@ -25,25 +24,19 @@ COMPARISON = columns(
     "task", *COMPARED, numeric=COMPARED, leaving=("pairs", "p indicator", "p success", "95 %")
 )
 
-LevelOption = Annotated[list[int] | None, typer.Option("--level", help="Only these levels.")]
 CategoryOption = Annotated[
     list[str] | None,
     typer.Option(
         "--category", help="Only tasks of these categories (mechanisms, flight, ...), ranked apart."
     ),
 ]
-SinceOption = Annotated[
-    datetime | None, typer.Option(help="Only jobs that ended then or later (UTC).")
-]
 
 
 def leaderboard(
     *,
     task: TasksOption = None,
-    level: LevelOption = None,
     category: CategoryOption = None,
     model: ModelsOption = None,
-    since: SinceOption = None,
     track: Annotated[
         str | None, typer.Option("--track", help="Only this track; as JSON the first without.")
     ] = None,
@@ -56,10 +49,8 @@ def leaderboard(
     """
     asked: dict[str, Any] = {
         "task": task,
-        "level": level,
         "category": category,
         "model": model,
-        "since": None if since is None else f"{since.isoformat()}Z",
     }
     client = Client(url)
     board = client.get("/v1/leaderboard", track=track, **asked)

@@ -18,7 +18,6 @@ from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
 
 if TYPE_CHECKING:
-    from buildarena_cli.alerts import Alert
     from buildarena_cli.local.service import ProcessFacts, Run
 
 MEBIBYTE = 1024 * 1024
@@ -116,19 +115,7 @@ def logs(
             places[name] = _print_new(file, places[name], f"{name:<{width}}  " if width else "")
 
 
-def doctor(
-    url: UrlOption = DEFAULT_URL,
-    as_json: JsonOption = False,
-    *,
-    prometheus: Annotated[
-        str | None,
-        typer.Option(
-            "--prometheus",
-            envvar="BUILDARENA_PROMETHEUS_URL",
-            help="Also say which alerts fire: where Prometheus is.",
-        ),
-    ] = None,
-) -> None:
+def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """Show what is wrong with the service and what to do.
 
     The exit code is 1 when anything is wrong.
@@ -137,10 +124,9 @@ def doctor(
 
     client = Client(url)
     health = _health_at(url)
-    alerts = _firing(prometheus) if prometheus else []
     peak = _peak_memory_bytes(client.url) if health["status"] != "down" else None
     if as_json:
-        print_json({**health, "alerts": list(map(asdict, alerts)), "peak_memory_bytes": peak})
+        print_json({**health, "peak_memory_bytes": peak})
     else:
         say(f"BuildArena at {client.url}: {health['status']}")
         rows = [
@@ -150,21 +136,12 @@ def doctor(
         if peak is not None:
             shown = f"{peak / MEBIBYTE:,.0f} MiB at the peak, all processes"
             rows.append(("ok", "memory", shown))
-        rows += [("!!", alert.name, alert.summary) for alert in alerts]
         print_table(columns("is", "check", "finding"), rows)
         for check in health["checks"]:
             if check["advice"]:
                 say(f"{check['name']}: {check['advice']}")
-        for name, runbook in {alert.name: alert.runbook for alert in alerts}.items():
-            say(f"{name}: {runbook}")
-    if health["status"] != "ok" or any(alert.severity != "info" for alert in alerts):
+    if health["status"] != "ok":
         raise typer.Exit(FAILED)
-
-
-def _firing(prometheus: str) -> list[Alert]:
-    from buildarena_cli.alerts import firing_alerts
-
-    return firing_alerts(prometheus)
 
 
 def _health_at(url: str, *, advice: str | None = None) -> dict[str, Any]:

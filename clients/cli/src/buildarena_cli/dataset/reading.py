@@ -34,7 +34,6 @@ class Filters:
         models: Names; all when there are none.
         track: A track's name; all without.
         success_only: Only jobs with the outcome `success`.
-        not_disqualified: Only jobs without a disqualifying flag.
     """
 
     sweeps: Sequence[str] = ()
@@ -42,17 +41,12 @@ class Filters:
     models: Sequence[str] = ()
     track: str | None = None
     success_only: bool = False
-    not_disqualified: bool = False
 
     def take(self, job: Mapping[str, Any]) -> bool:
         """Whether a job is taken, of what the service can't be asked for."""
-        from buildarena_benchmark.flags import is_disqualified
-
         if self.tasks and job["task"] not in self.tasks:
             return False
-        if self.models and job["model"] not in self.models:
-            return False
-        return not (self.not_disqualified and is_disqualified(job["flags"] or ()))
+        return not self.models or job["model"] in self.models
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
