@@ -13,7 +13,7 @@ from typing import NotRequired, get_origin, get_type_hints
 import pytest
 from support.contract import contract
 
-from buildarena_client import AsyncClient, Client, RetryPolicy, schemas
+from buildarena_client import AsyncClient, Client, schemas
 from buildarena_client.client import run
 
 ROOT = Path(__file__).parents[2]
@@ -92,18 +92,6 @@ def test_types_change_with_the_contract() -> None:
     assert text == Path(schemas.__file__).read_text(), "run `make install`"
     changed = json.loads(json.dumps(CONTRACT).replace('"cancelled"', '"stopped"'))
     assert build.module_text(changed) != text
-
-
-@pytest.mark.parametrize("client", [Client, AsyncClient])
-def test_the_former_names_of_retries_are_read_for_one_release(client) -> None:
-    import buildarena_client
-
-    with pytest.warns(DeprecationWarning, match="Patience is now RetryPolicy"):
-        assert buildarena_client.Patience is RetryPolicy
-    with pytest.warns(DeprecationWarning, match="patience= is now retries="):
-        client("http://127.0.0.1:1", patience=RetryPolicy())
-    done = ran("import buildarena_client.patience as p; p.Patience(breaks=1)", "-W", "always")
-    assert "buildarena_client.patience is now" in done.stderr
 
 
 def ran(program: str, *options: str) -> subprocess.CompletedProcess[str]:

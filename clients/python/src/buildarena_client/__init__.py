@@ -5,7 +5,6 @@ Importing it loads nothing: each name is loaded when it is first used.
 
 from __future__ import annotations
 
-import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -67,9 +66,6 @@ __all__ = sorted(_HOME_OF)  # noqa: PLE0605 - as the table above says
 
 
 def __getattr__(name: str) -> Any:
-    if name == "Patience":
-        warnings.warn("Patience is now RetryPolicy", DeprecationWarning, stacklevel=2)
-        name = "RetryPolicy"
     if name not in _HOME_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOME_OF[name]}"), name)

@@ -8,7 +8,7 @@ from typing import Final, Self
 
 from buildarena_client.endpoints.api import Api
 from buildarena_client.endpoints.sending import TIMEOUT_S
-from buildarena_client.retries import RetryPolicy, chosen_policy
+from buildarena_client.retries import RetryPolicy
 
 AT_ONCE: Final = 16
 """Of one caller, the service has 96 requests open at most."""
@@ -25,7 +25,6 @@ class AsyncClient(Api):
         retries: How long requests are sent again.
         at_once: Requests that are open at most; further ones wait. Downloads and
             streams are not counted.
-        patience: The former name of ``retries``.
 
     Attributes:
         url: Where the service is.
@@ -42,7 +41,6 @@ class AsyncClient(Api):
         timeout_s: float | None = TIMEOUT_S,
         retries: RetryPolicy | None = None,
         at_once: int = AT_ONCE,
-        patience: RetryPolicy | None = None,
     ) -> None:
         from buildarena_client.transports.asynchronous import AsyncTransport
 
@@ -50,7 +48,7 @@ class AsyncClient(Api):
             url,
             key,
             timeout_s=timeout_s,
-            retries=chosen_policy(retries, patience),
+            retries=retries or RetryPolicy(),
             transport=partial(AsyncTransport, at_once=at_once),
         )
 

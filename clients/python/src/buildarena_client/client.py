@@ -9,7 +9,7 @@ from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from buildarena_client.endpoints.api import Api
 from buildarena_client.endpoints.sending import TIMEOUT_S
-from buildarena_client.retries import RetryPolicy, chosen_policy
+from buildarena_client.retries import RetryPolicy
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -69,7 +69,6 @@ class Client:
             BUILDARENA_KEY_FILE names, if any.
         timeout_s: How long nothing may come before a request is given up.
         retries: How long requests are sent again.
-        patience: The former name of ``retries``.
 
     Raises:
         BadArgumentError: That is not the URL of an API, or not a key.
@@ -82,7 +81,6 @@ class Client:
         *,
         timeout_s: float | None = TIMEOUT_S,
         retries: RetryPolicy | None = None,
-        patience: RetryPolicy | None = None,
     ) -> None:
         # Help and completion of the command line load this module, and send nothing by it.
         from buildarena_client.transports.blocking import BlockingTransport
@@ -91,7 +89,7 @@ class Client:
             url,
             key,
             timeout_s=timeout_s,
-            retries=chosen_policy(retries, patience),
+            retries=retries or RetryPolicy(),
             transport=BlockingTransport,
         )
 

@@ -7,7 +7,6 @@ sent again. Nothing is sent again after a time-out, which has cost long enough.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Final
@@ -90,10 +89,3 @@ class RestartWatch:
         if self._since is None:
             self._since = now
         return now - self._since > self._longest_s
-
-
-def chosen_policy(retries: RetryPolicy | None, patience: RetryPolicy | None) -> RetryPolicy:
-    """The policy that a client was given under its name or its former one, or the default."""
-    if patience is not None:
-        warnings.warn("patience= is now retries=", DeprecationWarning, stacklevel=3)
-    return retries or patience or RetryPolicy()
