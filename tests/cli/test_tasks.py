@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from support.clients.commands import printed, run, run_cli
-from support.jobs import finish
 
 from buildarena_api.routes.tasks import EXAMPLE
 
@@ -101,54 +100,6 @@ def test_a_title_can_not_be_taken_for_markup(url, file) -> None:
     file.write_text(EXAMPLE.replace("A bridge over a gap of 3", '"[/red] [bold]gap"'))
     printed(url, "task", "add", str(file))
     assert "[/red] [bold]gap" in printed(url, "task", "list")
-
-
-@pytest.fixture
-def sweep_of_own(url, context, file) -> str:
-    """A sweep of an custom task and a built-in one, ended; the own one has changed since once."""
-    printed(url, "task", "add", str(file))
-    spec = file.with_name("sweep.yaml")
-    spec.write_text(
-        "name: mine\ntasks: [narrow-gap, lift-1]\n"
-        "models: [openai/gpt-5, builtin/random]\nsamples: 3\n"
-    )
-    words = ["sweep", "run", str(spec), "--detach", "--json"]
-    old = json.loads(printed(url, *words))["id"]
-    file.write_text(OTHER)
-    printed(url, "task", "add", str(file))
-    new = json.loads(printed(url, *words))["id"]
-    assert old != new
-    while (lease := context.store.leases.claim("construct", owner="w")) is not None:
-        won = lease.job.model == "openai/gpt-5"
-        score = ("success", 150.0) if won else ("unsuccessful", 0.0)
-        finish(context, lease, *score, metrics={"parts": 7})
-    return f"{old} {new}"
-
-
-@pytest.mark.ci
-def test_a_report_tells_of_own_tasks_with_their_own_indicator(url, sweep_of_own, tmp_path) -> None:
-    old, new = sweep_of_own.split()
-    out = tmp_path / "report.md"
-    versions = {}
-    for name, sweeps in (("old", [old]), ("new", [new]), ("both", [old, new])):
-        printed(url, "report", *sweeps, "--out", str(out))
-        text = out.read_text()
-        (row,) = (line for line in text.splitlines() if "| A bridge over a gap of 3 |" in line)
-        cells = [cell.strip() for cell in row.strip("|").split("|")]
-        assert cells[0] == "narrow-gap"
-        assert cells[3:8] == ["load in mass units", "1", "200", "-", "12 s"]
-        versions[name] = (cells[2], cells[8])
-        performance = text.split("## Performance")[1].split("##")[0]
-        (won,) = (line for line in performance.splitlines() if "| narrow-gap | openai" in line)
-        # No figure of the paper stands beside: the model is in it, the task is not.
-        assert " 3/3 | 3/3 | 100.0 % |" in won
-        assert "| - | 150.0 |" in won
-        assert "| lift-1 | openai/gpt-5 |" in performance
-    current = json.loads(printed(url, "task", "show", "narrow-gap", "--json"))["version"]
-    assert versions["new"] == (current, "0")
-    assert versions["both"] == (current, "6")
-    assert versions["old"][0] != current
-    assert versions["old"][1] == "0"
 
 
 def test_a_leaderboard_of_own_tasks_alone_has_no_overall_table(url, sweep_of_own) -> None:
