@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from support.clients.commands import printed, run, run_cli
+from support.jobs import finish
 
 from buildarena_api.routes.tasks import EXAMPLE
 
@@ -100,6 +101,24 @@ def test_a_title_can_not_be_taken_for_markup(url, file) -> None:
     file.write_text(EXAMPLE.replace("A bridge over a gap of 3", '"[/red] [bold]gap"'))
     printed(url, "task", "add", str(file))
     assert "[/red] [bold]gap" in printed(url, "task", "list")
+
+
+@pytest.fixture
+def sweep_of_own(url, context, file) -> str:
+    """A sweep of a custom task and a built-in one, ended."""
+    printed(url, "task", "add", str(file))
+    spec = file.with_name("sweep.yaml")
+    spec.write_text(
+        "name: mine\ntasks: [narrow-gap, lift-1]\n"
+        "models: [openai/gpt-5, builtin/random]\nsamples: 3\n"
+    )
+    words = ["sweep", "run", str(spec), "--detach", "--json"]
+    submitted = json.loads(printed(url, *words))["id"]
+    while (lease := context.store.leases.claim("construct", owner="w")) is not None:
+        won = lease.job.model == "openai/gpt-5"
+        score = ("success", 150.0) if won else ("unsuccessful", 0.0)
+        finish(context, lease, *score, metrics={"parts": 7})
+    return str(submitted)
 
 
 def test_a_leaderboard_of_own_tasks_alone_has_no_overall_table(url, sweep_of_own) -> None:
