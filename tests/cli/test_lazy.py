@@ -117,6 +117,7 @@ def test_help_is_one_line_a_sentence_through_a_pipe_and_fits_a_terminal() -> Non
     ("words", "says"),
     [
         (["leaderbord"], "did you mean leaderboard?"),
+        (["key", "list"], "did you mean admin key?"),
         (["sweep", "wacth"], "did you mean watch?"),
         (["job", "list", "--taks", "x"], "--task"),
         (["jbo", "list"], "did you mean job?"),

@@ -32,6 +32,8 @@ class SuggestingGroup(TyperGroup):
             return super().resolve_command(ctx, args)
         except Exception as error:
             near = suggested_words(args[0], self.commands)
+            if ctx.parent is None and args[0] in ADMIN:
+                near = [f"admin {args[0]}"]
             if near and getattr(error, "message", "").startswith("No such command"):
                 error.message = (  # type: ignore[attr-defined]
                     f"No such command {args[0]!r}; did you mean {' or '.join(near)}?"
