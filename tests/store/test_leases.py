@@ -7,7 +7,7 @@ from sqlalchemy import Connection, TextClause, event, text
 from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import Leases, StaleLeaseError
+from buildarena_store import Leases, StaleLeaseError, TurnResult
 
 
 def test_a_job_is_leased_to_one_worker_at_a_time(context, add) -> None:
@@ -67,9 +67,28 @@ def test_a_scored_job_cannot_be_scored_again(context, add) -> None:
     add(1)
     lease = claim(context)
     finish(context, lease)
-    with pytest.raises(StaleLeaseError):
-        finish(context, lease)
+    for change in (
+        lambda: finish(context, lease),
+        lambda: context.store.leases.hand_back(lease),
+    ):
+        with pytest.raises(StaleLeaseError):
+            change()
+    assert context.store.jobs.get(lease.job.id).outcome == "success"
     assert context.store.leases.claim("construct", owner="w") is None
+
+
+def test_turns_of_a_lost_lease_are_not_kept(context, add) -> None:
+    (job_id,) = add(1)
+    stale = claim(context, "slow")
+    expire_leases(context)
+    context.store.leases.recover()
+    fresh = claim(context, "quick")
+    for lease in (stale, fresh):
+        turn = TurnResult(index=0, sequence=0, sub_structure=None, results=[])
+        context.store.turns.append(lease, turn)
+    told = "SELECT count(*) FROM events WHERE job_id = :id AND kind = 'turn'"
+    with context.store.database.statement() as connection:
+        assert connection.execute(text(told), {"id": job_id}).scalar_one() == 1
 
 
 def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context, add) -> None:

@@ -10,6 +10,7 @@ import pytest
 from sqlalchemy import make_url, text
 from sqlalchemy.exc import IntegrityError, ProgrammingError
 from starlette.testclient import TestClient
+from support.servers.run_servers import execute
 from support.servers.stacks import wait_until
 from support.stages import work
 
@@ -187,6 +188,12 @@ def test_a_simulation_worker_sees_no_replies_and_spends_nothing(contexts) -> Non
         assert not allowed(contexts["simulate"], statement), statement
 
 
+@pytest.mark.parametrize("role", PROCESSES)
+@pytest.mark.parametrize("table", ["journal", "events"])
+def test_what_scores_rest_on_is_never_rewritten(contexts, role, table) -> None:
+    assert not allowed(contexts[role], f"UPDATE {table} SET job_id = job_id")
+
+
 def test_a_reader_only_reads(contexts) -> None:
     for table in tables.metadata.tables:
         assert allowed(contexts["reader"], f"SELECT 1 FROM {table}")
@@ -304,6 +311,18 @@ def test_an_older_installation_is_taken_over_table_by_table(context, owned) -> N
 def test_logins_that_are_none_are_refused(context, postgres_url, role, url, message) -> None:
     with pytest.raises(RoleError, match=message):
         make_roles(context.store.database, {role: url or postgres_url})
+
+
+@pytest.mark.parametrize("right", ["CREATEROLE", "CREATEDB", "BYPASSRLS", "REPLICATION"])
+def test_logins_that_may_more_than_a_process_are_refused(context, postgres_url, right) -> None:
+    name = f"{make_url(context.settings.database_url).database}_{right.lower()}"
+    execute(postgres_url, f"CREATE ROLE {name} LOGIN PASSWORD 'x' {right}")
+    url = make_url(postgres_url).set(username=name, password="x")
+    try:
+        with pytest.raises(RoleError, match="may do more than a process should"):
+            make_roles(context.store.database, {"api": url.render_as_string(hide_password=False)})
+    finally:
+        execute(postgres_url, f"DROP ROLE {name}")
 
 
 def test_two_roles_need_two_logins(context, logins) -> None:
