@@ -10,7 +10,7 @@ for name in "$@"; do
     sessions) "$python" -m support.documents.kept_sessions ;;
     games) PYTHONPATH=$PWD/tests:$PWD/services/simworker-besiege/tests/support "$python" -m record_games ;;
     inspect) "$python" mk/inspect_tasks.py ;;
-    sweeps) "$python" -c 'import json; from buildarena_cli.sweep_files import sweep_schema; print(json.dumps(sweep_schema(), indent=2))' >docs/sweep.schema.json ;;
+    sweeps) "$python" -c 'import json; from buildarena_cli.sweep_files import sweep_schema; print(json.dumps(sweep_schema(), indent=2, ensure_ascii=False))' >docs/sweep.schema.json ;;
     pictures) "$python" tests/web/screenshots.py ;;
     digests) bash mk/pin-images.sh docker-compose.yml .env.example deploy/docker/Dockerfile deploy/kubernetes/overlays/*/*.yaml ;;
     *)

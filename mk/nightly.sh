@@ -19,6 +19,8 @@ tests() {
         --dist loadfile --no-loadscope-reorder -rs -m nightly
 }
 
+# Without the search's library the tests of the hunt are left out.
+part "hunt's library" bash "$here/install_tool.sh" .venv/bin/python ribs
 part "tests" tests
 part "adapters" bash "$here/integrations.sh" test "" "$@"
 part "attack" bash "$here/scenario.sh" attack

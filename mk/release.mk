@@ -4,8 +4,9 @@
 TWINE := twine==7.0.0
 
 release: $(WEB_STAMP) ## Builds wheels and sdists into dist/; with V=1.2.0, makes a release of what is committed
+# Without the version in its environment, the program itself can ask for the distributions alone.
 ifdef V
-	@PACKAGES="$(PACKAGES) $(addprefix integrations/,$(INTEGRATIONS))" MAKE="$(MAKE)" $(BIN)/python mk/release.py $(V)
+	@env -u MAKEFLAGS -u V PACKAGES="$(PACKAGES) $(addprefix integrations/,$(INTEGRATIONS))" MAKE="$(MAKE)" $(BIN)/python mk/release.py $(V)
 else
 	@bash mk/dist.sh dist
 	@bash mk/uv.sh tool run --quiet --from "$(TWINE)" twine check --strict dist/*.whl dist/*.tar.gz

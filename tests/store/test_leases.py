@@ -7,7 +7,7 @@ from sqlalchemy import Connection, TextClause, event, text
 from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import Leases, StaleLeaseError, TurnResult
+from buildarena_store import Lease, Leases, StaleLeaseError, TurnResult
 
 
 def test_a_job_is_leased_to_one_worker_at_a_time(context, add) -> None:
@@ -43,12 +43,17 @@ def test_a_hint_that_is_gone_still_brings_another_job(context, add) -> None:
     assert context.store.leases.claim("simulate.mujoco", owner="w") is None
 
 
-def test_a_stale_lease_can_write_nothing(context, add) -> None:
-    (job_id,) = add(1)
+def stale_and_fresh(context: Context) -> tuple[Lease, Lease]:
+    """The lease of a worker that was too slow, and that of the one which has its job now."""
     stale = claim(context, "slow")
     expire_leases(context)
     context.store.leases.recover()
-    fresh = claim(context, "quick")
+    return stale, claim(context, "quick")
+
+
+def test_a_stale_lease_can_write_nothing(context, add) -> None:
+    (job_id,) = add(1)
+    stale, fresh = stale_and_fresh(context)
     assert fresh.token > stale.token
     for write in (
         lambda: context.store.journal.append(stale, journal_entry()),
@@ -79,11 +84,7 @@ def test_a_scored_job_cannot_be_scored_again(context, add) -> None:
 
 def test_turns_of_a_lost_lease_are_not_kept(context, add) -> None:
     (job_id,) = add(1)
-    stale = claim(context, "slow")
-    expire_leases(context)
-    context.store.leases.recover()
-    fresh = claim(context, "quick")
-    for lease in (stale, fresh):
+    for lease in stale_and_fresh(context):
         turn = TurnResult(index=0, sequence=0, sub_structure=None, results=[])
         context.store.turns.append(lease, turn)
     told = "SELECT count(*) FROM events WHERE job_id = :id AND kind = 'turn'"

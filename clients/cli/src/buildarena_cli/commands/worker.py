@@ -56,10 +56,7 @@ def worker(
     allow_http: AllowHttpOption = False,
     check: Annotated[
         bool,
-        typer.Option(
-            "--check",
-            help="Only show whether a runner could work from here.",
-        ),
+        typer.Option("--check", help="Only show whether a runner could work from here."),
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
