@@ -15,38 +15,9 @@ from buildarena_worker.builtin.designs import DESIGNS
 
 ROOT = Path(__file__).parents[1]
 NUMBER = CANARY.rpartition(" ")[2]
-SOURCES = [
-    *sorted((ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/catalogue").glob("*.yaml")),
-    *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").glob("*.py")),
-    *sorted((ROOT / "services/worker/src/buildarena_worker/builtin/designs").rglob("*.lua")),
-    ROOT / "docs/expert.md",
-]
 MAX_TOLD = 0.5
 """The greatest share of a solution's calls that a document may have."""
-DOCUMENTS = [
-    page
-    for pattern in ("*.md", "*.ipynb")
-    for folder in ("", "docs", "libs", "services", "clients", "integrations", "examples", "deploy")
-    for page in sorted((ROOT / folder).glob(f"**/{pattern}" if folder else pattern))
-    if not {"node_modules", "dist", ".venv"} & set(page.parts)
-]
 STEP = re.compile(r"^\W*(\d+\. )?(attach_block_to|connect_blocks)\b")
-
-
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: path.name)
-def test_statements_and_solutions_have_the_canary(source) -> None:
-    assert len(SOURCES) > len(builtin_tasks())
-    assert NUMBER in source.read_text(encoding="utf-8")
-
-
-def test_machines_that_are_driven_have_the_canary() -> None:
-    assert NUMBER in drive_machines.written()
-
-
-@pytest.mark.parametrize("task", builtin_tasks().values(), ids=lambda task: task.name)
-def test_no_model_reads_the_canary(task) -> None:
-    assert NUMBER not in task.statement
-    assert NUMBER not in briefing(task)
 
 
 @pytest.fixture(scope="module")
@@ -54,8 +25,7 @@ def solutions() -> dict[str, list[set[str]]]:
     """The expert's calls for each task, each in the spellings that documents and logs have."""
     spelled = {}
     for task, make in DESIGNS.items():
-        design = make(0)
-        actions = [action for part in design.parts.values() for action in part.actions]
+        actions = [action for part in make(0).parts.values() for action in part.actions]
         calls = {json.dumps(arguments): (name, dict(arguments)) for name, arguments in actions}
         spelled[task] = [spellings(*call) for call in calls.values()]
     return spelled
@@ -85,41 +55,61 @@ def told_share(text: str, calls: list[set[str]]) -> float:
     return sum(not lines.isdisjoint(call) for call in calls) / len(calls)
 
 
-@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_document_tells_most_of_a_solution(page, solutions) -> None:
-    text = page.read_text(encoding="utf-8")
-    told = {task: told_share(text, calls) for task, calls in solutions.items()}
-    assert not {task: share for task, share in told.items() if share > MAX_TOLD}
-
-
-@pytest.mark.parametrize(
-    "form",
-    [
-        lambda n, name, given: f"{n}. {name}: {', '.join(str(v) for v in given.values() if v)}",
-        lambda _, name, given: f"    {name} {given}",
-        lambda _, name, given: f"machine.{name}{tuple(v for v in given.values() if v)}".replace(
-            "'", '"'
-        ),
-        lambda _, name, given: "- " + json.dumps({"tool": name, "arguments": given}),
-    ],
-)
-def test_a_page_with_a_solution_would_be_found(form, solutions) -> None:
-    (part,) = DESIGNS["support-1"](0).parts.values()
-    page = "\n".join(form(n, name, dict(given)) for n, (name, given) in enumerate(part.actions, 1))
-    assert told_share(page, solutions["support-1"]) > MAX_TOLD
-
-
-@pytest.mark.parametrize("page", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
-def test_no_document_holds_a_whole_solution(page) -> None:
-    assert longest_passage(page.read_text(encoding="utf-8"), STEP) <= BEGINNING + 1
-
-
 def longest_passage(text: str, form: re.Pattern[str]) -> int:
     """How many lines of a form a text has at most, one below the other."""
     counts = [0]
     for line in text.splitlines():
         counts.append(counts[-1] + 1 if form.match(line) else 0)
     return max(counts)
+
+
+def documents() -> list[Path]:
+    folders = ("docs", "libs", "services", "clients", "integrations", "examples", "deploy")
+    pages = [
+        page
+        for ending in (".md", ".ipynb")
+        for pages in (
+            ROOT.glob(f"*{ending}"),
+            *((ROOT / folder).rglob(f"*{ending}") for folder in folders),
+        )
+        for page in pages
+        if not {"node_modules", "dist", ".venv"} & set(page.parts)
+    ]
+    assert len(pages) > 60
+    return pages
+
+
+def test_statements_and_solutions_have_the_canary_and_no_model_reads_it() -> None:
+    tasks = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/catalogue"
+    designs = ROOT / "services/worker/src/buildarena_worker/builtin/designs"
+    sources = [*tasks.glob("*.yaml"), *designs.glob("*.py"), *designs.rglob("*.lua")]
+    assert len(sources) > len(builtin_tasks())
+    sources.append(ROOT / "docs/expert.md")
+    assert not [file.name for file in sources if NUMBER not in file.read_text(encoding="utf-8")]
+    assert NUMBER in drive_machines.written()
+    told = {task.name: task.statement + briefing(task) for task in builtin_tasks().values()}
+    assert not [name for name, text in told.items() if NUMBER in text]
+
+
+def test_no_document_holds_a_whole_solution_or_tells_most_of_one(solutions) -> None:
+    found = []
+    for page in documents():
+        text = page.read_text(encoding="utf-8")
+        found += [page for calls in solutions.values() if told_share(text, calls) > MAX_TOLD]
+        found += [page] * (longest_passage(text, STEP) > BEGINNING + 1)
+    assert not found
+
+
+def test_a_page_with_a_solution_would_be_found(solutions) -> None:
+    (part,) = DESIGNS["support-1"](0).parts.values()
+    forms = (
+        lambda name, given: f"1. {name}: {', '.join(str(v) for v in given.values() if v)}",
+        lambda name, given: f"    {name} {given}",
+        lambda name, given: "- " + json.dumps({"tool": name, "arguments": given}),
+    )
+    for form in forms:
+        page = "\n".join(form(name, dict(given)) for name, given in part.actions)
+        assert told_share(page, solutions["support-1"]) > MAX_TOLD
 
 
 @pytest.mark.ci

@@ -1,11 +1,15 @@
-"""What documents name exists: links, files, modules, make targets and commands."""
+"""What documents, messages and advice name exists: files, modules, targets, commands, variables.
+
+Links are `mkdocs build --strict`'s.
+"""
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-
 from buildarena_cli.command_table import ADMIN, COMMANDS
+from buildarena_pipeline.runtime.settings import Settings
+from buildarena_simworker_besiege.settings import BesiegeSettings
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [
@@ -13,23 +17,21 @@ SOURCES = [
     for kind in ("libs", "services", "clients", "integrations")
     for folder in ROOT.glob(f"{kind}/*/src")
 ]
-# It names what modules were called before.
-RENAMES = "CHANGELOG.md"
+PATTERNS = ("*.md", "docs/**/*.md", "libs/*/README.md", "libs/*/src/**/README.md")
+PATTERNS += ("clients/*/README.md", "integrations/*/README.md")
+# The changelog names what modules were called before.
 DOCUMENTS = [
-    file
-    for pattern in (
-        *("*.md", "docs/**/*.md", "libs/*/README.md", "libs/*/src/**/README.md"),
-        "clients/*/README.md",
-        "integrations/*/README.md",
-    )
-    for file in sorted(ROOT.glob(pattern))
-    if file.name != RENAMES
+    file for each in PATTERNS for file in sorted(ROOT.glob(each)) if file.name != "CHANGELOG.md"
 ]
-
-
-@pytest.fixture(params=DOCUMENTS, ids=lambda file: str(file.relative_to(ROOT)))
-def document(request) -> Path:
-    return request.param
+PATH = re.compile(
+    r"`((?:libs|services|clients|integrations|tests|scenarios|benchmarks|examples|docs|deploy|mk)"
+    r"/[\w./*-]+)`"
+)
+MAKEFILES = "\n".join(f.read_text() for f in [ROOT / "Makefile", *ROOT.glob("mk/*.mk")])
+TARGETS = set(re.findall(r"^([a-z0-9-]+):", MAKEFILES, re.MULTILINE))
+VARIABLE = re.compile(r"\bBUILDARENA_([A-Z0-9]+(?:_[A-Z0-9]+)*)\b(?!_)")
+WITHOUT_SETTINGS = {"URL", "KEY", "BLAS_KERNELS", "PARENT_PID", "CHROMIUM"}
+"""Read before, or without, a process' settings."""
 
 
 def exists_as_module(name: str) -> bool:
@@ -46,41 +48,36 @@ def exists_as_module(name: str) -> bool:
     return False
 
 
-def test_links_lead_somewhere(document) -> None:
-    prose = re.sub(r"^```.*?^```$", "", document.read_text(), flags=re.MULTILINE | re.DOTALL)
-    targets = re.findall(r"\]\(([^)#\s]+)", prose)
-    missing = [t for t in targets if "://" not in t and not (document.parent / t).exists()]
-    assert not missing
+def missing_in(text: str) -> Iterator[str]:
+    """What a document names and nothing is."""
+    yield from (name for name in PATH.findall(text) if not list(ROOT.glob(name)))
+    for name in re.findall(r"`(buildarena_\w+/[\w./-]+\.\w+)`", text):
+        if not any((source / name).is_file() for source in SOURCES):
+            yield name
+    for name in set(re.findall(r"`(buildarena_[a-z]+(?:[./]\w+)*)", text)):
+        if not exists_as_module(name.removesuffix(".py").replace("/", ".")):
+            yield name
+    yield from set(re.findall(r"`make ([a-z0-9-]+)", text)) - TARGETS
+    yield from set(re.findall(r"(?<!import )\bbuildarena ([a-z]+)\b", text)) - COMMANDS.keys()
+    yield from set(re.findall(r"\b(?:buildarena|tools) admin ([a-z]+)\b", text)) - ADMIN.keys()
 
 
-def test_files_exist(document) -> None:
-    named = re.findall(
-        r"`((?:libs|services|clients|integrations|tests|scenarios|benchmarks|examples|docs|deploy|mk)/[\w./*-]+)`",
-        document.read_text(),
-    )
-    assert not [name for name in named if not list(ROOT.glob(name))]
+def test_what_documents_name_exists() -> None:
+    assert len(DOCUMENTS) > 30
+    missing = {str(f.relative_to(ROOT)): list(missing_in(f.read_text())) for f in DOCUMENTS}
+    assert not {file: names for file, names in missing.items() if names}
 
 
-def test_files_of_packages_exist(document) -> None:
-    """Files that are named from their package on, such as `buildarena_environment/briefing.md`."""
-    named = re.findall(r"`(buildarena_\w+/[\w./-]+\.\w+)`", document.read_text())
-    assert not [name for name in named if not any((s / name).is_file() for s in SOURCES)]
-
-
-def test_modules_exist(document) -> None:
-    named = re.findall(r"`(buildarena_[a-z]+(?:[./]\w+)*)", document.read_text())
-    dotted = {name.removesuffix(".py").replace("/", ".") for name in named}
-    assert not [name for name in sorted(dotted) if not exists_as_module(name)]
-
-
-def test_make_targets_exist(document) -> None:
-    makefiles = "\n".join(f.read_text() for f in [ROOT / "Makefile", *ROOT.glob("mk/*.mk")])
-    targets = set(re.findall(r"^([a-z0-9-]+):", makefiles, re.MULTILINE))
-    assert set(re.findall(r"`make ([a-z0-9-]+)", document.read_text())) <= targets
-
-
-def test_commands_exist(document) -> None:
-    named = set(re.findall(r"(?<!import )\bbuildarena ([a-z]+)\b", document.read_text()))
-    assert named <= COMMANDS.keys()
-    operating = set(re.findall(r"\b(?:buildarena|tools) admin ([a-z]+)\b", document.read_text()))
-    assert operating <= ADMIN.keys()
+def test_no_place_names_a_variable_that_nothing_reads() -> None:
+    own = {name.upper() for name in Settings.model_fields}
+    game = {f"BESIEGE_{name.upper()}" for name in BesiegeSettings.model_fields}
+    read = own | game | WITHOUT_SETTINGS | set(VARIABLE.findall((ROOT / ".env.example").read_text()))
+    places = [file for source in SOURCES for file in source.rglob("*.py")]
+    places += [*DOCUMENTS, ROOT / "deploy/monitoring/prometheus/alerts.yml"]
+    unknown = {
+        f"{place.relative_to(ROOT)}: {name}"
+        for place in places
+        for name in VARIABLE.findall(place.read_text())
+        if not {name, name.removesuffix("_FILE")} & read
+    }
+    assert not unknown, f"nothing reads {sorted(unknown)}"
