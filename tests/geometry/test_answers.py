@@ -1,13 +1,18 @@
-"""Answers tell what is: what holds, what heats what, which face looks where, what was meant."""
+"""What answers tell: what holds, heats, meshes and is locked, which side looks where, what was meant."""
 
 import re
 
+import numpy as np
 import pytest
-from support.machines.building import attach, connect
+from support.machines.building import BLOCK, attach, built, connect
+from support.machines.random_workshop import TASKS, random_workshop_machine
 
-from buildarena_geometry import Cause, Machine, load_catalogue
+from buildarena_geometry import Cause, Machine, load_catalogue, module_set
 from buildarena_geometry.feedback.modules import modules_text
+from buildarena_geometry.mobility import mobility
 from buildarena_geometry.modules.names import CaselessNames
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.structure.clusters import find_clusters
 
 BLOCK = "Small Wooden Block"
 COLUMN = (("1", "D", BLOCK), ("2", "E", BLOCK))
@@ -44,26 +49,6 @@ def details(machine: Machine, block: str) -> str:
 # What holds
 
 
-def test_a_shifted_block_says_how_far_off_it_is_and_that_it_holds(build):
-    machine = build(("1", "A", BLOCK), ("2", "E", BLOCK))
-    moved = shift(machine, "3", 0, 0.25, 0)
-    assert "0.25 off 2/E; still holds" in moved
-    for asked in (details(machine, "3"), act(machine, "get_machine_summary")):
-        assert "3 Small Wooden Block, 0.25 off 2/E; still holds" in asked
-    back = shift(machine, "3", 0, -0.25, 0)
-    assert "Block 3 sits flush on 2/E again." in back
-    assert "off" not in back
-
-
-def test_a_parted_block_says_what_that_means(build):
-    machine = build(("1", "A", BLOCK), ("2", "E", BLOCK))
-    moved = shift(machine, "2", 0, 0.5, 0.5)
-    assert "2 Small Wooden Block, 0.71 off 1/A; no longer joined" in moved
-    assert "Block 3 is 0.71 off 2/E; no longer joined." in moved
-    assert moved.count("there is no joint: without connectors the two come apart") == 1
-    assert moved.endswith("Not connected to block 1: 2, 3.")
-
-
 def test_a_parted_block_that_a_connector_holds_is_not_called_loose(build):
     machine = build(("1", "A", BLOCK))
     assert connect(machine, "1", "C", "2", "C").ok
@@ -80,33 +65,6 @@ def test_what_is_just_too_far_is_not_shown_as_just_near_enough(build):
 
 
 # What heats what
-
-
-def test_cannon_and_torch_tell_each_that_the_flame_reaches(engine):
-    assert "heats 4" in details(engine, "5")
-    assert "heated by 5" in details(engine, "4")
-    summary = act(engine, "get_machine_summary")
-    assert "heats 4" in summary
-    assert "heated by 5" in summary
-    assert "heat" not in details(engine, "3")
-
-
-def test_an_attach_tells_whether_the_flame_reaches(engine):
-    act(engine, "remove_block", block_id="4")
-    near = act(engine, "attach_block_to", base_block="1", face="A", new_block="Water Cannon")
-    assert "heated by 5" in near
-    away = act(engine, "attach_block_to", base_block="1", face="B", new_block="Water Cannon")
-    assert "not heated" in away
-
-
-def test_a_twist_away_ends_it_and_a_twist_back_begins_it(engine):
-    away = twist(engine, "5", 180)
-    assert "heats nothing" in away
-    assert "Block 4 (Water Cannon) is no longer heated by 5." in away
-    assert "not heated" in details(engine, "4")
-    back = twist(engine, "5", 180)
-    assert "heats 4" in back
-    assert "no longer" not in back
 
 
 @pytest.mark.parametrize(("apart", "reached"), [(0.3, True), (0.31, False)])
@@ -150,22 +108,25 @@ def shown_free_faces(text: str) -> dict[str, str]:
     return dict(re.findall(r"([A-F]) <([^>]*)>", listed))
 
 
-@pytest.mark.parametrize("angle", [0, 90, 180, 270])
-def test_a_refusal_names_the_free_faces_as_successes_do(build, angle):
-    machine = build(("1", "A", BLOCK), ("2", "E", "Torch"))
-    twisted = twist(machine, "2", angle)
-    faces = dict(re.findall(r"([A-F]) (<[^>]*>) \[[^]]*\](?=;|\.)", details(machine, "2")))
-    free = {label: side.strip("<>") for label, side in faces.items()}
-    assert set(free) == set("ABCD")
-    torch = {"base_block": "2", "new_block": "Torch"}
-    taken = machine.act("attach_block_to", {**torch, "face": "E"})
-    absent = machine.act("attach_block_to", {**torch, "face": "X"})
-    assert taken.cause is Cause.FACE_OCCUPIED
-    assert absent.cause is Cause.NO_SUCH_FACE
-    assert taken.text.startswith("Face E <East> of block 2")
-    assert shown_free_faces(taken.text) == free
-    assert shown_free_faces(absent.text) == free
-    assert dict(re.findall(r"([A-F]) <([^>]*)>", twisted.partition("Free faces: ")[2])) == free
+def test_a_refusal_names_the_free_faces_as_successes_do(build, subtests):
+    for angle in [0, 90, 180, 270]:
+        with subtests.test(angle=angle):
+            machine = build(("1", "A", BLOCK), ("2", "E", "Torch"))
+            twisted = twist(machine, "2", angle)
+            faces = dict(re.findall(r"([A-F]) (<[^>]*>) \[[^]]*\](?=;|\.)", details(machine, "2")))
+            free = {label: side.strip("<>") for label, side in faces.items()}
+            assert set(free) == set("ABCD")
+            torch = {"base_block": "2", "new_block": "Torch"}
+            taken = machine.act("attach_block_to", {**torch, "face": "E"})
+            absent = machine.act("attach_block_to", {**torch, "face": "X"})
+            assert taken.cause is Cause.FACE_OCCUPIED
+            assert absent.cause is Cause.NO_SUCH_FACE
+            assert taken.text.startswith("Face E <East> of block 2")
+            assert shown_free_faces(taken.text) == free
+            assert shown_free_faces(absent.text) == free
+            assert (
+                dict(re.findall(r"([A-F]) <([^>]*)>", twisted.partition("Free faces: ")[2])) == free
+            )
 
 
 def test_a_block_without_free_faces_says_so(build):
@@ -178,17 +139,6 @@ def test_a_missing_face_of_a_connection_names_all_faces_with_their_sides(build):
     machine = build(("1", "A", BLOCK))
     refused = connect(machine, "1", "G", "2", "C")
     assert "Its faces: A <East>, B <West>, C <Up>, D <Down>, E <North>, F <South>." in refused.text
-
-
-@pytest.mark.parametrize(
-    ("face", "centre"),
-    [("A", "[0.75, 0, 0]"), ("B", "[-0.75, 0, 0]"), ("C", "[0, 0, 0.75]")],
-)
-def test_a_wheel_says_where_its_centre_is(build, face, centre):
-    machine = build(("1", face, "Powered Wheel"))
-    assert f"centre {centre}" in details(machine, "2")
-    moved = shift(machine, "2", 0.1, 0, 0)
-    assert f"centre {centre}" not in moved
 
 
 # What an assembly's parts have
@@ -206,31 +156,23 @@ def test_an_added_machine_shows_its_blocks_faces_and_connectors(build):
     assert "sub-structure B: 3 blocks B_1 to B_3; connectors: B_4." in copy
 
 
-def test_a_turned_machine_shows_which_sides_its_faces_look_to_now(build):
-    assembly = Machine(available={"cart": build()})
-    added = act(assembly, "add_machine", machine_id="cart")
-    assert "A <East>" in added
-    turned = act(assembly, "rotate_machine", machine_index="A", rotation=[90, 0, 0])
-    assert "A <South>" in turned
-
-
 # Which name is meant
 
 
-@pytest.mark.parametrize(
-    "written", [BLOCK, "small wooden block", "SMALL  WOODEN BLOCK", " Small wooden block "]
-)
-def test_a_module_is_found_whatever_its_case(build, written):
-    machine = build()
-    text = act(machine, "attach_block_to", base_block="1", face="A", new_block=written)
-    assert text.startswith("Attached. 2 Small Wooden Block")
-    assert machine.blocks["2"].module.name == BLOCK
+def test_a_module_is_found_whatever_its_case(build, subtests):
+    for written in [BLOCK, "small wooden block", "SMALL  WOODEN BLOCK", " Small wooden block "]:
+        with subtests.test(written=written):
+            machine = build()
+            text = act(machine, "attach_block_to", base_block="1", face="A", new_block=written)
+            assert text.startswith("Attached. 2 Small Wooden Block")
+            assert machine.blocks["2"].module.name == BLOCK
 
 
-@pytest.mark.parametrize("written", ["Small Wooden", "Wooden Block", "smallwoodenblock", "", " "])
-def test_another_name_is_no_module(build, written):
-    refused = attach(build(), "1", "A", written)
-    assert refused.cause is Cause.UNKNOWN_MODULE
+def test_another_name_is_no_module(build, subtests):
+    for written in ["Small Wooden", "Wooden Block", "smallwoodenblock", "", " "]:
+        with subtests.test(written=written):
+            refused = attach(build(), "1", "A", written)
+            assert refused.cause is Cause.UNKNOWN_MODULE
 
 
 def test_connectors_actions_and_tools_are_found_whatever_their_case(build):
@@ -267,3 +209,211 @@ def test_the_module_list_gives_sizes_masses_faces_and_actions():
 def test_a_tasks_module_list_has_its_modules_and_the_starting_block_alone():
     lines = modules_text(load_catalogue(), [BLOCK]).splitlines()
     assert [line.partition(" (")[0] for line in lines] == ["- Starting Block", f"- {BLOCK}"]
+
+
+CATALOGUE = module_set("workshop")
+
+
+def line(module, face="A", twist=0.0, *, flip=False):
+    """What is said of a module on a face of a starting block: A looks east, C up, E north."""
+    machine = built(("1", face, module), catalogue=CATALOGUE)
+    if twist:
+        assert machine.act("twist_block", {"block_id": "2", "angle": twist}).ok
+    if flip:
+        assert machine.act("flip_spin", {"block_id": "2"}).ok
+    return machine.act("get_block_details", {"block_id": "2"}).text.splitlines()[0]
+
+
+def test_directions_are_the_worlds(subtests):
+    for module, face, twist, said in [
+        ("Hinge", "A", 0, "swings about <North>"),
+        ("Hinge", "A", 90, "swings about <Down>"),
+        ("Hinge", "A", 30, "swings about <North with -30° pitch>"),
+        ("Hinge", "C", 0, "swings about <West>"),
+        ("Swivel", "C", 0, "turns freely about <Up>"),
+        ("Ball Joint", "A", 0, "turns freely every way"),
+        ("Axle", "E", 0, "bends freely, shaft <North>"),
+        ("Slider", "E", 45, "slides along <North>"),
+        ("Suspension", "D", 0, "slides along <Down>"),
+        ("Piston", "B", 0, "extend moves it <West>"),
+        ("Steering Block", "A", 0, "turn_left turns it counterclockwise seen from outside"),
+        ("Spinning Block", "A", 0, "always turns clockwise seen from outside"),
+        ("Steering Hinge", "A", 0, "turn_right swings its far end <Up>"),
+        ("Steering Hinge", "A", 90, "turn_right swings its far end <North>"),
+        ("Steering Hinge", "A", 180, "turn_right swings its far end <Down>"),
+        ("Wheel Unpowered", "A", 0, "turns freely about <East>"),
+        ("Small Wheel", "D", 0, "turns freely about <West>"),
+        ("Large Wheel", "A", 0, "forward rolls it <North>"),
+        ("Fly Wheel", "A", 0, "forward rolls it <South>"),
+        ("Wing Panel", "A", 0, "flat side faces <Up>"),
+        ("Wing Panel", "A", 90, "flat side faces <North>"),
+        ("Drag Block", "A", 0, "open to <Down>"),
+        ("Flying Block", "D", 0, "fly pushes it <Down>"),
+    ]:
+        with subtests.test(module=module):
+            told = line(module, face, twist).rstrip(".")
+            assert said in told.split(", ") or told.endswith(said)
+
+
+def test_flipping_turns_them_round(subtests):
+    for module, said in [
+        ("Steering Hinge", "turn_right swings its far end <Down> (flipped)"),
+        ("Steering Block", "turn_left turns it clockwise seen from outside (flipped)"),
+        ("Spinning Block", "always turns counterclockwise seen from outside (flipped)"),
+        ("Large Wheel", "forward rolls it <South> (flipped)"),
+    ]:
+        with subtests.test(module=module):
+            assert line(module, flip=True).endswith(f"{said}.")
+
+
+def test_nothing_is_said_of_what_has_no_direction(subtests):
+    for module in ["Double Wooden Block", "Log", "Grip Pad", "Ballast", "Balloon"]:
+        with subtests.test(module=module):
+            assert line(module).count(",") == 4  # its face, and three coordinates
+
+
+def test_every_articulated_or_flying_type_says_something():
+    silent = [
+        name
+        for name in CATALOGUE.attachable
+        if (module := CATALOGUE[name]).joint or module.wing or module.push
+        if line(name).count(",") == 4
+    ]
+    assert silent == []
+
+
+WORKSHOP = module_set("workshop")
+
+
+def simulated(machine: Machine) -> tuple[set[str], set[frozenset[str]]]:
+    """The joints that move and the cogs that drive each other, as a simulator finds them."""
+    structure = structure_of(machine)
+    members = structure.members
+    clusters = find_clusters(structure, np.ones(len(members), dtype=bool))
+    ids = [part.id for part in structure.parts]
+    first, second = (clusters.cluster_of[ends] for ends in (members.first, members.second))
+    seated = {ids[members.second[k]] for k in np.flatnonzero(first != second)}
+    base = {ids[members.second[k]]: first[k] for k in range(len(members))}
+    meshes = {
+        frozenset((ids[mesh.first], ids[mesh.second]))
+        for mesh in structure.joints.meshes
+        if {ids[mesh.first], ids[mesh.second]} <= seated
+        and base[ids[mesh.first]] == base[ids[mesh.second]]
+    }
+    return seated, meshes
+
+
+def told(machine: Machine) -> tuple[set[str], set[frozenset[str]]]:
+    """The same as the library tells it."""
+    found = mobility(machine.state)
+    jointed = {
+        joint.part
+        for joint in machine.joints
+        if joint.holds
+        and machine.blocks[joint.part].module.physics.joint_type
+        in ("axle", "hinge", "slider", "ball", "constant_velocity")
+    }
+    pairs = {frozenset((a, b)) for a, others in found.meshes.items() for b in others}
+    return jointed - set(found.locks), pairs
+
+
+def test_it_agrees_with_the_simulator(subtests):
+    for seed, task in enumerate(TASKS[:8]):
+        with subtests.test(task=task):
+            machine = random_workshop_machine(task, seed % 4)
+            assert told(machine) == simulated(machine)
+            # Braces between any faces lock some joints and leave others.
+            draw = np.random.default_rng(seed)
+            faced = [block for block in machine.blocks.values() if block.module.faces]
+            for _ in range(5):
+                a, b = (faced[k] for k in draw.choice(len(faced), 2, replace=False))
+                face_a, face_b = (str(draw.choice(list(b.module.face_of_label))) for b in (a, b))
+                connect(machine, a.id, face_a, b.id, face_b)
+                assert told(machine) == simulated(machine)
+
+
+def test_a_brace_across_a_joint_is_told_to_lock_it(subtests):
+    for joint in ["Hinge", "Swivel", "Slider", "Piston", "Suspension", "Ball Joint"]:
+        with subtests.test(joint=joint):
+            machine = built(("1", "A", joint), ("2", "E", BLOCK), catalogue=WORKSHOP)
+            if joint in ("Piston", "Suspension"):
+                assert "locked" not in machine.act("get_machine_summary", {}).text
+            answer = connect(machine, "1", "C", "3", "E")
+            assert answer.text.endswith(f"Block 2 ({joint}) is locked by 4.")
+            assert "locked by 4" in machine.act("get_block_details", {"block_id": "2"}).text
+            assert "locked by 4" in machine.act("get_machine_summary", {}).text
+            removed = machine.act("remove_block", {"block_id": "4"})
+            assert removed.text.endswith(f"Block 2 ({joint}) can move again.")
+            assert "locked" not in machine.act("get_machine_summary", {}).text
+
+
+def test_ropes_and_springs_lock_nothing(subtests):
+    for connector in ["Winch", "Spring"]:
+        with subtests.test(connector=connector):
+            machine = built(("1", "A", "Hinge"), ("2", "E", BLOCK), catalogue=WORKSHOP)
+            assert "locked" not in connect(machine, "1", "C", "3", "E", connector=connector).text
+
+
+def test_a_deck_on_two_suspensions_does_not_move():
+    machine = built(
+        ("1", "A", BLOCK), ("1", "C", "Suspension"), ("2", "C", "Suspension"), catalogue=WORKSHOP
+    )
+    answer = connect(machine, "3", "E", "4", "E")
+    assert "Block 3 (Suspension) is locked by 4." in answer.text
+    assert "Block 4 (Suspension) is locked by 3." in answer.text
+
+
+def test_joints_of_a_loop_move_if_they_turn_about_one_line(subtests):
+    """Swivels on opposite faces turn about one line; on faces at right angles they lock."""
+    for faces, moves in [(("A", "B"), True), (("A", "C"), False)]:
+        with subtests.test(faces=faces):
+            machine = built(
+                ("1", faces[0], "Swivel"), ("1", faces[1], "Swivel"), catalogue=WORKSHOP
+            )
+            connect(machine, "2", "E", "3", "E")
+            assert told(machine) == simulated(machine)
+            assert bool(mobility(machine.state).locks) != moves
+
+
+COGS = [name for name, module in WORKSHOP.items() if module.gear is not None]
+
+
+def test_cogs_are_told_to_mesh_by_the_number_of_the_other(subtests):
+    for first, second in zip(COGS, [*COGS[1:], COGS[0]], strict=True):
+        with subtests.test(first=first, second=second):
+            apart = round(sum(WORKSHOP[name].gear.pitch_radius for name in (first, second)))
+            row = [("1", "A", BLOCK)] + [(str(k), "E", BLOCK) for k in range(2, apart + 1)]
+            machine = built(*row, ("1", "E", first), catalogue=WORKSHOP)
+            base, cog, other = (str(apart + number) for number in (1, 2, 3))
+            answer = attach(machine, base, _face(machine, base, "North"), second)
+            assert f"meshes with {cog}" in answer.text
+            assert f"meshes with {other}" in details(machine, cog)
+            assert told(machine) == simulated(machine)
+            shifted = shift(machine, other, 0.2, 0, 0)
+            assert shifted.endswith(f"no longer meshes with {other}.")
+            assert told(machine) == simulated(machine)
+
+
+def _face(machine: Machine, block: str, side: str) -> str:
+    text = machine.act("get_block_details", {"block_id": block}).text
+    return re.search(rf"(\w+) <{side}>", text).group(1)
+
+
+def test_a_wheel_that_is_braced_to_the_frame_is_told_to_be_locked():
+    machine = built(("1", "A", "Powered Wheel"))
+    assert not mobility(machine.state).locks
+    assert connect(machine, "1", "C", "2", "E").text.endswith(
+        "Block 2 (Powered Wheel) is locked by 3."
+    )
+
+
+def test_a_refusal_says_how_deep_the_overlap_is(subtests):
+    """Colliders of a row leave 0.2 between them along it; what goes beyond is told."""
+    for shift in [0.1, 0.25, 0.5]:
+        with subtests.test(shift=shift):
+            machine = built(("1", "A", BLOCK), ("2", "E", BLOCK))
+            answer = machine.act("shift_block", {"block_id": "3", "shift_real": [-shift, 0, 0]})
+            depth = shift - 0.2
+            assert answer.ok == (depth < 0)
+            if not answer.ok:
+                assert answer.text.endswith(f"block 2 (Small Wooden Block) by {depth:.2g}.")

@@ -1,4 +1,4 @@
-"""Attaching, connecting and removing."""
+"""Attaching, connecting, removing, twisting, shifting, flipping, and what it does to joints."""
 
 import numpy as np
 import pytest
@@ -22,29 +22,28 @@ def test_an_unrotated_starting_block_has_the_worlds_axes_and_faces():
     assert block.note == "a test"
 
 
-@pytest.mark.parametrize("module", ATTACHABLE)
-@pytest.mark.parametrize("face", "ABCDEF")
-def test_a_new_block_touches_its_base_face_and_points_away_from_it(build, module, face):
-    machine = build(("1", face, module))
-    base, part = machine.blocks["1"], machine.blocks["2"]
-    assert part.mount == ("1", face)
-    assert np.allclose(part.world_from_block.position, base.face_center(face))
-    assert np.allclose(part.axis_xyz, base.face_normal(face))
+def test_a_new_block_touches_its_base_face_and_points_away_from_it(build, subtests):
+    for module in ATTACHABLE:
+        for face in "ABCDEF":
+            with subtests.test(module=module, face=face):
+                machine = build(("1", face, module))
+                base, part = machine.blocks["1"], machine.blocks["2"]
+                assert part.mount == ("1", face)
+                assert np.allclose(part.world_from_block.position, base.face_center(face))
+                assert np.allclose(part.axis_xyz, base.face_normal(face))
 
 
-@pytest.mark.parametrize(
-    ("face", "torch", "cannon"),
-    [
+def test_torches_and_cannons_point_as_in_besiege(build, subtests):
+    for face, torch, cannon in [
         ("A", (0, 0, 1), (0, 0, -1)),
         ("B", (0, 0, 1), (0, 0, -1)),
         ("E", (0, 0, 1), (0, 0, -1)),
         ("F", (0, 0, -1), (0, 0, 1)),
         ("C", (0, -1, 0), (0, 1, 0)),
-    ],
-)
-def test_torches_and_cannons_point_as_in_besiege(build, face, torch, cannon):
-    assert np.allclose(build(("1", face, "Torch")).blocks["2"].pointing, torch)
-    assert np.allclose(build(("1", face, "Water Cannon")).blocks["2"].pointing, cannon)
+    ]:
+        with subtests.test(face=face):
+            assert np.allclose(build(("1", face, "Torch")).blocks["2"].pointing, torch)
+            assert np.allclose(build(("1", face, "Water Cannon")).blocks["2"].pointing, cannon)
 
 
 def test_only_the_face_it_sits_on_is_taken_and_faces_that_touch_a_neighbour_stay_open(build):
@@ -81,17 +80,19 @@ def test_wheels_side_by_side_overlap(build):
     assert attach(machine, "2", "C", "Powered Wheel").overlaps == (("4", "3"),)
 
 
-@pytest.mark.parametrize(("gap", "fits"), [(0.0, True), (-1e-7, True), (-1e-4, False)])
-def test_blocks_may_touch_and_not_overlap(build, gap, fits):
-    machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Small Wooden Block"))
-    # The starting block ends at 0.4, the small block begins at 0.5: 0.1 closes the gap.
-    outcome = machine.act("shift_block", {"block_id": "2", "shift_real": [-0.1 + gap, 0, 0]})
-    assert outcome.ok is fits
+def test_blocks_may_touch_and_not_overlap(build, subtests):
+    for gap, fits in [(0.0, True), (-1e-7, True), (-1e-4, False)]:
+        with subtests.test(gap=gap):
+            machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Small Wooden Block"))
+            # The starting block ends at 0.4, the small block begins at 0.5: 0.1 closes the gap.
+            outcome = machine.act(
+                "shift_block", {"block_id": "2", "shift_real": [-0.1 + gap, 0, 0]}
+            )
+            assert outcome.ok is fits
 
 
-@pytest.mark.parametrize(
-    ("arguments", "cause"),
-    [
+def test_an_attach_that_makes_no_sense_is_refused_with_its_cause(build, subtests):
+    for arguments, cause in [
         (("1", "a", "Torch"), Cause.NO_SUCH_FACE),
         (("2", "A", "Torch"), Cause.NO_SUCH_FACE),
         (("3", "A", "Torch"), Cause.NO_SUCH_FACE),
@@ -101,12 +102,11 @@ def test_blocks_may_touch_and_not_overlap(build, gap, fits):
         (("1", "B", "Starting Block"), Cause.UNKNOWN_MODULE),
         (("1", "B", "Ballast"), Cause.UNKNOWN_MODULE),
         (("1", "B", "torches"), Cause.UNKNOWN_MODULE),
-    ],
-)
-def test_an_attach_that_makes_no_sense_is_refused_with_its_cause(build, arguments, cause):
-    machine = build(("1", "A", "Torch"))
-    assert connect(machine, "1", "C", "1", "E").ok  # connector 3 has no faces either
-    assert attach(machine, *arguments).cause is cause
+    ]:
+        with subtests.test(arguments=arguments):
+            machine = build(("1", "A", "Torch"))
+            assert connect(machine, "1", "C", "1", "E").ok  # connector 3 has no faces either
+            assert attach(machine, *arguments).cause is cause
 
 
 def test_a_connector_joins_faces_and_leaves_them_open(build):
@@ -120,31 +120,30 @@ def test_a_connector_joins_faces_and_leaves_them_open(build):
     assert connect(machine, "1", "A", "2", "E").ok, "taken faces may be connected"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
+def test_a_connection_that_makes_no_sense_is_refused(build, subtests):
+    for arguments, reason in [
         (("1", "A", "2", "F"), RefusalClass.EXCESS_CONNECTION),
         (("2", "F", "1", "A"), RefusalClass.EXCESS_CONNECTION),
         (("1", "C", "1", "C"), RefusalClass.TOO_CLOSE),
         (("1", "C", "3", "A"), RefusalClass.FACE_PRESENCE),
         (("1", "C", "2", "Q"), RefusalClass.FACE_PRESENCE),
         (("7", "C", "2", "A"), RefusalClass.BLOCK_PRESENCE),
-    ],
-)
-def test_a_connection_that_makes_no_sense_is_refused(build, arguments, reason):
-    machine = build(("1", "A", "Small Wooden Block"), ("1", "B", "Torch"))
-    assert connect(machine, *arguments).reason is reason
+    ]:
+        with subtests.test(arguments=arguments):
+            machine = build(("1", "A", "Small Wooden Block"), ("1", "B", "Torch"))
+            assert connect(machine, *arguments).reason is reason
 
 
-@pytest.mark.parametrize(
-    ("module", "reason"),
-    [("Torch", RefusalClass.CONNECTOR_MISUSE), ("Rope", RefusalClass.MODULE_RESTRICTION)],
-)
-def test_only_connectors_connect(build, module, reason):
-    machine = build(("1", "A", "Small Wooden Block"))
-    outcome = connect(machine, "1", "C", "2", "C", connector=module)
-    assert outcome.reason is reason
-    assert "Brace, Winch" in outcome.text
+def test_only_connectors_connect(build, subtests):
+    for module, reason in [
+        ("Torch", RefusalClass.CONNECTOR_MISUSE),
+        ("Rope", RefusalClass.MODULE_RESTRICTION),
+    ]:
+        with subtests.test(module=module):
+            machine = build(("1", "A", "Small Wooden Block"))
+            outcome = connect(machine, "1", "C", "2", "C", connector=module)
+            assert outcome.reason is reason
+            assert "Brace, Winch" in outcome.text
 
 
 def test_connector_ends_follow_the_blocks_they_sit_on(build):
@@ -201,3 +200,106 @@ def test_nothing_is_built_before_the_start_and_nothing_is_started_twice():
 def test_the_starting_block_stays(build):
     outcome = build().act("remove_block", {"block_id": "1"})
     assert outcome.cause is Cause.START_BLOCK
+
+
+def twist(machine, block, angle):
+    return machine.act("twist_block", {"block_id": block, "angle": angle})
+
+
+def shift(machine, block, *offset):
+    return machine.act("shift_block", {"block_id": block, "shift_real": list(offset)})
+
+
+def test_a_twist_is_clockwise_seen_from_outside_and_keeps_the_root(build):
+    machine = build(("1", "A", "Torch"))  # on the east face, pointing up
+    before = machine.blocks["2"].world_from_block.position
+    assert twist(machine, "2", 90).ok
+    # Seen from the east, looking west, north is on the right: clockwise from up.
+    assert np.allclose(machine.blocks["2"].pointing, (0, 1, 0))
+    assert np.allclose(machine.blocks["2"].world_from_block.position, before)
+
+
+def test_twists_add_up_to_full_turns(build):
+    machine = build(("1", "A", "Small Wooden Block"))
+    before = machine.copy()
+    for _ in range(8):
+        assert twist(machine, "2", 45).ok
+    rotation, whole = (m.blocks["2"].world_from_block.rotation for m in (machine, before))
+    assert np.allclose(rotation, whole)
+    assert twist(machine, "2", -720).ok
+
+
+def test_a_block_twists_about_its_base_face_as_that_face_looks_now(build):
+    machine = build(("1", "C", "Small Wooden Block"), ("2", "C", "Small Wooden Block"))
+    assert twist(machine, "2", 90).ok
+    axis = machine.blocks["2"].face_normal("C")
+    assert twist(machine, "3", 30).ok
+    turn = machine.blocks["3"].world_from_block.rotation
+    before = build(("1", "C", "Small Wooden Block"), ("2", "C", "Small Wooden Block"))
+    change = turn @ before.blocks["3"].world_from_block.rotation.T
+    assert np.allclose(change @ axis, axis)
+
+
+def test_blocks_that_hang_on_a_moved_block_stay_and_are_named(build):
+    machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Small Wooden Block"))
+    before = machine.blocks["3"]
+    outcome = shift(machine, "2", 0, 0.3, 0)
+    assert machine.blocks["3"] == before
+    assert "2 Small Wooden Block, 0.3 off 1/A; still holds" in outcome.text
+    assert "Block 3 is 0.3 off 2/E; still holds." in outcome.text
+
+
+def test_a_joint_gives_up_when_its_sides_are_more_than_half_a_unit_apart(build):
+    machine = build(("1", "A", "Torch"))
+    assert shift(machine, "2", 0.5, 0, 0).ok
+    assert machine.joints[0].offset == pytest.approx(0.5)
+    assert machine.joints[0].holds
+    assert machine.detached == ()
+    outcome = shift(machine, "2", 0.01, 0, 0)
+    assert not machine.joints[0].holds
+    assert machine.detached == ("2",)
+    assert "0.51 off 1/A; no longer joined" in outcome.text
+
+
+def test_the_center_follows_a_shift(build):
+    machine = build(("1", "E", "Water Cannon"))
+    before = machine.blocks["2"].center
+    shift(machine, "2", 0.1, 0.2, 0.3)
+    assert np.allclose(machine.blocks["2"].center - before, (0.1, 0.2, 0.3))
+
+
+def test_a_shift_beyond_half_a_unit_is_out_of_range(build, subtests):
+    for offset in [(0.51, 0, 0), (0, -0.6, 0), (0, 0, 7)]:
+        with subtests.test(offset=offset):
+            machine = build(("1", "A", "Torch"))
+            assert shift(machine, "2", *offset).reason == RefusalClass.OUT_OF_RANGE
+
+
+def test_the_starting_block_shifts_and_does_not_twist(build):
+    machine = build(("1", "A", "Small Wooden Block"))
+    assert twist(machine, "1", 90).cause is Cause.START_BLOCK
+    outcome = shift(machine, "1", 0, 0.1, 0)
+    assert outcome.ok
+    assert "Block 2 is 0.1 off 1/A; still holds." in outcome.text
+
+
+def test_a_connector_turns_in_its_own_frame_and_keeps_its_ends(build):
+    machine = build(("1", "A", "Small Wooden Block"))
+    connect(machine, "1", "C", "2", "C")
+    before = machine.connectors["3"]
+    assert twist(machine, "3", 90).ok
+    assert shift(machine, "3", 0, 0, 0.2).ok
+    after = machine.connectors["3"]
+    assert (after.start_xyz, after.end_xyz) == (before.start_xyz, before.end_xyz)
+    assert np.allclose(after.world_from_connector.position - before.start_point, (0, 0, 0.2))
+
+
+def test_flipping_reverses_a_wheel_and_nothing_else(build):
+    machine = build(("1", "A", "Powered Wheel"), ("1", "B", "Torch"))
+    assert "forward rolls it <North>" in machine.act("get_block_details", {"block_id": 2}).text
+    outcome = machine.act("flip_spin", {"block_id": "2"})
+    assert machine.blocks["2"].flipped
+    assert "forward rolls it <South>" in outcome.text
+    assert machine.act("flip_spin", {"block_id": "3"}).reason == RefusalClass.SPIN_CAPABILITY
+    assert machine.act("flip_spin", {"block_id": "2"}).ok
+    assert not machine.blocks["2"].flipped

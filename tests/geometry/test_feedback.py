@@ -240,28 +240,15 @@ def golden():
     return json.loads(GOLDEN.read_text())
 
 
-def test_the_golden_texts_are_those_of_this_version(golden):
+def test_models_read_the_golden_texts_and_tools_of_this_version(golden):
     assert golden["version"] == FEEDBACK_VERSION
-    assert golden["texts"].keys() == TEXTS.keys()
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_a_model_reads_the_golden_text(golden, name):
-    assert TEXTS[name].text == golden["texts"][name]
-
-
-def test_models_are_given_the_golden_tools(golden):
+    assert {name: outcome.text for name, outcome in TEXTS.items()} == golden["texts"]
     assert [asdict(tool) for tool in tool_definitions()] == golden["tools"]
 
 
-@pytest.mark.parametrize("name", SEQUENCES)
-def test_the_golden_sequences_are_accepted(name):
-    assert TEXTS[name].ok, TEXTS[name].text
-
-
-@pytest.mark.parametrize("cause", Cause)
-def test_every_cause_of_refusal_has_its_golden_text(cause):
-    assert TEXTS[f"refused: {cause.value}"].cause is cause
+def test_golden_sequences_are_accepted_and_each_cause_has_its_refusal():
+    assert [TEXTS[name].text for name in SEQUENCES if not TEXTS[name].ok] == []
+    assert [cause for cause in Cause if TEXTS[f"refused: {cause.value}"].cause is not cause] == []
 
 
 def tokens(text: str) -> int:
@@ -274,36 +261,22 @@ def tokens(text: str) -> int:
     return sum(2 if len(piece) > 8 else 1 for piece in pieces)
 
 
-@pytest.mark.parametrize("name", [name for name in TEXTS if name.startswith("refused")])
-def test_a_refusal_costs_few_tokens(name):
-    lists_all = name in {"refused: unknown_action", "refused: face of a turned block taken"}
-    assert tokens(TEXTS[name].text) <= (130 if lists_all else 65)
+def test_texts_cost_few_tokens():
+    lists_all = ("refused: unknown_action", "refused: face of a turned block taken")
+    most = {name: 130 if name in lists_all else 65 for name in TEXTS if name.startswith("refused")}
+    for name in (name for name in TEXTS if name.startswith("attach")):
+        most[name] = 60 + 27 * TEXTS[name].text.count("<")
+    most["summary of a car"] = 46 * 7
+    assert [name for name in most if tokens(TEXTS[name].text) > most[name]] == []
+    assert tokens(json.dumps([asdict(tool) for tool in tool_definitions()])) <= 4_200
 
 
-@pytest.mark.parametrize("name", [name for name in TEXTS if name.startswith("attach")])
-def test_an_attach_costs_few_tokens(name):
-    faces = TEXTS[name].text.count("<")
-    assert tokens(TEXTS[name].text) <= 60 + 27 * faces
+def test_no_text_shows_a_negative_zero():
+    assert [n for n, said in TEXTS.items() if re.search(r"-0\.?0*(?![.\d])", said.text)] == []
 
 
-def test_a_summary_costs_few_tokens_a_part():
-    parts = 7
-    assert tokens(TEXTS["summary of a car"].text) <= 46 * parts
-
-
-def test_all_tools_together_cost_few_tokens():
-    rendered = json.dumps([asdict(tool) for tool in tool_definitions()])
-    assert tokens(rendered) <= 4_200
-
-
-@pytest.mark.parametrize("name", TEXTS)
-def test_no_text_shows_a_negative_zero(name):
-    assert not re.search(r"-0\.?0*(?![.\d])", TEXTS[name].text)
-
-
-@pytest.mark.parametrize(
-    ("direction", "rendered"),
-    [
+def test_directions_are_reported_by_compass_and_pitch(subtests):
+    for direction, rendered in [
         ((0, 1, 0), "<North>"),
         ((1, 0, 0), "<East>"),
         ((0, -1, 0), "<South>"),
@@ -317,15 +290,13 @@ def test_no_text_shows_a_negative_zero(name):
         ((-0.8, 0.6, 0), "<Northwest 306.9°>"),
         ((0, 0.8, 0.6), "<North with 36.9° pitch>"),
         ((0, -0.6, -0.8), "<South with -53.1° pitch>"),
-    ],
-)
-def test_directions_are_reported_by_compass_and_pitch(direction, rendered):
-    assert caption(direction) == rendered
+    ]:
+        with subtests.test(direction=direction):
+            assert caption(direction) == rendered
 
 
-@pytest.mark.parametrize(
-    ("axle", "flipped", "rendered"),
-    [
+def test_wheels_say_what_their_forward_key_does(subtests):
+    for axle, flipped, rendered in [
         ((1, 0, 0), False, "forward rolls it <North>"),
         ((1, 0, 0), True, "forward rolls it <South>"),
         ((0, 1, 0), False, "forward rolls it <West>"),
@@ -334,19 +305,12 @@ def test_directions_are_reported_by_compass_and_pitch(direction, rendered):
         ((0, 0, 1), False, "too flat to roll, forward spins it clockwise seen from above"),
         ((0, 0, -1), False, "too flat to roll, forward spins it counterclockwise seen from above"),
         ((0, 0, 1), True, "too flat to roll, forward spins it counterclockwise seen from above"),
-    ],
-)
-def test_wheels_say_what_their_forward_key_does(axle, flipped, rendered):
-    assert rolling(axle, clockwise=not flipped) == rendered
+    ]:
+        with subtests.test(axle=axle):
+            assert rolling(axle, clockwise=not flipped) == rendered
 
 
-@pytest.mark.parametrize(
-    ("value", "rendered"), [(-0.001, "0"), (0.006, "0.01"), (-1.5, "-1.5"), (2, "2")]
-)
-def test_numbers_have_at_most_two_decimals_and_no_negative_zero(value, rendered):
-    assert number(value) == rendered
-
-
-@pytest.mark.parametrize(("value", "rendered"), [(0.004, "0.004"), (3.65, "3.65"), (-0.0, "0")])
-def test_amounts_have_the_digits_they_need(value, rendered):
-    assert plain(value) == rendered
+def test_numbers_have_two_decimals_and_amounts_the_digits_they_need():
+    told = [number(value) for value in (-0.001, 0.006, -1.5, 2)]
+    assert told == ["0", "0.01", "-1.5", "2"]
+    assert [plain(value) for value in (0.004, 3.65, -0.0)] == ["0.004", "3.65", "0"]

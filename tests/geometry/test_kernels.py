@@ -3,6 +3,7 @@
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,21 +17,19 @@ NUMERIC = {"numpy", "scipy", "fcl", "mujoco", "pybullet"}
 PACKAGES = sorted(ROOT.glob("libs/*/src/*")) + sorted(ROOT.glob("services/*/src/*"))
 
 
-@pytest.mark.parametrize(
-    ("flags", "names"),
-    [
+def test_a_processor_has_the_kernels_whose_flags_it_has(tmp_path, subtests) -> None:
+    for flags, names in [
         (AVX512, ("SkylakeX", "Haswell", "Sandybridge", "Nehalem")),
         (AVX512.replace(" avx512vl", ""), ("Haswell", "Sandybridge", "Nehalem")),
         (AVX2, ("Haswell", "Sandybridge", "Nehalem")),
         ("sse4_2 avx", ("Sandybridge", "Nehalem")),
         ("sse4_2", ("Nehalem",)),
         ("", ()),
-    ],
-)
-def test_a_processor_has_the_kernels_whose_flags_it_has(tmp_path, flags, names) -> None:
-    described = tmp_path / "cpuinfo"
-    described.write_text(f"processor : 0\nflags\t\t: fpu {flags} ht\nprocessor : 1\n")
-    assert kernels.runnable(described) == names
+    ]:
+        with subtests.test(flags=flags):
+            described = tmp_path / "cpuinfo"
+            described.write_text(f"processor : 0\nflags\t\t: fpu {flags} ht\nprocessor : 1\n")
+            assert kernels.runnable(described) == names
 
 
 def test_a_system_that_does_not_describe_its_processor_leaves_the_choice(tmp_path) -> None:
@@ -52,11 +51,12 @@ def test_what_is_pinned_ignores_the_libraries_own_variables() -> None:
     assert not environment
 
 
-@pytest.mark.parametrize(("lacks", "pinned"), [(1, "Haswell"), (2, "Sandybridge"), (3, "Nehalem")])
-def test_a_processor_without_the_usual_ones_has_the_first_that_it_can_run(lacks, pinned) -> None:
-    environment = {"NPY_DISABLE_CPU_FEATURES": "X86_V4"}
-    assert kernels.pin(environment, tuple(kernels.LADDER)[lacks:]) == pinned
-    assert environment == {"OPENBLAS_CORETYPE": pinned}
+def test_a_processor_without_the_usual_ones_has_the_first_that_it_can_run(subtests) -> None:
+    for lacks, pinned in [(1, "Haswell"), (2, "Sandybridge"), (3, "Nehalem")]:
+        with subtests.test(lacks=lacks):
+            environment = {"NPY_DISABLE_CPU_FEATURES": "X86_V4"}
+            assert kernels.pin(environment, tuple(kernels.LADDER)[lacks:]) == pinned
+            assert environment == {"OPENBLAS_CORETYPE": pinned}
 
 
 def test_the_widest_kernels_can_be_chosen() -> None:
@@ -65,17 +65,18 @@ def test_the_widest_kernels_can_be_chosen() -> None:
     assert environment == {kernels.CHOICE: "SkylakeX", "OPENBLAS_CORETYPE": "SkylakeX"}
 
 
-@pytest.mark.parametrize("name", list(kernels.LADDER)[1:])
-def test_chosen_kernels_take_numpys_loops_with_them(name) -> None:
-    environment = {kernels.CHOICE: name}
-    assert kernels.pin(environment, tuple(kernels.LADDER)) == name
-    assert environment["OPENBLAS_CORETYPE"] == name
-    disabled = environment["NPY_DISABLE_CPU_FEATURES"].split()
-    assert "X86_V4" in disabled
-    assert ("X86_V3" in disabled) == (name != "Haswell")
-    inherited = dict(environment)
-    assert kernels.pin(inherited, tuple(kernels.LADDER)) == name
-    assert inherited == environment, "child processes have the same"
+def test_chosen_kernels_take_numpys_loops_with_them(subtests) -> None:
+    for name in list(kernels.LADDER)[1:]:
+        with subtests.test(name=name):
+            environment = {kernels.CHOICE: name}
+            assert kernels.pin(environment, tuple(kernels.LADDER)) == name
+            assert environment["OPENBLAS_CORETYPE"] == name
+            disabled = environment["NPY_DISABLE_CPU_FEATURES"].split()
+            assert "X86_V4" in disabled
+            assert ("X86_V3" in disabled) == (name != "Haswell")
+            inherited = dict(environment)
+            assert kernels.pin(inherited, tuple(kernels.LADDER)) == name
+            assert inherited == environment, "child processes have the same"
 
 
 def test_kernels_that_the_processor_lacks_are_refused_with_those_it_has() -> None:
@@ -85,6 +86,7 @@ def test_kernels_that_the_processor_lacks_are_refused_with_those_it_has() -> Non
     assert environment["OPENBLAS_CORETYPE"] == "Haswell"
 
 
+@cache
 def _imports(file: Path) -> list[str]:
     """What a module imports when it is imported, in order."""
     names = []
@@ -114,25 +116,8 @@ def _unpinned(package: Path) -> list[str]:
     return wrong
 
 
-@pytest.mark.nightly(keep=4)
-@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
-def test_whatever_loads_numpy_pins_the_kernels_first(package) -> None:
-    assert _unpinned(package) == []
-
-
-def test_a_module_that_does_not_pin_them_is_named(tmp_path, monkeypatch) -> None:
-    monkeypatch.setitem(globals(), "ROOT", tmp_path)
-    package = tmp_path / "src" / "package"
-    package.mkdir(parents=True)
-    (package / "__init__.py").write_text("")
-    (package / "sums.py").write_text(
-        "import numpy as np\nfrom buildarena_geometry import kernels\n"
-    )
-    assert _unpinned(package) == ["src/package/sums.py"]
-    (package / "sums.py").write_text(
-        "from buildarena_geometry import kernels\nimport numpy as np\n"
-    )
-    assert _unpinned(package) == []
+def test_whatever_loads_numpy_pins_the_kernels_first() -> None:
+    assert [file for package in PACKAGES for file in _unpinned(package)] == []
 
 
 def test_a_program_that_loaded_numpy_first_knows_it() -> None:

@@ -1,15 +1,17 @@
-"""What holds for every machine, whatever was done to it."""
+"""What holds for every machine and every pose, whatever was done to it."""
 
 import itertools
 import json
+import math
 
 import fcl
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.machines.building import connect
 
-from buildarena_geometry import Machine, replay
+from buildarena_geometry import Machine, Pose, replay
 from buildarena_geometry.modules.solids import Box
 
 ids = st.integers(1, 12).map(str)
@@ -216,3 +218,122 @@ def test_the_laws_hold_for_assemblies_too(sequence):
 def end_of(machine, face):
     block, label = face
     return machine.blocks[block].face_center(label)
+
+
+coordinates = st.floats(-100, 100)
+points = st.tuples(coordinates, coordinates, coordinates)
+quaternions = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: math.hypot(*q) > 0.01)
+poses = st.builds(lambda p, q: Pose(position=p, quaternion=q), points, quaternions)
+
+
+def assert_close(left: Pose, right: Pose):
+    assert np.allclose(left.position, right.position, atol=1e-9)
+    assert np.allclose(left.rotation, right.rotation, atol=1e-12)
+
+
+@given(poses, poses, poses)
+def test_composition_is_associative(a, b, c):
+    assert_close((a @ b) @ c, a @ (b @ c))
+
+
+@given(poses)
+def test_the_identity_changes_nothing(pose):
+    assert_close(pose @ Pose(), pose)
+    assert_close(Pose() @ pose, pose)
+
+
+@given(poses)
+def test_a_pose_and_its_inverse_cancel(pose):
+    assert_close(pose @ pose.inverse(), Pose())
+    assert_close(pose.inverse() @ pose, Pose())
+
+
+@given(poses, poses, points)
+def test_a_composition_acts_like_its_parts_one_after_the_other(a, b, point):
+    assert np.allclose((a @ b).apply(point), a.apply(b.apply(point)), atol=1e-9)
+
+
+@given(poses, points, points)
+def test_poses_keep_distances(pose, left, right):
+    moved = math.dist(pose.apply(left), pose.apply(right))
+    assert moved == pytest.approx(math.dist(left, right), abs=1e-9)
+
+
+@given(poses)
+def test_rotations_are_proper(pose):
+    assert np.allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(pose.rotation) == pytest.approx(1)
+
+
+@given(poses)
+def test_a_pose_rebuilt_from_its_parts_is_the_very_same(pose):
+    assert Pose(position=pose.position, quaternion=pose.quaternion) == pose
+
+
+@given(poses)
+def test_opposite_quaternions_make_equal_poses(pose):
+    assert_close(Pose(position=pose.position, quaternion=-pose.quaternion), pose)
+
+
+def test_many_points_move_as_each_of_them():
+    pose = Pose(position=(1, 2, 3), quaternion=(1, 0, 0, 1))
+    cloud = np.arange(12.0).reshape(4, 3)
+    assert np.allclose(pose.apply(cloud), [pose.apply(point) for point in cloud])
+
+
+def test_a_quarter_turn_about_the_vertical_takes_east_to_north():
+    quarter = Pose(quaternion=(1, 0, 0, 1))
+    assert np.allclose(quarter.apply((1, 0, 0)), (0, 1, 0))
+
+
+def test_arrays_of_a_pose_are_read_only():
+    with pytest.raises(ValueError, match="read-only"):
+        Pose().position[0] = 1
+
+
+def test_a_pose_refuses_parts_that_are_none(subtests):
+    for position, quaternion, message in [
+        ((1, 2), (1, 0, 0, 0), "three finite numbers"),
+        ((1, 2, math.nan), (1, 0, 0, 0), "three finite numbers"),
+        ((1, 2, 3), (1, 0, 0), "four finite numbers"),
+        ((1, 2, 3), (1, 0, 0, math.inf), "four finite numbers"),
+        ((1, 2, 3), (0, 0, 0, 0), "has a length"),
+    ]:
+        with subtests.test(position=position), pytest.raises(ValueError, match=message):
+            Pose(position=position, quaternion=quaternion)
+
+
+def test_the_center_of_mass_weighs_blocks_and_connectors(build):
+    machine = build(("1", "A", "Small Wooden Block"), ("1", "C", "Torch"))
+    connect(machine, "1", "E", "2", "B")
+    link = machine.connectors["4"]
+    middle = (link.start_point + link.end_point) / 2
+    weighed = 0.3 * np.array((1, 0, 0)) + 1.0 * np.array((0, 0, 1)) + 0.5 * middle
+    assert np.allclose(machine.center_of_mass, weighed / (0.25 + 0.3 + 1.0 + 0.5))
+
+
+def test_bounds_enclose_the_bodies_and_not_the_colliders(build):
+    machine = build(("1", "A", "Powered Wheel"))
+    assert np.allclose(machine.bounds, [(-0.5, -1, -1), (1.0, 1, 1)])
+
+
+def test_bounds_of_a_turned_machine_are_those_of_its_turned_bodies(build):
+    machine = build(init_rotation=[45, 0, 0])
+    half = 0.5 * 2**0.5
+    assert np.allclose(machine.bounds, [(-half, -half, -0.5), (half, half, 0.5)])
+
+
+def test_a_turned_wheels_bounds_are_those_of_a_cylinder(build):
+    machine = build(("1", "A", "Powered Wheel"), init_rotation=[45, 0, 0])
+    # The disc stands upright and diagonal: its rim reaches 1 up, and 1/sqrt(2) to each side.
+    assert machine.bounds[1, 2] == pytest.approx(1.0)
+    rim = 0.5**0.5
+    outer = 1.0 * rim  # the outer end's centre lies 1.0 along the axle from the starting block
+    assert machine.bounds[1, 0] == pytest.approx(outer + rim)
+
+
+def test_an_empty_machine_has_neither():
+    with pytest.raises(ValueError, match="no bounds"):
+        _ = Machine().bounds
+    with pytest.raises(ValueError, match="no center of mass"):
+        _ = Machine().center_of_mass

@@ -1,4 +1,4 @@
-"""The sets of modules, and the rules that further types bring."""
+"""The sets of modules, the rules that further types bring, and their data sheets."""
 
 import itertools
 import json
@@ -14,6 +14,7 @@ from support.machines.module_files import BASIC, like, module_file
 from buildarena_geometry import (
     MODULE_SETS,
     Ball,
+    Catalogue,
     CatalogueError,
     Machine,
     catalogue_of,
@@ -23,6 +24,9 @@ from buildarena_geometry import (
     replay,
     simulated_modules,
 )
+from buildarena_geometry.feedback.data_sheets import data_sheet
+from buildarena_geometry.feedback.modules import modules_text
+from buildarena_geometry.feedback.words import number, plain, point
 from buildarena_geometry.modules.catalogue import read_modules
 
 EXTENDED = [name for name in module_set("all") if name not in load_catalogue()]
@@ -69,26 +73,30 @@ def test_a_choice_is_a_set_or_names():
         catalogue_of(("Hinj",))
 
 
-@pytest.mark.parametrize("name", EXTENDED)
-def test_what_a_further_type_says_fits_together(name):
-    module = module_set("all")[name]
-    assert module.categories
-    assert module.description
-    assert {"mass", "cost"} <= dict(module.sources).keys()
-    if module.kind == "connector":
-        return
-    assert module.physics is not None
-    assert module.physics.origin
-    labels = [face.label for face in module.faces]
-    assert labels == [label(index) for index in range(len(labels))]
-    for one, other in itertools.combinations(module.faces, 2):
-        apart = math.dist(one.center, other.center)
-        assert apart > 0.3 or math.dist(one.normal, other.normal) > 0.5, (one.label, other.label)
-    size = np.array(extent(module.body))
-    np.testing.assert_allclose(module.size, size[1] - size[0], atol=1e-6)
-    drawn_in = np.array(extent(module.colliders))
-    assert (drawn_in[0] >= size[0] - 1e-9).all()
-    assert (drawn_in[1] <= size[1] + 1e-9).all()
+def test_what_a_further_type_says_fits_together(subtests):
+    for name in EXTENDED:
+        with subtests.test(name=name):
+            module = module_set("all")[name]
+            assert module.categories
+            assert module.description
+            assert {"mass", "cost"} <= dict(module.sources).keys()
+            if module.kind == "connector":
+                return
+            assert module.physics is not None
+            assert module.physics.origin
+            labels = [face.label for face in module.faces]
+            assert labels == [label(index) for index in range(len(labels))]
+            for one, other in itertools.combinations(module.faces, 2):
+                apart = math.dist(one.center, other.center)
+                assert apart > 0.3 or math.dist(one.normal, other.normal) > 0.5, (
+                    one.label,
+                    other.label,
+                )
+            size = np.array(extent(module.body))
+            np.testing.assert_allclose(module.size, size[1] - size[0], atol=1e-6)
+            drawn_in = np.array(extent(module.colliders))
+            assert (drawn_in[0] >= size[0] - 1e-9).all()
+            assert (drawn_in[1] <= size[1] + 1e-9).all()
 
 
 def label(index):
@@ -110,20 +118,28 @@ def extent(solids):
     return np.min(corners, axis=0), np.max(corners, axis=0)
 
 
-@pytest.mark.parametrize("name", module_set("all").attachable)
-def test_every_type_can_be_attached_and_comes_back_from_its_document(name):
-    machine = built(("1", "C", name), catalogue=module_set("all"))
-    document = json.loads(json.dumps(machine.to_document()))
-    again = Machine.from_document(document)
-    assert again == machine
-    assert again.mass == pytest.approx(0.25 + module_set("all")[name].mass)
+def test_every_type_can_be_attached_and_comes_back_from_its_document(subtests):
+    for name in module_set("all").attachable:
+        with subtests.test(name=name):
+            machine = built(("1", "C", name), catalogue=module_set("all"))
+            document = json.loads(json.dumps(machine.to_document()))
+            again = Machine.from_document(document)
+            assert again == machine
+            assert again.mass == pytest.approx(0.25 + module_set("all")[name].mass)
 
 
-@pytest.mark.parametrize("category", ["basic", "locomotion", "mechanical", "flight"])
-def test_lists_of_a_category_are_short(category):
-    lines = built(catalogue=module_set("workshop")).act("list_modules", {"category": category}).text
-    assert all(len(line) < 130 for line in lines.splitlines())
-    assert all(line.endswith(".") and not line.endswith("..") for line in lines.splitlines())
+def test_lists_of_a_category_are_short(subtests):
+    for category in ["basic", "locomotion", "mechanical", "flight"]:
+        with subtests.test(category=category):
+            lines = (
+                built(catalogue=module_set("workshop"))
+                .act("list_modules", {"category": category})
+                .text
+            )
+            assert all(len(line) < 130 for line in lines.splitlines())
+            assert all(
+                line.endswith(".") and not line.endswith("..") for line in lines.splitlines()
+            )
 
 
 def test_documents_know_all_types_and_a_machine_only_its_own():
@@ -151,9 +167,8 @@ def test_a_machine_goes_on_with_what_it_was_made_of():
     assert Machine.from_document(gate.to_document()).catalogue is everything
 
 
-@pytest.mark.parametrize(
-    ("written", "meant"),
-    [
+def test_a_wrong_name_is_answered_with_the_nearest_ones(subtests):
+    for written, meant in [
         ("Hinj", "Hinge"),
         ("steering", "Steering Hinge"),
         ("wheel", "Large Wheel"),
@@ -161,23 +176,23 @@ def test_a_machine_goes_on_with_what_it_was_made_of():
         ("Baloon", "Balloon"),
         ("Propellor", "Propeller"),
         ("Powerd Wheel", "Powered Wheel"),
-    ],
-)
-def test_a_wrong_name_is_answered_with_the_nearest_ones(written, meant):
-    outcome = attach(built(catalogue=module_set("all")), "1", "A", written)
-    assert outcome.reason.value == "module_restriction"
-    assert f'"{written}"' in outcome.text or repr(written) in outcome.text
-    named = re.split(r", | and ", outcome.text.partition("Modules: ")[2])
-    assert meant in named
-    assert len(named) == 6
-    assert named[-1] == f"{len(module_set('all').attachable) - 5} more."
+    ]:
+        with subtests.test(written=written):
+            outcome = attach(built(catalogue=module_set("all")), "1", "A", written)
+            assert outcome.reason.value == "module_restriction"
+            assert f'"{written}"' in outcome.text or repr(written) in outcome.text
+            named = re.split(r", | and ", outcome.text.partition("Modules: ")[2])
+            assert meant in named
+            assert len(named) == 6
+            assert named[-1] == f"{len(module_set('all').attachable) - 5} more."
 
 
-@pytest.mark.parametrize("written", ["", " ", "x" * 500, "\n"])
-def test_names_like_no_other_are_refused_in_short(written):
-    outcome = attach(built(catalogue=module_set("all")), "1", "A", written)
-    assert not outcome.ok
-    assert len(outcome.text) < 400
+def test_names_like_no_other_are_refused_in_short(subtests):
+    for written in ["", " ", "x" * 500, "\n"]:
+        with subtests.test(written=written):
+            outcome = attach(built(catalogue=module_set("all")), "1", "A", written)
+            assert not outcome.ok
+            assert len(outcome.text) < 400
 
 
 def test_a_root_offset_lifts_a_block_off_its_face(tmp_path):
@@ -195,25 +210,21 @@ def test_a_root_offset_lifts_a_block_off_its_face(tmp_path):
     assert machine.joints[1].offset == pytest.approx(0.1)
 
 
-@pytest.mark.parametrize(
-    ("faces", "taken"),
-    [
+def test_sitting_takes_the_face_at_the_root_or_else_the_lowest_that_looks_down(tmp_path, subtests):
+    for faces, taken in [
         ([((0, 0, 0), (0, 0, -1)), ((0.5, 0, 0), (0, 0, -1))], "A"),
         ([((0.5, 0, 0.5), (0, 0, -1)), ((0, 0, 0.2), (0, 0, -1))], "B"),
         ([((0, 0, 0), (1, 0, 0)), ((0, 0, 1), (0, 0, 1))], None),
         ([((0, 0, 0.3), (0, 0.6, -0.8)), ((0, 0, 1), (0, 0, 1))], None),
         ([((0, 0, 0.3), (0, math.sin(0.3), -math.cos(0.3))), ((0, 0, 1), (0, 0, 1))], "A"),
-    ],
-)
-def test_sitting_takes_the_face_at_the_root_or_else_the_lowest_that_looks_down(
-    tmp_path, faces, taken
-):
-    entries = [
-        {"label": name, "center": center, "normal": normal, "x_axis": across(normal)}
-        for name, (center, normal) in zip("AB", faces, strict=True)
-    ]
-    module = own(tmp_path, faces=entries)["Own"]
-    assert module.root_face == taken
+    ]:
+        with subtests.test(faces=faces):
+            entries = [
+                {"label": name, "center": center, "normal": normal, "x_axis": across(normal)}
+                for name, (center, normal) in zip("AB", faces, strict=True)
+            ]
+            module = own(tmp_path, faces=entries)["Own"]
+            assert module.root_face == taken
 
 
 def across(normal):
@@ -267,9 +278,8 @@ def test_balls_meet_as_balls(tmp_path):
     assert outcome.ok or outcome.overlaps
 
 
-@pytest.mark.parametrize(
-    ("fields", "complaint"),
-    [
+def test_bad_fields_are_named(subtests):
+    for fields, complaint in [
         ({"default_keys": {1: "H"}}, r"default_keys: expected an object whose keys are texts"),
         ({"kind": "\ud800"}, r"expected texts without lone surrogates"),
         ({"motor": "fast"}, r"motor: expected an object or null, found 'fast'"),
@@ -289,9 +299,125 @@ def test_balls_meet_as_balls(tmp_path):
         ),
         ({"body": [{"shape": "cone", "from": [0, 0, 0], "to": [1, 1, 1]}]}, r"box, cylinder, sph"),
         ({"kind": "gadget"}, r"kind: expected one of block, cannon, cargo"),
-    ],
-)
-def test_bad_fields_are_named(fields, complaint):
-    content = {"version": 1, "modules": [like(BLOCK, "Own", **fields)]}
-    with pytest.raises(CatalogueError, match=complaint):
-        read_modules(content, where="file")
+    ]:
+        with subtests.test(fields=fields):
+            content = {"version": 1, "modules": [like(BLOCK, "Own", **fields)]}
+            with pytest.raises(CatalogueError, match=complaint):
+                read_modules(content, where="file")
+
+
+WORKSHOP = module_set("workshop")
+NAMES = list(WORKSHOP)
+
+
+def sheet(name: str) -> str:
+    return data_sheet(WORKSHOP[name], WORKSHOP.start.physics)
+
+
+def figures(module) -> list[str]:
+    """Every figure of a module's entry that decides what it does, as a sheet writes it."""
+    told = [point(face.center) for face in module.faces]
+    motor, joint, push, wing = module.motor, module.joint, module.push, module.wing
+    if motor is not None:
+        told += [f"{plain(motor.speed_rpm)} rpm", number(motor.speed), plain(motor.torque)]
+    if joint is not None:
+        told += [
+            plain(value) for value in (joint.friction, joint.stiffness, joint.damping) if value
+        ]
+        turns = module.physics.joint_type != "slider"
+        told += [number(abs(math.degrees(x) if turns else x)) for x in joint.limits or ()]
+        if joint.point is not None:
+            told.append(point(joint.point))
+    if joint is not None and joint.drive is not None:
+        told += [number(joint.drive.rate), plain(joint.drive.force)]
+    if module.gear is not None:
+        told.append(f"pitch radius {plain(module.gear.pitch_radius)}")
+    if module.thrust is not None:
+        told += [plain(module.thrust.cold), plain(module.thrust.heated)]
+    if push is not None:
+        told += [plain(push.force), point(push.direction)]
+    if wing is not None:
+        told += [plain(wing.coefficient), plain(wing.cap_speed), point(wing.normal)]
+    for part, names in (
+        ("lift", ["force"]),
+        ("altitude", ["most", "stiffness", "damping", "rate"]),
+        ("rope_mount", ["length"]),
+        ("spring", ["stiffness", "damping", "shortest", "rate", "limit"]),
+        ("decouple", ["impulse"]),
+        ("grip", ["reach", "force", "moment"]),
+    ):
+        force = getattr(module, part)
+        told += [plain(getattr(force, name)) for name in names] if force is not None else []
+    return told
+
+
+def test_a_sheet_has_every_figure_of_its_module_in_one_line(subtests):
+    for name in NAMES:
+        with subtests.test(name=name):
+            text = sheet(name)
+            assert "\n" not in text
+            for figure in figures(WORKSHOP[name]):
+                assert figure in text, figure
+
+
+def test_friction_and_drag_are_told_where_they_are_unusual(subtests):
+    for name in NAMES:
+        with subtests.test(name=name):
+            physics, usual = WORKSHOP[name].physics, WORKSHOP.start.physics
+            if physics is None:
+                return
+            text = sheet(name)
+            assert ("friction" in re.sub("dry friction", "", text)) == (
+                physics.friction != usual.friction
+            )
+            assert ("drag" in text) == (physics.linear_drag != usual.linear_drag)
+            alone = data_sheet(WORKSHOP[name], None)
+            assert f"friction {plain(physics.friction)}" in alone
+
+
+def test_figures_are_the_modules_own():
+    """Another figure in the file is another figure in the line."""
+    from msgspec.structs import replace
+
+    cog = WORKSHOP["Cog Large Unpowered"]
+    wider = replace(cog, gear=replace(cog.gear, pitch_radius=2.75))
+    assert "pitch radius 2.75" in data_sheet(wider, None)
+    wheel = WORKSHOP["Powered Wheel"]
+    slower = replace(wheel, motor=replace(wheel.motor, speed_rpm=77.0, torque=13.5))
+    assert "77 rpm (8.06 rad/s" in data_sheet(slower, None)
+    assert "torque and brake up to 13.5" in data_sheet(slower, None)
+
+
+def test_a_cog_says_the_radius_that_it_meshes_at_and_no_other(subtests):
+    for name in [name for name in NAMES if WORKSHOP[name].gear]:
+        with subtests.test(name=name):
+            cog = WORKSHOP[name]
+            for text in (cog.description, cog.brief):
+                assert {float(r) for r in re.findall(r"radius ([\d.]*\d)", text)} == {
+                    cog.gear.pitch_radius
+                }
+
+
+def test_lists_have_data_only_where_they_are_told():
+    plain_list = modules_text(WORKSHOP).splitlines()
+    told = modules_text(WORKSHOP.with_data_sheets()).splitlines()
+    assert not any("Data:" in line for line in plain_list)
+    assert len(plain_list) == len(WORKSHOP)
+    with_data = [name for name in NAMES if sheet(name)]
+    assert sum(line.startswith("  Data: ") for line in told) == len(with_data)
+    assert len(told) == len(WORKSHOP) + len(with_data)
+
+
+def test_who_looks_a_module_up_reads_its_data_where_they_are_told():
+    for catalogue in (WORKSHOP, WORKSHOP.with_data_sheets()):
+        machine = Machine(catalogue=catalogue)
+        answer = machine.act("describe_module", {"module": "Steering Hinge"}).text
+        assert ("torque up to 40" in answer) == catalogue.data_sheets
+
+
+def test_a_catalogue_with_data_sheets_has_the_same_modules():
+    told = WORKSHOP.with_data_sheets()
+    assert dict(told) == dict(WORKSHOP)
+    assert told is WORKSHOP.with_data_sheets() is told.with_data_sheets()
+    assert isinstance(told, Catalogue)
+    assert not WORKSHOP.data_sheets

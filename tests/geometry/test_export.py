@@ -1,4 +1,4 @@
-"""Machines as GLB files and SVG drawings."""
+"""Documents, GLB files and drawings of machines and modules, and the guide's examples."""
 
 import json
 import struct
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from support.machines.building import connect
 
-from buildarena_geometry import Machine
-from buildarena_geometry.export import View, machine_glb, machine_svg
+from buildarena_geometry import Machine, Module, module_set
+from buildarena_geometry.export import View, machine_glb, machine_svg, module_svg
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -122,3 +122,31 @@ def test_nearer_faces_are_painted_over_farther_ones(build):
 def test_an_empty_machine_gives_an_empty_drawing():
     drawing = ET.fromstring(machine_svg(Machine()))
     assert not list(drawing.iter(f"{SVG}polygon"))
+
+
+MODULES = [module for module in module_set("all").values() if module.kind != "cargo"]
+
+
+def test_pictures_show_the_body_and_its_faces():
+    wrong = {module.name: faults for module in MODULES if (faults := faults_of(module))}
+    assert not wrong
+
+
+def test_large_modules_are_drawn_as_large_as_small_ones():
+    barrel, block = module_set("all")["Big Barrel"], module_set("all")["Small Wooden Block"]
+    assert width(module_svg(barrel)) < 3 * width(module_svg(block))
+    assert width(module_svg(block, View(scale=160))) > 1.5 * width(module_svg(block))
+
+
+def faults_of(module: Module) -> list[str]:
+    """What a module's picture lacks."""
+    elements = list(ET.fromstring(module_svg(module)).iter())
+    kinds = {element.tag.rpartition("}")[2] for element in elements}
+    body = "line" if module.kind == "connector" else "polygon"
+    written = {element.text for element in elements if element.tag.endswith("text")}
+    upward = {face.label for face in module.faces if face.normal[2] > 0.5}
+    return [name for name in (body,) if name not in kinds] + sorted(upward - written)
+
+
+def width(svg):
+    return float(ET.fromstring(svg).get("width"))

@@ -1,0 +1,113 @@
+"""JSON texts and values, read within bounds."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from buildarena_geometry.json_texts import MAX_DEPTH, TooDeepError, is_too_deep, read_json
+from buildarena_geometry.json_values import levels
+
+
+def test_brackets_in_texts_are_no_depth(subtests) -> None:
+    for text, deep in [
+        ('"' + "[" * 1000 + '"', False),
+        ('["' + '\\"' * 100 + "[" * 100 + '"]', False),
+        (json.dumps([{"a": "]}" * 200}] * 200), False),
+        ("[" * 64 + "]" * 64, False),
+        ("[" * 65 + "]" * 65, True),
+        ('{"\\\\":' * 65 + "1" + "}" * 65, True),
+        ("[" + "[]," * 5000 + "[]]", False),
+    ]:
+        with subtests.test(text=text):
+            assert is_too_deep(text.encode()) is deep
+
+
+def test_a_deep_text_is_refused_before_the_stack_is_used_up(subtests) -> None:
+    for bracket in ["[", '{"a":']:
+        for depth in [MAX_DEPTH + 1, 990, 100_000]:
+            with subtests.test(bracket=bracket, depth=depth):
+                for text in (bracket * depth, (bracket * depth).encode()):
+                    with pytest.raises(TooDeepError, match="more than 64 arrays or objects"):
+                        read_json(text)
+
+
+def test_everything_else_is_read_as_it_was_written(subtests) -> None:
+    for value in [1, 'ü\\"[', [], {"a": [{"b": None}]}, "\ud800"]:
+        with subtests.test(value=value):
+            assert read_json(json.dumps(value)) == value
+            assert read_json(json.dumps(value).encode()) == value
+
+
+def test_what_is_no_json_is_a_value_error(subtests) -> None:
+    for text in ["", "{", b"\xff", '{"a"}', "[1,]"]:
+        with subtests.test(text=text), pytest.raises(ValueError):
+            read_json(text)
+
+
+DEEP = {"a": 1, "b": {"c": (2, 3)}}
+
+
+def test_each_level_has_what_the_one_above_holds(subtests) -> None:
+    for value, found in [
+        (1, [[1]]),
+        ("text", [["text"]]),
+        ([], [[[]]]),
+        ({}, [[{}]]),
+        ([1, [2, []]], [[[1, [2, []]]], [1, [2, []]], [2, []]]),
+        (DEEP, [[DEEP], [1, {"c": (2, 3)}], [(2, 3)], [2, 3]]),
+    ]:
+        with subtests.test(value=value):
+            assert list(levels(value)) == found
+
+
+def test_no_level_is_collected_before_it_is_asked_for() -> None:
+    endless: list[object] = []
+    endless.append(endless)
+    for depth, level in enumerate(levels(endless)):
+        assert level[0] is endless
+        if depth == 100:
+            break
+
+
+FIRST_READS = """
+import sys
+import threading
+
+import msgspec
+
+from buildarena_geometry.errors import DocumentError
+from buildarena_geometry.reading import Form, read
+
+THREADS, ROUNDS, FIELDS = 8, 50, 30
+sys.setswitchinterval(1e-6)
+
+
+def fresh():
+    kinds = {"bases": (Form,), "frozen": True, "kw_only": True}
+    numbers = [(f"n{i}", dict[str, tuple[float, ...]]) for i in range(FIELDS)]
+    inner = msgspec.defstruct("Inner", numbers, **kinds)
+    return msgspec.defstruct("Outer", [(f"f{i}", list[inner]) for i in range(FIELDS)], **kinds)
+
+
+inner = {f"n{i}": {"a": [1.0]} for i in range(FIELDS)}
+value = {f"f{i}": [inner] for i in range(FIELDS)}
+for _ in range(ROUNDS):
+    kind, together, whole = fresh(), threading.Barrier(THREADS), []
+
+    def go():
+        together.wait()
+        whole.append(read(value, kind, where="value", error=DocumentError))
+
+    threads = [threading.Thread(target=go) for _ in range(THREADS)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(whole) == THREADS and all(one == whole[0] for one in whole)
+"""
+
+
+def test_threads_may_be_the_first_to_read_a_form_together() -> None:
+    subprocess.run([sys.executable, "-c", FIRST_READS], check=True)
