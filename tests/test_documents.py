@@ -71,7 +71,9 @@ def test_what_documents_name_exists() -> None:
 def test_no_place_names_a_variable_that_nothing_reads() -> None:
     own = {name.upper() for name in Settings.model_fields}
     game = {f"BESIEGE_{name.upper()}" for name in BesiegeSettings.model_fields}
-    read = own | game | WITHOUT_SETTINGS | set(VARIABLE.findall((ROOT / ".env.example").read_text()))
+    read = (
+        own | game | WITHOUT_SETTINGS | set(VARIABLE.findall((ROOT / ".env.example").read_text()))
+    )
     places = [file for source in SOURCES for file in source.rglob("*.py")]
     places += [*DOCUMENTS, ROOT / "deploy/monitoring/prometheus/alerts.yml"]
     unknown = {

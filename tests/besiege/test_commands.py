@@ -81,19 +81,17 @@ def test_other_keys_may_be_pressed(machine, tmp_path) -> None:
     assert (done.exit_code, "expected one of UpArrow" in done.stderr) == (1, True)
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
+def test_wrong_words_are_named(machine, tmp_path, monkeypatch, subtests) -> None:
+    for words, says in [
         (("--out", "x.stl"), ".glb, .svg, .json, .bsg"),
         (("--out", "x.glb", "--task", "lift-1"), "--task is for .bsg files"),
         (("--out", "Big Name.bsg"), "lower case letters"),
         (("--out", "x.bsg", "--task", "lift-9"), "no task 'lift-9'"),
-    ],
-)
-def test_wrong_words_are_named(machine, tmp_path, monkeypatch, words, says) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = run("machine", "export", machine, *words)
-    assert (done.exit_code, says in done.stderr) == (1, True), done.stderr
+    ]:
+        with subtests.test(words=words):
+            monkeypatch.chdir(tmp_path)
+            done = run("machine", "export", machine, *words)
+            assert (done.exit_code, says in done.stderr) == (1, True), done.stderr
 
 
 def test_machine_files_are_read_wherever_machines_are(tmp_path) -> None:

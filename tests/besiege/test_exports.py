@@ -1,32 +1,53 @@
-"""Machine files hold what the published library saves, for 60 machines in every setting."""
+"""Machine files and levels hold what the published library saves; every module type comes back."""
 
 import json
 import math
 import subprocess
 import sys
+from xml.etree import ElementTree as ET
 
 import pytest
-from tests.besiege.golden import dangles, golden, goldens, played_document, scenario_of, task_of
+from support.machines.building import attach
+from tests.besiege.golden import (
+    LEVELS,
+    content,
+    dangles,
+    golden,
+    goldens,
+    played_document,
+    scenario_of,
+    task_of,
+)
+from tests.besiege.test_reading_files import assert_alike, contents
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_besiege import (
+    MachineNotPlayableError,
+    level_file,
+    plain_machine_file,
+    prepare_run,
+    read_machine_file,
+)
 from buildarena_besiege.__main__ import main
 from buildarena_besiege.normal import normal_form
-from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry import KeyPress, Machine, module_set
+from buildarena_geometry.modules.module import Module
 from buildarena_geometry.rotations import multiply
+from buildarena_simulation import Scenario
+from buildarena_simulation.scenario import TerrainBox
 
 TOLERANCE = 1e-6
-EXPORTS = [
-    pytest.param(one.name, index, id=f"{one.name}-{export['category']}-{export['level']}")
-    for one in goldens()
-    for index, export in enumerate(one.exports)
-]
 ENDS = ("start-rotation", "end-rotation")
 
 
-@pytest.mark.parametrize(("name", "index"), EXPORTS)
-def test_an_export_is_the_published_one(name, index) -> None:
-    found = golden(name)
-    theirs = found.exports[index]
+def test_exports_are_the_published_ones(subtests) -> None:
+    for found in goldens():
+        for theirs in found.exports:
+            with subtests.test(found.name, category=theirs["category"], level=theirs["level"]):
+                assert_published(found, theirs)
+
+
+def assert_published(found, theirs) -> None:
     ours = normal_form_of(found, theirs)
     assert (ours["category"], ours["level"]) == (theirs["category"], theirs["level"])
     assert ours["refused"] == theirs["refused"]
@@ -76,21 +97,19 @@ def test_the_command_prints_the_normal_form(tmp_path, capsys) -> None:
     assert json.loads(capsys.readouterr().out)["category"] == "plain"
 
 
-@pytest.mark.parametrize(
-    ("text", "words", "says"),
-    [
+def test_the_command_says_what_is_wrong(tmp_path, capsys, subtests) -> None:
+    for text, words, says in [
         ("{}", (), "neither a machine document nor an action log"),
         ("[1]", (), "a list of objects"),
         ("{", (), "not valid JSON"),
         ("<Machine/>", (), "no blocks"),
         ("[]", ("--task", "lift-9"), "no task 'lift-9'; there are transport-1"),
-    ],
-)
-def test_the_command_says_what_is_wrong(tmp_path, capsys, text, words, says) -> None:
-    file = tmp_path / "machine.json"
-    file.write_text(text, encoding="utf-8")
-    assert main(["export", str(file), *words]) == 1
-    assert says in capsys.readouterr().err
+    ]:
+        with subtests.test(text=text):
+            file = tmp_path / "machine.json"
+            file.write_text(text, encoding="utf-8")
+            assert main(["export", str(file), *words]) == 1
+            assert says in capsys.readouterr().err
 
 
 def test_the_command_reads_standard_input() -> None:
@@ -182,3 +201,175 @@ def test_the_presses_of_a_golden_machine_are_key_presses() -> None:
     export = next(e for e in found.exports if e["category"] == "transport")
     _, presses = found.played(export)
     assert presses == [KeyPress(time_s=1, key="UpArrow", hold_for_s=1)]
+
+
+ALL = module_set("all")
+BLOCKS = list(ALL.attachable)
+CONNECTORS = list(ALL.connectors)
+CARGO = builtin_tasks()["support-1"].scenario
+
+
+def built_with(module: Module) -> Machine:
+    """A machine with one module of a type, its keys bound, and another on it where one can sit."""
+    machine = Machine(catalogue=ALL)
+    assert machine.act("start").ok
+    if module.kind == "connector":
+        assert attach(machine, "1", "E").ok
+        ends = {"block_a": "1", "face_a": "A", "block_b": "2", "face_b": "A"}
+        outcome = machine.act("connect_blocks", {**ends, "connector": module.name})
+    else:
+        outcome = attach(machine, "1", "E", module.name)
+    assert outcome.ok, outcome.text
+    number = next(reversed([*machine.blocks, *machine.connectors]))
+    for key, action in enumerate(module.actions, 1):
+        bound = {"block_id": number, "action": action, "new_key": f"Alpha{key}"}
+        if number in machine.blocks:
+            outcome = machine.act("change_control_key", bound)
+            assert outcome.ok, outcome.text
+    return machine
+
+
+def test_every_type_comes_back_as_it_was(subtests) -> None:
+    for name in [*BLOCKS, *CONNECTORS]:
+        with subtests.test(name=name):
+            machine = built_with(ALL[name])
+            imported = read_machine_file(plain_machine_file(machine, name="m"))
+            assert imported.not_understood == ()
+            assert_alike(contents(imported.machine), contents(machine))
+            assert Machine.from_document(imported.machine.to_document()) == imported.machine
+
+
+def test_the_keys_of_every_action_stand_in_the_file(subtests) -> None:
+    for name in BLOCKS:
+        with subtests.test(name=name):
+            module = ALL[name]
+            file = ET.fromstring(plain_machine_file(built_with(module), name="m"))
+            block = next(
+                one for one in file.iter("Block") if one.get("id") == str(module.besiege_id)
+            )
+            lists = {
+                entry.get("key"): [one.text for one in entry.iter("String")]
+                for entry in block.iter("StringArray")
+            }
+            keys = [[f"Alpha{k}"] for k in range(1, len(module.actions) + 1)]
+            assert list(lists.values()) == keys
+            assert len(lists) == len(module.actions)
+
+
+def test_a_ballast_of_the_machine_is_told_from_the_cargo() -> None:
+    machine = built_with(ALL["Ballast"])
+    run = prepare_run(machine, CARGO, name="m", run_id="r")
+    imported = read_machine_file(run.machine_file)
+    assert [("cargo" in one) for one in imported.not_understood] == [True]
+    assert_alike(contents(imported.machine), contents(machine))
+
+
+def test_in_files_of_others_the_ballast_that_sits_on_nothing_is_cargo() -> None:
+    file = ET.fromstring(plain_machine_file(built_with(ALL["Ballast"]), name="m"))
+    for script in [one for one in file.iter("StringArray") if one.get("key") == "lua_data"]:
+        script.text = ""
+    attached = read_machine_file(ET.tostring(file))
+    assert [block.module.name for block in attached.machine.blocks.values()] == [
+        "Starting Block",
+        "Ballast",
+    ]
+    ballast = next(one for one in file.iter("Block") if one.get("id") == "35")
+    ballast.find("Transform/Position").set("y", "9")
+    loose = read_machine_file(ET.tostring(file))
+    assert [block.module.name for block in loose.machine.blocks.values()] == ["Starting Block"]
+    assert any("a cargo is the task's" in one for one in loose.not_understood)
+
+
+def test_trials_that_a_machine_file_cannot_say_are_refused(subtests) -> None:
+    for task in ["flight-2", "mechanisms-3", "mechanisms-4"]:
+        with subtests.test(task=task):
+            scenario = builtin_tasks()[task].scenario
+            with pytest.raises(MachineNotPlayableError, match="use another engine"):
+                prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
+
+
+def test_a_level_with_a_quarter_pipe_is_written_and_one_that_is_turned_is_refused() -> None:
+    pipe = {"shape": "pipe", "center": [0, 6, 5], "radius": 5, "length": 6, "from_deg": 0}
+    for heading_deg in (0, 30):
+        terrain = [{**pipe, "to_deg": 90, "heading_deg": heading_deg}]
+        scenario = Scenario.model_validate({"duration_s": 2, "terrain": terrain})
+        if heading_deg:
+            with pytest.raises(MachineNotPlayableError, match="no turned boxes"):
+                prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
+        else:
+            run = prepare_run(built_with(ALL["Log"]), scenario, name="m", run_id="r")
+            assert run.level is not None
+            assert run.level.count(b"<Object ID") == 12
+
+
+def test_a_trial_with_a_boulder_is_refused_and_its_plain_file_is_not() -> None:
+    machine, scenario = built_with(ALL["Boulder"]), builtin_tasks()["throw-1"].scenario
+    with pytest.raises(MachineNotPlayableError, match="what a boulder touches: use another"):
+        prepare_run(machine, scenario, name="m", run_id="r")
+    assert b'id="36"' in plain_machine_file(machine, name="m")
+
+
+def test_the_other_trials_of_the_workshop_are_written(subtests) -> None:
+    for task in ["mechanisms-1", "mechanisms-2", "flight-1"]:
+        with subtests.test(task=task):
+            run = prepare_run(
+                built_with(ALL["Log"]), builtin_tasks()[task].scenario, name="m", run_id="r"
+            )
+            assert b"<Machine" in run.machine_file
+
+
+def read(scenario):
+    data = level_file(scenario)
+    assert data.startswith(b"\xef\xbb\xbf<?xml")
+    return ET.fromstring(data)
+
+
+def numbers(element, names="xyz"):
+    return [float(element.get(name)) for name in names]
+
+
+def test_support_levels_are_the_published_ones(subtests) -> None:
+    for level in LEVELS:
+        with subtests.test(level=level):
+            theirs = content()["levels"][level]
+            ours = read(builtin_tasks()[f"support-{LEVELS.index(level) + 1}"].scenario)
+            assert ours.tag == theirs["root"]
+            settings = ours.find("LevelSettings")
+            assert dict(settings.attrib) == theirs["settings"]
+            assert {flag.tag: dict(flag.attrib) for flag in settings} == theirs["flags"]
+            data = ours.find("CustomData")
+            assert [[one.tag, one.get("key"), []] for one in data] == theirs["custom_data"]
+            objects = list(ours.find("Objects"))
+            assert len({one.get("ID") for one in objects}) == len(objects)
+            for one, wanted in zip(objects, theirs["objects"], strict=True):
+                assert one.get("Prefab") == wanted["attrs"]["Prefab"]
+                assert numbers(one.find("Position")) == pytest.approx(wanted["position"], abs=1e-6)
+                assert numbers(one.find("Scale")) == pytest.approx(wanted["scale"], abs=1e-6)
+                assert (one.find("Rotation") is None) == (wanted["rotation"] is None)
+                entries = [[e.tag, e.get("key"), e.text == "True"] for e in one.find("Data")]
+                assert entries == wanted["data"]
+
+
+def test_a_slope_rises_towards_the_north() -> None:
+    box = TerrainBox(center=(1.0, 2.0, 3.0), size=(4.0, 6.0, 2.0), slope_deg=30.0)
+    one = read(Scenario(duration_s=1.0, terrain=(box,))).find("Objects")[0]
+    x, y, z, w = numbers(one.find("Rotation"), "xyzw")
+    # Left-handed, a turn by a negative angle about east lifts what lies north.
+    assert (y, z) == (0.0, 0.0)
+    assert math.degrees(2 * math.atan2(x, w)) == pytest.approx(-30.0)
+    down = (1.0, 3.0 - math.cos(math.radians(30)), 2.0 + math.sin(math.radians(30)))
+    assert numbers(one.find("Position")) == pytest.approx(down)
+    assert numbers(one.find("Scale")) == [4.0, 2.0, 6.0]
+
+
+def test_ids_are_unique_signed_and_always_the_same() -> None:
+    boxes = tuple(TerrainBox(center=(0.0, 0.0, 0.0), size=(1.0, 1.0, 1.0)) for _ in range(64))
+    scenario = Scenario(duration_s=1.0, terrain=boxes)
+    ids = [int(one.get("ID")) for one in read(scenario).find("Objects")]
+    assert len(set(ids)) == 64
+    assert all(-(2**63) <= one < 2**63 for one in ids)
+    assert level_file(scenario) == level_file(scenario)
+
+
+def test_a_scenario_without_terrain_has_an_empty_level() -> None:
+    assert len(read(Scenario(duration_s=1.0)).find("Objects")) == 0

@@ -59,9 +59,10 @@ VARIANTS = {
 }
 
 
-@pytest.mark.parametrize("name", [n for n in VARIANTS if n != "glued with foreign text"])
-def test_form_does_not_matter(name) -> None:
-    assert log_of(VARIANTS[name]) == REFERENCE
+def test_form_does_not_matter(subtests) -> None:
+    for name in [n for n in VARIANTS if n != "glued with foreign text"]:
+        with subtests.test(name=name):
+            assert log_of(VARIANTS[name]) == REFERENCE
 
 
 def test_order_repeats_and_pieces_do_not_matter() -> None:
@@ -144,12 +145,15 @@ COMPLAINTS = [
 ]
 
 
-@pytest.mark.parametrize("complaint", COMPLAINTS)
-def test_errors_are_complaints_and_nothing_else_is(complaint) -> None:
-    for text in (complaint, f"{complaint}\n{WHOLE}", f"{WHOLE}\r\n{complaint}\r\n"):
-        assert log_of(text).complaints == (complaint,)
-    assert log_of(f"{LINES[5][:40]}{complaint}\n").complaints
-    assert log_of("0.1, ID_1, 1.0, 2.0, 3.0\nhello, terror\nba,other,s,lua,1").complaints == ()
+def test_errors_are_complaints_and_nothing_else_is(subtests) -> None:
+    for complaint in COMPLAINTS:
+        with subtests.test(complaint=complaint):
+            for text in (complaint, f"{complaint}\n{WHOLE}", f"{WHOLE}\r\n{complaint}\r\n"):
+                assert log_of(text).complaints == (complaint,)
+            assert log_of(f"{LINES[5][:40]}{complaint}\n").complaints
+            assert (
+                log_of("0.1, ID_1, 1.0, 2.0, 3.0\nhello, terror\nba,other,s,lua,1").complaints == ()
+            )
 
 
 def test_a_complaint_in_the_last_row_of_a_copy_is_not_lost() -> None:
@@ -203,24 +207,22 @@ FORGED = [
 ]
 
 
-@pytest.mark.parametrize("body", FORGED)
-def test_lines_of_another_form_do_not_count_even_with_their_sum(body) -> None:
-    assert not log_of(signed(body)).lines
+def test_lines_of_another_form_do_not_count_even_with_their_sum(subtests) -> None:
+    for body in FORGED:
+        with subtests.test(body=body):
+            assert not log_of(signed(body)).lines
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
+def test_megabytes_are_read_in_moments(subtests) -> None:
+    for text in [
         "x" * 5_000_000,
         "ba,run-1," * 150_000,
         "ba,run-1,s,4,1,1," + "1,-,0.0000,0.0000,0.0000," * 100_000,
         "\n" * 3_000_000,
         (LINES[3] + "\n") * 20_000,
         "lua" * 1_000_000,
-    ],
-    ids=["junk", "marks", "one long line", "line ends", "repeats", "complaints"],
-)
-def test_megabytes_are_read_in_moments(text) -> None:
-    started = time.process_time()
-    log_of(text, text[: len(text) // 2])
-    assert time.process_time() - started < 10
+    ]:
+        with subtests.test(text=text):
+            started = time.process_time()
+            log_of(text, text[: len(text) // 2])
+            assert time.process_time() - started < 10

@@ -1,7 +1,10 @@
-"""Logs of the published runner become trajectories that our scorers take."""
+"""Logs of the published runner, made up and real, become trajectories that our scorers take."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
+from support.machines.families import beam
 from tests.besiege.playing import vehicle
 from tests.besiege.published_logs import cleaned, copies, printed
 
@@ -42,16 +45,21 @@ def read(text, task=SUPPORT):
     return published_trajectory(text, MACHINE, task.scenario)
 
 
-@pytest.mark.parametrize("form", FORMS)
-def test_a_bridges_load_is_scored_from_any_form(form) -> None:
-    found = read(FORMS[form])
-    result = score(SUPPORT, MACHINE, found)
-    # The height is below 4 from 14.04 s on; one decimal costs a tenth of a second.
-    wanted = SUPPORT.scenario.cargo.mass_at(14.04)
-    assert result.indicator == pytest.approx(wanted, abs=15.0)
-    assert found.time_s[-1] == 17.0
-    assert np.abs(found.cargo_position[:250, 2] - 8.0).max() < 0.05
-    assert (found.engine, found.engine_version, found.bearing) == ("besiege", "published", None)
+def test_a_bridges_load_is_scored_from_any_form(subtests) -> None:
+    for form in FORMS:
+        with subtests.test(form=form):
+            found = read(FORMS[form])
+            result = score(SUPPORT, MACHINE, found)
+            # The height is below 4 from 14.04 s on; one decimal costs a tenth of a second.
+            wanted = SUPPORT.scenario.cargo.mass_at(14.04)
+            assert result.indicator == pytest.approx(wanted, abs=15.0)
+            assert found.time_s[-1] == 17.0
+            assert np.abs(found.cargo_position[:250, 2] - 8.0).max() < 0.05
+            assert (found.engine, found.engine_version, found.bearing) == (
+                "besiege",
+                "published",
+                None,
+            )
 
 
 def test_a_vehicles_path_is_scored() -> None:
@@ -89,29 +97,27 @@ TRAPS = {
 }
 
 
-@pytest.mark.parametrize("trap", TRAPS)
-def test_rows_that_are_not_whole_do_not_count(trap) -> None:
-    rows = list(SUPPORT_ROWS)
-    rows.insert(400, TRAPS[trap])
-    plain, trapped = read("\n".join(SUPPORT_ROWS)), read("\n".join(rows))
-    assert (plain.cargo_position == trapped.cargo_position).all()
-    assert (plain.cargo_mass == trapped.cargo_mass).all()
+def test_rows_that_are_not_whole_do_not_count(subtests) -> None:
+    for trap in TRAPS:
+        with subtests.test(trap=trap):
+            rows = list(SUPPORT_ROWS)
+            rows.insert(400, TRAPS[trap])
+            plain, trapped = read("\n".join(SUPPORT_ROWS)), read("\n".join(rows))
+            assert (plain.cargo_position == trapped.cargo_position).all()
+            assert (plain.cargo_mass == trapped.cargo_mass).all()
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
+def test_what_is_missing_is_said(subtests) -> None:
+    for text, says in [
         ("", "tells nothing of the cargo"),
         ("main.lua:1: x", "speaks of an error"),
         ("\n".join(SUPPORT_ROWS[:-400]), "ends at 9 s of 17 s"),
         ("\n".join(SUPPORT_ROWS[:200] + SUPPORT_ROWS[260:]), "nothing is told of the cargo"),
         ("\n".join(row for row in SUPPORT_ROWS if row.count(",") == 4), "cargo's mass"),
         ("\n".join(row.replace(", 8.0, 1.0", ", 8.0, 2.0") for row in DRIVE_ROWS), "the cargo"),
-    ],
-)
-def test_what_is_missing_is_said(text, says) -> None:
-    with pytest.raises(LogIncompleteError, match=says):
-        read(text)
+    ]:
+        with subtests.test(text=text), pytest.raises(LogIncompleteError, match=says):
+            read(text)
 
 
 def test_a_log_may_end_a_little_early() -> None:
@@ -133,3 +139,127 @@ def test_a_log_of_nobody_is_refused() -> None:
     with pytest.raises(LogIncompleteError, match="nothing of any block"):
         read("\n".join(rows), DRIVE)
     assert not looks_published("hello, world\n1,2,3,4,5")
+
+
+FOLDER = Path(__file__).parents[1] / "data" / "besiege" / "game_logs"
+ROWS = (FOLDER / "support-1_seven_blocks.csv").read_text(encoding="ascii").splitlines()
+SUPPORT_OF_REAL_LOGS = builtin_tasks()["support-1"]
+BEAM = beam(7)
+LETTERS = str.maketrans(".", ",")
+
+
+def rounded(row: str) -> str:
+    """A row as the runner's first release wrote it."""
+    return ",".join(
+        part if part.startswith("ID_") else f"{float(part):.1f}" for part in row.split(",")
+    )
+
+
+def longer(row: str) -> str:
+    """A row as a runner that prints three decimals would write it."""
+    time, name, *values = row.split(",")
+    if len(values) == 1:
+        values = [f"{SUPPORT_OF_REAL_LOGS.scenario.cargo.mass_at(float(time)):.3f}"]
+        return ",".join([f"{time}0", name, *values])
+    return ",".join([f"{time}0", name, *(f"{value}0" for value in values)])
+
+
+def thinned(rows: list[str]) -> list[str]:
+    draw = np.random.default_rng(7)
+    return [row for row in rows if draw.random() > 0.15]
+
+
+FORMS_OF_REAL_LOGS = {
+    "as it was written": "\n".join(ROWS),
+    "decimal commas": "\n".join(row.translate(LETTERS) for row in ROWS),
+    "decimal commas between semicolons": "\n".join(
+        row.replace(",", ";").translate(LETTERS) for row in ROWS
+    ),
+    "between tabs": "\n".join(row.replace(",", "\t") for row in ROWS),
+    "blanks after commas": "\r\n".join(row.replace(",", ", ") for row in ROWS),
+    "quoted": "\n".join(",".join(f'"{part}"' for part in row.split(",")) for row in ROWS),
+    "one decimal": "\n".join(map(rounded, ROWS)),
+    "three decimals": "\n".join(map(longer, ROWS)),
+    "copied again and again": copies(ROWS, window=300, every=50),
+    "copied, with decimal commas": copies([row.translate(LETTERS) for row in ROWS], every=70),
+    "rows missing": "\n".join(thinned(ROWS)),
+    "cut at a comma": "\n".join([*ROWS, "17.00,ID_Ballast,-0.23,1.1", "17.00,ID_Ballast,-0.2"]),
+    "from 0.40 s on": "\n".join(row for row in ROWS if float(row.split(",")[0]) >= 0.4),
+}
+
+
+def read_of_real_logs(text: str):
+    return published_trajectory(text, BEAM, SUPPORT_OF_REAL_LOGS.scenario)
+
+
+def test_the_log_of_seven_blocks_is_a_failure_in_any_form(subtests) -> None:
+    for form in FORMS_OF_REAL_LOGS:
+        with subtests.test(form=form):
+            assert looks_published(FORMS_OF_REAL_LOGS[form])
+            trajectory = read_of_real_logs(FORMS_OF_REAL_LOGS[form])
+            result = score(SUPPORT_OF_REAL_LOGS, BEAM, trajectory)
+            assert (result.success, result.indicator) == (False, 0.0)
+            # Too far aside from 1.28 s on; the first sample below 4 is that of 1.48 s, at 103.
+            assert result.metrics["fall_time_s"] == pytest.approx(1.28, abs=0.06)
+            height = trajectory.cargo_position[:, 2]
+            low = int(np.argmax(height < 4.0))
+            assert trajectory.time_s[low] == pytest.approx(1.48, abs=0.06)
+            assert trajectory.cargo_mass[low] == pytest.approx(103.0, abs=6.0)
+            # Hits the deck (at 5.46), bounces to 6.66, and ends on the floor on its side.
+            assert height[12:17].min() == pytest.approx(5.7, abs=0.25)
+            assert height[18:25].max() == pytest.approx(6.66, abs=0.1)
+            assert height[-1] == pytest.approx(1.14, abs=0.05)
+
+
+def test_what_was_before_the_first_rows_is_the_fall_that_they_continue() -> None:
+    trajectory = read_of_real_logs(FORMS_OF_REAL_LOGS["as it was written"])
+    height = trajectory.cargo_position[:, 2]
+    assert trajectory.settings["begins_at_s"] == 0.32
+    assert height[:2] == pytest.approx([9.03, 9.03], abs=0.03)
+    assert (np.diff(height[2:9]) < 0).all()
+    fall = np.diff(height[3:9], n=2) * 25**2
+    assert fall == pytest.approx([-SUPPORT.scenario.gravity] * 4, abs=0.02 * 2 * 25**2)
+
+
+def without(first: float, last: float) -> list[str]:
+    return [row for row in ROWS if not first <= float(row.split(",")[0]) <= last]
+
+
+def shifted(by: float) -> list[str]:
+    """The log as if its clock ran ahead: its fall would begin later than any of the game's."""
+    return [
+        ",".join([f"{float(t) + by:.2f}", *rest]) for t, *rest in (row.split(",") for row in ROWS)
+    ]
+
+
+def test_what_a_log_does_not_show_is_not_made_up(subtests) -> None:
+    for rows, says in [
+        (without(0.0, 0.42), r"Between 0.00 s and 0.44 s"),
+        (shifted(0.1), r"Between 0.00 s and 0.42 s"),
+        (without(3.0, 3.2), r"Between 2.96 s and 3.24 s"),
+        ([row.replace("ID_Ballast", "ID_1") for row in ROWS], "nothing of the cargo"),
+        ([row for row in ROWS if row.count(",") != 2], "cargo's mass"),
+    ]:
+        with subtests.test(rows=rows), pytest.raises(LogIncompleteError, match=says):
+            read_of_real_logs("\n".join(rows))
+
+
+def test_a_beginning_without_a_fall_is_refused() -> None:
+    """A cargo that already stands still when the rows begin may have been anywhere before."""
+    standing = [
+        ",".join([*parts[:2], *(["0.00", "9.03", "0.00"] if len(parts) == 5 else parts[2:])])
+        if float(parts[0]) < 0.6
+        else ",".join(parts)
+        for parts in (row.split(",") for row in ROWS)
+    ]
+    with pytest.raises(LogIncompleteError, match=r"Between 0.00 s and 0.32 s"):
+        read_of_real_logs("\n".join(standing))
+
+
+SAGGING = np.loadtxt(FOLDER / "support-2_sagging_bridge_y.csv", delimiter=",", skiprows=1)
+
+
+def test_the_excerpts_are_as_the_notes_say() -> None:
+    height = dict(zip(np.round(SAGGING[:, 0], 2), SAGGING[:, 2], strict=True))
+    assert height[0.36] == 10.19
+    assert min(height.values()) < 5.1

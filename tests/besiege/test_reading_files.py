@@ -25,7 +25,7 @@ from buildarena_besiege.normal import normal_form
 from buildarena_geometry import DocumentError, Machine
 
 EXPORTS = [
-    pytest.param(one, export, id=f"{one.name}-{export['category']}-{export['level']}")
+    (one, export)
     for one in goldens()
     for export in (one.exports[0], one.exports[-1])
     if not export["refused"]
@@ -64,43 +64,49 @@ def written(machine, scenario, presses) -> bytes:
     return prepare_run(machine, scenario, name="m", run_id="r", controls=presses).machine_file
 
 
-@pytest.mark.parametrize(("found", "export"), EXPORTS)
-def test_our_files_come_back_as_they_were(found, export) -> None:
-    machine, presses = found.played(export)
-    scenario = scenario_of(export)
-    imported = read_machine_file(written(machine, scenario, presses))
-    wanted = contents(machine)
-    wanted["control_sequence"] = [
-        {"time_s": one.time_s, "key": one.key, "hold_for_s": one.hold_for_s} for one in presses
-    ]
-    assert_alike(contents(imported.machine), wanted)
-    cargo = scenario is not None and scenario.cargo is not None
-    assert [("cargo" in one) for one in imported.not_understood] == [True] * cargo
-    # It is a sound document, assemblies with their sources included.
-    again = Machine.from_document(imported.machine.to_document())
-    assert again == imported.machine
-    assert_alike(normal_form(again, scenario), normal_form(imported.machine, scenario))
+def test_our_files_come_back_as_they_were(subtests) -> None:
+    for found, export in EXPORTS:
+        with subtests.test(found=found):
+            machine, presses = found.played(export)
+            scenario = scenario_of(export)
+            imported = read_machine_file(written(machine, scenario, presses))
+            wanted = contents(machine)
+            wanted["control_sequence"] = [
+                {"time_s": one.time_s, "key": one.key, "hold_for_s": one.hold_for_s}
+                for one in presses
+            ]
+            assert_alike(contents(imported.machine), wanted)
+            cargo = scenario is not None and scenario.cargo is not None
+            assert [("cargo" in one) for one in imported.not_understood] == [True] * cargo
+            # It is a sound document, assemblies with their sources included.
+            again = Machine.from_document(imported.machine.to_document())
+            assert again == imported.machine
+            assert_alike(normal_form(again, scenario), normal_form(imported.machine, scenario))
 
 
-@pytest.mark.parametrize(("found", "export"), EXPORTS[::3])
-def test_what_is_written_again_is_the_same_file(found, export) -> None:
-    def guids():
-        drawn = random.Random(1)
-        return lambda: uuid.UUID(int=drawn.getrandbits(128), version=4)
+def test_what_is_written_again_is_the_same_file(subtests) -> None:
+    for found, export in EXPORTS[::3]:
+        with subtests.test(found=found):
 
-    machine, presses = found.played(export)
-    scenario = builtin_tasks()["transport-3"].scenario
-    first = prepare_run(
-        machine, scenario, name="m", run_id="r", controls=presses, new_guid=guids()
-    ).machine_file
-    second = prepare_run(
-        read_machine_file(first).machine, scenario, name="m", run_id="r", new_guid=guids()
-    ).machine_file
-    number = re.compile(rb"-?\d+\.\d+(?:e-?\d+)?")
-    assert number.sub(b"#", without_script(first)) == number.sub(b"#", without_script(second))
-    theirs = [float(one) for one in number.findall(without_script(first))]
-    ours = [float(one) for one in number.findall(without_script(second))]
-    assert ours == pytest.approx(theirs, abs=1e-9)
+            def guids():
+                drawn = random.Random(1)
+                return lambda: uuid.UUID(int=drawn.getrandbits(128), version=4)
+
+            machine, presses = found.played(export)
+            scenario = builtin_tasks()["transport-3"].scenario
+            first = prepare_run(
+                machine, scenario, name="m", run_id="r", controls=presses, new_guid=guids()
+            ).machine_file
+            second = prepare_run(
+                read_machine_file(first).machine, scenario, name="m", run_id="r", new_guid=guids()
+            ).machine_file
+            number = re.compile(rb"-?\d+\.\d+(?:e-?\d+)?")
+            assert number.sub(b"#", without_script(first)) == number.sub(
+                b"#", without_script(second)
+            )
+            theirs = [float(one) for one in number.findall(without_script(first))]
+            ours = [float(one) for one in number.findall(without_script(second))]
+            assert ours == pytest.approx(theirs, abs=1e-9)
 
 
 def seats(machine: Machine) -> dict:
@@ -140,29 +146,37 @@ def near(place, block) -> bool:
     return all(abs(a - b) < 1e-3 for a, b in zip(place, block.world_from_block.xyz, strict=True))
 
 
-@pytest.mark.parametrize("name", published_files())
-def test_published_files_are_read(name) -> None:
-    imported = read_machine_file(published_files()[name])
-    found = next(one for one in goldens() if one.name == "-".join(name.split("_")[:2]))
-    _, _, category, level = name.split("_")
-    export = next(
-        e for e in found.exports if (e["category"], e["level"] or "none") == (category, level)
-    )
-    blocks = [b for b in export["blocks"] if b["local_id"] != "Ballast"]
-    theirs = sorted((b["name"], *(round(x, 4) + 0.0 for x in b["position"])) for b in blocks)
-    ours = sorted(
-        (b["name"], *(round(x, 4) + 0.0 for x in b["position"]))
-        for b in normal_form(imported.machine)["blocks"]
-    )
-    assert ours == theirs
-    assert "the Lua script is not ours" in imported.not_understood[0]
-    keys = sorted(v for b in blocks for k, _, v in b["data"] if k == "StringArray" and v)
-    bound = sorted(
-        sorted(v) for b in imported.machine.blocks.values() for v in b.bindings.values() if v
-    )
-    # The published bridge was saved with the keys of the rocket before it.
-    assert bound == keys or category == "support"
-    assert imported.name == export["machine"]["name"]
+def test_published_files_are_read(subtests) -> None:
+    for name in published_files():
+        with subtests.test(name=name):
+            imported = read_machine_file(published_files()[name])
+            found = next(one for one in goldens() if one.name == "-".join(name.split("_")[:2]))
+            _, _, category, level = name.split("_")
+            export = next(
+                e
+                for e in found.exports
+                if (e["category"], e["level"] or "none") == (category, level)
+            )
+            blocks = [b for b in export["blocks"] if b["local_id"] != "Ballast"]
+            theirs = sorted(
+                (b["name"], *(round(x, 4) + 0.0 for x in b["position"])) for b in blocks
+            )
+            ours = sorted(
+                (b["name"], *(round(x, 4) + 0.0 for x in b["position"]))
+                for b in normal_form(imported.machine)["blocks"]
+            )
+            assert ours == theirs
+            assert "the Lua script is not ours" in imported.not_understood[0]
+            keys = sorted(v for b in blocks for k, _, v in b["data"] if k == "StringArray" and v)
+            bound = sorted(
+                sorted(v)
+                for b in imported.machine.blocks.values()
+                for v in b.bindings.values()
+                if v
+            )
+            # The published bridge was saved with the keys of the rocket before it.
+            assert bound == keys or category == "support"
+            assert imported.name == export["machine"]["name"]
 
 
 def test_a_plain_foreign_file_is_understood() -> None:
@@ -173,9 +187,8 @@ def test_a_plain_foreign_file_is_understood() -> None:
     assert imported.machine.state.next_id == 3
 
 
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
+def test_what_is_not_understood_is_named(subtests) -> None:
+    for given, says in [
         ({"blocks": block(57)}, ["block 3: no module is of the game's type 57: left out"]),
         (
             {"blocks": block(35, 'x="0" y="0" z="9"')},
@@ -209,12 +222,11 @@ def test_a_plain_foreign_file_is_understood() -> None:
         ({"data": '<String key="lua_data">x = 1</String>'}, ["the Lua script is not ours"]),
         ({"version": "2.0"}, ["bsgVersion '2.0' is read as 1.4"]),
         ({"blocks": block(15, place='x="0" y="0" z="0.6"')}, ["would not be read back"]),
-    ],
-)
-def test_what_is_not_understood_is_named(given, says) -> None:
-    found = foreign(**given).not_understood
-    for words in says:
-        assert any(words in one for one in found), found
+    ]:
+        with subtests.test(given=given):
+            found = foreign(**given).not_understood
+            for words in says:
+                assert any(words in one for one in found), found
 
 
 def test_a_connector_without_rotations_finds_its_faces() -> None:
@@ -260,9 +272,8 @@ def test_a_file_that_the_game_saved_again_is_still_ours() -> None:
         assert mounts == {key: one.mount for key, one in machine.blocks.items()}
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
+def test_a_description_that_does_not_fit_is_not_believed(subtests) -> None:
+    for old, new in [
         (b"&quot;mount&quot;:[&quot;1&quot;", b"&quot;mount&quot;:[&quot;9&quot;"),
         (
             b"&quot;mount&quot;:[&quot;1&quot;,&quot;A&quot;",
@@ -274,15 +285,14 @@ def test_a_file_that_the_game_saved_again_is_still_ours() -> None:
         (b"&quot;structures&quot;:[]", b"&quot;structures&quot;:[[1,2,3]]"),
         (b"&quot;version&quot;:1", b"&quot;version&quot;:7"),
         (b"buildarena machine {", b"buildarena machine {{"),
-    ],
-)
-def test_a_description_that_does_not_fit_is_not_believed(old, new) -> None:
-    data = plain_machine_file(vehicle(), name="m")
-    assert old in data
-    imported = read_machine_file(data.replace(old, new, 1))
-    assert any("description is not believed" in one for one in imported.not_understood)
-    assert imported.machine.part_count == 4
-    assert all(b.mount for b in list(imported.machine.blocks.values())[1:])
+    ]:
+        with subtests.test(old=old):
+            data = plain_machine_file(vehicle(), name="m")
+            assert old in data
+            imported = read_machine_file(data.replace(old, new, 1))
+            assert any("description is not believed" in one for one in imported.not_understood)
+            assert imported.machine.part_count == 4
+            assert all(b.mount for b in list(imported.machine.blocks.values())[1:])
 
 
 def test_a_description_of_other_ends_is_not_believed() -> None:
@@ -417,6 +427,7 @@ def test_keys_have_the_games_names() -> None:
         assert not is_game_key(name)
 
 
-@pytest.mark.parametrize("name", ["rich", *published_files()])
-def test_machines_of_files_come_back_from_ours(name) -> None:
-    assert round_trip(RICH if name == "rich" else published_files()[name])
+def test_machines_of_files_come_back_from_ours(subtests) -> None:
+    for name in ["rich", *published_files()]:
+        with subtests.test(name=name):
+            assert round_trip(RICH if name == "rich" else published_files()[name])

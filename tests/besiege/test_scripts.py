@@ -1,4 +1,4 @@
-"""Scripts do in every Lua what the published ones do, and what the control sequence says."""
+"""Scripts do in every Lua what the published ones do, and say which level was open."""
 
 import pytest
 from hypothesis import given, settings
@@ -9,29 +9,22 @@ from tests.besiege.golden import goldens, scenario_of
 from tests.besiege.playing import log_of, played, press, vehicle
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_besiege import MachineNotPlayableError, prepare_run, trajectory_of
+from buildarena_besiege import (
+    LogIncompleteError,
+    MachineNotPlayableError,
+    prepare_run,
+    trajectory_of,
+)
 from buildarena_besiege.check_sums import check_sum
+from buildarena_besiege.exporting.probes import MAX_PROBES, height_at, level_probes
 from buildarena_besiege.exporting.script import lua_text
 from buildarena_besiege.keys import key_edges
 from buildarena_besiege.tracking import tracked_blocks
 from buildarena_simulation import Scenario
+from buildarena_simulation.scenario import TerrainBox
 
 TASKS = builtin_tasks()
 SHORT = TASKS["transport-2"].scenario.model_copy(update={"duration_s": 2.0})
-
-
-def _exports():
-    """Of each machine one drive with its keys, and of some one other trial."""
-    for number, one in enumerate(goldens()):
-        trials = [e for e in one.exports if not e["refused"] and e["category"] != "plain"]
-        for drives in (True, False)[: 2 - (number % 3 > 0)]:
-            fitting = [e for e in trials if (e["category"] == "transport") == drives]
-            for export in fitting[-1:]:
-                name = f"{one.name}-{export['category']}-{export['level']}"
-                yield pytest.param(one, export, id=name)
-
-
-EXPORTS = list(_exports())
 
 
 def in_order_of_time(presses) -> bool:
@@ -39,9 +32,17 @@ def in_order_of_time(presses) -> bool:
     return times == sorted(times)
 
 
-@pytest.mark.nightly(keep=20)
-@pytest.mark.parametrize(("found", "export"), EXPORTS)
-def test_keys_and_slider_are_those_of_the_published_script(found, export) -> None:
+def test_keys_and_slider_are_those_of_the_published_script(subtests) -> None:
+    """Of every third machine one drive with its keys, and one other trial."""
+    for found in goldens()[::3]:
+        trials = [e for e in found.exports if not e["refused"] and e["category"] != "plain"]
+        for drives in (True, False):
+            for export in [e for e in trials if (e["category"] == "transport") == drives][-1:]:
+                with subtests.test(found.name, category=export["category"]):
+                    assert_played_alike(found, export)
+
+
+def assert_played_alike(found, export) -> None:
     machine, presses = found.played(export)
     game = played(machine, scenario_of(export), controls=presses)
     theirs = {key: one["held"] for key, one in export["lua"]["keys"].items() if one["held"]}
@@ -53,19 +54,20 @@ def test_keys_and_slider_are_those_of_the_published_script(found, export) -> Non
         assert ours[n] == (name, pytest.approx(value, abs=1e-9))
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("task", ["transport-3", "support-1", "lift-1", "lift-3"])
-def test_every_lua_prints_the_same(version, task) -> None:
-    scenario = TASKS[task].scenario.model_copy(update={"duration_s": 6.0})
-    machine = vehicle(cannon=True)
-    lines = played(machine, scenario, version=version, updates=660).lines
-    assert lines == played(machine, scenario, version="lua54", updates=660).lines
-    assert lines[0].startswith("ba,run-1,b,")
-    assert [line.split(",")[2:4] for line in lines[-3:]] == [
-        ["e", "600"],
-        ["e", "625"],
-        ["e", "650"],
-    ]
+def test_every_lua_prints_the_same(subtests) -> None:
+    for version in VERSIONS:
+        for task in ["transport-3", "support-1", "lift-1", "lift-3"]:
+            with subtests.test(version=version, task=task):
+                scenario = TASKS[task].scenario.model_copy(update={"duration_s": 6.0})
+                machine = vehicle(cannon=True)
+                lines = played(machine, scenario, version=version, updates=660).lines
+                assert lines == played(machine, scenario, version="lua54", updates=660).lines
+                assert lines[0].startswith("ba,run-1,b,")
+                assert [line.split(",")[2:4] for line in lines[-3:]] == [
+                    ["e", "600"],
+                    ["e", "625"],
+                    ["e", "650"],
+                ]
 
 
 def test_lines_hold_their_sums_and_at_most_eight_blocks() -> None:
@@ -139,17 +141,21 @@ def test_presses_of_unbound_keys_reach_nothing() -> None:
     assert played(vehicle(), SHORT, controls=[press(0.5, "Keypad7", 1)]).calls == {}
 
 
-@pytest.mark.parametrize("key", ['x") os.exit("', "Alpha10", "", "alpha1\n"])
-def test_unknown_keys_are_refused_with_the_known_ones(key) -> None:
-    with pytest.raises(MachineNotPlayableError, match="the keys are UpArrow, DownArrow"):
-        key_edges([press(0.0, key, 1.0)])
+def test_unknown_keys_are_refused_with_the_known_ones(subtests) -> None:
+    for key in ['x") os.exit("', "Alpha10", "", "alpha1\n"]:
+        with (
+            subtests.test(key=key),
+            pytest.raises(MachineNotPlayableError, match="the keys are UpArrow, DownArrow"),
+        ):
+            key_edges([press(0.0, key, 1.0)])
 
 
-@pytest.mark.parametrize("time_s", [float("nan"), float("-inf")])
-def test_times_that_are_no_numbers_are_refused(time_s) -> None:
-    with pytest.raises(MachineNotPlayableError, match="numbers of seconds"):
-        key_edges([press(time_s, "UpArrow", 1.0)])
-    assert key_edges([press(float("inf"), "UpArrow", 1.0)]) == ()
+def test_times_that_are_no_numbers_are_refused(subtests) -> None:
+    for time_s in [float("nan"), float("-inf")]:
+        with subtests.test(time_s=time_s):
+            with pytest.raises(MachineNotPlayableError, match="numbers of seconds"):
+                key_edges([press(time_s, "UpArrow", 1.0)])
+            assert key_edges([press(float("inf"), "UpArrow", 1.0)]) == ()
 
 
 def test_held_cannons_get_a_key_of_their_own() -> None:
@@ -187,29 +193,30 @@ def test_a_run_knows_ground_level_and_duration() -> None:
     assert run.script.encode()[:40] in run.machine_file
 
 
-@pytest.mark.parametrize("name", ["", "A", "a b", "a.bsg", "ä", "a" * 101, 'a"'])
-def test_names_that_cannot_be_typed_are_refused(name) -> None:
-    with pytest.raises(ValueError, match="lower case letters"):
-        prepare_run(vehicle(), SHORT, name=name, run_id="r")
+def test_names_that_cannot_be_typed_are_refused(subtests) -> None:
+    for name in ["", "A", "a b", "a.bsg", "ä", "a" * 101, 'a"']:
+        with subtests.test(name=name), pytest.raises(ValueError, match="lower case letters"):
+            prepare_run(vehicle(), SHORT, name=name, run_id="r")
 
 
 EVIL = ['"]]os.exit()--', "a\nb", "\\", "ü,1", "'); error('", "]]", "\x00", "ba,run-1,e,1", "%d %s"]
 
 
-@pytest.mark.parametrize("evil", EVIL)
-@pytest.mark.parametrize("version", ["lua51", "lua54"])
-def test_texts_of_users_stay_texts(evil, version) -> None:
-    machine = vehicle()
-    document = machine.to_document()
-    for block in document["blocks"]:
-        block["id"] += evil
-        block["note"] = evil
-        if block["mount"]:
-            block["mount"][0] += evil
-    machine = type(machine).from_document({**document, "next_id": 90})
-    game = played(machine, SHORT, run_id=evil, version=version)
-    trajectory = trajectory_of(log_of(game, evil), machine, SHORT, game="1", mod="2")
-    assert trajectory.block_ids == tuple(machine.blocks)[:3]
+def test_texts_of_users_stay_texts(subtests) -> None:
+    for evil in EVIL:
+        for version in ["lua51", "lua54"]:
+            with subtests.test(evil=evil, version=version):
+                machine = vehicle()
+                document = machine.to_document()
+                for block in document["blocks"]:
+                    block["id"] += evil
+                    block["note"] = evil
+                    if block["mount"]:
+                        block["mount"][0] += evil
+                machine = type(machine).from_document({**document, "next_id": 90})
+                game = played(machine, SHORT, run_id=evil, version=version)
+                trajectory = trajectory_of(log_of(game, evil), machine, SHORT, game="1", mod="2")
+                assert trajectory.block_ids == tuple(machine.blocks)[:3]
 
 
 @given(st.text(max_size=30))
@@ -230,17 +237,23 @@ def test_machines_the_game_cannot_take_are_refused() -> None:
         prepare_run(vehicle(), SHORT, name="a", run_id="")
 
 
-@pytest.mark.parametrize("version", VERSIONS)
-def test_the_first_lines_are_printed_again_at_one_and_at_two_seconds(version) -> None:
-    lines = played(vehicle(), SHORT, version=version, updates=230).lines
-    early = [line for line in lines if line.split(",")[2] == "s" and int(line.split(",")[3]) <= 60]
-    assert {line: early.count(line) for line in early} == dict.fromkeys(early, 3)
-    assert len(set(early)) == 15
-    one, two = (
-        next(i for i, line in enumerate(lines) if f",s,{update}," in line) for update in (100, 200)
-    )
-    for at in (one, two):
-        assert set(early) <= set(lines[at : at + 30])
+def test_the_first_lines_are_printed_again_at_one_and_at_two_seconds(subtests) -> None:
+    for version in VERSIONS:
+        with subtests.test(version=version):
+            lines = played(vehicle(), SHORT, version=version, updates=230).lines
+            early = [
+                line
+                for line in lines
+                if line.split(",")[2] == "s" and int(line.split(",")[3]) <= 60
+            ]
+            assert {line: early.count(line) for line in early} == dict.fromkeys(early, 3)
+            assert len(set(early)) == 15
+            one, two = (
+                next(i for i, line in enumerate(lines) if f",s,{update}," in line)
+                for update in (100, 200)
+            )
+            for at in (one, two):
+                assert set(early) <= set(lines[at : at + 30])
 
 
 def test_a_large_machine_does_not_push_its_own_lines_out_of_the_window() -> None:
@@ -279,3 +292,98 @@ def test_a_script_formats_no_number_as_the_computers_language_has_it() -> None:
             continue
         code = [line for line in script.splitlines() if not line.startswith("--")]
         assert not [line for line in code if "%f" in line or "%g" in line or "tostring" in line]
+
+
+PLAYABLE = [
+    name
+    for name, task in TASKS.items()
+    if task.scenario.placement.kind != "released"
+    and (task.scenario.cargo is None or task.scenario.cargo.at is None)
+    and task.scenario.gravity == Scenario(duration_s=1.0).gravity
+    and task.scenario.drive_strength == 1
+]
+TERRAINS = {TASKS[name].scenario.terrain: name for name in PLAYABLE}
+"""A task of each level there is."""
+
+
+def short(name: str) -> Scenario:
+    return TASKS[name].scenario.model_copy(update={"duration_s": 1.0})
+
+
+def judged(scenario: Scenario, **game: object):
+    machine = vehicle()
+    log = log_of(played(machine, scenario, **game))
+    return trajectory_of(log, machine, scenario, game="1", mod="2")
+
+
+def test_every_level_but_the_tasks_own_is_found_out(subtests) -> None:
+    names = list(TERRAINS.values())
+    for wanted, other in zip(names, [*names[1:], names[0]], strict=True):
+        for opened in (wanted, other):
+            terrain = TASKS[opened].scenario.terrain
+            game = {"ground": lambda east, north, terrain=terrain: height_at(terrain, east, north)}
+            with subtests.test(wanted=wanted, opened=opened):
+                if wanted == opened:
+                    measured = judged(short(wanted), **game).settings["measured_gravity"]
+                    assert measured == -32.81
+                else:
+                    with pytest.raises(LogIncompleteError, match=r"Another level was open .*: at "):
+                        judged(short(wanted), **game)
+
+
+def test_boxes_a_little_higher_or_lower_than_written_are_the_level(subtests) -> None:
+    for top in [4.2, 4.5, 5.0, 5.5]:
+        with subtests.test(top=top):
+            scenario = short("support-2")
+            found = judged(
+                scenario,
+                ground=lambda e, n: top if height_at(scenario.terrain, e, n) > 0.0 else 0.05,
+            )
+            assert found.settings["measured_ground"] == top
+
+
+def test_another_gravity_is_another_level(subtests) -> None:
+    for gravity in [0.0, -9.81, -32.0, 32.81, float("nan")]:
+        with subtests.test(gravity=gravity), pytest.raises(LogIncompleteError, match="gravity is"):
+            judged(short("transport-1"), gravity=gravity)
+
+
+def test_a_place_below_the_machine_is_not_judged() -> None:
+    scenario = short("support-1")
+    found = judged(
+        scenario, ground=lambda e, n: "b" if e < 5 else height_at(scenario.terrain, e, n)
+    )
+    assert found.settings["measured_ground"] == 5.0
+
+
+def test_a_level_that_was_not_seen_is_not_believed(subtests) -> None:
+    for ground in ["b", None, float("nan")]:
+        with (
+            subtests.test(ground=ground),
+            pytest.raises(LogIncompleteError, match="Another level was open"),
+        ):
+            judged(short("support-1"), ground=lambda _e, _n: ground)
+
+
+def test_a_log_without_the_line_about_the_level_is_refused() -> None:
+    scenario = short("transport-1")
+    machine = vehicle()
+    game = played(machine, scenario)
+    game.lines = [line for line in game.lines if ",w," not in line]
+    with pytest.raises(LogIncompleteError, match="line about the level is missing"):
+        trajectory_of(log_of(game), machine, scenario, game="1", mod="2")
+
+
+def test_a_tilted_boxs_height_is_that_of_its_upper_side() -> None:
+    box = TerrainBox(center=(0.0, 0.0, 1.0), size=(4.0, 10.0, 2.0), slope_deg=30.0)
+    # The middle of the upper side is 1 along the box's own vertical: half a unit south, 0.87 up.
+    assert height_at((box,), 0.0, -0.5) == pytest.approx(1.0 + 0.75**0.5)
+    rise = height_at((box,), 1.0, 2.0) - height_at((box,), 1.0, 1.0)
+    assert rise == pytest.approx(3**-0.5)
+    assert height_at((box,), 2.1, 0.0) == 0.0
+
+
+def test_many_boxes_have_few_probes() -> None:
+    box = TerrainBox(center=(0.0, 0.0, 0.25), size=(1.0, 1.0, 0.5))
+    terrain = tuple(box.model_copy(update={"center": (3.0 * i, 30.0, 0.25)}) for i in range(64))
+    assert len(level_probes(Scenario(duration_s=1.0, terrain=terrain))) == MAX_PROBES

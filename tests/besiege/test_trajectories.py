@@ -97,17 +97,18 @@ def test_pieces_are_unknown_without_a_starting_block() -> None:
     assert trajectory(played(MACHINE, scenario, path=still), scenario=scenario).pieces is None
 
 
-@pytest.mark.parametrize("gone", [{100}, {100, 104, 108, 112}, {4, 8, 12}, {192, 196, 200}])
-def test_short_gaps_are_filled_in_a_straight_line(gone) -> None:
-    game = played(MACHINE, SHORT, path=still)
-    found = trajectory_of(without(game, gone), MACHINE, SHORT, game="1", mod="2")
-    whole = trajectory(game)
-    inside = slice(5, 46)
-    assert np.abs(found.positions[inside] - whole.positions[inside]).max() < 1e-3
-    assert found.settings["filled_samples"] == len(gone)
-    assert found.settings["longest_gap_s"] == pytest.approx(
-        0.04 * (len(gone) + (100 in gone or 4 in gone))
-    )
+def test_short_gaps_are_filled_in_a_straight_line(subtests) -> None:
+    for gone in [{100}, {100, 104, 108, 112}, {4, 8, 12}, {192, 196, 200}]:
+        with subtests.test(gone=gone):
+            game = played(MACHINE, SHORT, path=still)
+            found = trajectory_of(without(game, gone), MACHINE, SHORT, game="1", mod="2")
+            whole = trajectory(game)
+            inside = slice(5, 46)
+            assert np.abs(found.positions[inside] - whole.positions[inside]).max() < 1e-3
+            assert found.settings["filled_samples"] == len(gone)
+            assert found.settings["longest_gap_s"] == pytest.approx(
+                0.04 * (len(gone) + (100 in gone or 4 in gone))
+            )
 
 
 def test_what_is_missing_at_the_end_goes_on_as_it_went() -> None:
@@ -123,19 +124,17 @@ def test_what_is_missing_at_the_end_goes_on_as_it_went() -> None:
     assert (found.pieces == whole.pieces).all()
 
 
-@pytest.mark.parametrize(
-    ("gone", "says"),
-    [
+def test_long_gaps_are_named(subtests) -> None:
+    for gone, says in [
         (range(100, 121, 4), r"Between 0\.96 s and 1\.24 s nothing is told of block 1"),
         (range(4, 29, 4), r"Between 0\.00 s and 0\.32 s"),
         (range(176, 201, 4), r"Between 1\.72 s and 2\.00 s"),
         (range(4, 201, 4), "tells nothing of block 1"),
-    ],
-)
-def test_long_gaps_are_named(gone, says) -> None:
-    game = played(MACHINE, SHORT, path=still)
-    with pytest.raises(LogIncompleteError, match=says):
-        trajectory_of(without(game, set(gone)), MACHINE, SHORT, game="1", mod="2")
+    ]:
+        with subtests.test(gone=gone):
+            game = played(MACHINE, SHORT, path=still)
+            with pytest.raises(LogIncompleteError, match=says):
+                trajectory_of(without(game, set(gone)), MACHINE, SHORT, game="1", mod="2")
 
 
 def test_a_log_without_begin_or_end_is_incomplete() -> None:
@@ -178,16 +177,19 @@ def drive(i: int, n: int) -> tuple[float, float, float]:
     return (float(i), 1.0, max(n - 300, 0) * 0.01)
 
 
-@pytest.mark.parametrize("task", ["transport-1", "lift-1", "lift-2"])
-def test_our_scorers_take_it(task) -> None:
-    chosen = TASKS[task]
-    game = played(MACHINE, chosen.scenario, controls=[press(1.0, "UpArrow", 20)], path=drive)
-    found = trajectory(game, scenario=chosen.scenario)
-    result = score(chosen, MACHINE, found)
-    if task == "transport-1":
-        assert result.indicator == pytest.approx(27.0, abs=0.01)
-        assert "drive_not_measured" in result.flags
-        assert found.settings["effective_key_presses"] == 1
+def test_our_scorers_take_it(subtests) -> None:
+    for task in ["transport-1", "lift-1", "lift-2"]:
+        with subtests.test(task=task):
+            chosen = TASKS[task]
+            game = played(
+                MACHINE, chosen.scenario, controls=[press(1.0, "UpArrow", 20)], path=drive
+            )
+            found = trajectory(game, scenario=chosen.scenario)
+            result = score(chosen, MACHINE, found)
+            if task == "transport-1":
+                assert result.indicator == pytest.approx(27.0, abs=0.01)
+                assert "drive_not_measured" in result.flags
+                assert found.settings["effective_key_presses"] == 1
 
 
 def fall(i: int, n: int) -> tuple[float, float, float]:
@@ -212,24 +214,32 @@ def test_a_run_that_reports_nothing_still_tells_its_time() -> None:
     assert (found.positions.shape, found.cargo_position, found.pieces) == ((51, 0, 3), None, None)
 
 
-@pytest.mark.parametrize(("task", "height"), [("lift-2", 100.0), ("transport-1", 0.0)])
-def test_centres_and_turns_are_told_by_the_roots_of_what_moves_as_one(task, height) -> None:
-    machine, scenario = tumbling(task), TASKS[task].scenario.model_copy(update={"duration_s": 8.0})
-    true = simulate(machine, scenario, "mujoco")
-    ids = true.block_ids
-    centers = np.array([machine.blocks[one].module.center for one in ids])
-    turns = Rotation.from_quat(true.quaternions.reshape(-1, 4)[:, [1, 2, 3, 0]])
-    offsets = turns.apply(np.tile(centers, (len(true.time_s), 1))).reshape(true.positions.shape)
-    roots = (true.positions - offsets)[:, :, [0, 2, 1]].astype(float)
-    samples = Samples(block_ids=ids, positions=roots, burning=np.zeros(roots.shape[:2], bool))
-    found = made_trajectory(samples, machine, scenario, version="1-1")
-    assert found.settings["quaternions"] == "fitted to the blocks' places"
-    assert found.positions[:, 0, 2].max() > height
-    still = [i for i, one in enumerate(ids) if machine.blocks[one].module.motor is None]
-    assert np.abs(found.positions - true.positions)[:, still].max() < 1e-3
-    same = np.abs((found.quaternions * true.quaternions).sum(axis=2))[:, still]
-    assert same.min() > 1 - 1e-4
-    assert np.ptp(true.quaternions[:, 0], axis=0).max() > 0.05, "it turns"
+def test_centres_and_turns_are_told_by_the_roots_of_what_moves_as_one(subtests) -> None:
+    for task, height in [("lift-2", 100.0), ("transport-1", 0.0)]:
+        with subtests.test(task=task):
+            machine, scenario = (
+                tumbling(task),
+                TASKS[task].scenario.model_copy(update={"duration_s": 8.0}),
+            )
+            true = simulate(machine, scenario, "mujoco")
+            ids = true.block_ids
+            centers = np.array([machine.blocks[one].module.center for one in ids])
+            turns = Rotation.from_quat(true.quaternions.reshape(-1, 4)[:, [1, 2, 3, 0]])
+            offsets = turns.apply(np.tile(centers, (len(true.time_s), 1))).reshape(
+                true.positions.shape
+            )
+            roots = (true.positions - offsets)[:, :, [0, 2, 1]].astype(float)
+            samples = Samples(
+                block_ids=ids, positions=roots, burning=np.zeros(roots.shape[:2], bool)
+            )
+            found = made_trajectory(samples, machine, scenario, version="1-1")
+            assert found.settings["quaternions"] == "fitted to the blocks' places"
+            assert found.positions[:, 0, 2].max() > height
+            still = [i for i, one in enumerate(ids) if machine.blocks[one].module.motor is None]
+            assert np.abs(found.positions - true.positions)[:, still].max() < 1e-3
+            same = np.abs((found.quaternions * true.quaternions).sum(axis=2))[:, still]
+            assert same.min() > 1 - 1e-4
+            assert np.ptp(true.quaternions[:, 0], axis=0).max() > 0.05, "it turns"
 
 
 def tumbling(task: str) -> Machine:
@@ -259,20 +269,23 @@ def begun(i: int, n: int) -> tuple[float, float, float]:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("late", [0.24, 0.32, 0.4])
-def test_a_late_start_counts_where_the_first_sample_is_near_where_the_trial_begins(late) -> None:
-    gone = set(range(4, round(late * 100), 4))
-    log = without(played(MACHINE, SHORT, path=begun), gone)
-    found = trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
-    assert found.settings["longest_gap_s"] == pytest.approx(late)
+def test_a_late_start_counts_where_the_first_sample_is_near_where_the_trial_begins(
+    subtests,
+) -> None:
+    for late in [0.24, 0.32, 0.4]:
+        with subtests.test(late=late):
+            gone = set(range(4, round(late * 100), 4))
+            log = without(played(MACHINE, SHORT, path=begun), gone)
+            found = trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
+            assert found.settings["longest_gap_s"] == pytest.approx(late)
 
-    def elsewhere(i: int, n: int) -> tuple[float, float, float]:
-        x, y, z = begun(i, n)
-        return (x + 4.0, y, z)
+            def elsewhere(i: int, n: int) -> tuple[float, float, float]:
+                x, y, z = begun(i, n)
+                return (x + 4.0, y, z)
 
-    log = without(played(MACHINE, SHORT, path=elsewhere), gone)
-    with pytest.raises(LogIncompleteError, match=r"Between 0\.00 s"):
-        trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
+            log = without(played(MACHINE, SHORT, path=elsewhere), gone)
+            with pytest.raises(LogIncompleteError, match=r"Between 0\.00 s"):
+                trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
 
 
 def test_a_start_later_than_that_is_refused() -> None:

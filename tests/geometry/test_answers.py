@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from support.machines.building import BLOCK, attach, built, connect
+from support.machines.building import attach, built, connect
 from support.machines.random_workshop import TASKS, random_workshop_machine
 
 from buildarena_geometry import Cause, Machine, load_catalogue, module_set
