@@ -223,17 +223,16 @@ def test_a_wheel_that_comes_off_ends_it(engine) -> None:
     assert result.metrics["balanced_s"] == pytest.approx(300 / 25 - 0.04)
 
 
-@pytest.mark.parametrize(
-    "stricter", [{"max_tilt_deg": 0.5}, {"min_height": 2.5}, {"min_clearance": 0.6}]
-)
-def test_each_threshold_ends_a_balance(stricter) -> None:
-    task = TASKS["balance-2"]
-    machine = experts_machine(task)
-    trial = simulate(machine, task.scenario, "mujoco")
-    assert score(task, machine, trial).success
-    result = score(load_task(_changed(task, scoring=stricter)), machine, trial)
-    assert not result.success
-    assert result.flags == (() if "max_tilt_deg" in stricter else ("propped",))
+def test_each_threshold_ends_a_balance(subtests) -> None:
+    for stricter in [{"max_tilt_deg": 0.5}, {"min_height": 2.5}, {"min_clearance": 0.6}]:
+        with subtests.test(stricter=stricter):
+            task = TASKS["balance-2"]
+            machine = experts_machine(task)
+            trial = simulate(machine, task.scenario, "mujoco")
+            assert score(task, machine, trial).success
+            result = score(load_task(_changed(task, scoring=stricter)), machine, trial)
+            assert not result.success
+            assert result.flags == (() if "max_tilt_deg" in stricter else ("propped",))
 
 
 @pytest.mark.nightly
@@ -262,19 +261,16 @@ def test_pushes_are_what_makes_the_second_harder(engine) -> None:
     assert pushed > calm + 0.3
 
 
-@pytest.mark.parametrize(
-    ("changes", "told"),
-    [
+def test_a_balance_that_nobody_can_keep_is_refused(subtests) -> None:
+    for changes, told in [
         ({"placement": {"kind": "released", "height": 5}, "draws": {}}, "not alone on flat"),
         ({"terrain": [{"center": [0, 9, 1], "size": [2, 2, 2]}]}, "not alone on flat"),
         ({"cargo": {"size": [1, 1, 1], "final_mass": 5, "ramp_s": 1}}, "not alone on flat"),
         ({"duration_s": 15}, "min_s 20 is longer"),
         ({"control": {"mode": "none"}}, "control"),
-    ],
-)
-def test_a_balance_that_nobody_can_keep_is_refused(changes, told) -> None:
-    with pytest.raises(TaskError, match=told):
-        load_task(_changed(TASKS["balance-1"], scenario=changes))
+    ]:
+        with subtests.test(changes=changes), pytest.raises(TaskError, match=told):
+            load_task(_changed(TASKS["balance-1"], scenario=changes))
 
 
 def _changed(task: Any, **parts: Mapping[str, Any]) -> str:

@@ -42,16 +42,17 @@ def test_there_are_such_tasks() -> None:
     assert all(task.takes_programs and task.scenario.draws for task in CONTROL)
 
 
-@pytest.mark.parametrize("task", CONTROL, ids=lambda task: task.name)
-def test_a_statement_tells_every_range_that_a_seed_draws_from(task) -> None:
-    words = task.statement.replace("\n", " ")
-    numbers = {float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", words)}
-    for path, ends in task.scenario.draws.items():
-        if path.startswith("gates."):
-            assert "11 k - 1.5" in words
-            assert "11 k + 1.5" in words
-        told = [end[:1] for end in ends] if path.startswith("gates.") else ends
-        assert set(figures(told)) <= numbers | {0.0}, path
+def test_a_statement_tells_every_range_that_a_seed_draws_from(subtests) -> None:
+    for task in CONTROL:
+        with subtests.test(task=task):
+            words = task.statement.replace("\n", " ")
+            numbers = {float(number) for number in re.findall(r"-?\d+(?:\.\d+)?", words)}
+            for path, ends in task.scenario.draws.items():
+                if path.startswith("gates."):
+                    assert "11 k - 1.5" in words
+                    assert "11 k + 1.5" in words
+                told = [end[:1] for end in ends] if path.startswith("gates.") else ends
+                assert set(figures(told)) <= numbers | {0.0}, path
 
 
 LEAVES_ITS_LANE = {("walk-2", "mujoco", 1)}
@@ -255,18 +256,19 @@ def test_who_stays_where_the_place_was_does_not_follow_it(engine) -> None:
     assert scored(task, honest, engine, None).success
 
 
-@pytest.mark.parametrize("task", ["landing-1", "mechanisms-4", "transport-4"])
-def test_a_scorer_of_places_that_stay_refuses_those_that_move(task) -> None:
-    document = dict(builtin_tasks()[task].as_document())
-    marks = [
-        {**mark, "drift": {"swing": [1, 1, 1], "period_s": [9, 9, 9]}}
-        for mark in document["scenario"]["marks"]
-    ]
-    document["scenario"] = {**document["scenario"], "marks": marks}
-    document["name"] = "moving"
-    document = {key: value for key, value in document.items() if value is not None}
-    with pytest.raises(TaskError, match=r"moves \(drift\), and this scorer's marks stay"):
-        load_task(json.dumps(document) + "\n")
+def test_a_scorer_of_places_that_stay_refuses_those_that_move(subtests) -> None:
+    for task in ["landing-1", "mechanisms-4", "transport-4"]:
+        with subtests.test(task=task):
+            document = dict(builtin_tasks()[task].as_document())
+            marks = [
+                {**mark, "drift": {"swing": [1, 1, 1], "period_s": [9, 9, 9]}}
+                for mark in document["scenario"]["marks"]
+            ]
+            document["scenario"] = {**document["scenario"], "marks": marks}
+            document["name"] = "moving"
+            document = {key: value for key, value in document.items() if value is not None}
+            with pytest.raises(TaskError, match=r"moves \(drift\), and this scorer's marks stay"):
+                load_task(json.dumps(document) + "\n")
 
 
 def test_a_gate_that_is_not_told_ends_a_trial_at_its_line() -> None:
@@ -277,9 +279,8 @@ def test_a_gate_that_is_not_told_ends_a_trial_at_its_line() -> None:
         simulate(machine.with_controller(program), task.scenario, "mujoco")
 
 
-@pytest.mark.parametrize(
-    ("name", "changes", "told"),
-    [
+def test_a_task_that_nobody_can_pass_is_refused(subtests) -> None:
+    for name, changes, told in [
         ("landing-1", {"placement": {"kind": "ground"}, "draws": {}}, "kind is not released"),
         ("landing-1", {"marks": [], "draws": {}}, "there is no mark 'goal'"),
         ("landing-1", {"duration_s": 2}, "hold_s 3 is longer"),
@@ -288,14 +289,13 @@ def test_a_gate_that_is_not_told_ends_a_trial_at_its_line() -> None:
         ("hover-3", {"duration_s": 4}, "from_s 5 is not within"),
         ("slalom-2", {"gates": [], "draws": {}}, "has 0"),
         ("slalom-2", {"draws": {"gates.gate 9.center": [[0, 0], [1, 1]]}}, "no 'gate 9'"),
-    ],
-)
-def test_a_task_that_nobody_can_pass_is_refused(name, changes, told) -> None:
-    document = dict(builtin_tasks()[name].as_document())
-    document["scenario"] = {**document["scenario"], **changes}
-    document = {key: value for key, value in document.items() if value is not None}
-    with pytest.raises(TaskError, match=told):
-        load_task(json.dumps(document) + "\n")
+    ]:
+        with subtests.test(name=name):
+            document = dict(builtin_tasks()[name].as_document())
+            document["scenario"] = {**document["scenario"], **changes}
+            document = {key: value for key, value in document.items() if value is not None}
+            with pytest.raises(TaskError, match=told):
+                load_task(json.dumps(document) + "\n")
 
 
 @pytest.mark.parametrize(

@@ -129,23 +129,21 @@ def test_a_machine_around_the_ball_is_refused() -> None:
         simulate(draft.machine, TASK.scenario, "mujoco")
 
 
-@pytest.mark.parametrize(
-    ("part", "changes", "told"),
-    [
+def test_a_delivery_that_nobody_can_make_is_refused(subtests) -> None:
+    for part, changes, told in [
         ("scenario", {"gates": []}, "there is no gate 'line': there are none"),
         ("scenario", {"cargo": None}, "needs shape: ball"),
         ("scenario", {"gates": [{"name": "line", "center": [0, 5], "half_width": 6}]}, "already"),
         ("scenario", {"pushes": [{"at_s": 1, "velocity": [0, 5]}]}, "would deliver as well"),
         ("scenario", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
         ("scenario", {"control": {"mode": "none"}}, "control"),
-    ],
-)
-def test_a_delivery_that_nobody_can_make_is_refused(part, changes, told) -> None:
-    document = dict(TASK.as_document()) | {"name": "other"}
-    document[part] = {**document[part], **changes}
-    text = json.dumps({key: value for key, value in document.items() if value is not None})
-    with pytest.raises(TaskError, match=told):
-        load_task(text + "\n")
+    ]:
+        with subtests.test(part=part):
+            document = dict(TASK.as_document()) | {"name": "other"}
+            document[part] = {**document[part], **changes}
+            text = json.dumps({key: value for key, value in document.items() if value is not None})
+            with pytest.raises(TaskError, match=told):
+                load_task(text + "\n")
 
 
 def test_going_round_with_the_ball_is_no_shorter() -> None:

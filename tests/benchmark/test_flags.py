@@ -1,8 +1,6 @@
 import re
 from pathlib import Path
 
-import pytest
-
 from buildarena_benchmark import flags
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.scorers.registry import known_flags, known_scorers
@@ -17,12 +15,15 @@ def test_a_flag_says_one_sentence() -> None:
     assert flags.meaning("a flag of tomorrow") == ""
 
 
-@pytest.mark.parametrize("name", known_scorers())
-def test_a_scorer_documents_the_flags_that_it_declares(name) -> None:
-    scorer = known_scorers()[name]
-    section = re.search(r"Flags:\n(.*?)\n\n", (scorer.judge.__doc__ or "") + "\n\n", re.DOTALL)
-    documented = set(re.findall(r"`(\w+)`:", section[1])) if section else set()
-    assert documented == {flag.name for flag in scorer.flags}
+def test_a_scorer_documents_the_flags_that_it_declares(subtests) -> None:
+    for name in known_scorers():
+        with subtests.test(name=name):
+            scorer = known_scorers()[name]
+            section = re.search(
+                r"Flags:\n(.*?)\n\n", (scorer.judge.__doc__ or "") + "\n\n", re.DOTALL
+            )
+            documented = set(re.findall(r"`(\w+)`:", section[1])) if section else set()
+            assert documented == {flag.name for flag in scorer.flags}
 
 
 def test_the_documentation_says_the_same() -> None:
@@ -40,19 +41,17 @@ def test_the_documentation_says_the_same() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("given", "disqualified", "left_out", "censored"),
-    [
+def test_what_flags_do(subtests) -> None:
+    for given, disqualified, left_out, censored in [
         ((), False, False, False),
         (("never_fell",), False, True, True),
         (("never_fell", "does_not_span"), True, True, True),
         (("unstable",), True, False, False),
         (("span_not_measured", "drive_not_measured"), False, False, False),
         (("a flag of tomorrow",), False, False, False),
-    ],
-)
-def test_what_flags_do(given, disqualified, left_out, censored) -> None:
-    assert flags.is_disqualified(given) == disqualified
-    assert flags.is_left_out(given, ScoringPolicy.PUBLISHED) == left_out
-    assert not flags.is_left_out(given, ScoringPolicy.OURS)
-    assert flags.is_censored(given) == censored
+    ]:
+        with subtests.test(given=given):
+            assert flags.is_disqualified(given) == disqualified
+            assert flags.is_left_out(given, ScoringPolicy.PUBLISHED) == left_out
+            assert not flags.is_left_out(given, ScoringPolicy.OURS)
+            assert flags.is_censored(given) == censored

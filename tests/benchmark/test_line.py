@@ -186,14 +186,15 @@ def _until(task: Any, machine: Machine, trial: Trajectory, samples: int) -> int:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("aside", [0.0, 0.9, 1.3])
-def test_only_what_is_near_the_line_counts(aside) -> None:
+def test_only_what_is_near_the_line_counts(subtests) -> None:
     """The expert's trial beside the line, by so much to the east: along half of it, aside."""
-    machine, trial = honest("mujoco")
-    result = _beside(machine, trial, aside)
-    whole = score(TASK, machine, trial).metrics["stretches"]
-    assert result.metrics["stretches"] <= (whole if aside < 1 else 9)
-    assert aside or result.metrics["stretches"] == whole
+    for aside in [0.0, 0.9, 1.3]:
+        with subtests.test(aside=aside):
+            machine, trial = honest("mujoco")
+            result = _beside(machine, trial, aside)
+            whole = score(TASK, machine, trial).metrics["stretches"]
+            assert result.metrics["stretches"] <= (whole if aside < 1 else 9)
+            assert aside or result.metrics["stretches"] == whole
 
 
 def _beside(machine: Machine, trial: Trajectory, aside: float) -> Score:
@@ -218,15 +219,15 @@ def test_the_time_ends_once_all_but_one_stretch_are_followed() -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize(
-    "stricter",
-    [{"max_distance": 0.05}, {"stretches": 100, "min_stretches": 95, "all_stretches": 99}],
-    ids=["nearer", "longer"],
-)
-def test_each_threshold_decides(stricter) -> None:
-    machine, trial = honest("mujoco")
-    scoring = LineScoring(**(TASK.scoring.model_dump() | stricter))
-    assert not score(replace(TASK, scoring=scoring), machine, trial).success
+def test_each_threshold_decides(subtests) -> None:
+    for stricter in [
+        {"max_distance": 0.05},
+        {"stretches": 100, "min_stretches": 95, "all_stretches": 99},
+    ]:
+        with subtests.test(stricter=stricter):
+            machine, trial = honest("mujoco")
+            scoring = LineScoring(**(TASK.scoring.model_dump() | stricter))
+            assert not score(replace(TASK, scoring=scoring), machine, trial).success
 
 
 @pytest.mark.nightly
@@ -252,26 +253,21 @@ def test_lines_are_as_the_statement_says() -> None:
     assert 100 < left < 200
 
 
-@pytest.mark.parametrize(
-    ("scenario", "told"),
-    [
+def test_a_line_that_nobody_can_follow_is_refused(subtests) -> None:
+    for scenario, told in [
         ({"line": None, "draws": {}}, "scenario.line is missing"),
         ({"control": {"mode": "none"}}, "control"),
         ({"line": {"radius": 12, "bends": [[0.4, 0.2]]}, "draws": {}}, "shares are 0.6 in all"),
         ({"draws": {"line.bends.3": [[0, 0], [0.1, 0.1]]}}, "there is no '3'"),
-    ],
-)
-def test_a_line_that_nobody_can_follow_is_refused(scenario, told) -> None:
-    with pytest.raises(TaskError, match=told):
-        load_task(_changed(scenario=scenario))
+    ]:
+        with subtests.test(scenario=scenario), pytest.raises(TaskError, match=told):
+            load_task(_changed(scenario=scenario))
 
 
-@pytest.mark.parametrize(
-    "scoring", [{"min_stretches": 12}, {"all_stretches": 13}, {"stretches": 2}]
-)
-def test_stretches_that_cannot_be_are_refused(scoring) -> None:
-    with pytest.raises(TaskError):
-        load_task(_changed(scoring=scoring))
+def test_stretches_that_cannot_be_are_refused(subtests) -> None:
+    for scoring in [{"min_stretches": 12}, {"all_stretches": 13}, {"stretches": 2}]:
+        with subtests.test(scoring=scoring), pytest.raises(TaskError):
+            load_task(_changed(scoring=scoring))
 
 
 def _changed(**parts: Any) -> str:

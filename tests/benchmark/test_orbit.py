@@ -77,26 +77,30 @@ def test_what_swings_to_and_fro_goes_nowhere() -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("radius", [5.0, 50.0, 300.0])
-def test_circles_over_one_place_are_no_way_round(radius) -> None:
-    machine, trial = flown(FASTER_FIRST[0])
-    around = np.linspace(0, 20 * math.pi, len(trial.time_s))
-    height = math.sqrt(660**2 - radius**2)
-    path = np.stack([radius * np.sin(around), radius * np.cos(around), 0 * around + height], axis=1)
-    result = score(ONCE, machine, bent(trial, path))
-    assert result.metrics["cycles"] == pytest.approx(10 * (radius / 660) ** 2, rel=0.02)
-    # As many units along a great circle are worth 660 / radius times as much.
-    assert result.metrics["cycles"] < 10 * radius / 660
+def test_circles_over_one_place_are_no_way_round(subtests) -> None:
+    for radius in [5.0, 50.0, 300.0]:
+        with subtests.test(radius=radius):
+            machine, trial = flown(FASTER_FIRST[0])
+            around = np.linspace(0, 20 * math.pi, len(trial.time_s))
+            height = math.sqrt(660**2 - radius**2)
+            path = np.stack(
+                [radius * np.sin(around), radius * np.cos(around), 0 * around + height], axis=1
+            )
+            result = score(ONCE, machine, bent(trial, path))
+            assert result.metrics["cycles"] == pytest.approx(10 * (radius / 660) ** 2, rel=0.02)
+            # As many units along a great circle are worth 660 / radius times as much.
+            assert result.metrics["cycles"] < 10 * radius / 660
 
 
-@pytest.mark.parametrize("height", [0.5, 5.0, 19.0])
-def test_rolling_and_hopping_round_is_no_flight(height) -> None:
+def test_rolling_and_hopping_round_is_no_flight(subtests) -> None:
     """As wheels would carry it, had it all the time of the world."""
-    machine, trial = flown(FASTER_FIRST[0])
-    arms = arms_of(trial)
-    low = arms / np.linalg.norm(arms, axis=1)[:, None] * (RADIUS + height)
-    result = score(ONCE, machine, bent(trial, low))
-    assert (result.success, result.indicator, result.metrics["cycles"]) == (False, 0.0, 0.0)
+    for height in [0.5, 5.0, 19.0]:
+        with subtests.test(height=height):
+            machine, trial = flown(FASTER_FIRST[0])
+            arms = arms_of(trial)
+            low = arms / np.linalg.norm(arms, axis=1)[:, None] * (RADIUS + height)
+            result = score(ONCE, machine, bent(trial, low))
+            assert (result.success, result.indicator, result.metrics["cycles"]) == (False, 0.0, 0.0)
 
 
 def test_what_comes_down_on_its_way_ends_it() -> None:
@@ -173,11 +177,12 @@ def test_what_comes_off_when_it_lands_is_told() -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("task", [ONCE, shorter(RETURN, 12.0)])
-def test_without_a_program_nothing_flies(task) -> None:
-    machine = built(catalogue=module_set("all"))
-    result = scored(task, machine, FASTER_FIRST[0], None)
-    assert (result.success, result.indicator, result.metrics["cycles"]) == (False, 0.0, 0.0)
+def test_without_a_program_nothing_flies(subtests) -> None:
+    for task in [ONCE, shorter(RETURN, 12.0)]:
+        with subtests.test(task=task):
+            machine = built(catalogue=module_set("all"))
+            result = scored(task, machine, FASTER_FIRST[0], None)
+            assert (result.success, result.indicator, result.metrics["cycles"]) == (False, 0.0, 0.0)
 
 
 @pytest.mark.nightly

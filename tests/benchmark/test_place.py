@@ -96,16 +96,19 @@ def test_a_cargo_that_falls_from_the_arm_was_loose(engine) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("what", ["cargo", "goal"])
-def test_who_remembers_where_things_were_fails_where_they_are_not(what) -> None:
+def test_who_remembers_where_things_were_fails_where_they_are_not(subtests) -> None:
     """It looks at one of the two only; for the other it takes the exact world's place."""
-    place = {"cargo": TASK.scenario.cargo.at, "goal": TASK.scenario.marks[0].center}[what]
-    known = f"reach(sense, answer, {{ x = {place[0]}, y = {place[1]} }})"
-    program = experts_machine(TASK).controller.replace(f"reach(sense, answer, seen.{what})", known)
-    machine = experts_machine(TASK).with_controller(program)
-    assert scored(TASK, machine, "mujoco", None).success
-    seeds = [seed for seed in range(20) if _apart(seed, what) > 2.5][:2]
-    assert not any(scored(TASK, machine, "mujoco", seed).success for seed in seeds)
+    for what in ["cargo", "goal"]:
+        with subtests.test(what=what):
+            place = {"cargo": TASK.scenario.cargo.at, "goal": TASK.scenario.marks[0].center}[what]
+            known = f"reach(sense, answer, {{ x = {place[0]}, y = {place[1]} }})"
+            program = experts_machine(TASK).controller.replace(
+                f"reach(sense, answer, seen.{what})", known
+            )
+            machine = experts_machine(TASK).with_controller(program)
+            assert scored(TASK, machine, "mujoco", None).success
+            seeds = [seed for seed in range(20) if _apart(seed, what) > 2.5][:2]
+            assert not any(scored(TASK, machine, "mujoco", seed).success for seed in seeds)
 
 
 def _apart(seed: int, what: str) -> float:
@@ -200,18 +203,15 @@ def test_worlds_leave_the_cargo_out_of_the_machines_way_and_its_mark_far_enough(
         assert world.cargo.mass_at(0.2) == world.cargo.final_mass
 
 
-@pytest.mark.parametrize(
-    ("scenario", "told"),
-    [
+def test_a_place_that_nobody_can_reach_is_refused(subtests) -> None:
+    for scenario, told in [
         ({"cargo": None, "draws": {}}, "has none: give cargo.at"),
         ({"marks": [], "draws": {}}, "there is no mark 'goal'"),
         ({"control": {"mode": "none"}}, "control"),
         ({"duration_s": 2, "draws": {}}, "rest_s 2 is longer"),
-    ],
-)
-def test_a_place_that_nobody_can_reach_is_refused(scenario, told) -> None:
-    with pytest.raises(TaskError, match=told):
-        load_task(_changed(scenario=scenario))
+    ]:
+        with subtests.test(scenario=scenario), pytest.raises(TaskError, match=told):
+            load_task(_changed(scenario=scenario))
 
 
 def _changed(**parts: Any) -> str:

@@ -180,18 +180,16 @@ def test_a_users_own_task_loads_from_text_and_file(tmp_path) -> None:
     assert load_task(file) == task == load_task(str(file))
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
+def test_what_can_change_a_score_changes_the_version(subtests) -> None:
+    for old, new in [
         ("final_mass: 300", "final_mass: 301"),
         ("min_time_s: 3", "min_time_s: 2"),
         ("over a gap of 10", "over a gap of ten"),
         ("max_blocks: 100", "max_blocks: 99"),
         ("duration_s: 10", "duration_s: 11"),
-    ],
-)
-def test_what_can_change_a_score_changes_the_version(old, new) -> None:
-    assert load_task(OWN.replace(old, new)).version != load_task(OWN).version
+    ]:
+        with subtests.test(old=old):
+            assert load_task(OWN.replace(old, new)).version != load_task(OWN).version
 
 
 def test_what_cannot_change_a_score_keeps_the_version() -> None:
@@ -201,9 +199,8 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
     assert load_task(reordered).version == load_task(OWN).version
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "parts"),
-    [
+def test_an_error_names_line_field_and_choices(subtests) -> None:
+    for old, new, parts in [
         (
             "min_time_s: 3",
             "min_tim_s: 3",
@@ -216,19 +213,17 @@ def test_what_cannot_change_a_score_keeps_the_version() -> None:
         ("title: A suspended bridge\n", "", ["title", "required"]),
         ("max_blocks: 100", "max_blocks: many", ["task:8: constraints.max_blocks: ", "integer"]),
         ("indicator: {", "indicator: [", ["not valid YAML"]),
-    ],
-)
-def test_an_error_names_line_field_and_choices(old, new, parts) -> None:
-    assert old in OWN
-    with pytest.raises(TaskError) as caught:
-        load_task(OWN.replace(old, new))
-    for part in parts:
-        assert part in str(caught.value)
+    ]:
+        with subtests.test(old=old):
+            assert old in OWN
+            with pytest.raises(TaskError) as caught:
+                load_task(OWN.replace(old, new))
+            for part in parts:
+                assert part in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
+def test_a_trial_that_is_out_of_bounds_is_refused(subtests) -> None:
+    for old, new, says in [
         ("duration_s: 10", "duration_s: 601", "less than or equal to 600"),
         ("duration_s: 10", "duration_s: 100", "50,000 block-seconds; at most 20,000"),
         ("max_blocks: 100", "max_blocks: 401", "20,050 block-seconds"),
@@ -247,15 +242,14 @@ def test_an_error_names_line_field_and_choices(old, new, parts) -> None:
         ("indicator: {name: load", 'indicator: {name: "$x$"', "indicator.name"),
         ("title: A suspended", 'title: "\\e[31m', "title: "),
         ("title: A suspended bridge", 'title: "\\ud800"', "title: "),
-    ],
-)
-def test_a_trial_that_is_out_of_bounds_is_refused(old, new, says) -> None:
-    assert old in OWN
-    text = OWN.replace(old, new, 1)
-    if new.startswith('title: "\\e'):
-        text = text.replace("31m bridge", '31m bridge"')
-    with pytest.raises(TaskError, match=re.escape(says)):
-        load_task(text)
+    ]:
+        with subtests.test(old=old):
+            assert old in OWN
+            text = OWN.replace(old, new, 1)
+            if new.startswith('title: "\\e'):
+                text = text.replace("31m bridge", '31m bridge"')
+            with pytest.raises(TaskError, match=re.escape(says)):
+                load_task(text)
 
 
 BLOCKS, SUPPORT = "max_blocks: 100", "name: support\n  min_time_s: 3"
@@ -268,9 +262,8 @@ def test_more_terrain_than_is_simulated_is_refused() -> None:
         load_task(OWN.replace("  terrain:\n", "  terrain:\n" + 63 * box))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
+def test_a_task_that_nobody_can_pass_is_refused(subtests) -> None:
+    for old, new, says in [
         (BLOCKS, "min_sub_structures: 6", "constraints.max_sub_structures: is 5"),
         (BLOCKS, "modules: [Winch, Roket]", "8: constraints.modules[1]: there is no"),
         (BLOCKS, "modules: [Rocket]", "'Rocket' can be built, but is not simulated"),
@@ -291,12 +284,11 @@ def test_more_terrain_than_is_simulated_is_refused() -> None:
             "control: {mode: held}\nscoring:\n  name: height",
             "windows within the trial",
         ),
-    ],
-)
-def test_a_task_that_nobody_can_pass_is_refused(old, new, says) -> None:
-    assert old in OWN
-    with pytest.raises(TaskError, match=re.escape(says)):
-        load_task(OWN.replace(old, new))
+    ]:
+        with subtests.test(old=old):
+            assert old in OWN
+            with pytest.raises(TaskError, match=re.escape(says)):
+                load_task(OWN.replace(old, new))
 
 
 def test_a_tasks_document_is_the_task_again(tasks) -> None:

@@ -283,22 +283,19 @@ def after(time_s: float, shift: tuple[float, float, float]) -> Callable[[np.ndar
     return lambda t: np.outer(t >= time_s, shift)
 
 
-@pytest.mark.parametrize(
-    ("part", "change", "flag"),
-    [
+def test_a_trial_that_breaks_one_rule(subtests) -> None:
+    for part, change, flag in [
         (5, after(2.4, (0, 9, 0)), "crossed_line"),
         (0, after(1.0, (0, -3.05, 0)), "base_moved"),
         ("Boulder", after(2.6, (0, 3, 0)), "not_free"),
         ("Boulder", lambda t: np.outer((t > 1.2) & (t < 1.3), (0, -2.0, 2.0)), "not_borne"),
-    ],
-    ids=["debris", "base", "deflected", "hopped"],
-)
-def test_a_trial_that_breaks_one_rule(part, change, flag) -> None:
-    machine, trial = honest("mujoco")
-    block = part if isinstance(part, int) else index_of(machine, part)
-    result = score(TASK, machine, later(trial, block, change))
-    fails(result)
-    assert result.flags == (flag,)
+    ]:
+        with subtests.test(part=part):
+            machine, trial = honest("mujoco")
+            block = part if isinstance(part, int) else index_of(machine, part)
+            result = score(TASK, machine, later(trial, block, change))
+            fails(result)
+            assert result.flags == (flag,)
 
 
 def test_recoil_after_the_throw_does_not_count() -> None:
@@ -350,9 +347,8 @@ def test_each_threshold_decides(stricter) -> None:
     assert not score(lax(**stricter), *honest("mujoco")).success
 
 
-@pytest.mark.parametrize(
-    ("part", "changes", "told"),
-    [
+def test_a_throw_that_nobody_can_make_is_refused(subtests) -> None:
+    for part, changes, told in [
         ("scenario", {"gates": []}, "there is no gate 'line': there are none"),
         ("scoring", {"target": "ring"}, "there is no mark 'ring'"),
         ("scoring", {"rings": ["hoop"]}, "there is no mark 'hoop'"),
@@ -361,11 +357,10 @@ def test_each_threshold_decides(stricter) -> None:
         ("scenario", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
         ("scoring", {"borne_s": 20}, "borne_s 20 is longer"),
         ("scenario", {"control": {"mode": "none"}}, "control"),
-    ],
-)
-def test_a_throw_that_nobody_can_make_is_refused(part, changes, told) -> None:
-    document = dict(TASK.as_document()) | {"name": "other"}
-    document[part] = {**document[part], **changes}
-    text = json.dumps({key: value for key, value in document.items() if value is not None})
-    with pytest.raises(TaskError, match=told):
-        load_task(text + "\n")
+    ]:
+        with subtests.test(part=part):
+            document = dict(TASK.as_document()) | {"name": "other"}
+            document[part] = {**document[part], **changes}
+            text = json.dumps({key: value for key, value in document.items() if value is not None})
+            with pytest.raises(TaskError, match=told):
+                load_task(text + "\n")

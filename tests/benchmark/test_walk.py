@@ -223,15 +223,14 @@ def test_a_part_that_comes_off_ends_the_walk() -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize(
-    "stricter", [{"max_tilt_deg": 1}, {"max_part_tilt_deg": 1}, {"lane": 0.01}]
-)
-def test_each_threshold_ends_a_walk(stricter) -> None:
-    machine = experts_machine(WALK)
-    trial = simulate(machine, WALK.scenario, "mujoco")
-    assert score(WALK, machine, trial).success
-    result = score(changed(WALK, scoring=stricter), machine, trial)
-    assert (result.success, result.flags) == (False, ("not_walked",))
+def test_each_threshold_ends_a_walk(subtests) -> None:
+    for stricter in [{"max_tilt_deg": 1}, {"max_part_tilt_deg": 1}, {"lane": 0.01}]:
+        with subtests.test(stricter=stricter):
+            machine = experts_machine(WALK)
+            trial = simulate(machine, WALK.scenario, "mujoco")
+            assert score(WALK, machine, trial).success
+            result = score(changed(WALK, scoring=stricter), machine, trial)
+            assert (result.success, result.flags) == (False, ("not_walked",))
 
 
 @pytest.mark.nightly
@@ -249,9 +248,8 @@ def test_the_corner_must_be_walked_to_and_round(engine) -> None:
         assert result.indicator < 6
 
 
-@pytest.mark.parametrize(
-    ("scoring", "scenario", "told"),
-    [
+def test_a_walk_that_nobody_can_take_is_refused(subtests) -> None:
+    for scoring, scenario, told in [
         (
             {},
             {"placement": {"kind": "released", "height": 5}, "draws": {}},
@@ -260,8 +258,6 @@ def test_the_corner_must_be_walked_to_and_round(engine) -> None:
         ({}, {"control": {"mode": "none"}}, "control"),
         ({"corner": "nowhere"}, {}, "no mark 'nowhere'"),
         ({"corner_slack": 6}, {}, "not north of the start"),
-    ],
-)
-def test_a_walk_that_nobody_can_take_is_refused(scoring, scenario, told) -> None:
-    with pytest.raises(TaskError, match=told):
-        changed(CORNER, scoring=scoring, scenario=scenario)
+    ]:
+        with subtests.test(scoring=scoring), pytest.raises(TaskError, match=told):
+            changed(CORNER, scoring=scoring, scenario=scenario)

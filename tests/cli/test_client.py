@@ -12,19 +12,17 @@ MOVED = answer(302, Location="http://127.0.0.1:1/")
 WHOLE = answer(200, b"PK01")
 
 
-@pytest.mark.parametrize(
-    ("said", "error", "says"),
-    [
+def test_what_is_no_answer_of_an_api_is_one_sentence(subtests) -> None:
+    for said, error, says in [
         (HTML, CommandError, "does not answer in JSON"),
         (SHORT, UnreachableError, "no BuildArena answers"),
         (MOVED, RefusedError, "HTTP 302"),
         (b"SSH-2.0-OpenSSH\r\n", UnreachableError, "no BuildArena answers"),
         (b"", UnreachableError, "no BuildArena answers"),
-    ],
-)
-def test_what_is_no_answer_of_an_api_is_one_sentence(said, error, says) -> None:
-    with wrong_server(said) as server, pytest.raises(error, match=says):
-        Client(server.url).get("/v1/jobs")
+    ]:
+        with subtests.test(said=said), wrong_server(said) as server:
+            with pytest.raises(error, match=says):
+                Client(server.url).get("/v1/jobs")
 
 
 def test_a_download_is_there_whole_or_not_at_all(tmp_path) -> None:
@@ -49,12 +47,10 @@ def test_parameters_and_keys_are_sent_as_the_api_reads_them() -> None:
     assert "Authorization: Bearer secret\r\n" in head
 
 
-@pytest.mark.parametrize(
-    "url", ["ftp://x", "nonsense", "http://", "http://x:99999", "http://[", ""]
-)
-def test_what_is_no_url_is_refused(url) -> None:
-    with pytest.raises(CommandError, match="is not the URL of an API"):
-        Client(url)
+def test_what_is_no_url_is_refused(subtests) -> None:
+    for url in ["ftp://x", "nonsense", "http://", "http://x:99999", "http://[", ""]:
+        with subtests.test(url=url), pytest.raises(CommandError, match="is not the URL of an API"):
+            Client(url)
 
 
 def test_what_is_no_key_is_refused_unseen() -> None:

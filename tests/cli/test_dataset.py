@@ -242,12 +242,13 @@ def test_nonsense_is_refused_and_leaves_nothing(url, context, tmp_path, words, r
     assert not [name for name in names(tmp_path) if "out" in name]
 
 
-@pytest.mark.parametrize(
-    "words", [["--sweep", "sweep_00"], ["--success-only"], ["--license", "mit"]]
-)
-def test_options_of_datasets_are_no_options_of_boards(tmp_path, words):
-    done = run_cli("http://127.0.0.1:1", "export", "--out", str(tmp_path / "board.csv"), *words)
-    assert (done.returncode, done.stderr) == (2, f"{words[0]} goes with --dataset only")
+def test_options_of_datasets_are_no_options_of_boards(tmp_path, subtests):
+    for words in [["--sweep", "sweep_00"], ["--success-only"], ["--license", "mit"]]:
+        with subtests.test(words=words):
+            done = run_cli(
+                "http://127.0.0.1:1", "export", "--out", str(tmp_path / "board.csv"), *words
+            )
+            assert (done.returncode, done.stderr) == (2, f"{words[0]} goes with --dataset only")
 
 
 def test_a_folder_with_something_in_it_stays_as_it_is(url, tmp_path):

@@ -121,11 +121,12 @@ def test_a_word_of_the_command_line_is_an_id_or_nothing_is_sent(client, kind, wo
     assert all(is_safe(path, 3) for path in _Recorder.paths)
 
 
-@pytest.mark.parametrize("given_id", [None, 5, ["x"], {}, JOB + "\n", JOB.upper(), "job_", CANCELS])
-def test_ids_are_matched_whole(given_id) -> None:
-    with pytest.raises(CommandError, match="is not the id of a job"):
-        checked_id("job", given_id)
-    assert checked_id("job", JOB) == JOB
+def test_ids_are_matched_whole(subtests) -> None:
+    for given_id in [None, 5, ["x"], {}, JOB + "\n", JOB.upper(), "job_", CANCELS]:
+        with subtests.test(given_id=given_id):
+            with pytest.raises(CommandError, match="is not the id of a job"):
+                checked_id("job", given_id)
+            assert checked_id("job", JOB) == JOB
 
 
 @pytest.mark.parametrize(

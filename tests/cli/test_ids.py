@@ -61,9 +61,8 @@ def test_an_ambiguous_prefix_is_refused_with_the_candidates(url, ids) -> None:
     assert f"no job's id begins with 'job_{missing}'" in run_cli(url, "job", "show", missing).stderr
 
 
-@pytest.mark.parametrize(
-    "word",
-    [
+def test_nonsense_is_no_id_and_is_never_sent(subtests) -> None:
+    for word in [
         "../sweeps/x/cancel#",
         "job_",
         "",
@@ -74,13 +73,12 @@ def test_an_ambiguous_prefix_is_refused_with_the_candidates(url, ids) -> None:
         "job_0\n",
         "é",
         ".",
-    ],
-)
-def test_nonsense_is_no_id_and_is_never_sent(word) -> None:
-    for words in (["job", "cancel", word], ["job", "files", word], ["job", "logs", word]):
-        done = run_cli("http://127.0.0.1:1", *words)
-        assert done.returncode == 1
-        assert "is not the id of a job" in done.stderr
+    ]:
+        with subtests.test(word=word):
+            for words in (["job", "cancel", word], ["job", "files", word], ["job", "logs", word]):
+                done = run_cli("http://127.0.0.1:1", *words)
+                assert done.returncode == 1
+                assert "is not the id of a job" in done.stderr
 
 
 def test_names_that_are_no_ids_reach_no_other_route(url) -> None:
@@ -127,15 +125,16 @@ def test_shells_are_offered_ids_tasks_and_models(url, ids, sweep) -> None:
     assert offered("buildarena job show nothing") == []
 
 
-@pytest.mark.parametrize("url", ["http://127.0.0.1:1", "nonsense", "http://[", "ftp://x:99999"])
-def test_shells_are_offered_nothing_when_no_api_answers(url) -> None:
-    done = piped(
-        _BUILDARENA_COMPLETE="complete_bash",
-        COMP_WORDS="buildarena job show ",
-        COMP_CWORD="3",
-        BUILDARENA_URL=url,
-    )
-    assert (done.stdout.strip(), done.stderr) == ("", "")
+def test_shells_are_offered_nothing_when_no_api_answers(subtests) -> None:
+    for url in ["http://127.0.0.1:1", "nonsense", "http://[", "ftp://x:99999"]:
+        with subtests.test(url=url):
+            done = piped(
+                _BUILDARENA_COMPLETE="complete_bash",
+                COMP_WORDS="buildarena job show ",
+                COMP_CWORD="3",
+                BUILDARENA_URL=url,
+            )
+            assert (done.stdout.strip(), done.stderr) == ("", "")
 
 
 def test_jobs_are_filtered_by_how_they_ended(url, ids, context) -> None:
@@ -217,31 +216,27 @@ def test_damaged_bytes_are_not_written(url, made, tmp_path, monkeypatch) -> None
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(
-    ("name", "safe"),
-    [
+def test_a_files_name_stays_in_its_folder(subtests) -> None:
+    for name, safe in [
         ("machine", "machine.json"),
         ("../../etc/passwd", "_.._etc_passwd.json"),
         (".hidden", "hidden.json"),
         ("a/b\\c:d\x00", "a_b_c_d_.json"),
         ("...", "file.json"),
         ("x.json", "x.json"),
-    ],
-)
-def test_a_files_name_stays_in_its_folder(name, safe) -> None:
-    assert file_name(name, JSON) == safe
-    assert Path(safe).name == safe
+    ]:
+        with subtests.test(name=name):
+            assert file_name(name, JSON) == safe
+            assert Path(safe).name == safe
 
 
-@pytest.mark.parametrize(
-    ("word", "near"),
-    [
+def test_near_words(subtests) -> None:
+    for word, near in [
         ("seed", ["seeds"]),
         ("expert", ["builtin/expert"]),
         ("Lift-1", ["lift-1"]),
         ("zzz", []),
         ("", []),
-    ],
-)
-def test_near_words(word, near) -> None:
-    assert suggested_words(word, ["seeds", "samples", "builtin/expert", "lift-1"]) == near
+    ]:
+        with subtests.test(word=word):
+            assert suggested_words(word, ["seeds", "samples", "builtin/expert", "lift-1"]) == near

@@ -47,10 +47,13 @@ def test_help_loads_no_library_that_it_does_not_need(words) -> None:
     assert loaded_by(*words) & {*HEAVY, "ssl"} == set()
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_loads_no_library_that_it_does_not_need(shell) -> None:
-    environment = completing(shell, "buildarena job show ", BUILDARENA_URL="http://127.0.0.1:1")
-    assert loaded_by(**environment) & {*HEAVY, "ssl"} == set()
+def test_completion_loads_no_library_that_it_does_not_need(subtests) -> None:
+    for shell in ["bash", "zsh", "fish"]:
+        with subtests.test(shell=shell):
+            environment = completing(
+                shell, "buildarena job show ", BUILDARENA_URL="http://127.0.0.1:1"
+            )
+            assert loaded_by(**environment) & {*HEAVY, "ssl"} == set()
 
 
 def test_asking_the_api_loads_none_either() -> None:
@@ -58,14 +61,17 @@ def test_asking_the_api_loads_none_either() -> None:
         assert loaded_by(*words, "--url", "http://127.0.0.1:1") & HEAVY == set()
 
 
-@pytest.mark.parametrize("name", COMMANDS)
-def test_the_tables_sentence_is_the_commands_own(name) -> None:
-    entry = COMMANDS[name]
-    found = getattr(import_module(f"buildarena_cli.commands.{entry.module}"), entry.attribute)
-    if isinstance(found, typer.Typer):
-        assert str(found.info.help).partition(". ")[0].rstrip(".") == entry.help.rstrip(".")
-    else:
-        assert str(inspect.getdoc(found)).splitlines()[0] == entry.help
+def test_the_tables_sentence_is_the_commands_own(subtests) -> None:
+    for name in COMMANDS:
+        with subtests.test(name=name):
+            entry = COMMANDS[name]
+            found = getattr(
+                import_module(f"buildarena_cli.commands.{entry.module}"), entry.attribute
+            )
+            if isinstance(found, typer.Typer):
+                assert str(found.info.help).partition(". ")[0].rstrip(".") == entry.help.rstrip(".")
+            else:
+                assert str(inspect.getdoc(found)).splitlines()[0] == entry.help
 
 
 def test_defaults_are_those_of_the_settings(monkeypatch) -> None:
@@ -88,21 +94,23 @@ def completing(shell: str, line: str, **environment: str) -> dict[str, str]:
     }
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_each_shell_is_offered_commands_and_options(shell) -> None:
-    for line, word in (
-        ("buildarena swe", "sweep"),
-        ("buildarena sweep wat", "watch"),
-        ("buildarena job list --rea", "--reason"),
-    ):
-        done = piped(**completing(shell, line))
-        assert word in done.stdout, (line, done)
+def test_each_shell_is_offered_commands_and_options(subtests) -> None:
+    for shell in ["bash", "zsh", "fish"]:
+        with subtests.test(shell=shell):
+            for line, word in (
+                ("buildarena swe", "sweep"),
+                ("buildarena sweep wat", "watch"),
+                ("buildarena job list --rea", "--reason"),
+            ):
+                done = piped(**completing(shell, line))
+                assert word in done.stdout, (line, done)
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_each_shells_script_calls_the_command(shell) -> None:
-    done = piped(_BUILDARENA_COMPLETE=f"source_{shell}")
-    assert "_BUILDARENA_COMPLETE=complete_" + shell in done.stdout
+def test_each_shells_script_calls_the_command(subtests) -> None:
+    for shell in ["bash", "zsh", "fish"]:
+        with subtests.test(shell=shell):
+            done = piped(_BUILDARENA_COMPLETE=f"source_{shell}")
+            assert "_BUILDARENA_COMPLETE=complete_" + shell in done.stdout
 
 
 def test_help_is_one_line_a_sentence_through_a_pipe_and_fits_a_terminal() -> None:
@@ -113,20 +121,18 @@ def test_help_is_one_line_a_sentence_through_a_pipe_and_fits_a_terminal() -> Non
     assert max(map(len, shown.splitlines())) <= 60
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
+def test_a_usage_error_names_the_near_words_and_ends_with_code_2(subtests) -> None:
+    for words, says in [
         (["leaderbord"], "did you mean leaderboard?"),
         (["key", "list"], "did you mean admin key?"),
         (["sweep", "wacth"], "did you mean watch?"),
         (["job", "list", "--taks", "x"], "--task"),
         (["jbo", "list"], "did you mean job?"),
-    ],
-)
-def test_a_usage_error_names_the_near_words_and_ends_with_code_2(words, says) -> None:
-    done = piped(*words)
-    assert done.returncode == 2
-    assert says in done.stderr
+    ]:
+        with subtests.test(words=words):
+            done = piped(*words)
+            assert done.returncode == 2
+            assert says in done.stderr
 
 
 def test_the_script_and_the_module_are_one_command() -> None:

@@ -18,24 +18,30 @@ def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("command", ["up", "demo"])
-def test_a_taken_port(tmp_path, command) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = str(taken.getsockname()[1])
-        done = piped(command, "--data", str(tmp_path), "--port", port)
-    assert_refused(done, port, "choose another port with --port")
-    named = [p for p in psutil.process_iter(["cmdline"]) if str(tmp_path) in str(p.info["cmdline"])]
-    assert named == []
+def test_a_taken_port(tmp_path, subtests) -> None:
+    for command in ["up", "demo"]:
+        with subtests.test(command=command):
+            with socket.socket() as taken:
+                taken.bind(("127.0.0.1", 0))
+                taken.listen()
+                port = str(taken.getsockname()[1])
+                done = piped(command, "--data", str(tmp_path), "--port", port)
+            assert_refused(done, port, "choose another port with --port")
+            named = [
+                p
+                for p in psutil.process_iter(["cmdline"])
+                if str(tmp_path) in str(p.info["cmdline"])
+            ]
+            assert named == []
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("command", ["up", "demo"])
-def test_an_unwritable_data_folder(tmp_path, command) -> None:
-    (tmp_path / "file").write_text("in the way")
-    done = piped(command, "--data", str(tmp_path / "file" / "data"))
-    assert_refused(done, "can't be written", "choose another with --data")
+def test_an_unwritable_data_folder(tmp_path, subtests) -> None:
+    for command in ["up", "demo"]:
+        with subtests.test(command=command):
+            (tmp_path / "file").write_text("in the way")
+            done = piped(command, "--data", str(tmp_path / "file" / "data"))
+            assert_refused(done, "can't be written", "choose another with --data")
 
 
 @pytest.mark.ci

@@ -91,17 +91,15 @@ def test_equal_contents_are_one_file(tmp_path) -> None:
     assert folder.job_answers("job_none", "d") is None
 
 
-@pytest.mark.parametrize(
-    ("params", "key"),
-    [
+def test_questions_have_one_spelling(subtests) -> None:
+    for params, key in [
         ({}, "/p"),
         ({"b": 2, "a": "x y&z"}, "/p?a=x y&z&b=2"),
         ({"task": ["b", "a"], "none": None}, "/p?task=a&task=b"),
         ({"track": "five-role/mujoco-3"}, "/p?track=five-role/mujoco-3"),
-    ],
-)
-def test_questions_have_one_spelling(params, key) -> None:
-    assert question("/p", params) == key
+    ]:
+        with subtests.test(params=params):
+            assert question("/p", params) == key
 
 
 def row(id_: str, **change: object) -> dict[str, object]:

@@ -176,7 +176,7 @@ def test_workers_that_are_killed_again_and_again(operator) -> None:
         before = {each["id"] for each in _workers(operator)}
         kill(operator.stack, "construct worker")
         wait_until(
-            lambda: {each["id"] for each in _workers(operator)} - before,  # noqa: B023
+            lambda: {each["id"] for each in _workers(operator)} - before,
             WITHIN_S,
             "another took its place",
         )

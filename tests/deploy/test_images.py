@@ -52,27 +52,27 @@ def test_the_compose_file_follows_the_specification() -> None:
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize(
-    "path", ["deploy/docker/Dockerfile", "scenarios/containers/bases/Dockerfile"]
-)
-def test_recipes_are_clean(path) -> None:
-    done = run(str(PROGRAMS / "hadolint"), "--config", "deploy/docker/hadolint.yaml", path)
-    assert (done.returncode, done.stdout) == (0, "")
+def test_recipes_are_clean(subtests) -> None:
+    for path in ["deploy/docker/Dockerfile", "scenarios/containers/bases/Dockerfile"]:
+        with subtests.test(path=path):
+            done = run(str(PROGRAMS / "hadolint"), "--config", "deploy/docker/hadolint.yaml", path)
+            assert (done.returncode, done.stdout) == (0, "")
 
 
-@pytest.mark.parametrize("name", SERVICES)
-def test_each_container_is_confined(name) -> None:
-    service = SERVICES[name]
-    assert service["read_only"] is True
-    assert service["cap_drop"] == ["ALL"]
-    assert "cap_add" not in service
-    assert "privileged" not in service
-    assert service["security_opt"] == ["no-new-privileges:true"]
-    assert service.get("network_mode") is None
-    if name not in OURS:
-        user = str(service["user"]).split(":")[0]
-        assert user not in {"0", "root"}
-    assert not [volume for volume in service.get("volumes", []) if "docker.sock" in volume]
+def test_each_container_is_confined(subtests) -> None:
+    for name in SERVICES:
+        with subtests.test(name=name):
+            service = SERVICES[name]
+            assert service["read_only"] is True
+            assert service["cap_drop"] == ["ALL"]
+            assert "cap_add" not in service
+            assert "privileged" not in service
+            assert service["security_opt"] == ["no-new-privileges:true"]
+            assert service.get("network_mode") is None
+            if name not in OURS:
+                user = str(service["user"]).split(":")[0]
+                assert user not in {"0", "root"}
+            assert not [volume for volume in service.get("volumes", []) if "docker.sock" in volume]
 
 
 def test_images_of_ours_run_as_an_ordinary_user() -> None:

@@ -62,10 +62,11 @@ def check(document: dict) -> None:
         kubernetes_validate.validate(document, version, strict=True)
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(KUBERNETES)))
-def test_each_file_is_valid_by_itself(path) -> None:
-    for document in read(path.read_text()):
-        check(document)
+def test_each_file_is_valid_by_itself(subtests) -> None:
+    for path in FILES:
+        with subtests.test(path=path):
+            for document in read(path.read_text()):
+                check(document)
 
 
 @pytest.mark.ci
@@ -429,18 +430,16 @@ def test_models_in_the_cluster_can_be_named_and_reached(overlay, with_component,
     assert to["namespaceSelector"]["matchLabels"] == {"kubernetes.io/metadata.name": namespace}
 
 
-@pytest.mark.parametrize(
-    ("path", "spoil"),
-    [
+def test_a_wrong_document_of_what_extends_kubernetes_is_found(subtests) -> None:
+    for path, spoil in [
         ("components/gateway/route.yaml", lambda spec: spec["rules"][0].update(backend="api")),
         ("components/gateway/route.yaml", lambda spec: spec["rules"][0].update(timeouts=3)),
         ("components/prometheus-operator/pods.yaml", lambda spec: spec.pop("selector")),
         ("overlays/external/scaling.yaml", lambda spec: spec.update(minReplicas=1)),
-    ],
-)
-def test_a_wrong_document_of_what_extends_kubernetes_is_found(path, spoil) -> None:
-    document = read((KUBERNETES / path).read_text())[0]
-    check(document)
-    spoil(document["spec"])
-    with pytest.raises(jsonschema.ValidationError):
-        check(document)
+    ]:
+        with subtests.test(path=path):
+            document = read((KUBERNETES / path).read_text())[0]
+            check(document)
+            spoil(document["spec"])
+            with pytest.raises(jsonschema.ValidationError):
+                check(document)

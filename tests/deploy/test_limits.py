@@ -79,33 +79,37 @@ def secrets_of(service: dict) -> dict[str, str]:
     }
 
 
-@pytest.mark.parametrize("name", SERVICES)
-def test_each_service_has_a_limit_of_memory(name) -> None:
-    limit = SERVICES[name]["deploy"]["resources"]["limits"]["memory"]
-    assert size(default(limit)) >= size("256m")
+def test_each_service_has_a_limit_of_memory(subtests) -> None:
+    for name in SERVICES:
+        with subtests.test(name=name):
+            limit = SERVICES[name]["deploy"]["resources"]["limits"]["memory"]
+            assert size(default(limit)) >= size("256m")
 
 
-@pytest.mark.parametrize("name", SERVICES)
-def test_each_service_that_stays_says_whether_it_works(name) -> None:
-    service = SERVICES[name]
-    if service["restart"] == "no":
-        return
-    if default(service["image"]).startswith("buildarena/"):
-        stage = default(service["image"]).removeprefix("buildarena/").split(":")[0]
-        recipes = dict(
-            re.findall(
-                r"^FROM \S+ AS (\S+)\n(.*?)(?=^FROM |\Z)", DOCKERFILE, re.MULTILINE | re.DOTALL
-            )
-        )
-        checks = []
-        while stage in recipes and not checks:
-            checks = [recipes[stage]] if "HEALTHCHECK" in recipes[stage] else []
-            stage = re.search(rf"^FROM (\S+) AS {stage}$", DOCKERFILE, re.MULTILINE)[1]
-        assert len(checks) == 1, name
-        assert "socket" not in checks[0]
-    else:
-        assert ("healthcheck" in service) != (name in WITHOUT_CHECK)
-        assert "pg_isready" not in str(service.get("healthcheck"))
+def test_each_service_that_stays_says_whether_it_works(subtests) -> None:
+    for name in SERVICES:
+        with subtests.test(name=name):
+            service = SERVICES[name]
+            if service["restart"] == "no":
+                return
+            if default(service["image"]).startswith("buildarena/"):
+                stage = default(service["image"]).removeprefix("buildarena/").split(":")[0]
+                recipes = dict(
+                    re.findall(
+                        r"^FROM \S+ AS (\S+)\n(.*?)(?=^FROM |\Z)",
+                        DOCKERFILE,
+                        re.MULTILINE | re.DOTALL,
+                    )
+                )
+                checks = []
+                while stage in recipes and not checks:
+                    checks = [recipes[stage]] if "HEALTHCHECK" in recipes[stage] else []
+                    stage = re.search(rf"^FROM (\S+) AS {stage}$", DOCKERFILE, re.MULTILINE)[1]
+                assert len(checks) == 1, name
+                assert "socket" not in checks[0]
+            else:
+                assert ("healthcheck" in service) != (name in WITHOUT_CHECK)
+                assert "pg_isready" not in str(service.get("healthcheck"))
 
 
 def test_checks_go_as_far_as_a_user_does() -> None:
@@ -163,24 +167,25 @@ def test_the_broker_hears_when_it_is_to_stop_and_shows_no_password(tmp_path) -> 
                 os.killpg(process.pid, signal.SIGKILL)
 
 
-@pytest.mark.parametrize("name", SERVICES)
-def test_each_service_signs_in_as_its_own_role(name) -> None:
-    urls = {
-        file: source
-        for file, source in secrets_of(SERVICES[name]).items()
-        if file.startswith("database_url")
-    }
-    if name == "roles":
-        assert urls["database_url"] == "database_url"
-        made = {word.split("=")[0] for word in SERVICES[name]["command"][2:]}
-        assert made == {*ROLES, OWNER}
-    elif name == "postgres":
-        assert set(urls.values()) == {"database_url_api"}, "for its health check"
-    elif name in ROLE_OF:
-        assert urls == {"database_url": f"database_url_{ROLE_OF[name]}"}
-    else:
-        assert not urls
-    assert ("postgres_password" in secrets_of(SERVICES[name])) == (name == "postgres")
+def test_each_service_signs_in_as_its_own_role(subtests) -> None:
+    for name in SERVICES:
+        with subtests.test(name=name):
+            urls = {
+                file: source
+                for file, source in secrets_of(SERVICES[name]).items()
+                if file.startswith("database_url")
+            }
+            if name == "roles":
+                assert urls["database_url"] == "database_url"
+                made = {word.split("=")[0] for word in SERVICES[name]["command"][2:]}
+                assert made == {*ROLES, OWNER}
+            elif name == "postgres":
+                assert set(urls.values()) == {"database_url_api"}, "for its health check"
+            elif name in ROLE_OF:
+                assert urls == {"database_url": f"database_url_{ROLE_OF[name]}"}
+            else:
+                assert not urls
+            assert ("postgres_password" in secrets_of(SERVICES[name])) == (name == "postgres")
 
 
 def test_nobody_kills_a_worker_before_its_time() -> None:
@@ -318,6 +323,7 @@ def test_a_registry_that_does_not_answer_changes_nothing(pin, tmp_path) -> None:
         assert (tmp_path / file.relative_to(ROOT)).read_text() == file.read_text()
 
 
-@pytest.mark.parametrize(("name", "value"), ALLOCATOR.items())
-def test_images_keep_as_few_arenas_as_processes_on_this_machine(name, value) -> None:
-    assert re.search(rf"^ENV (.*\\\n)*.*\b{name}={value}\b", DOCKERFILE, re.MULTILINE)
+def test_images_keep_as_few_arenas_as_processes_on_this_machine(subtests) -> None:
+    for name, value in ALLOCATOR.items():
+        with subtests.test(name=name):
+            assert re.search(rf"^ENV (.*\\\n)*.*\b{name}={value}\b", DOCKERFILE, re.MULTILINE)

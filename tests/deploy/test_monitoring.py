@@ -109,28 +109,29 @@ def test_an_expression_that_does_not_parse_is_found(tmp_path) -> None:
         promtool("check", "rules", str(file))
 
 
-@pytest.mark.parametrize("path", DASHBOARDS, ids=lambda path: path.stem)
-def test_dashboards_are_whole(path) -> None:
-    board = read(path)
-    assert board["uid"] == f"buildarena-{path.stem}"
-    source = MONITORING / "grafana" / "provisioning" / "datasources" / "prometheus.yaml"
-    (known,) = yaml.safe_load(source.read_text())["datasources"]
-    ids = [panel["id"] for panel in board["panels"]]
-    assert len(set(ids)) == len(ids)
-    taken: set[tuple[int, int]] = set()
-    for panel in board["panels"]:
-        at = panel["gridPos"]
-        cells = {
-            (x, y)
-            for x in range(at["x"], at["x"] + at["w"])
-            for y in range(at["y"], at["y"] + at["h"])
-        }
-        assert not cells & taken
-        assert at["x"] + at["w"] <= 24
-        taken |= cells
-        assert panel["title"]
-        for target in panel["targets"]:
-            assert target["datasource"]["uid"] == known["uid"]
+def test_dashboards_are_whole(subtests) -> None:
+    for path in DASHBOARDS:
+        with subtests.test(path=path):
+            board = read(path)
+            assert board["uid"] == f"buildarena-{path.stem}"
+            source = MONITORING / "grafana" / "provisioning" / "datasources" / "prometheus.yaml"
+            (known,) = yaml.safe_load(source.read_text())["datasources"]
+            ids = [panel["id"] for panel in board["panels"]]
+            assert len(set(ids)) == len(ids)
+            taken: set[tuple[int, int]] = set()
+            for panel in board["panels"]:
+                at = panel["gridPos"]
+                cells = {
+                    (x, y)
+                    for x in range(at["x"], at["x"] + at["w"])
+                    for y in range(at["y"], at["y"] + at["h"])
+                }
+                assert not cells & taken
+                assert at["x"] + at["w"] <= 24
+                taken |= cells
+                assert panel["title"]
+                for target in panel["targets"]:
+                    assert target["datasource"]["uid"] == known["uid"]
 
 
 def test_there_is_a_dashboard_for_each_part() -> None:

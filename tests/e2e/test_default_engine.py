@@ -28,15 +28,17 @@ FUNCTIONS = {
 }
 
 
-@pytest.mark.parametrize("door", FUNCTIONS)
-def test_a_function_takes_the_default_engine(door) -> None:
-    function, name = FUNCTIONS[door]
-    assert inspect.signature(function).parameters[name].default == DEFAULT_ENGINE
+def test_a_function_takes_the_default_engine(subtests) -> None:
+    for door in FUNCTIONS:
+        with subtests.test(door=door):
+            function, name = FUNCTIONS[door]
+            assert inspect.signature(function).parameters[name].default == DEFAULT_ENGINE
 
 
-@pytest.mark.parametrize("model", [JobSpec, SweepSpec, OpenSession, TrialQuery])
-def test_a_request_means_the_default_engine(model) -> None:
-    assert model.model_fields["simulator"].default == DEFAULT_ENGINE
+def test_a_request_means_the_default_engine(subtests) -> None:
+    for model in [JobSpec, SweepSpec, OpenSession, TrialQuery]:
+        with subtests.test(model=model):
+            assert model.model_fields["simulator"].default == DEFAULT_ENGINE
 
 
 @pytest.fixture
@@ -49,19 +51,16 @@ REFUSED = "'pybullet' is not installed: `pip install pybullet`, or name another;
 
 
 @pytest.mark.usefixtures("missing")
-@pytest.mark.parametrize(
-    "ask",
-    [
+def test_where_it_is_missing_a_function_says_how_to_get_it(subtests) -> None:
+    for ask in [
         lambda machine, task: simulate(machine, task.scenario),
         ba.simulate,
         lambda machine, task: ba.simulate_all([machine], task),
         lambda _, task: Environment(task),
         lambda _, task: Evaluator(task),
-    ],
-)
-def test_where_it_is_missing_a_function_says_how_to_get_it(ask) -> None:
-    with pytest.raises(UnknownEngineError, match=REFUSED):
-        ask(Machine(), builtin_tasks()[TASK])
+    ]:
+        with subtests.test(ask=ask), pytest.raises(UnknownEngineError, match=REFUSED):
+            ask(Machine(), builtin_tasks()[TASK])
 
 
 @pytest.mark.usefixtures("missing")

@@ -1,4 +1,4 @@
-"""What answers tell: what holds, heats, meshes and is locked, which side looks where, what was meant."""
+"""What answers tell: what holds, heats, meshes, is locked or looks where, and what was meant."""
 
 import re
 

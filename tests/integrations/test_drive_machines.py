@@ -2,7 +2,6 @@
 
 import json
 
-import pytest
 from support.machines.drive_machines import written
 
 from buildarena_benchmark import broken_constraint, builtin_tasks
@@ -12,9 +11,10 @@ from buildarena_simulation import pilot_of
 PILOTED = [task for task in builtin_tasks().values() if task.scenario.senses is not None]
 
 
-@pytest.mark.parametrize("task", PILOTED, ids=lambda task: task.name)
-def test_each_task_for_programs_has_a_machine_that_nothing_controls_yet(task) -> None:
-    machine = Machine.from_document(json.loads(written())["machines"][task.name])
-    assert broken_constraint(task, machine) is None
-    assert (machine.controller, tuple(machine.control_sequence)) == ("", ())
-    assert pilot_of(machine, task.scenario).axes
+def test_each_task_for_programs_has_a_machine_that_nothing_controls_yet(subtests) -> None:
+    for task in PILOTED:
+        with subtests.test(task=task):
+            machine = Machine.from_document(json.loads(written())["machines"][task.name])
+            assert broken_constraint(task, machine) is None
+            assert (machine.controller, tuple(machine.control_sequence)) == ("", ())
+            assert pilot_of(machine, task.scenario).axes

@@ -26,20 +26,21 @@ def bridge(each_side: int = 3) -> ba.Machine:
     return machine
 
 
-@pytest.mark.parametrize("tool", tool_definitions(), ids=lambda tool: tool.name)
-def test_each_action_is_a_method_with_its_tool_s_words(tool):
-    method = getattr(ba.Machine, tool.name)
-    names = [name for name in inspect.signature(method).parameters if name != "self"]
-    assert names == list(tool.parameters["properties"])
-    required = [
-        name
-        for name, parameter in inspect.signature(method).parameters.items()
-        if parameter.default is inspect.Parameter.empty and name != "self"
-    ]
-    assert required == tool.parameters["required"]
-    assert method.__doc__.startswith(tool.description)
-    for name, schema in tool.parameters["properties"].items():
-        assert f"    {name}: {schema['description']}" in method.__doc__
+def test_each_action_is_a_method_with_its_tool_s_words(subtests):
+    for tool in tool_definitions():
+        with subtests.test(tool=tool):
+            method = getattr(ba.Machine, tool.name)
+            names = [name for name in inspect.signature(method).parameters if name != "self"]
+            assert names == list(tool.parameters["properties"])
+            required = [
+                name
+                for name, parameter in inspect.signature(method).parameters.items()
+                if parameter.default is inspect.Parameter.empty and name != "self"
+            ]
+            assert required == tool.parameters["required"]
+            assert method.__doc__.startswith(tool.description)
+            for name, schema in tool.parameters["properties"].items():
+                assert f"    {name}: {schema['description']}" in method.__doc__
 
 
 def test_the_machine_is_the_geometry_library_s():
@@ -67,20 +68,19 @@ def test_feedback_reads_as_a_model_reads_it():
     assert str(twice) == twice.text
 
 
-@pytest.mark.parametrize(
-    "given", [{"base_block": 1, "face": "Z"}, {"base_block": None}, {"face": {"a": [1]}}, {}]
-)
-def test_bad_values_are_refused_and_bad_calls_raise(given):
-    machine = ba.Machine()
-    machine.start()
-    before = machine.to_document()["blocks"]
-    usual = {"base_block": "1", "face": "A", "new_block": "Small Wooden Blck"}
-    assert not machine.attach_block_to(**{**usual, **given})
-    assert machine.to_document()["blocks"] == before
-    with pytest.raises(TypeError, match="colour"):
-        machine.attach_block_to(**usual, colour="red")
-    with pytest.raises(TypeError, match="base_block"):
-        machine.attach_block_to()
+def test_bad_values_are_refused_and_bad_calls_raise(subtests):
+    for given in [{"base_block": 1, "face": "Z"}, {"base_block": None}, {"face": {"a": [1]}}, {}]:
+        with subtests.test(given=given):
+            machine = ba.Machine()
+            machine.start()
+            before = machine.to_document()["blocks"]
+            usual = {"base_block": "1", "face": "A", "new_block": "Small Wooden Blck"}
+            assert not machine.attach_block_to(**{**usual, **given})
+            assert machine.to_document()["blocks"] == before
+            with pytest.raises(TypeError, match="colour"):
+                machine.attach_block_to(**usual, colour="red")
+            with pytest.raises(TypeError, match="base_block"):
+                machine.attach_block_to()
 
 
 def test_unknown_names_are_answered_with_the_choices():

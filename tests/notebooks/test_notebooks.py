@@ -58,13 +58,14 @@ def read(name: str):
     return nbformat.read(FOLDER / f"{name}.ipynb", as_version=4)
 
 
-@pytest.mark.parametrize("file", sorted(FOLDER.glob("*.ipynb")), ids=lambda file: file.stem)
-def test_notebooks_are_kept_without_outputs(file):
-    notebook = nbformat.read(file, as_version=4)
-    nbformat.validate(notebook)
-    code = [cell for cell in notebook.cells if cell.cell_type == "code"]
-    assert code
-    assert not [cell for cell in code if cell.outputs or cell.execution_count is not None]
+def test_notebooks_are_kept_without_outputs(subtests):
+    for file in sorted(FOLDER.glob("*.ipynb")):
+        with subtests.test(file=file):
+            notebook = nbformat.read(file, as_version=4)
+            nbformat.validate(notebook)
+            code = [cell for cell in notebook.cells if cell.cell_type == "code"]
+            assert code
+            assert not [cell for cell in code if cell.outputs or cell.execution_count is not None]
 
 
 @pytest.mark.ci

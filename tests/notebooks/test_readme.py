@@ -31,15 +31,14 @@ def test_its_python_runs_as_it_stands(tmp_path, monkeypatch):
     assert (tmp_path / "bridge.html").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(
-    "change", [("load 959.81", "load 959.82"), ("Refused (", "Accepted ("), ('"F")', '"A")')]
-)
-def test_it_can_fail(tmp_path, monkeypatch, change, capsys):
-    monkeypatch.chdir(tmp_path)
-    text = README.read_text(encoding="utf-8")
-    assert change[0] in text
-    assert failures(text.replace(*change)) > 0
-    assert "Expected:" in capsys.readouterr().out
+def test_it_can_fail(tmp_path, monkeypatch, capsys, subtests):
+    for change in [("load 959.81", "load 959.82"), ("Refused (", "Accepted ("), ('"F")', '"A")')]:
+        with subtests.test(change=change):
+            monkeypatch.chdir(tmp_path)
+            text = README.read_text(encoding="utf-8")
+            assert change[0] in text
+            assert failures(text.replace(*change)) > 0
+            assert "Expected:" in capsys.readouterr().out
 
 
 def test_its_commands_exist():

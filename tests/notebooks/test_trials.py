@@ -47,16 +47,21 @@ def test_a_trial_keeps_the_machine_as_it_was():
     assert len(trial.machine.blocks) == 7
 
 
-@pytest.mark.parametrize(
-    ("machine", "words"),
-    [(ba.Machine(), "no machine was started"), (row(0), "nothing but its starting block")],
-)
-def test_what_a_task_does_not_allow_is_a_failure_that_says_why(machine, words):
-    trial = ba.simulate(machine, "support-1")
-    assert (trial.score.success, trial.score.indicator, trial.trajectory) == (False, 0.0, None)
-    assert words in trial.refusal
-    assert f"Not tried: {trial.refusal}" in repr(trial)
-    assert "Not tried" in trial._repr_mimebundle_()["text/html"]
+def test_what_a_task_does_not_allow_is_a_failure_that_says_why(subtests):
+    for machine, words in [
+        (ba.Machine(), "no machine was started"),
+        (row(0), "nothing but its starting block"),
+    ]:
+        with subtests.test(machine=machine):
+            trial = ba.simulate(machine, "support-1")
+            assert (trial.score.success, trial.score.indicator, trial.trajectory) == (
+                False,
+                0.0,
+                None,
+            )
+            assert words in trial.refusal
+            assert f"Not tried: {trial.refusal}" in repr(trial)
+            assert "Not tried" in trial._repr_mimebundle_()["text/html"]
 
 
 @pytest.mark.ci

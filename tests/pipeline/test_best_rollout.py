@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-import pytest
-
 from buildarena_benchmark import builtin_tasks
 from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_store import RolloutRecord
@@ -19,20 +17,18 @@ def rollout(number: int, *, success: bool, indicator: float, flags: tuple[str, .
     return RolloutRecord(**{**nothing, **given, "finished_at": NOW})
 
 
-@pytest.mark.parametrize(
-    ("rollouts", "best"),
-    [
+def test_an_honest_success_comes_first_then_the_larger_indicator(subtests) -> None:
+    for rollouts, best in [
         ([(False, 90.0, ()), (True, 20.0, ())], 1),
         ([(True, 20.0, ()), (True, 30.0, ())], 1),
         ([(True, 20.0, ()), (True, 20.0, ())], 0),
         ([(True, 90.0, ("no_wheels",)), (True, 20.0, ())], 1),
         ([(True, 90.0, ("never_fell",)), (True, 20.0, ())], 0),
         ([(False, 9.0, ()), (True, 90.0, ("no_wheels",))], 1),
-    ],
-)
-def test_an_honest_success_comes_first_then_the_larger_indicator(rollouts, best) -> None:
-    made = [
-        rollout(number, success=success, indicator=indicator, flags=flags)
-        for number, (success, indicator, flags) in enumerate(rollouts)
-    ]
-    assert best_rollout(made, builtin_tasks()["transport-1"]).number == best
+    ]:
+        with subtests.test(rollouts=rollouts):
+            made = [
+                rollout(number, success=success, indicator=indicator, flags=flags)
+                for number, (success, indicator, flags) in enumerate(rollouts)
+            ]
+            assert best_rollout(made, builtin_tasks()["transport-1"]).number == best

@@ -22,35 +22,33 @@ def objects(levels: int, inner: Any) -> Any:
     return inner
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
+def test_bounded_arguments_pass(subtests) -> None:
+    for arguments in [
         lists(MAX_DEPTH, 1),
         objects(MAX_DEPTH, "x"),
         lists(MAX_DEPTH - 1, {}),
         [1, "x", objects(MAX_DEPTH - 1, None)],
         None,
         "x" * (MAX_BYTES - 2),
-    ],
-)
-def test_bounded_arguments_pass(arguments: Any) -> None:
-    check_arguments(arguments)
+    ]:
+        with subtests.test(arguments=arguments):
+            check_arguments(arguments)
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
+def test_deeper_arguments_are_refused(subtests) -> None:
+    for arguments in [
         lists(MAX_DEPTH + 1, 1),
         objects(MAX_DEPTH + 1, "x"),
         lists(MAX_DEPTH, {}),
         objects(MAX_DEPTH, []),
         [1, "x", objects(MAX_DEPTH // 2, lists(MAX_DEPTH // 2, None))],
         objects(5_000, 1),
-    ],
-)
-def test_deeper_arguments_are_refused(arguments: Any) -> None:
-    with pytest.raises(SubmissionError, match="more than 20 lists or objects inside each other"):
-        check_arguments(arguments)
+    ]:
+        with (
+            subtests.test(arguments=arguments),
+            pytest.raises(SubmissionError, match="more than 20 lists or objects inside each other"),
+        ):
+            check_arguments(arguments)
 
 
 def test_larger_arguments_are_refused() -> None:

@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-import pytest
-
 from buildarena_pipeline.runtime.owner_slots import OwnerSlots
 
 
@@ -14,11 +12,12 @@ def greedy(slots: OwnerSlots, owner: str) -> int:
     return taken
 
 
-@pytest.mark.parametrize("configured", [1, 2, 3, 5, 8, 32, 40, 200])
-def test_one_owner_alone_gets_what_is_configured_and_another_finds_room(configured) -> None:
-    slots = OwnerSlots(configured)
-    assert greedy(slots, "a") == configured
-    assert greedy(slots, "b") >= 1
+def test_one_owner_alone_gets_what_is_configured_and_another_finds_room(subtests) -> None:
+    for configured in [1, 2, 3, 5, 8, 32, 40, 200]:
+        with subtests.test(configured=configured):
+            slots = OwnerSlots(configured)
+            assert greedy(slots, "a") == configured
+            assert greedy(slots, "b") >= 1
 
 
 def test_each_of_several_owners_finds_less_room_but_some() -> None:

@@ -44,20 +44,18 @@ def test_an_operator_adds_models_and_providers(tmp_path: Path) -> None:
     assert "builtin/expert" in registry.models
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
+def test_a_bad_file_is_named(tmp_path: Path, subtests) -> None:
+    for text, says in [
         ("models: [", "is not valid YAML"),
         ("models:\n  - {name: a/b, provider: nobody, model: b}", "'nobody'; known are alibaba"),
         ("models:\n  - {name: b, provider: openai, model: b}", r"models\.0\.name"),
         ("modles: []", "modles"),
-    ],
-)
-def test_a_bad_file_is_named(tmp_path: Path, text: str, says: str) -> None:
-    file = tmp_path / "models.yaml"
-    file.write_text(text)
-    with pytest.raises(StartupError, match=says):
-        load_registry(file)
+    ]:
+        with subtests.test(text=text):
+            file = tmp_path / "models.yaml"
+            file.write_text(text)
+            with pytest.raises(StartupError, match=says):
+                load_registry(file)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -127,27 +125,23 @@ def test_a_pack_of_the_published_layout_takes_the_place_of_our_sentences(tmp_pat
     assert pack.digest != packs.load("default").digest
 
 
-@pytest.mark.parametrize(
-    ("file", "text", "says"),
-    [
+def test_a_malformed_published_pack_is_named(tmp_path: Path, subtests) -> None:
+    for file, text, says in [
         ("prompt.yaml", "agents: {planner: {}}", "system_message"),
         ("prompt.yaml", "agents: [", "can't be read"),
         ("levels.yaml", "category: x\nlevel: extreme\ntask: y", "document 1 .* soft, medium, hard"),
-    ],
-)
-def test_a_malformed_published_pack_is_named(
-    tmp_path: Path, file: str, text: str, says: str
-) -> None:
-    (tmp_path / "prompt.yaml").write_text(PUBLISHED)
-    (tmp_path / file).write_text(text)
-    with pytest.raises(StartupError, match=says):
-        read_pack(tmp_path, name="bad")
+    ]:
+        with subtests.test(file=file):
+            (tmp_path / "prompt.yaml").write_text(PUBLISHED)
+            (tmp_path / file).write_text(text)
+            with pytest.raises(StartupError, match=says):
+                read_pack(tmp_path, name="bad")
 
 
-@pytest.mark.parametrize("target", ["nowhere", "file.py", ":Class", "no/such/file.py:Class", "m:1"])
-def test_a_bad_workflow_setting_is_named(target: str) -> None:
-    with pytest.raises(StartupError, match="workflow 'mine'"):
-        workflow_sources({"mine": target})
+def test_a_bad_workflow_setting_is_named(subtests) -> None:
+    for target in ["nowhere", "file.py", ":Class", "no/such/file.py:Class", "m:1"]:
+        with subtests.test(target=target), pytest.raises(StartupError, match="workflow 'mine'"):
+            workflow_sources({"mine": target})
 
 
 def test_only_what_is_known_to_cost_nothing_is_free(tmp_path) -> None:

@@ -43,24 +43,30 @@ def plain(value: object) -> object:
     return getattr(value, "get_secret_value", lambda: value)()
 
 
-@pytest.mark.parametrize("field", SECRETS)
-@pytest.mark.parametrize("end", ["", "\n", "\r\n"])
-def test_each_secret_setting_can_stand_in_a_file(field, end, tmp_path, monkeypatch) -> None:
-    value = URLS.get(field, SECRET)
-    monkeypatch.setenv(f"BUILDARENA_{field.upper()}_FILE", kept(tmp_path, f"{value}{end}".encode()))
-    assert plain(getattr(load_settings(), field)) == value
+def test_each_secret_setting_can_stand_in_a_file(tmp_path, monkeypatch, subtests) -> None:
+    for field in SECRETS:
+        for end in ["", "\n", "\r\n"]:
+            with subtests.test(field=field, end=end):
+                value = URLS.get(field, SECRET)
+                monkeypatch.setenv(
+                    f"BUILDARENA_{field.upper()}_FILE", kept(tmp_path, f"{value}{end}".encode())
+                )
+                assert plain(getattr(load_settings(), field)) == value
 
 
-@pytest.mark.parametrize("field", SECRETS)
 def test_a_setting_given_in_both_ways_is_refused_by_both_names(
-    field, tmp_path, monkeypatch
+    tmp_path, monkeypatch, subtests
 ) -> None:
-    name = f"BUILDARENA_{field.upper()}"
-    monkeypatch.setenv(name, SECRET)
-    monkeypatch.setenv(f"{name}_FILE", kept(tmp_path, SECRET.encode()))
-    with pytest.raises(StartupError, match=f"{name} and {name}_FILE are both set") as refused:
-        load_settings()
-    assert SECRET not in str(refused.value)
+    for field in SECRETS:
+        with subtests.test(field=field), monkeypatch.context() as patch:
+            name = f"BUILDARENA_{field.upper()}"
+            patch.setenv(name, SECRET)
+            patch.setenv(f"{name}_FILE", kept(tmp_path, SECRET.encode()))
+            with pytest.raises(
+                StartupError, match=f"{name} and {name}_FILE are both set"
+            ) as refused:
+                load_settings()
+            assert SECRET not in str(refused.value)
 
 
 def test_of_a_file_one_line_end_alone_is_cut() -> None:
@@ -69,27 +75,24 @@ def test_of_a_file_one_line_end_alone_is_cut() -> None:
     assert read_secret("A", {"A": " x \n"}) == " x \n"
 
 
-@pytest.mark.parametrize(
-    ("data", "read"), [(b"x\n\n", "x\n"), (b" x ", " x "), (b"a\nb\n", "a\nb")]
-)
-def test_what_else_a_file_holds_is_part_of_the_secret(data, read, tmp_path) -> None:
-    assert read_secret("A", {"A_FILE": kept(tmp_path, data)}) == read
+def test_what_else_a_file_holds_is_part_of_the_secret(tmp_path, subtests) -> None:
+    for data, read in [(b"x\n\n", "x\n"), (b" x ", " x "), (b"a\nb\n", "a\nb")]:
+        with subtests.test(data=data):
+            assert read_secret("A", {"A_FILE": kept(tmp_path, data)}) == read
 
 
-@pytest.mark.parametrize(
-    ("data", "reason"),
-    [
+def test_a_file_that_holds_no_secret_is_refused_by_name(tmp_path, subtests) -> None:
+    for data, reason in [
         (b"", "is empty"),
         (b"\n", "is empty"),
         (b" \r\n", "is empty"),
         (b"\xff\xfe", "not UTF-8"),
         (b"x" * (MAX_BYTES + 1), "more than"),
-    ],
-)
-def test_a_file_that_holds_no_secret_is_refused_by_name(data, reason, tmp_path) -> None:
-    file = kept(tmp_path, data)
-    with pytest.raises(ValueError, match=f"A_FILE names {file}.*{reason}"):
-        read_secret("A", {"A_FILE": file})
+    ]:
+        with subtests.test(data=data):
+            file = kept(tmp_path, data)
+            with pytest.raises(ValueError, match=f"A_FILE names {file}.*{reason}"):
+                read_secret("A", {"A_FILE": file})
 
 
 def test_a_file_that_is_not_there_or_is_none_is_refused_by_name(tmp_path) -> None:
@@ -120,15 +123,18 @@ def test_a_wrong_setting_is_named_and_a_secret_never_shown(tmp_path, monkeypatch
         load_settings()
 
 
-@pytest.mark.parametrize("name", ARTIFACT_CREDENTIALS)
-def test_credentials_of_the_artifact_store_can_stand_in_files(name, tmp_path, monkeypatch) -> None:
-    monkeypatch.setenv(f"{name}_FILE", kept(tmp_path, b"shh\n"))
-    assert load_settings(artifacts_url="s3://bucket/x").artifact_options == {name: "shh"}
-    assert load_settings().artifact_options == {}
-    assert "shh" not in repr(load_settings(artifacts_url="s3://bucket/x"))
-    monkeypatch.setenv(name, "other")
-    with pytest.raises(StartupError, match=f"{name} and {name}_FILE are both set"):
-        load_settings()
+def test_credentials_of_the_artifact_store_can_stand_in_files(
+    tmp_path, monkeypatch, subtests
+) -> None:
+    for name in ARTIFACT_CREDENTIALS:
+        with subtests.test(name=name), monkeypatch.context() as patch:
+            patch.setenv(f"{name}_FILE", kept(tmp_path, b"shh\n"))
+            assert load_settings(artifacts_url="s3://bucket/x").artifact_options == {name: "shh"}
+            assert load_settings().artifact_options == {}
+            assert "shh" not in repr(load_settings(artifacts_url="s3://bucket/x"))
+            patch.setenv(name, "other")
+            with pytest.raises(StartupError, match=f"{name} and {name}_FILE are both set"):
+                load_settings()
 
 
 class _Bucket(BaseHTTPRequestHandler):
@@ -195,22 +201,25 @@ def test_the_command_line_reads_its_key_from_a_file(tmp_path, monkeypatch) -> No
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize(
-    "words", [["buildarena_api"], ["buildarena_worker"], ["buildarena_simworker", "--simulator"]]
-)
-def test_a_process_says_in_one_line_which_file_it_misses(words, tmp_path) -> None:
-    words = [*words, "mujoco"] if "--simulator" in words else words
-    done = subprocess.run(
-        [sys.executable, "-m", *words],
-        env={**os.environ, "BUILDARENA_DATABASE_URL_FILE": str(tmp_path / "gone")},
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 1
-    (line,) = done.stderr.splitlines()
-    assert f"BUILDARENA_DATABASE_URL_FILE names {tmp_path / 'gone'}: No such file" in line
+def test_a_process_says_in_one_line_which_file_it_misses(tmp_path, subtests) -> None:
+    for words in [
+        ["buildarena_api"],
+        ["buildarena_worker"],
+        ["buildarena_simworker", "--simulator"],
+    ]:
+        with subtests.test(words=words):
+            engine = ["mujoco"] if "--simulator" in words else []
+            done = subprocess.run(
+                [sys.executable, "-m", *words, *engine],
+                env={**os.environ, "BUILDARENA_DATABASE_URL_FILE": str(tmp_path / "gone")},
+                capture_output=True,
+                text=True,
+                timeout=60,
+                check=False,
+            )
+            assert done.returncode == 1
+            (line,) = done.stderr.splitlines()
+            assert f"BUILDARENA_DATABASE_URL_FILE names {tmp_path / 'gone'}: No such file" in line
 
 
 def test_keys_of_a_stack_pass_to_its_processes_once(tmp_path, monkeypatch) -> None:

@@ -154,17 +154,15 @@ class Registered:
 ENGINE = "buildarena_simworker.registered:engine_simulator"
 
 
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
+def test_a_distribution_that_registers_wrongly_is_named(monkeypatch, subtests) -> None:
+    for given, says in [
         ([("mujoco", ENGINE), ("mujoco", ENGINE)], "two distributions register .* 'mujoco'"),
         ([("unity", "no_such_package:x")], r"'unity' \(no_such_package:x\) can't be loaded"),
-    ],
-)
-def test_a_distribution_that_registers_wrongly_is_named(monkeypatch, given, says) -> None:
-    monkeypatch.setattr(installed, "entry_points", Registered(*given))
-    with pytest.raises(StartupError, match=says):
-        installed_simulators()
+    ]:
+        with subtests.test(given=given):
+            monkeypatch.setattr(installed, "entry_points", Registered(*given))
+            with pytest.raises(StartupError, match=says):
+                installed_simulators()
 
 
 def test_an_engine_that_is_not_installed_counts_as_not_there(monkeypatch) -> None:
@@ -183,12 +181,13 @@ def announce(context, name: str, **versions: object) -> None:
     )
 
 
-@pytest.mark.parametrize(("game", "mod"), [("1.75", ""), ("", "1.4"), ("", "")])
-def test_half_a_version_is_none(game, mod) -> None:
-    assert Settings(besiege_game=game, besiege_mod=mod).besiege_version is None
+def test_half_a_version_is_none(subtests) -> None:
+    for game, mod in [("1.75", ""), ("", "1.4"), ("", "")]:
+        with subtests.test(game=game):
+            assert Settings(besiege_game=game, besiege_mod=mod).besiege_version is None
 
 
-@pytest.mark.parametrize("bad", ["1.75/2", "1 75", "x" * 41, "1.75\n"])
-def test_a_version_that_would_spoil_a_tracks_name_is_refused(bad) -> None:
-    with pytest.raises(ValueError, match="besiege_game"):
-        Settings(besiege_game=bad, besiege_mod="1")
+def test_a_version_that_would_spoil_a_tracks_name_is_refused(subtests) -> None:
+    for bad in ["1.75/2", "1 75", "x" * 41, "1.75\n"]:
+        with subtests.test(bad=bad), pytest.raises(ValueError, match="besiege_game"):
+            Settings(besiege_game=bad, besiege_mod="1")

@@ -60,15 +60,16 @@ def test_all_that_is_done_for_a_submission_is_one_trace_at_the_collector() -> No
     assert [one.name for one in failed] == ["alone"]
 
 
-@pytest.mark.parametrize("sampler", ["parentbased_traceidratio", "traceidratio"])
-def test_a_sampled_trace_is_whole(sampler) -> None:
-    kept = sent(OTEL_TRACES_SAMPLER=sampler, OTEL_TRACES_SAMPLER_ARG="0.5")
-    sizes: dict[bytes, int] = {}
-    for _, one in kept.spans():
-        if one.name != "alone":
-            sizes[one.trace_id] = sizes.get(one.trace_id, 0) + 1
-    assert 5 < len(sizes) < 35
-    assert set(sizes.values()) == {5}
+def test_a_sampled_trace_is_whole(subtests) -> None:
+    for sampler in ["parentbased_traceidratio", "traceidratio"]:
+        with subtests.test(sampler=sampler):
+            kept = sent(OTEL_TRACES_SAMPLER=sampler, OTEL_TRACES_SAMPLER_ARG="0.5")
+            sizes: dict[bytes, int] = {}
+            for _, one in kept.spans():
+                if one.name != "alone":
+                    sizes[one.trace_id] = sizes.get(one.trace_id, 0) + 1
+            assert 5 < len(sizes) < 35
+            assert set(sizes.values()) == {5}
 
 
 def test_no_trace_is_kept_where_none_is_sampled() -> None:
@@ -83,11 +84,12 @@ def test_a_fault_of_ours_is_named_by_its_reason() -> None:
     assert "sk-1" not in one.to_json()
 
 
-@pytest.mark.parametrize("parent", ["", "00-zz", "00-" + "0" * 32 + "-" + "0" * 16 + "-01"])
-def test_a_parent_that_can_not_be_read_is_none(parent) -> None:
-    with recorded() as spans, span("outside", {}), span("inside", {}, parent=parent):
-        pass
-    assert spans.named("inside")[0].parent is None
+def test_a_parent_that_can_not_be_read_is_none(subtests) -> None:
+    for parent in ["", "00-zz", "00-" + "0" * 32 + "-" + "0" * 16 + "-01"]:
+        with subtests.test(parent=parent):
+            with recorded() as spans, span("outside", {}), span("inside", {}, parent=parent):
+                pass
+            assert spans.named("inside")[0].parent is None
 
 
 def test_what_is_not_traced_has_no_context() -> None:

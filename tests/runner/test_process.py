@@ -129,27 +129,26 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
     assert not loaded & (UNNEEDED | {"buildarena_store"})
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
+def test_wrong_options_are_named(subtests) -> None:
+    for words, says in [
         (["construct", "--api", "http://127.0.0.1:1"], "needs the database"),
         (["simulate.unity", "--api", "http://127.0.0.1:1"], "choose from"),
         (["simulate.mujoco", "--at-once", "2"], "--at-once: only with --api"),
         (["simulate.mujoco", "--key-file", __file__], "--key-file: only with --api"),
-    ],
-)
-def test_wrong_options_are_named(words, says) -> None:
-    done = run("admin", "worker", *words)
-    assert done.returncode == 1
-    assert says in done.stderr
+    ]:
+        with subtests.test(words=words):
+            done = run("admin", "worker", *words)
+            assert done.returncode == 1
+            assert says in done.stderr
 
 
-@pytest.mark.parametrize(
-    "url", ["ftp://a", "nothing", "http://", "https://u:p@a", "http://10.0.0.1", "http://lab"]
-)
-def test_the_key_goes_to_no_odd_place(url) -> None:
-    with pytest.raises(ValueError, match=r"URL of an API|not encrypted"):
-        check_url(url, allow_http=False)
+def test_the_key_goes_to_no_odd_place(subtests) -> None:
+    for url in ["ftp://a", "nothing", "http://", "https://u:p@a", "http://10.0.0.1", "http://lab"]:
+        with (
+            subtests.test(url=url),
+            pytest.raises(ValueError, match=r"URL of an API|not encrypted"),
+        ):
+            check_url(url, allow_http=False)
 
 
 def test_https_and_this_machine_need_no_leave() -> None:

@@ -91,9 +91,8 @@ def test_migrations_only_add_or_say_that_they_break() -> None:
         assert breaking or not taken, f"{revision.revision} is not BREAKING and has {taken}"
 
 
-@pytest.mark.parametrize(
-    ("sql", "breaks"),
-    [
+def test_what_takes_away_is_recognised(subtests) -> None:
+    for sql, breaks in [
         ("ALTER TABLE jobs DROP COLUMN seed", True),
         ("ALTER TABLE jobs RENAME seed TO luck", True),
         ("ALTER TABLE jobs ADD COLUMN luck INTEGER NOT NULL", True),
@@ -102,10 +101,9 @@ def test_migrations_only_add_or_say_that_they_break() -> None:
         ("ALTER TABLE jobs ADD COLUMN luck INTEGER DEFAULT 0 NOT NULL", False),
         ("CREATE TABLE luck (job_id TEXT NOT NULL)", False),
         ("CREATE INDEX ix_luck ON jobs (seed)", False),
-    ],
-)
-def test_what_takes_away_is_recognised(sql, breaks) -> None:
-    assert bool(TAKES_AWAY.search(sql)) is breaks
+    ]:
+        with subtests.test(sql=sql):
+            assert bool(TAKES_AWAY.search(sql)) is breaks
 
 
 LARGE = (
@@ -140,17 +138,15 @@ def test_later_migrations_make_indexes_of_large_tables_while_others_write() -> N
         assert not found, f"{revision.revision}: see CONTRIBUTING.md, {found}"
 
 
-@pytest.mark.parametrize(
-    ("sql", "locks"),
-    [
+def test_what_locks_a_large_table_is_recognised(subtests) -> None:
+    for sql, locks in [
         ("CREATE INDEX ix_luck ON jobs (seed)", True),
         ("CREATE UNIQUE INDEX ix_luck ON events (id)", True),
         ("CREATE INDEX CONCURRENTLY ix_luck ON jobs (seed)", False),
         ("CREATE INDEX ix_luck ON budgets (id)", False),
-    ],
-)
-def test_what_locks_a_large_table_is_recognised(sql, locks) -> None:
-    assert bool(LOCKS_A_LARGE_TABLE.search(sql)) is locks
+    ]:
+        with subtests.test(sql=sql):
+            assert bool(LOCKS_A_LARGE_TABLE.search(sql)) is locks
 
 
 @pytest.mark.parametrize("idle_s", [0.0, 1000.0])

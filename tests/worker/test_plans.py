@@ -21,17 +21,14 @@ def test_the_last_plan_counts() -> None:
     assert read_plan(GOOD.replace("deck", "draft") + GOOD).sub_structures[0].name == "deck"
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
+def test_what_is_missing_is_said(subtests) -> None:
+    for text, says in [
         ("", "no <building_plan>"),
         ("<building_plan></building_plan>", "no <sub_structure>"),
         (GOOD.replace("overall_structure", "overall"), "no <overall_structure>"),
         (GOOD.replace("<name>deck</name>", ""), "sub-structure 1 has no <name>"),
         (GOOD.replace("tower", "deck"), "'deck' stands for several"),
         (GOOD.replace("<function>holds < ropes</function>", ""), "'tower' says nothing"),
-    ],
-)
-def test_what_is_missing_is_said(text, says) -> None:
-    with pytest.raises(PlanError, match=says):
-        read_plan(text)
+    ]:
+        with subtests.test(text=text), pytest.raises(PlanError, match=says):
+            read_plan(text)

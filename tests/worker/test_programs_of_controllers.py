@@ -86,9 +86,8 @@ def test_a_controller_reads_the_contract_and_what_its_task_offers() -> None:
     assert "## Program" not in model.read[0]
 
 
-@pytest.mark.parametrize(
-    "answer",
-    [
+def test_the_last_program_of_an_answer_counts(subtests) -> None:
+    for answer in [
         fenced(FALLS),
         fenced(FALLS, "It falls.\n", "\nThat is all."),
         f"```Lua\n{FALLS}\n```",
@@ -96,12 +95,11 @@ def test_a_controller_reads_the_contract_and_what_its_task_offers() -> None:
         + "\n"
         + fenced(FALLS),
         f"  ```lua\n{FALLS}\n  ```",
-    ],
-)
-def test_the_last_program_of_an_answer_counts(answer) -> None:
-    played, _ = answered(answer)
-    assert played.suspended, played.failure
-    assert played.suspended.machine.controller.strip() == FALLS
+    ]:
+        with subtests.test(answer=answer):
+            played, _ = answered(answer)
+            assert played.suspended, played.failure
+            assert played.suspended.machine.controller.strip() == FALLS
 
 
 def test_an_answer_of_a_hundred_thousand_beginnings_is_read() -> None:
@@ -116,9 +114,8 @@ def test_keys_are_an_answer_too() -> None:
     assert [press.key for press in played.suspended.controls] == ["Alpha1"]
 
 
-@pytest.mark.parametrize(
-    ("answer", "told"),
-    [
+def test_a_program_that_cannot_be_read_costs_a_turn_and_no_trial(subtests) -> None:
+    for answer, told in [
         (fenced("function control( return {} end"), "line 1"),
         (fenced("x = 1"), "control"),
         (fenced("while true do end"), "instructions"),
@@ -127,14 +124,13 @@ def test_keys_are_an_answer_too() -> None:
         (fenced(""), "control"),
         ("function control() return end", "no JSON object; a program stands between"),
         (f"```\n{FALLS}\n```", "between a line of ```lua and"),
-    ],
-)
-def test_a_program_that_cannot_be_read_costs_a_turn_and_no_trial(answer, told) -> None:
-    played, model = answered(answer, fenced(FALLS))
-    assert played.suspended, played.failure
-    assert len(model.read) == 2
-    assert told in model.read[1]
-    assert "Nothing was tried." in model.read[1]
+    ]:
+        with subtests.test(answer=answer):
+            played, model = answered(answer, fenced(FALLS))
+            assert played.suspended, played.failure
+            assert len(model.read) == 2
+            assert told in model.read[1]
+            assert "Nothing was tried." in model.read[1]
 
 
 def test_who_never_writes_one_that_can_be_read_has_not_built() -> None:

@@ -240,10 +240,11 @@ def test_numbered_steps_are_carried_out_one_after_the_other(play, guidance, buil
     assert roles[: turns + 1] == ["builder"] * turns + ["guidance"]
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, MAX_STEPS, MAX_STEPS + 5])
-def test_steps_are_counted_up_to_a_bound(count) -> None:
-    text = "\n".join(f"{n}. attach" for n in range(7, 7 + count))
-    assert steps_in(f"Now:\n{text}") == max(1, min(count, MAX_STEPS))
+def test_steps_are_counted_up_to_a_bound(subtests) -> None:
+    for count in [0, 1, 2, MAX_STEPS, MAX_STEPS + 5]:
+        with subtests.test(count=count):
+            text = "\n".join(f"{n}. attach" for n in range(7, 7 + count))
+            assert steps_in(f"Now:\n{text}") == max(1, min(count, MAX_STEPS))
 
 
 def test_a_builders_view_grows_through_its_steps_and_begins_anew(play) -> None:

@@ -22,8 +22,9 @@ def test_a_request_that_did_not_come_in_time_reaches_the_limit_whatever_was_used
             spending.require_room()
 
 
-@pytest.mark.parametrize("limits", [{}, {"max_seconds": None}])
-def test_without_a_limit_there_is_always_time(limits) -> None:
-    spending = Spending(limits, seconds=1e6)
-    assert spending.seconds_left == math.inf
-    assert spending.to_the_end(2.5) == 2.5
+def test_without_a_limit_there_is_always_time(subtests) -> None:
+    for limits in [{}, {"max_seconds": None}]:
+        with subtests.test(limits=limits):
+            spending = Spending(limits, seconds=1e6)
+            assert spending.seconds_left == math.inf
+            assert spending.to_the_end(2.5) == 2.5

@@ -194,24 +194,22 @@ def test_who_works_from_a_plan_knows_the_modules_that_it_names(play, task) -> No
             assert not described
 
 
-@pytest.mark.parametrize(
-    ("plan", "named"),
-    [
+def test_a_plans_modules_are_found_by_their_names(subtests) -> None:
+    for plan, named in [
         ("four POWERED WHEELS on small wooden blocks", {"Powered Wheel", "Small Wooden Block"}),
         ("a Steering Hinge", {"Steering Hinge"}),
         ("a Steering Hinge and a hinge", {"Steering Hinge", "Hinge"}),
         ("cog medium powered, log", {"Cog Medium Powered", "Log"}),
-    ],
-)
-def test_a_plans_modules_are_found_by_their_names(plan, named) -> None:
-    given = builtin_tasks()["mechanisms-2"]
-    text = parts_of(given, plan)
-    connectors = set(given.constraints.catalogue.connectors)
-    listed = set(re.findall(r"^- ([^:]+):", text, re.MULTILINE))
-    assert listed == named | connectors | {"Starting Block"}
-    assert len(parts_of(given, "something that rolls").splitlines()) == len(
-        given.constraints.catalogue
-    )
+    ]:
+        with subtests.test(plan=plan):
+            given = builtin_tasks()["mechanisms-2"]
+            text = parts_of(given, plan)
+            connectors = set(given.constraints.catalogue.connectors)
+            listed = set(re.findall(r"^- ([^:]+):", text, re.MULTILINE))
+            assert listed == named | connectors | {"Starting Block"}
+            assert len(parts_of(given, "something that rolls").splitlines()) == len(
+                given.constraints.catalogue
+            )
 
 
 def test_no_sentence_is_told_twice(play, played_requests) -> None:

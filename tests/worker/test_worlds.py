@@ -184,15 +184,18 @@ def told_of_worlds(words: str) -> str:
     return next((line for line in words.splitlines() if line.startswith("**Worlds.**")), "")
 
 
-@pytest.mark.parametrize("worlds", [0, 1, 5])
-def test_every_role_is_told_of_the_worlds_that_score_it(worlds) -> None:
-    model = Recording()
-    Player()("builtin/expert", client=model, worlds=worlds)
-    for request in model.requests:
-        text = "\n".join(message.text for message in request.messages)
-        if "# Build a bridge" in text:
-            assert told_of_worlds(text).startswith("**Worlds.**") is bool(worlds)
-    assert_tells(told_of_worlds("\n".join(m.text for m in model.requests[0].messages)), worlds)
+def test_every_role_is_told_of_the_worlds_that_score_it(subtests) -> None:
+    for worlds in [0, 1, 5]:
+        with subtests.test(worlds=worlds):
+            model = Recording()
+            Player()("builtin/expert", client=model, worlds=worlds)
+            for request in model.requests:
+                text = "\n".join(message.text for message in request.messages)
+                if "# Build a bridge" in text:
+                    assert told_of_worlds(text).startswith("**Worlds.**") is bool(worlds)
+            assert_tells(
+                told_of_worlds("\n".join(m.text for m in model.requests[0].messages)), worlds
+            )
 
 
 @pytest.mark.parametrize("worlds", [0, 1, 5])

@@ -76,43 +76,49 @@ def test_a_cell_of_a_hand_worked_case() -> None:
     assert cell.outcomes["construction_failed"] == 1
 
 
-@pytest.mark.parametrize("flag", [name for name, flag in KNOWN.items() if flag.disqualifying])
-def test_a_disqualified_success_is_a_failure_with_nothing_in_our_reading(flag) -> None:
-    found = trials("lift-1", "a", 3, 4)
-    found[0] = replace(found[0], flags=("never_fell", flag), indicator=900.0)
-    ours = summarise(found)
-    assert (ours.flagged, ours.successes, ours.trials) == (1, 2, 4)
-    assert (ours.indicator_best, ours.censored) == (12.0, 0)
-    assert ours.indicator_mean == pytest.approx((11 + 12) / 4)
-    assert ours.flags == {"never_fell": 1, flag: 1}
+def test_a_disqualified_success_is_a_failure_with_nothing_in_our_reading(subtests) -> None:
+    for flag in [name for name, flag in KNOWN.items() if flag.disqualifying]:
+        with subtests.test(flag=flag):
+            found = trials("lift-1", "a", 3, 4)
+            found[0] = replace(found[0], flags=("never_fell", flag), indicator=900.0)
+            ours = summarise(found)
+            assert (ours.flagged, ours.successes, ours.trials) == (1, 2, 4)
+            assert (ours.indicator_best, ours.censored) == (12.0, 0)
+            assert ours.indicator_mean == pytest.approx((11 + 12) / 4)
+            assert ours.flags == {"never_fell": 1, flag: 1}
 
 
-@pytest.mark.parametrize(
-    "flag",
-    [*(name for name, flag in KNOWN.items() if not flag.disqualifying), "a flag of tomorrow"],
-)
-def test_an_informative_flag_changes_no_figure_of_a_rank(flag) -> None:
-    plain = trials("lift-1", "a", 3, 4)
-    cell, without = summarise([replace(t, flags=(flag,)) for t in plain]), summarise(plain)
-    for name in ("trials", "successes", "success_low", "indicator_mean", "indicator_best"):
-        assert getattr(cell, name) == getattr(without, name)
-    assert (cell.flagged, cell.flags) == (0, {flag: 4})
-    assert cell.censored == (3 if flag == "never_fell" else 0)
+def test_an_informative_flag_changes_no_figure_of_a_rank(subtests) -> None:
+    for flag in [
+        *(name for name, flag in KNOWN.items() if not flag.disqualifying),
+        "a flag of tomorrow",
+    ]:
+        with subtests.test(flag=flag):
+            plain = trials("lift-1", "a", 3, 4)
+            cell, without = summarise([replace(t, flags=(flag,)) for t in plain]), summarise(plain)
+            for name in ("trials", "successes", "success_low", "indicator_mean", "indicator_best"):
+                assert getattr(cell, name) == getattr(without, name)
+            assert (cell.flagged, cell.flags) == (0, {flag: 4})
+            assert cell.censored == (3 if flag == "never_fell" else 0)
 
 
-@pytest.mark.parametrize("flag", [name for name, flag in KNOWN.items() if flag.published])
-@pytest.mark.parametrize("success", [True, False])
-def test_the_published_reading_leaves_out_what_it_calls_hacked(flag, success) -> None:
-    found = trials("lift-1", "a", 3, 4)
-    found[0] = replace(found[0], flags=(flag,), success=success)
-    cell = summarise(found, policy=ScoringPolicy.PUBLISHED)
-    assert (cell.flagged, cell.successes, cell.trials, cell.ended) == (1, 2, 3, 4)
+def test_the_published_reading_leaves_out_what_it_calls_hacked(subtests) -> None:
+    for flag in [name for name, flag in KNOWN.items() if flag.published]:
+        for success in [True, False]:
+            with subtests.test(flag=flag, success=success):
+                found = trials("lift-1", "a", 3, 4)
+                found[0] = replace(found[0], flags=(flag,), success=success)
+                cell = summarise(found, policy=ScoringPolicy.PUBLISHED)
+                assert (cell.flagged, cell.successes, cell.trials, cell.ended) == (1, 2, 3, 4)
 
 
-@pytest.mark.parametrize("flag", [name for name, flag in KNOWN.items() if not flag.published])
-def test_the_published_reading_knows_no_flags_but_its_own(flag) -> None:
-    cell = summarise(trials("lift-1", "a", 3, 4, flags=(flag,)), policy=ScoringPolicy.PUBLISHED)
-    assert (cell.flagged, cell.successes, cell.trials) == (0, 3, 4)
+def test_the_published_reading_knows_no_flags_but_its_own(subtests) -> None:
+    for flag in [name for name, flag in KNOWN.items() if not flag.published]:
+        with subtests.test(flag=flag):
+            cell = summarise(
+                trials("lift-1", "a", 3, 4, flags=(flag,)), policy=ScoringPolicy.PUBLISHED
+            )
+            assert (cell.flagged, cell.successes, cell.trials) == (0, 3, 4)
 
 
 def test_the_published_policy_reads_the_metric_that_was_published() -> None:

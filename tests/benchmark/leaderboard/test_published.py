@@ -36,31 +36,32 @@ def test_the_papers_models_are_on_each_of_its_tasks() -> None:
     assert (gpt.model, gpt.successes, gpt.trials, gpt.indicator_mean) == ("GPT-5", 55, 64, 324.9)
 
 
-@pytest.mark.parametrize("table", [performance_table, cost_table], ids=lambda t: t.__name__)
-def test_our_tables_mark_what_the_paper_marks(table) -> None:
-    frontier = {
-        task: [row for row in rows if row.model not in OPEN_WEIGHT]
-        for task, rows in published_rows().items()
-    }
-    found, category = set(), ""
-    for line in table(frontier).splitlines():
-        if heading := re.match(r"\\multirow\{9\}\{\*\}\{(\w+)\}", line):
-            category = heading[1].lower()
-        cells = [cell.strip(" \\") for cell in line.split("&")]
-        if not category or len(cells) != 11:
-            continue
-        for place, cell in enumerate(cells[2:]):
-            mark = {"text": "best", "unde": "second"}.get(cell[:4])
-            if mark:
-                figure = COLUMNS[table][place // 3]
-                found.add((f"{category}-{place % 3 + 1}", figure, cells[1], mark))
-    with MARKS.open() as file:
-        marks = {
-            (row["task"], row["figure"], row["model"], row["mark"])
-            for row in csv.DictReader(file)
-            if row["figure"] in COLUMNS[table]
-        }
-    assert found ^ marks <= MISMARKED
+def test_our_tables_mark_what_the_paper_marks(subtests) -> None:
+    for table in [performance_table, cost_table]:
+        with subtests.test(table=table):
+            frontier = {
+                task: [row for row in rows if row.model not in OPEN_WEIGHT]
+                for task, rows in published_rows().items()
+            }
+            found, category = set(), ""
+            for line in table(frontier).splitlines():
+                if heading := re.match(r"\\multirow\{9\}\{\*\}\{(\w+)\}", line):
+                    category = heading[1].lower()
+                cells = [cell.strip(" \\") for cell in line.split("&")]
+                if not category or len(cells) != 11:
+                    continue
+                for place, cell in enumerate(cells[2:]):
+                    mark = {"text": "best", "unde": "second"}.get(cell[:4])
+                    if mark:
+                        figure = COLUMNS[table][place // 3]
+                        found.add((f"{category}-{place % 3 + 1}", figure, cells[1], mark))
+            with MARKS.open() as file:
+                marks = {
+                    (row["task"], row["figure"], row["model"], row["mark"])
+                    for row in csv.DictReader(file)
+                    if row["figure"] in COLUMNS[table]
+                }
+            assert found ^ marks <= MISMARKED
 
 
 def test_at_64_samples_only_about_a_third_of_the_pairs_differ() -> None:

@@ -2,8 +2,6 @@
 
 import re
 
-import pytest
-
 from buildarena_benchmark.leaderboard import OverallRow, verdict_of
 
 BASELINES = {"builtin/expert", "builtin/idle"}
@@ -81,9 +79,8 @@ def test_leaders_need_not_stand_next_to_each_other() -> None:
     assert sentence(*rows).startswith("a and c are tied for first")
 
 
-@pytest.mark.parametrize(
-    ("rows", "says"),
-    [
+def test_where_nobody_is_best_it_says_so(subtests) -> None:
+    for rows, says in [
         ([row("a", None)], "Nobody is ranked yet: no model has counted jobs on all 4 tasks."),
         (
             [row("a", 1, 2, 0.0), row("b", 1, 2, 0.0), row("c", None, rate=0.5)],
@@ -93,10 +90,9 @@ def test_leaders_need_not_stand_next_to_each_other() -> None:
             [row("a", 1, 1, 0.25), row("b", None)],
             "a alone is ranked on these 4 tasks: 25 % of its trials succeed.",
         ),
-    ],
-)
-def test_where_nobody_is_best_it_says_so(rows, says) -> None:
-    assert sentence(*rows) == says
+    ]:
+        with subtests.test(rows=rows):
+            assert sentence(*rows) == says
 
 
 def test_a_baseline_in_front_leaves_room_for_the_best_model() -> None:

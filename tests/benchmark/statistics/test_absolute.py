@@ -10,9 +10,10 @@ from buildarena_benchmark.leaderboard import EndedJob, summarise
 from buildarena_benchmark.statistics import expert_scores
 
 
-@pytest.mark.parametrize(("times", "score"), [(0, 0), (1, 1), (3, 2), (7, 3), (-2, 0)])
-def test_each_point_stands_for_about_twice_as_much(times, score) -> None:
-    assert expert_scores(np.array([times * 40.0]), 40.0) == pytest.approx([score])
+def test_each_point_stands_for_about_twice_as_much(subtests) -> None:
+    for times, score in [(0, 0), (1, 1), (3, 2), (7, 3), (-2, 0)]:
+        with subtests.test(times=times):
+            assert expert_scores(np.array([times * 40.0]), 40.0) == pytest.approx([score])
 
 
 @given(st.lists(st.floats(0, 1e6), min_size=2), st.floats(1e-3, 1e6))
@@ -32,16 +33,17 @@ def trial(number: int, task: str, indicator: float, *, success: bool = True) -> 
     )
 
 
-@pytest.mark.parametrize("task", builtin_tasks())
-def test_the_expert_scores_one_and_a_failure_nothing(task) -> None:
-    expert = references()[task]
-    cell = summarise([trial(number, task, expert) for number in range(12)])
-    assert cell.score == pytest.approx(1)
-    assert cell.score_low is not None
-    assert cell.score_low < 1 <= cell.score_high
-    failed = [trial(number, task, 100 * expert, success=False) for number in range(12, 24)]
-    both = summarise([*(trial(number, task, expert) for number in range(12)), *failed])
-    assert both.score == pytest.approx(0.5)
+def test_the_expert_scores_one_and_a_failure_nothing(subtests) -> None:
+    for task in builtin_tasks():
+        with subtests.test(task=task):
+            expert = references()[task]
+            cell = summarise([trial(number, task, expert) for number in range(12)])
+            assert cell.score == pytest.approx(1)
+            assert cell.score_low is not None
+            assert cell.score_low < 1 <= cell.score_high
+            failed = [trial(number, task, 100 * expert, success=False) for number in range(12, 24)]
+            both = summarise([*(trial(number, task, expert) for number in range(12)), *failed])
+            assert both.score == pytest.approx(0.5)
 
 
 def test_a_task_without_an_expert_has_no_score() -> None:

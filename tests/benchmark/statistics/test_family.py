@@ -14,22 +14,20 @@ def boards(seed: int, count: int, rates, sizes, loads):
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize(
-    ("rate", "size", "loads"),
-    [
+def test_of_models_alike_none_is_called_better(subtests) -> None:
+    """Testing each pair for itself, some model is called better on 77 % of such boards."""
+    for rate, size, loads in [
         (0.3, 64, "lognormal, sigma 0.8"),
         (0.9, 64, "censored at 1500"),
         (0.1, 64, "near constant"),
         (0.6, 16, "lognormal, sigma 1.2"),
-    ],
-)
-def test_of_models_alike_none_is_called_better(rate, size, loads) -> None:
-    """Testing each pair for itself, some model is called better on 77 % of such boards."""
-    rates = np.full((TASKS, MODELS), rate)
-    found = boards(31, 40, rates, [size] * MODELS, loads)
-    wrong = sum(any(ranking.better.any() for ranking in made) for made in found)
-    # At 5 % a board, six of forty or more are wrong in 1 of 70 trials.
-    assert wrong < 6
+    ]:
+        with subtests.test(rate=rate):
+            rates = np.full((TASKS, MODELS), rate)
+            found = boards(31, 40, rates, [size] * MODELS, loads)
+            wrong = sum(any(ranking.better.any() for ranking in made) for made in found)
+            # At 5 % a board, six of forty or more are wrong in 1 of 70 trials.
+            assert wrong < 6
 
 
 def test_models_with_unequal_numbers_of_trials_are_not_called_better() -> None:

@@ -28,13 +28,14 @@ def test_intervals_of_means_hold_as_often_as_they_say(name, trials, rate) -> Non
     assert found.covered >= 0.92
 
 
-@pytest.mark.parametrize("failures", [0.0, 8.0])
-def test_few_successes_are_covered_or_too_few(failures) -> None:
+def test_few_successes_are_covered_or_too_few(subtests) -> None:
     """Where few trials succeed, resampling covers too few: it knows only the successes it saw."""
-    lognormal = LOADS["lognormal, sigma 0.8"]
-    found = coverage(lognormal, 128, 0.04, samples=6000, seed=22, failures=failures)
-    assert 0.02 < found.shown < 0.08
-    assert found.covered >= 0.93
+    for failures in [0.0, 8.0]:
+        with subtests.test(failures=failures):
+            lognormal = LOADS["lognormal, sigma 0.8"]
+            found = coverage(lognormal, 128, 0.04, samples=6000, seed=22, failures=failures)
+            assert 0.02 < found.shown < 0.08
+            assert found.covered >= 0.93
 
 
 def test_a_rate_that_is_never_missed_for_want_of_failures() -> None:
@@ -43,14 +44,15 @@ def test_a_rate_that_is_never_missed_for_want_of_failures() -> None:
     assert low < 0.9 * 300 < high == 300
 
 
-@pytest.mark.parametrize("successes", range(MIN_SUCCESSES))
-@pytest.mark.parametrize("trials", [10, 64])
-def test_too_few_successes_give_no_interval(successes, trials) -> None:
-    values = np.zeros(trials)
-    values[:successes] = 300.0
-    assert mean_interval(values) is None
-    # Failures that moved a little are no successes.
-    assert mean_interval(np.maximum(values, 3.0), values > 0) is None
+def test_too_few_successes_give_no_interval(subtests) -> None:
+    for successes in range(MIN_SUCCESSES):
+        for trials in [10, 64]:
+            with subtests.test(successes=successes, trials=trials):
+                values = np.zeros(trials)
+                values[:successes] = 300.0
+                assert mean_interval(values) is None
+                # Failures that moved a little are no successes.
+                assert mean_interval(np.maximum(values, 3.0), values > 0) is None
 
 
 def test_what_is_no_number_is_refused() -> None:
@@ -96,38 +98,41 @@ def covered(interval, trials: int, rate: float) -> float:
     )
 
 
-@pytest.mark.parametrize("trials", [8, 16, 32, 64])
-def test_exact_intervals_hold_every_rate_where_wilsons_do_not(trials) -> None:
-    rates = [0.16 / trials, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, 0.99, 1.0]
-    assert min(covered(exact_interval, trials, rate) for rate in rates) >= 0.95
-    assert min(covered(wilson_interval, trials, rate) for rate in rates) < 0.93
+def test_exact_intervals_hold_every_rate_where_wilsons_do_not(subtests) -> None:
+    for trials in [8, 16, 32, 64]:
+        with subtests.test(trials=trials):
+            rates = [0.16 / trials, 0.01, 0.03, 0.1, 0.3, 0.6, 0.9, 0.99, 1.0]
+            assert min(covered(exact_interval, trials, rate) for rate in rates) >= 0.95
+            assert min(covered(wilson_interval, trials, rate) for rate in rates) < 0.93
 
 
-@pytest.mark.parametrize("worlds", [2, 4, 16])
-@pytest.mark.parametrize(("low", "high"), [(0.0, 0.1), (0.0, 1.0), (0.4, 0.6), (0.9, 1.0)])
-@pytest.mark.parametrize("sure", [0.0, 0.7])
-def test_exact_intervals_hold_means_of_shares(worlds, low, high, sure) -> None:
-    # A job's machine succeeds in each world with a chance of its own; some always do, or never.
-    rng = np.random.default_rng(worlds)
-    chances = rng.choice([low, high, (low + high) / 2], size=(400, 16))
-    chances = np.where(rng.random(chances.shape) < sure, low, chances)
-    rate = sure * low + (1 - sure) * (low + high) / 2
-    sums = (rng.binomial(worlds, chances) / worlds).sum(axis=1)
-    ends = {total: exact_interval(total, 16) for total in set(sums.tolist())}
-    held = [ends[total][0] <= rate <= ends[total][1] for total in sums.tolist()]
-    assert np.mean(held) >= 0.95 - 2 * (0.05 * 0.95 / 400) ** 0.5
+def test_exact_intervals_hold_means_of_shares(subtests) -> None:
+    for worlds in [2, 4, 16]:
+        for low, high in [(0.0, 0.1), (0.0, 1.0), (0.4, 0.6), (0.9, 1.0)]:
+            for sure in [0.0, 0.7]:
+                with subtests.test(worlds=worlds, low=low, sure=sure):
+                    # A machine succeeds in each world with a chance of its own: always, or never.
+                    rng = np.random.default_rng(worlds)
+                    chances = rng.choice([low, high, (low + high) / 2], size=(400, 16))
+                    chances = np.where(rng.random(chances.shape) < sure, low, chances)
+                    rate = sure * low + (1 - sure) * (low + high) / 2
+                    sums = (rng.binomial(worlds, chances) / worlds).sum(axis=1)
+                    ends = {total: exact_interval(total, 16) for total in set(sums.tolist())}
+                    held = [ends[total][0] <= rate <= ends[total][1] for total in sums.tolist()]
+                    assert np.mean(held) >= 0.95 - 2 * (0.05 * 0.95 / 400) ** 0.5
 
 
-@pytest.mark.parametrize("rate", [0.01, 0.05, 0.1, 0.3, 0.9])
-@pytest.mark.parametrize("trials", [8, 20, 64])
-def test_intervals_that_are_shown_from_five_on_hold_when_they_are_shown(trials, rate) -> None:
-    shown = held = 0.0
-    for won in range(5, trials + 1):
-        low, high = exact_interval(won, trials, at_least=5)
-        chance = float(binom.pmf(won, trials, rate))
-        shown += chance
-        held += chance * (low <= rate <= high)
-    assert held / shown >= 0.95
+def test_intervals_that_are_shown_from_five_on_hold_when_they_are_shown(subtests) -> None:
+    for rate in [0.01, 0.05, 0.1, 0.3, 0.9]:
+        for trials in [8, 20, 64]:
+            with subtests.test(rate=rate, trials=trials):
+                shown = held = 0.0
+                for won in range(5, trials + 1):
+                    low, high = exact_interval(won, trials, at_least=5)
+                    chance = float(binom.pmf(won, trials, rate))
+                    shown += chance
+                    held += chance * (low <= rate <= high)
+                assert held / shown >= 0.95
 
 
 def test_counts_that_no_interval_exists_for() -> None:

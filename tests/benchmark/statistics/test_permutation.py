@@ -29,9 +29,8 @@ def dealt(pooled: np.ndarray, number: int) -> float:
     return 2 * float(np.mean(np.array(sums) >= abs(weight[:number].sum()) - 1e-9))
 
 
-@pytest.mark.parametrize(
-    ("first", "second"),
-    [
+def test_counts_alone_give_fishers_p_value_from_above(subtests) -> None:
+    for first, second in [
         ((9, 64), (1, 64)),
         ((10, 64), (0, 64)),
         ((38, 64), (2, 64)),
@@ -40,29 +39,29 @@ def dealt(pooled: np.ndarray, number: int) -> float:
         ((2, 2), (1, 64)),
         ((12, 16), (0, 16)),
         ((260, 740), (140, 740)),
-    ],
-)
-def test_counts_alone_give_fishers_p_value_from_above(first, second) -> None:
-    (won, of), (lost, among) = first, second
-    exact = 2 * float(hypergeom.sf(won - 1, of + among, won + lost, of))
-    found = evidence([counts(first, second)])
-    assert exact * 0.98 <= found.p_value[0] <= 3 * exact
-    assert found.z[0] > 0
-    turned = evidence([counts(second, first)])
-    assert turned.p_value[0] == pytest.approx(found.p_value[0])
-    assert turned.z[0] == pytest.approx(-found.z[0])
+    ]:
+        with subtests.test(first=first):
+            (won, of), (lost, among) = first, second
+            exact = 2 * float(hypergeom.sf(won - 1, of + among, won + lost, of))
+            found = evidence([counts(first, second)])
+            assert exact * 0.98 <= found.p_value[0] <= 3 * exact
+            assert found.z[0] > 0
+            turned = evidence([counts(second, first)])
+            assert turned.p_value[0] == pytest.approx(found.p_value[0])
+            assert turned.z[0] == pytest.approx(-found.z[0])
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_p_values_are_those_of_dealing_every_label_from_above(seed) -> None:
-    rng = np.random.default_rng(seed)
-    won = (rng.random(16) < [*[0.9] * 8, *[0.3] * 8]).astype(float)
-    pooled = np.column_stack([won, won * rng.lognormal(5, 0.8, 16)])
-    found = float(evidence([(pooled[:8], pooled[8:])]).p_value[0])
-    exact = min(1.0, dealt(pooled, 8))
-    assert exact * 0.95 <= found
-    # Sixteen trials make wide gaps, and the correction of half a gap is large.
-    assert found <= 10 * exact
+def test_p_values_are_those_of_dealing_every_label_from_above(subtests) -> None:
+    for seed in range(6):
+        with subtests.test(seed=seed):
+            rng = np.random.default_rng(seed)
+            won = (rng.random(16) < [*[0.9] * 8, *[0.3] * 8]).astype(float)
+            pooled = np.column_stack([won, won * rng.lognormal(5, 0.8, 16)])
+            found = float(evidence([(pooled[:8], pooled[8:])]).p_value[0])
+            exact = min(1.0, dealt(pooled, 8))
+            assert exact * 0.95 <= found
+            # Sixteen trials make wide gaps, and the correction of half a gap is large.
+            assert found <= 10 * exact
 
 
 def test_pairs_are_tested_alike_alone_and_among_others() -> None:
@@ -89,10 +88,11 @@ def test_where_nothing_varies_nothing_is_said() -> None:
     assert evidence([(same, other)]).p_value[0] == 1.0
 
 
-@pytest.mark.parametrize("trials", [1, 2, 3])
-def test_very_few_trials_say_nothing_apart(trials) -> None:
-    found = evidence([counts((trials, trials), (0, trials))])
-    assert found.p_value[0] > 0.05
+def test_very_few_trials_say_nothing_apart(subtests) -> None:
+    for trials in [1, 2, 3]:
+        with subtests.test(trials=trials):
+            found = evidence([counts((trials, trials), (0, trials))])
+            assert found.p_value[0] > 0.05
 
 
 def test_a_scale_of_the_indicator_changes_nothing() -> None:
@@ -129,24 +129,25 @@ SHAPES = {
 }
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("trials", [200, 600, 2000])
-def test_near_trials_together_say_what_each_says(monkeypatch, shape, trials) -> None:
-    rng = np.random.default_rng(1)
+def test_near_trials_together_say_what_each_says(monkeypatch, subtests) -> None:
+    for shape in SHAPES:
+        for trials in [200, 600, 2000]:
+            with subtests.test(shape=shape, trials=trials), monkeypatch.context() as patch:
+                rng = np.random.default_rng(1)
 
-    def model() -> np.ndarray:
-        won = rng.random(trials) < rng.uniform(0.45, 0.55)
-        share = np.where(won, rng.integers(1, 5, trials), 0) / 4
-        indicator = SHAPES[shape](rng, trials) * rng.uniform(0.95, 1.05)
-        return np.column_stack([share, np.where(won, indicator, 0.0)])
+                def model() -> np.ndarray:
+                    won = rng.random(trials) < rng.uniform(0.45, 0.55)
+                    share = np.where(won, rng.integers(1, 5, trials), 0) / 4
+                    indicator = SHAPES[shape](rng, trials) * rng.uniform(0.95, 1.05)
+                    return np.column_stack([share, np.where(won, indicator, 0.0)])
 
-    models = [model() for _ in range(6)]
-    near = [Sample.of(model) for model in models]
-    for sample, each in zip(near, models, strict=True):
-        assert sample.times @ sample.figures == pytest.approx(each.sum(axis=0))
-        assert len(sample.times) < trials / 2
-    together = pair_tests(list(combinations(near, 2)))
-    monkeypatch.setattr(permutation, "MANY", trials)
-    apart = evidence(combinations(models, 2))
-    assert np.abs(together.z - apart.z).max() < 0.005
-    assert np.abs(together.z - apart.z).max() > 0
+                models = [model() for _ in range(6)]
+                near = [Sample.of(model) for model in models]
+                for sample, each in zip(near, models, strict=True):
+                    assert sample.times @ sample.figures == pytest.approx(each.sum(axis=0))
+                    assert len(sample.times) < trials / 2
+                together = pair_tests(list(combinations(near, 2)))
+                patch.setattr(permutation, "MANY", trials)
+                apart = evidence(combinations(models, 2))
+                assert np.abs(together.z - apart.z).max() < 0.005
+                assert np.abs(together.z - apart.z).max() > 0

@@ -1,7 +1,6 @@
 """What a board can show, said before it is paid for."""
 
 import numpy as np
-import pytest
 from support.boards.made_up_trials import LOADS, board, rankings
 
 from buildarena_benchmark.statistics import board_power, detectable_difference
@@ -25,11 +24,12 @@ def test_boards_claim_what_was_said_and_hardly_half_of_it() -> None:
     assert claimed(rise / 2, **sizes, boards=50) <= 0.3
 
 
-@pytest.mark.parametrize("more", ["models", "tasks"])
-def test_more_claims_need_more_on_each_task(more) -> None:
-    few = {"models": 3, "tasks": 3, "trials": 64}
-    many = {**few, more: 12}
-    assert board_power(**many).on_a_task > board_power(**few).on_a_task
+def test_more_claims_need_more_on_each_task(subtests) -> None:
+    for more in ["models", "tasks"]:
+        with subtests.test(more=more):
+            few = {"models": 3, "tasks": 3, "trials": 64}
+            many = {**few, more: 12}
+            assert board_power(**many).on_a_task > board_power(**few).on_a_task
 
 
 def test_more_tasks_and_more_trials_show_smaller_differences() -> None:

@@ -49,10 +49,10 @@ def test_one_more_success_raises_the_interval(count) -> None:
         assert more_high >= high
 
 
-@pytest.mark.parametrize("count", [(0, 0), (3, 2), (-1, 2)])
-def test_impossible_counts_are_refused(count) -> None:
-    with pytest.raises(ValueError, match="have no interval"):
-        wilson_interval(*count)
+def test_impossible_counts_are_refused(subtests) -> None:
+    for count in [(0, 0), (3, 2), (-1, 2)]:
+        with subtests.test(count=count), pytest.raises(ValueError, match="have no interval"):
+            wilson_interval(*count)
 
 
 def test_the_wilson_interval_covers_as_often_as_it_says() -> None:

@@ -88,12 +88,13 @@ def test_one_model_is_first() -> None:
     assert (ranking.rank[0], ranking.low[0], ranking.high[0]) == (1, 1, 1)
 
 
-@pytest.mark.parametrize(("trials", "apart"), [(1, False), (3, False), (8, True)])
-def test_very_few_trials_say_nothing_apart(trials, apart) -> None:
-    ranking = ranked([trials, 0], trials)
-    assert ranking.better[0, 1] == apart
-    assert ranking.rank.tolist() == ([1, 2] if apart else [1, 1])
-    assert (ranking.low[1], ranking.high[0]) == ((2, 1) if apart else (1, 2))
+def test_very_few_trials_say_nothing_apart(subtests) -> None:
+    for trials, apart in [(1, False), (3, False), (8, True)]:
+        with subtests.test(trials=trials):
+            ranking = ranked([trials, 0], trials)
+            assert ranking.better[0, 1] == apart
+            assert ranking.rank.tolist() == ([1, 2] if apart else [1, 1])
+            assert (ranking.low[1], ranking.high[0]) == ((2, 1) if apart else (1, 2))
 
 
 def test_evidence_against_the_order_makes_no_claim() -> None:

@@ -116,23 +116,22 @@ def read(message: dict[str, Any], usage: Any = None) -> Any:
     return READER.read(200, {}, json.dumps(answer).encode())
 
 
-@pytest.mark.parametrize("lie", LIES)
-@pytest.mark.parametrize(
-    "name", ["prompt_tokens", "completion_tokens", "cached_tokens", "reasoning_tokens"]
-)
-def test_lies_about_usage_are_nothing_or_bounded(name, lie) -> None:
-    usage: dict[str, Any] = {"prompt_tokens": 100, "completion_tokens": 50}
-    if name in usage:
-        usage[name] = lie
-    else:
-        part = "prompt" if name == "cached_tokens" else "completion"
-        usage[f"{part}_tokens_details"] = {name: lie}
-    used = asdict(read({"content": "x"}, usage).usage)
-    del used["cost_usd"]
-    for count in used.values():
-        assert type(count) is int
-        assert 0 <= count <= bounds.MAX_TOKENS
-    assert used["cached_tokens"] <= used["input_tokens"]
+def test_lies_about_usage_are_nothing_or_bounded(subtests) -> None:
+    for lie in LIES:
+        for name in ["prompt_tokens", "completion_tokens", "cached_tokens", "reasoning_tokens"]:
+            with subtests.test(lie=lie, name=name):
+                usage: dict[str, Any] = {"prompt_tokens": 100, "completion_tokens": 50}
+                if name in usage:
+                    usage[name] = lie
+                else:
+                    part = "prompt" if name == "cached_tokens" else "completion"
+                    usage[f"{part}_tokens_details"] = {name: lie}
+                used = asdict(read({"content": "x"}, usage).usage)
+                del used["cost_usd"]
+                for count in used.values():
+                    assert type(count) is int
+                    assert 0 <= count <= bounds.MAX_TOKENS
+                assert used["cached_tokens"] <= used["input_tokens"]
 
 
 @pytest.mark.parametrize("lie", LIES)
@@ -199,9 +198,8 @@ def test_arguments_of_any_shape_can_be_kept_and_sent_back(name, play) -> None:
     assert isinstance(played.failure, Failed), played.failure
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
+def test_what_is_no_reply_is_garbage(subtests) -> None:
+    for message in [
         calling("{}", name=7),
         calling("{}", name=None),
         calling("{}", name=["a"]),
@@ -211,12 +209,11 @@ def test_arguments_of_any_shape_can_be_kept_and_sent_back(name, play) -> None:
         {"tool_calls": "many"},
         {"tool_calls": {"a": 1}},
         {"tool_calls": [None]},
-    ],
-)
-def test_what_is_no_reply_is_garbage(message) -> None:
-    with pytest.raises(ProviderError) as caught:
-        read(message)
-    assert caught.value.failure == "garbage"
+    ]:
+        with subtests.test(message=message):
+            with pytest.raises(ProviderError) as caught:
+                read(message)
+            assert caught.value.failure == "garbage"
 
 
 def test_a_reply_is_cut_to_what_can_be_kept() -> None:
@@ -227,11 +224,12 @@ def test_a_reply_is_cut_to_what_can_be_kept() -> None:
     assert len(reply.calls[0].name) == bounds.MAX_NAME
 
 
-@pytest.mark.parametrize("text", ["<think>" * 10**6, "<think></think>" * 400_000])
-def test_many_thoughts_take_no_time(text) -> None:
-    started = time.process_time()
-    read({"content": text})
-    assert time.process_time() - started < 1
+def test_many_thoughts_take_no_time(subtests) -> None:
+    for text in ["<think>" * 10**6, "<think></think>" * 400_000]:
+        with subtests.test(text=text):
+            started = time.process_time()
+            read({"content": text})
+            assert time.process_time() - started < 1
 
 
 def test_many_openings_of_a_plan_take_no_time() -> None:
@@ -268,11 +266,12 @@ def test_bounded_arguments_are_plain() -> None:
     assert bounds.bounded(Completion(text="", calls=(call,))).calls == (call,)
 
 
-@pytest.mark.parametrize("inner", [1, [], {}, {"k": "v"}])
-def test_arguments_have_a_last_level(inner: Any) -> None:
-    deep = inner
-    for _ in range(bounds.MAX_DEPTH - bool(inner == {"k": "v"})):
-        deep = [deep]
-    assert bounds.bounded_arguments(deep) == deep
-    assert isinstance(bounds.bounded_arguments({"k": deep}), str)
-    assert isinstance(bounds.bounded_arguments([0, deep]), str)
+def test_arguments_have_a_last_level(subtests) -> None:
+    for inner in [1, [], {}, {"k": "v"}]:
+        with subtests.test(inner=inner):
+            deep = inner
+            for _ in range(bounds.MAX_DEPTH - bool(inner == {"k": "v"})):
+                deep = [deep]
+            assert bounds.bounded_arguments(deep) == deep
+            assert isinstance(bounds.bounded_arguments({"k": deep}), str)
+            assert isinstance(bounds.bounded_arguments([0, deep]), str)

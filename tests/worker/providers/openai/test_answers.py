@@ -40,25 +40,24 @@ def meaning(case: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("status", sorted({case["status"] for case in KEPT}))
-def test_answers_mean_what_kept_ones_meant(status) -> None:
-    cases = [case for case in KEPT if case["status"] == status]
-    found = {case["name"]: meaning(case) for case in cases}
-    assert found == {case["name"]: case["means"] for case in cases}
+def test_answers_mean_what_kept_ones_meant(subtests) -> None:
+    for status in sorted({case["status"] for case in KEPT}):
+        with subtests.test(status=status):
+            cases = [case for case in KEPT if case["status"] == status]
+            found = {case["name"]: meaning(case) for case in cases}
+            assert found == {case["name"]: case["means"] for case in cases}
 
 
-@pytest.mark.parametrize(
-    ("body", "says"),
-    [
+def test_an_error_says_what_the_provider_said(subtests) -> None:
+    for body, says in [
         ({"error": {"message": "No such thing.\nAsk again.", "code": "x"}}, "HTTP 400: No such"),
         ({"detail": "odd"}, 'HTTP 400: {"detail": "odd"}'),
         ("", "HTTP 400: no reason given"),
         ({"error": {"message": "Odd.", "code": {"a": 1}, "type": "x"}}, "HTTP 400: Odd."),
-    ],
-)
-def test_an_error_says_what_the_provider_said(body, says) -> None:
-    text = body if isinstance(body, str) else json.dumps(body)
-    with pytest.raises(ProviderError, match=r"^HTTP 400") as caught:
-        READERS[URL].read(400, {"retry-after": "3"}, text.encode())
-    assert str(caught.value).startswith(says)
-    assert caught.value.headers == {"retry-after": "3"}
+    ]:
+        with subtests.test(body=body):
+            text = body if isinstance(body, str) else json.dumps(body)
+            with pytest.raises(ProviderError, match=r"^HTTP 400") as caught:
+                READERS[URL].read(400, {"retry-after": "3"}, text.encode())
+            assert str(caught.value).startswith(says)
+            assert caught.value.headers == {"retry-after": "3"}

@@ -6,8 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.openai.request import RequestWriter
 from buildarena_worker.providers.openai.schema import function_tool
@@ -98,20 +96,21 @@ TOOLS = {
 }
 
 
-@pytest.mark.parametrize("case", KEPT["requests"], ids=lambda c: f"{c['decoding']}-{c['tools']}")
-def test_requests_carry_what_kept_ones_carried(case) -> None:
-    tools = TOOLS[case["tools"]]
-    for model in case["models"]:
-        writer = RequestWriter(model)
-        for seed in (case["sent"]["seed"], 77):  # the second has its frame already
-            config = {"decoding": DECODING[case["decoding"]]}
-            request = Request(model_config=config, messages=TALK, tools=tools, seed=seed)
-            body = json.loads(writer.body(request))
-            wanted = {**case["sent"], "model": model, "seed": seed}
-            wanted["messages"] = KEPT["messages"][case["messages"]]
-            if tools:
-                wanted["tools"] = KEPT["tools"][case["tools"]]
-            assert body == wanted
+def test_requests_carry_what_kept_ones_carried(subtests) -> None:
+    for case in KEPT["requests"]:
+        with subtests.test(case=case):
+            tools = TOOLS[case["tools"]]
+            for model in case["models"]:
+                writer = RequestWriter(model)
+                for seed in (case["sent"]["seed"], 77):  # the second has its frame already
+                    config = {"decoding": DECODING[case["decoding"]]}
+                    request = Request(model_config=config, messages=TALK, tools=tools, seed=seed)
+                    body = json.loads(writer.body(request))
+                    wanted = {**case["sent"], "model": model, "seed": seed}
+                    wanted["messages"] = KEPT["messages"][case["messages"]]
+                    if tools:
+                        wanted["tools"] = KEPT["tools"][case["tools"]]
+                    assert body == wanted
 
 
 def test_schemas_are_written_as_kept_ones_were() -> None:
