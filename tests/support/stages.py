@@ -1,9 +1,12 @@
 """Does what waits, with the real stage handlers, in the test's process."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any
+
+from sqlalchemy import text
 
 from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.runtime.active_lease import LeaseKeeper
@@ -96,3 +99,25 @@ def work(
             steps -= len(waiting)
             list(pool.map(lambda job: runners[job.queue].process_next(job.queue, job.id), waiting))
     keeper.stop()
+
+
+_RESTORED = """
+UPDATE jobs SET indicator = kept.indicator, input_tokens = kept.input_tokens, metrics = kept.metrics
+FROM kept_jobs AS kept WHERE kept.id = jobs.id;
+DELETE FROM rollouts; INSERT INTO rollouts SELECT * FROM kept_rollouts;
+DELETE FROM journal; INSERT INTO journal SELECT * FROM kept_journal;
+DROP TABLE kept_jobs, kept_rollouts, kept_journal
+"""
+
+
+@contextmanager
+def tampered(context: Context, statement: str, **values: str) -> Iterator[None]:
+    """Changes figures of jobs, rollouts or journals, and has them as they were in the end."""
+    with context.store.database.transaction() as connection:
+        for table in ("jobs", "rollouts", "journal"):
+            connection.exec_driver_sql(f"CREATE TABLE kept_{table} AS SELECT * FROM {table}")
+        connection.execute(text(statement), values)
+    yield
+    with context.store.database.transaction() as connection:
+        for restoring in _RESTORED.split(";"):
+            connection.exec_driver_sql(restoring)

@@ -1,14 +1,17 @@
-"""Stages on the real database, in this process."""
+"""Stages on the real database, in this process: scored, verified, within a budget."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import pytest
-from support.stages import work
+from support.jobs import execute
+from support.stages import tampered, work
 
+from buildarena_pipeline.agents import submission
+from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.catalog.specs import Budget, JobSpec, SweepSpec
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import Job
 from buildarena_worker.wiring import verifier
@@ -41,27 +44,23 @@ def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
     assert {"transcript", "rollout 0: trajectory", "score: indicator", "usage: cost_usd"} <= names
 
 
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize(
-    ("statement", "check"),
-    [
-        ("UPDATE jobs SET indicator = indicator + 1e-9", "score: indicator"),
-        ("UPDATE jobs SET input_tokens = input_tokens + 1", "usage: input_tokens"),
-        ("UPDATE rollouts SET machine_hash = repeat('0', 64)", "rollout 0: machine"),
-        (
-            "UPDATE journal SET reply = jsonb_set(reply::jsonb, '{text}', '\"changed\"')",
-            "replay",
-        ),
-        ("DELETE FROM journal WHERE sequence > 10", "replay"),
-    ],
-)
-def test_any_changed_figure_is_found(context, run, statement, check) -> None:
+TAMPERINGS = {
+    "UPDATE jobs SET indicator = indicator + 1e-9": "score: indicator",
+    "UPDATE jobs SET input_tokens = input_tokens + 1": "usage: input_tokens",
+    "UPDATE rollouts SET machine_hash = repeat('0', 64)": "rollout 0: machine",
+    """UPDATE journal SET reply = jsonb_set(reply::jsonb, '{text}', '"changed"')""": "replay",
+    "DELETE FROM journal WHERE sequence > 10": "replay",
+}
+
+
+def test_any_changed_figure_is_found(context, run, subtests) -> None:
     job = run()
-    with context.store.database.transaction() as connection:
-        connection.exec_driver_sql(statement)
-    report = verifier(context).verify(job.id).as_document()
-    assert not report["ok"]
-    assert check in {entry["name"] for entry in report["checks"] if not entry["ok"]}
+    for statement, check in TAMPERINGS.items():
+        with subtests.test(statement=statement), tampered(context, statement):
+            report = verifier(context).verify(job.id).as_document()
+            assert not report["ok"]
+            assert check in {entry["name"] for entry in report["checks"] if not entry["ok"]}
+    assert verifier(context).verify(job.id).as_document()["ok"]
 
 
 @pytest.mark.parametrize("model", ["builtin/idle", "builtin/random"])
@@ -118,3 +117,108 @@ def test_an_assembled_rocket_flies(context, run) -> None:
     job = run(task="lift-3")
     assert job.outcome == "success"
     assert verifier(context).verify(job.id).as_document()["ok"]
+
+
+ROCKET = (
+    ("start", {}),
+    ("attach_block_to", {"base_block": "1", "face": "A", "new_block": "Water Cannon"}),
+    ("shift_block", {"block_id": "2", "shift_real": [0.5, 0, 0]}),
+    ("shift_block", {"block_id": "2", "shift_real": [0.5, 0, 0]}),
+)
+
+
+def _submitted(context) -> str:
+    sessions = ExternalSessions(context)
+    job = sessions.open(task="lift-1", agent="me", seed=0, simulator="mujoco").job
+    for tool, arguments in ROCKET:
+        done = sessions.call(job.id, machine="main", tool=tool, arguments=arguments)
+        assert done.ok, done.feedback
+    sessions.submit(job.id)
+    work(context)
+    return job.id
+
+
+def test_a_machine_that_was_let_through_fails_verification(context, monkeypatch) -> None:
+    monkeypatch.setattr(submission, "broken_constraint", lambda *_: None)
+    job = _submitted(context)
+    assert context.store.jobs.get(job).outcome == "unsuccessful"
+    report = verifier(context).verify(job).as_document()
+    assert not report["ok"]
+    wrong = [check for check in report["checks"] if not check["ok"]]
+    assert [(check["name"], check["found"]) for check in wrong] == [("reason", "unjoined_parts")]
+
+
+def test_a_machine_that_was_refused_is_verified_as_refused(context) -> None:
+    job = _submitted(context)
+    assert context.store.jobs.get(job).reason == "unjoined_parts"
+    report = verifier(context).verify(job).as_document()
+    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+
+
+PAYLOAD = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}
+
+
+def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions) -> None:
+    spec = SweepSpec(**PAYLOAD, seeds=[0, 1, 2, 3, 4, 5], budget=Budget(max_requests=20))
+    sweep_id = submissions.submit_sweep(spec).sweep.id
+    work(context, threads=4)
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+    budget = context.store.budgets.get(sweep_id)
+    assert budget.spent_requests == 20
+    on_hold = context.store.jobs.page(limit=10, state="on_hold")
+    assert on_hold
+    assert all("max_requests is 20" in job.detail for job in on_hold if job.requests)
+
+    again = submissions.submit_sweep(
+        spec.model_copy(update={"budget": Budget(max_requests=10_000)}), resume=True
+    )
+    assert (again.sweep.id, again.resumed) == (sweep_id, True)
+    work(context, threads=4)
+    assert context.store.sweeps.progress(sweep_id).outcomes == {"success": 6}
+    jobs = context.store.jobs.page(limit=10)
+    # No reply was paid for twice: the budget knows of no request that the journals lack.
+    journaled = sum(len(context.store.journal.read(job.id)) for job in jobs)
+    assert context.store.budgets.get(sweep_id).spent_requests == journaled
+    assert journaled == sum(job.requests for job in jobs)
+
+
+def test_a_small_token_budget_stops_before_the_first_request(context, submissions) -> None:
+    spec = SweepSpec(**PAYLOAD, seeds=[0], budget=Budget(max_tokens=1000))
+    sweep_id = submissions.submit_sweep(spec).sweep.id
+    work(context, threads=4)
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+    assert context.store.budgets.get(sweep_id).spent_requests == 0
+    (job,) = context.store.jobs.page(limit=2)
+    assert job.outcome is None
+    assert "max_tokens is 1,000, 0 is spent" in job.detail
+
+
+def test_what_costs_nothing_goes_on_when_the_dollars_are_used_up(
+    context, submissions, monkeypatch
+) -> None:
+    monkeypatch.setenv("OPENAI_API_KEY", "never-sent")
+    models = ["openai/gpt-4o", "builtin/idle"]
+    spec = SweepSpec(
+        **{**PAYLOAD, "models": models}, seeds=[0, 1], budget=Budget(max_cost_usd=0.000001)
+    )
+    sweep_id = submissions.submit_sweep(spec).sweep.id
+    # The dollars are used up before anything else has begun.
+    execute(context, "UPDATE jobs SET queue = 'later' WHERE model = 'builtin/idle'")
+    work(context, queues=("construct",))
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+    execute(context, "UPDATE jobs SET queue = 'construct' WHERE model = 'builtin/idle'")
+    work(context)
+    progress = context.store.sweeps.progress(sweep_id)
+    assert progress.stages == {"construct on_hold": 2}
+    assert progress.outcomes == {"construction_failed": 2}
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+
+
+def test_resuming_a_finished_sweep_does_nothing_twice(context, submissions) -> None:
+    spec = SweepSpec(**PAYLOAD, seeds=[0])
+    first = submissions.submit_sweep(spec)
+    work(context, threads=4)
+    second = submissions.submit_sweep(spec, resume=True)
+    assert (second.sweep.id, second.added) == (first.sweep.id, 0)
+    other = submissions.submit_sweep(SweepSpec(**PAYLOAD, seeds=[0, 1]), resume=True)
+    assert (other.resumed, other.added) == (False, 1)

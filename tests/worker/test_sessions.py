@@ -1,14 +1,26 @@
+"""Sessions: plans, rounds, limits, and what a journal resumes."""
+
 from __future__ import annotations
 
 import itertools
+import math
+import random
 
 import pytest
 from support.providers.scripted import Recording, Scripted, call
 
 from buildarena_store import StaleLeaseError, Usage
 from buildarena_worker.session.messages import Completion, Message, ToolCall
-from buildarena_worker.session.results import Diverged, Failed, LimitReached, Superseded
+from buildarena_worker.session.results import (
+    Diverged,
+    Failed,
+    LimitReached,
+    SessionEnded,
+    Superseded,
+)
+from buildarena_worker.session.spending import Spending
 from buildarena_worker.workflow.phases import MAX_STEPS, steps_in
+from buildarena_worker.workflow.plan import PlanError, read_plan
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
 BLOCK = call("attach_block_to", base_block="1", face="A", new_block="Small Wooden Block", note="")
@@ -32,11 +44,12 @@ def test_seeds_vary_the_expert_s_design(play) -> None:
     assert documents[0] != documents[1]
 
 
-@pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
-def test_every_workflow_leads_the_expert_to_a_machine(play, workflow) -> None:
-    played = play(workflow=workflow)
-    assert played.suspended is not None, played.failure
-    assert played.suspended.machine.part_count > 12
+def test_every_workflow_leads_the_expert_to_a_machine(play, subtests) -> None:
+    for workflow in ["five-role", "guidance-builder", "builder"]:
+        with subtests.test(workflow=workflow):
+            played = play(workflow=workflow)
+            assert played.suspended is not None, played.failure
+            assert played.suspended.machine.part_count > 12
 
 
 def test_the_idle_model_builds_nothing(play) -> None:
@@ -90,15 +103,17 @@ def test_a_lost_lease_stops_the_session_before_it_pays(play) -> None:
     assert model.requests == []
 
 
-@pytest.mark.parametrize(
-    ("limits", "requests"),
-    [({"max_requests": 3}, 3), ({"max_tokens": 40}, 3), ({"max_seconds": 4}, 4)],
-)
-def test_limits_stop_a_session_within_one_request(play, limits, requests) -> None:
-    played = play(workflow="builder", client=Scripted(last=START), limits=limits)
-    assert isinstance(played.failure, LimitReached)
-    assert played.failure.limit in limits
-    assert len(played.entries) == requests
+def test_limits_stop_a_session_within_one_request(play, subtests) -> None:
+    for limits, requests in [
+        ({"max_requests": 3}, 3),
+        ({"max_tokens": 40}, 3),
+        ({"max_seconds": 4}, 4),
+    ]:
+        with subtests.test(limits=limits):
+            played = play(workflow="builder", client=Scripted(last=START), limits=limits)
+            assert isinstance(played.failure, LimitReached)
+            assert played.failure.limit in limits
+            assert len(played.entries) == requests
 
 
 def test_an_unreadable_plan_gets_one_more_try(play) -> None:
@@ -122,17 +137,18 @@ def test_too_many_sub_structures_fail_the_plan(play) -> None:
     assert "2 sub-structures, the task allows 1" in model.requests[1].messages[-1].text
 
 
-@pytest.mark.parametrize("role", ["reviewer", "guidance"])
-def test_an_objection_ends_the_session(play, role) -> None:
-    objection = call("raise_objection", reason="no rope")
-    draft = Completion(text="a drawing")
-    replies = [PLAN, draft, objection]
-    if role == "guidance":
-        replies = [PLAN, draft, Completion(text="TERMINATE"), draft, START, objection]
-    failure = play(client=Scripted(*replies)).failure
-    assert isinstance(failure, Failed)
-    assert failure.reason == "objection"
-    assert failure.detail == f"{role}: no rope"
+def test_an_objection_ends_the_session(play, subtests) -> None:
+    for role in ["reviewer", "guidance"]:
+        with subtests.test(role=role):
+            objection = call("raise_objection", reason="no rope")
+            draft = Completion(text="a drawing")
+            replies = [PLAN, draft, objection]
+            if role == "guidance":
+                replies = [PLAN, draft, Completion(text="TERMINATE"), draft, START, objection]
+            failure = play(client=Scripted(*replies)).failure
+            assert isinstance(failure, Failed)
+            assert failure.reason == "objection"
+            assert failure.detail == f"{role}: no rope"
 
 
 def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
@@ -146,9 +162,8 @@ def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
     assert [m.call_id for m in answers] == ["c1", "c2"]
 
 
-@pytest.mark.parametrize(
-    ("reply", "reason"),
-    [
+def test_bad_tool_calls_are_refused_with_one_class(play, subtests) -> None:
+    for reply, reason in [
         (call("fly", height=3), "unknown_action"),
         (
             Completion(text="", calls=(ToolCall(id="c", name="start", arguments="no json"),)),
@@ -162,11 +177,10 @@ def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
             call("attach_block_to", base_block="1", face="A", new_block="Torch", note=""),
             "initialization_absent",
         ),
-    ],
-)
-def test_bad_tool_calls_are_refused_with_one_class(play, reply, reason) -> None:
-    played = play(workflow="builder", client=Scripted(reply))
-    assert played.session.transcript.refusals == {reason: 1}
+    ]:
+        with subtests.test(reply=reply):
+            played = play(workflow="builder", client=Scripted(reply))
+            assert played.session.transcript.refusals == {reason: 1}
 
 
 def test_an_empty_reply_is_heard_as_no_answer(play) -> None:
@@ -222,9 +236,8 @@ def spoken(play, guidance: str, *builder: Completion) -> list[str]:
     return [turn.role for turn in turns if turn.stage == "build"][2:]
 
 
-@pytest.mark.parametrize(
-    ("guidance", "builder", "turns"),
-    [
+def test_numbered_steps_are_carried_out_one_after_the_other(play, subtests) -> None:
+    for guidance, builder, turns in [
         (STEPS, [START, BLOCK], 3),
         ("First\n  1) start,\n  2) a block.", [START, BLOCK], 2),
         ("Start, then 2. a block.", [START, BLOCK], 1),
@@ -232,12 +245,13 @@ def spoken(play, guidance: str, *builder: Completion) -> list[str]:
         # What is refused, and what is no call, is read by guidance at once.
         (STEPS, [START, START, BLOCK], 2),
         (STEPS, [Completion(text="How?"), START], 1),
-    ],
-)
-def test_numbered_steps_are_carried_out_one_after_the_other(play, guidance, builder, turns) -> None:
-    further = call("attach_block_to", base_block="2", face="E", new_block="Small Wooden Block")
-    roles = spoken(play, guidance, *builder, further)
-    assert roles[: turns + 1] == ["builder"] * turns + ["guidance"]
+    ]:
+        with subtests.test(guidance=guidance):
+            further = call(
+                "attach_block_to", base_block="2", face="E", new_block="Small Wooden Block"
+            )
+            roles = spoken(play, guidance, *builder, further)
+            assert roles[: turns + 1] == ["builder"] * turns + ["guidance"]
 
 
 def test_steps_are_counted_up_to_a_bound(subtests) -> None:
@@ -269,30 +283,18 @@ def test_a_builders_view_grows_through_its_steps_and_begins_anew(play) -> None:
     assert max(len(view) for view in views) <= 2 + 2 * MAX_STEPS
 
 
-@pytest.mark.parametrize(
-    ("text", "ends"),
-    [
+def test_a_stage_ends_with_the_word_alone_on_the_last_line(play, subtests) -> None:
+    for text, ends in [
         ("TERMINATE", True),
         ("All is as drawn.\n\n**TERMINATE**.\n", True),
         ("When it is done I shall say TERMINATE.", False),
         ("TERMINATE\nOr rather, one more block.", False),
         ("Not yet: do not TERMINATE", False),
-    ],
-)
-def test_a_stage_ends_with_the_word_alone_on_the_last_line(play, text, ends) -> None:
-    model = Scripted(START, BLOCK, Completion(text=text), last=Completion(text="TERMINATE"))
-    played = play(workflow="builder", client=model)
-    assert (len(played.entries) == 3) == ends
-
-
-def test_two_replies_of_one_role_are_never_next_to_each_other(play) -> None:
-    model = Scripted(START, Completion(text="Hm."), Completion(text="Hm again."), BLOCK)
-    play(workflow="builder", client=model)
-    for request in model.requests:
-        roles = [m.role for m in request.messages]
-        assert roles[:2] == ["system", "user"]
-        assert all(pair != ("assistant", "assistant") for pair in itertools.pairwise(roles))
-        assert roles[-1] in {"user", "tool"}
+    ]:
+        with subtests.test(text=text):
+            model = Scripted(START, BLOCK, Completion(text=text), last=Completion(text="TERMINATE"))
+            played = play(workflow="builder", client=model)
+            assert (len(played.entries) == 3) == ends
 
 
 def test_views_only_grow(play) -> None:
@@ -340,3 +342,54 @@ class Budgets:
 
     def charge_lost(self, _: object, usage: Usage) -> None:
         self.lost.append(usage)
+
+
+GOOD = """<building_plan><overall_structure>all</overall_structure><sub_structures>
+<sub_structure><name>deck</name><description>flat & long</description></sub_structure>
+<sub_structure><name>tower</name><function>holds < ropes</function></sub_structure>
+</sub_structures></building_plan>"""
+
+
+def test_a_plan_is_found_among_other_words() -> None:
+    plan = read_plan(f"Thinking…\n{GOOD}\nDone.")
+    assert [part.name for part in plan.sub_structures] == ["deck", "tower"]
+    assert plan.sub_structures[0].text == "- description: flat & long"
+    assert plan.overall == "all"
+
+
+def test_the_last_plan_counts() -> None:
+    assert read_plan(GOOD.replace("deck", "draft") + GOOD).sub_structures[0].name == "deck"
+
+
+def test_what_is_missing_is_said(subtests) -> None:
+    for text, says in [
+        ("", "no <building_plan>"),
+        ("<building_plan></building_plan>", "no <sub_structure>"),
+        (GOOD.replace("overall_structure", "overall"), "no <overall_structure>"),
+        (GOOD.replace("<name>deck</name>", ""), "sub-structure 1 has no <name>"),
+        (GOOD.replace("tower", "deck"), "'deck' stands for several"),
+        (GOOD.replace("<function>holds < ropes</function>", ""), "'tower' says nothing"),
+    ]:
+        with subtests.test(text=text), pytest.raises(PlanError, match=says):
+            read_plan(text)
+
+
+def test_a_request_that_did_not_come_in_time_reaches_the_limit_whatever_was_used_before() -> None:
+    rng = random.Random(4)
+    for _ in range(2000):
+        limit = rng.choice([0.1, 1.5, 60, 1e9]) * rng.uniform(0.5, 2)
+        spending = Spending({"max_seconds": limit}, seconds=limit * rng.random())
+        left = spending.seconds_left
+        latency_s = spending.to_the_end(left * rng.choice([1e-9, 0.5, 1.0, 1.01]))
+        spending.seconds += latency_s
+        assert latency_s <= left * 1.01 + 1e-6 * limit
+        with pytest.raises(SessionEnded, match="max_seconds"):
+            spending.require_room()
+
+
+def test_without_a_limit_there_is_always_time(subtests) -> None:
+    for limits in [{}, {"max_seconds": None}]:
+        with subtests.test(limits=limits):
+            spending = Spending(limits, seconds=1e6)
+            assert spending.seconds_left == math.inf
+            assert spending.to_the_end(2.5) == 2.5

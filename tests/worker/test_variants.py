@@ -1,20 +1,28 @@
+"""Variants of sessions: closed loops, packs, modules that are looked up, given machines."""
+
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from support.providers.scripted import Scripted, call
+from support.machines.repairs import faulty
+from support.providers.scripted import Recording, Scripted, call
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_geometry import Machine
+from buildarena_benchmark.families.given import edits_between
+from buildarena_geometry import LOOKUP, Machine, module_set, tool_definitions
 from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
 from buildarena_pipeline.errors import PermanentError, StartupError
+from buildarena_pipeline.replays.from_turns import replay_of_turns
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.builtin.reading import read_situation
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.results import Failed
 from buildarena_worker.workflow import Workflows
+from buildarena_worker.workflow.phases import MAX_LOOKUPS
 from buildarena_worker.workflow.rounds import Loop
 
 START = call("start", init_shift=[0, 0, 0], init_rotation=[0, 0, 0], note="")
@@ -181,3 +189,132 @@ def test_the_expert_ends_work_on_tasks_it_does_not_know() -> None:
     )
     assert read_situation(request).task == "my-task"
     assert "TERMINATE" in expert(request).text
+
+
+LOOKUPS = {tool.name for tool in tool_definitions([LOOKUP])}
+HINGE = module_set("workshop")["Hinge"]
+
+
+def task(how, modules="workshop"):
+    given = builtin_tasks()["transport-1"]
+    update = {"modules": modules, "module_list": how}
+    return replace(given, constraints=given.constraints.model_copy(update=update))
+
+
+def texts(request):
+    return "\n".join(message.text for message in request.messages)
+
+
+def test_the_expert_plays_as_well_where_it_looks_up(play, subtests):
+    for workflow in ["five-role", "guidance-builder", "builder"]:
+        with subtests.test(workflow=workflow):
+            machines = {}
+            for how in ("inline", "on_demand"):
+                model = Recording()
+                played = play(task=task(how), client=model, workflow=workflow)
+                assert played.suspended is not None, played.failure
+                machines[how] = played.session.machine
+                held = {tool.name for request in model.requests for tool in request.tools}
+                assert held >= LOOKUPS if how == "on_demand" else not held & LOOKUPS
+                told = any(HINGE.description in texts(request) for request in model.requests)
+                assert told == (how == "inline")
+            assert machines["inline"] == machines["on_demand"]
+
+
+def test_what_one_role_looks_up_no_other_reads(play):
+    model = Recording()
+    played = play(task=task("on_demand"), client=model)
+    wheel = module_set("workshop")["Powered Wheel"].description
+    readers = {
+        turn.role
+        for turn, request in zip(played.session.transcript.turns, model.requests, strict=True)
+        if wheel in texts(request) and turn.role != "controller"
+    }
+    # The controller is told of what it drives, whatever was looked up.
+    assert readers == {"planner", "drafter"}
+
+
+def test_builders_that_only_carry_out_have_no_lookups(play):
+    model = Recording()
+    played = play(task=task("on_demand"), client=model)
+    for turn, request in zip(played.session.transcript.turns, model.requests, strict=True):
+        held = {tool.name for tool in request.tools} & LOOKUPS
+        assert held == (
+            LOOKUPS if turn.role in ("planner", "drafter", "reviewer", "guidance") else set()
+        )
+
+
+def test_a_role_that_only_looks_up_comes_to_its_end(play):
+    model = Scripted(last=call("list_modules", category="basic"))
+    played = play(task=task("on_demand"), client=model)
+    assert played.failure.reason == "plan_unreadable"
+    assert len(model.requests) == 5 * (1 + MAX_LOOKUPS)
+
+
+def test_a_lookup_that_is_refused_says_what_there_is(play):
+    model = Scripted(
+        call("list_modules", category="gears"),
+        call("describe_module", module="Hinje, Swivel"),
+        call("describe_module", module="hinge, SWIVEL"),
+    )
+    played = play(task=task("on_demand"), client=model, workflow="builder")
+    answers = [
+        action.feedback for turn in played.session.transcript.turns for action in turn.actions
+    ]
+    assert answers[0].startswith('There is no category "gears". Categories: basic, locomotion')
+    assert '"Hinje"' in answers[1]
+    assert "Hinge" in answers[1].partition("Modules: ")[2]
+    assert HINGE.description in answers[2]
+    assert module_set("workshop")["Swivel"].description in answers[2]
+
+
+def test_a_told_session_has_no_such_tools(play):
+    model = Scripted(call("list_modules", category="basic"))
+    played = play(task=task("told"), client=model, workflow="builder")
+    action = played.session.transcript.turns[0].actions[0]
+    assert (action.ok, action.reason) == (False, "unknown_action")
+
+
+def test_further_types_are_built_and_replayed(play):
+    attach = {"base_block": "1", "face": "A", "new_block": "Hinge"}
+    model = Scripted(
+        call("start"),
+        call("attach_block_to", **attach),
+        call("attach_block_to", **{**attach, "face": "B", "new_block": "Rocket"}),
+        Completion(text="TERMINATE"),
+    )
+    played = play(task=task("told"), client=model, workflow="builder")
+    turns = played.session.transcript.turns
+    assert [turn.actions[0].ok for turn in turns[:3]] == [True, True, False]
+    assert "Rocket" not in turns[2].actions[0].feedback.partition("Modules: ")[2]
+    again = replay_of_turns(json.loads(played.session.transcript.to_json())["turns"])
+    assert again.complete
+    assert [block.module.name for block in again.machine.blocks.values()][1:] == ["Hinge"]
+
+
+def test_builders_begin_with_the_machine_of_the_seed_and_nobody_drives(play, subtests) -> None:
+    for workflow in ["five-role", "builder", "guidance-builder"]:
+        for seed in [0, 9]:
+            with subtests.test(workflow=workflow, seed=seed):
+                played = play("builtin/expert", task="repair-1", seed=seed, workflow=workflow)
+                assert played.suspended is not None, played.failure
+                task = builtin_tasks()["repair-1"].drawn(seed)
+                assert edits_between(faulty(task), played.suspended.machine) == 3
+                assert played.suspended.controls is None
+                assert all(turn.role != "controller" for turn in played.session.transcript.turns)
+
+
+def test_those_without_tools_are_told_the_machine(play) -> None:
+    played = play("builtin/expert", task="repair-1", seed=3)
+    task = builtin_tasks()["repair-1"].drawn(3)
+    summary = faulty(task).act("get_machine_summary", {}).text
+    assert summary in played.session.statement
+    assert "UpArrow" in played.session.statement
+    assert summary not in play("builtin/expert", task="repair-1", seed=4).session.statement
+
+
+def test_an_idle_builder_leaves_it_as_it_is(play) -> None:
+    played = play("builtin/idle", task="repair-1", workflow="builder")
+    task = builtin_tasks()["repair-1"].drawn(0)
+    if played.suspended is not None:
+        assert edits_between(faulty(task), played.suspended.machine) == 0

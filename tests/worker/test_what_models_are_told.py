@@ -9,54 +9,20 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 
 import pytest
-from support.providers.scripted import Recording
+from support.providers.scripted import Recording, call
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import load_catalogue, tool_definitions
-from buildarena_worker.session.messages import Request
+from buildarena_worker.builtin import BuiltinClient
+from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.workflow.machine_tools import parts_of
+from buildarena_worker.workflow.plan import read_plan
 from buildarena_worker.workflow.rounds import Loop
 
-TASKS = ("support-1", "support-3", "transport-1", "transport-2", "lift-2", "lift-3")
+TASKS = ("support-3", "transport-1", "lift-3")
 WORKFLOWS = ("five-role", "guidance-builder", "builder")
 TOOLS = {tool.name for tool in tool_definitions()} | {"raise_objection"}
 MODULES = [m for m in load_catalogue().values() if m.kind not in {"start", "cargo"}]
-FRAME = "x points east, y north, z up"
-START = "mass 0.25"
-
-FACTS: dict[tuple[str, str], tuple[str, ...]] = {
-    ("plan", "planner"): (FRAME, START, "middle of a free face", "<motion_control>"),
-    ("draft", "drafter"): (FRAME, START, "You may move blocks to make the plan fit", "side"),
-    ("draft", "reviewer"): (FRAME, START, "half the sum of their sizes", "block by block"),
-    ("build", "guidance"): (
-        FRAME,
-        START,
-        "twist_block",
-        "clockwise seen from outside",
-        "shift_block",
-        "0.5",
-        "flip_spin",
-        "remove_block",
-        "reset",
-        "get_machine_summary",
-        "get_block_details",
-    ),
-    ("build", "builder"): (FRAME, "state in a few lines what each of your tools does"),
-    ("build", "engineer"): (FRAME, START, "`start`"),
-    ("refine", "guidance"): (FRAME, "twist_block", "shift_block", "flip_spin"),
-    ("assemble", "guidance"): (FRAME, "Brace", "Winch", "add_machine", "several times"),
-    ("assemble", "builder"): (FRAME, "Brace", "several times"),
-    ("control", "controller"): (
-        "UpArrow",
-        "spinning_forward",
-        "## Plan",
-        "no key",
-        "100 rpm",
-        "torque and brake up to 20",
-        "Gravity is",
-    ),
-}
-"""What a role must be able to read, by phase and role."""
 
 
 @pytest.fixture(scope="module")
@@ -153,17 +119,6 @@ def test_nobody_is_told_of_modules_that_the_task_does_not_allow(play) -> None:
         object.__setattr__(task, "constraints", constraints.model_copy(update={"modules": None}))
 
 
-def test_each_role_is_told_what_its_work_needs(play, played_requests) -> None:
-    seen = set()
-    for task, where, request in all_requests(play, played_requests):
-        text = "\n".join(_told(request))
-        seen.add(where)
-        for fact in FACTS.get(where, ()):
-            assert fact in text, (task, where, fact)
-    # The controller comes after a simulation; it has a test of its own.
-    assert set(FACTS) - seen <= {("control", "controller"), ("refine", "guidance")}
-
-
 def test_who_plans_or_works_without_a_plan_knows_every_module(play, played_requests) -> None:
     for task, workflow in itertools.product(TASKS, WORKFLOWS):
         for stage, role, request in played_requests(play, task, workflow):
@@ -174,24 +129,29 @@ def test_who_plans_or_works_without_a_plan_knows_every_module(play, played_reque
                     assert re.search(rf"{module.name}.*mass {module.mass:g}", text), (task, role)
 
 
-@pytest.mark.parametrize("task", ["mechanisms-1", "mechanisms-3", "flight-1", "support-1"])
-def test_who_works_from_a_plan_knows_the_modules_that_it_names(play, task) -> None:
-    model = Recording()
-    played = play(task=task, client=model)
-    catalogue = builtin_tasks()[task].constraints.catalogue
-    (plan,) = (turn.text for turn in played.session.transcript.turns if turn.role == "planner")
-    for turn, request in zip(played.session.transcript.turns, model.requests, strict=True):
-        text = "\n".join(_told(request))
-        described = {name for name, module in catalogue.items() if module.description in text}
-        if turn.role in {"drafter", "reviewer"}:
-            named = {name for name in catalogue if name in plan.replace("Sqr Balloon", "")}
-            assert named <= described
-            # The list as a whole is told once in a session.
-            assert len(described) < len(catalogue) or len(catalogue) <= len(named) + 1
-            for name, module in catalogue.items():
-                assert module.kind != "connector" or name in text
-        elif turn.role in {"builder", "guidance"}:
-            assert not described
+def test_who_works_from_a_plan_knows_the_modules_that_it_names(play, subtests) -> None:
+    for task in ["mechanisms-3", "support-1"]:
+        with subtests.test(task=task):
+            model = Recording()
+            played = play(task=task, client=model)
+            catalogue = builtin_tasks()[task].constraints.catalogue
+            (plan,) = (
+                turn.text for turn in played.session.transcript.turns if turn.role == "planner"
+            )
+            for turn, request in zip(played.session.transcript.turns, model.requests, strict=True):
+                text = "\n".join(_told(request))
+                described = {
+                    name for name, module in catalogue.items() if module.description in text
+                }
+                if turn.role in {"drafter", "reviewer"}:
+                    named = {name for name in catalogue if name in plan.replace("Sqr Balloon", "")}
+                    assert named <= described
+                    # The list as a whole is told once in a session.
+                    assert len(described) < len(catalogue) or len(catalogue) <= len(named) + 1
+                    for name, module in catalogue.items():
+                        assert module.kind != "connector" or name in text
+                elif turn.role in {"builder", "guidance"}:
+                    assert not described
 
 
 def test_a_plans_modules_are_found_by_their_names(subtests) -> None:
@@ -258,32 +218,31 @@ def test_the_controller_keeps_its_past(play, rollout) -> None:
         assert len(lines) == 1, block.id
         if block.module.actions:
             assert all(action in lines[0] for action in block.module.actions)
-    for fact in FACTS["control", "controller"]:
-        assert fact in first[0].text + opening
 
 
-@pytest.mark.parametrize("keep", ["KEEP", "`KEEP`.", "**KEEP**\n"])
-@pytest.mark.parametrize("succeeds_at", [0, 1])
-def test_a_trial_that_succeeded_may_be_kept(play, rollout, keep, succeeds_at) -> None:
-    model = Recording()
-    model.complete = _keeping(model.complete, keep)
-    records = [
-        rollout(number, success=number == succeeds_at, indicator=5.0 + number)
-        for number in range(succeeds_at + 1)
-    ]
-    played = play(task="transport-1", client=model, rollouts=records)
-    assert played.end is not None, played.failure
-    assert played.end.best.number == succeeds_at
-    asked = [r for r in model.requests if _role(r) == "controller"]
-    assert len(asked) == succeeds_at + 2
-    last = asked[-1].messages[-1].text
-    assert "KEEP" in last
-    assert "It succeeded." in last
-    for earlier in asked[1:-1]:
-        text = earlier.messages[-1].text
-        assert "KEEP" not in text
-        assert "Criterion: " in text
-        assert "min distance 10" in text
+def test_a_trial_that_succeeded_may_be_kept(play, rollout, subtests) -> None:
+    for keep in ["KEEP", "`KEEP`.", "**KEEP**\n"]:
+        for succeeds_at in [0, 1]:
+            with subtests.test(keep=keep, succeeds_at=succeeds_at):
+                model = Recording()
+                model.complete = _keeping(model.complete, keep)
+                records = [
+                    rollout(number, success=number == succeeds_at, indicator=5.0 + number)
+                    for number in range(succeeds_at + 1)
+                ]
+                played = play(task="transport-1", client=model, rollouts=records)
+                assert played.end is not None, played.failure
+                assert played.end.best.number == succeeds_at
+                asked = [r for r in model.requests if _role(r) == "controller"]
+                assert len(asked) == succeeds_at + 2
+                last = asked[-1].messages[-1].text
+                assert "KEEP" in last
+                assert "It succeeded." in last
+                for earlier in asked[1:-1]:
+                    text = earlier.messages[-1].text
+                    assert "KEEP" not in text
+                    assert "Criterion: " in text
+                    assert "min distance 10" in text
 
 
 def _keeping(complete, keep):
@@ -307,3 +266,85 @@ def test_before_a_success_nothing_is_kept(play) -> None:
     )
     played = play(task="transport-1", client=model)
     assert played.failure.reason == "control_invalid"
+
+
+class Spoiling:
+    """The expert, until the machine is to be refined: then it is spoilt at guidance's request."""
+
+    def __init__(self, *, guidance: Completion, builder: Completion) -> None:
+        self._expert = BuiltinClient("expert")
+        self._guidance, self._builder = guidance, builder
+        self._left = 3
+
+    def complete(self, request: Request, options: object = None) -> Completion:
+        del options
+        text = "\n".join(message.text for message in request.messages)
+        if "## Refinement of: " not in text:
+            return self._expert.complete(request)
+        builds = "# Role: builder" in text
+        if not builds and self._left == 0:
+            reply = self._guidance
+        else:
+            reply = self._builder if builds else Completion(text="Do it.")
+            self._left -= not builds
+        return reply
+
+
+def test_a_refinement_that_fails_leaves_the_machine_as_it_was(play, subtests) -> None:
+    for guidance, spoils in [
+        (call("raise_objection", reason="it is all wrong"), False),
+        (Completion(text="TERMINATE"), True),
+        (Completion(text="Go on and on."), False),
+    ]:
+        with subtests.test(guidance=guidance):
+            plain = play(task="transport-1").session
+            away = call("shift_block", block_id="2", shift_real=[0.0, 0.0, 0.5])
+            model = Spoiling(guidance=guidance, builder=away)
+            played = play(task="transport-1", client=model)
+            assert played.suspended is not None, played.failure
+            kept = played.session.machine.to_document()["blocks"]
+            if spoils:
+                # Three shifts part the block, which the task's rules forbid.
+                assert played.session.transcript.actions > plain.transcript.actions
+            assert kept == plain.machine.to_document()["blocks"]
+
+
+def test_a_refinement_within_the_rules_is_taken(play) -> None:
+    plain = play(task="transport-1").session.machine
+    wheel = next(block.id for block in plain.blocks.values() if block.module.spins)
+    model = Spoiling(
+        guidance=Completion(text="TERMINATE"), builder=call("flip_spin", block_id=wheel)
+    )
+    refined = play(task="transport-1", client=model).session.machine
+    assert refined.blocks[wheel].flipped != plain.blocks[wheel].flipped
+
+
+def test_plans_are_read_in_the_published_form() -> None:
+    plan = read_plan(
+        """<building_plan><overall_structure>
+        <description>A cart</description><functionality>It rolls</functionality>
+        <assembly>none</assembly><motion_control>two wheels</motion_control></overall_structure>
+        <sub_structures>
+        <sub_structure_1><name>body</name><description>a beam</description>
+        <assembly>in a row</assembly></sub_structure_1>
+        <sub_structure_2><name>tail</name><function>drags</function></sub_structure_2>
+        </sub_structures></building_plan>"""
+    )
+    assert [part.name for part in plan.sub_structures] == ["body", "tail"]
+    assert "in a row" in plan.sub_structures[0].text
+    assert (plan.assembly, plan.motion_control) == ("none", "two wheels")
+    assert plan.text == "A cart\nIt rolls\nAssembly: none\nMotion control: two wheels"
+
+
+def test_plans_are_read_in_our_form() -> None:
+    plan = read_plan(
+        """<building_plan><overall_structure>A cart that rolls</overall_structure>
+        <motion_control>one wheel</motion_control><sub_structures><sub_structure>
+        <name>body</name><motion_control>the wheel turns</motion_control></sub_structure>
+        </sub_structures></building_plan>"""
+    )
+    assert (plan.overall, plan.assembly, plan.motion_control) == (
+        "A cart that rolls",
+        "",
+        "one wheel",
+    )

@@ -10,7 +10,7 @@ from sqlalchemy import text
 from support.player import Player
 from support.providers.scripted import Recording
 from support.servers.live_api import changed
-from support.stages import work
+from support.stages import tampered, work
 
 from buildarena_benchmark.leaderboard import summarise
 from buildarena_geometry import Machine
@@ -103,24 +103,23 @@ def test_what_breaks_a_rule_is_tried_in_no_world(context, submissions) -> None:
     assert (job.success, rollouts(context, job)) == (False, ([], []))
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize(
-    "tampering",
-    [
-        "DELETE FROM rollouts WHERE job_id = :job AND number = 3",
-        SAME_TWICE,
-        "UPDATE rollouts SET seed = seed + 1 WHERE job_id = :job AND number = 3",
-        "UPDATE rollouts SET success = NOT success WHERE job_id = :job AND number = 3",
-        "UPDATE jobs SET metrics = jsonb_set(metrics, '{robustness}', '0.5') WHERE id = :job",
-        "UPDATE jobs SET metrics = metrics - 'robust_indicator' WHERE id = :job",
-    ],
+TAMPERINGS = (
+    "DELETE FROM rollouts WHERE job_id = :job AND number = 3",
+    SAME_TWICE,
+    "UPDATE rollouts SET seed = seed + 1 WHERE job_id = :job AND number = 3",
+    "UPDATE rollouts SET success = NOT success WHERE job_id = :job AND number = 3",
+    "UPDATE jobs SET metrics = jsonb_set(metrics, '{robustness}', '0.5') WHERE id = :job",
+    "UPDATE jobs SET metrics = metrics - 'robust_indicator' WHERE id = :job",
 )
-def test_no_world_can_be_left_out_or_changed(context, submissions, tampering) -> None:
+
+
+@pytest.mark.ci
+def test_no_world_can_be_left_out_or_changed(context, submissions, subtests) -> None:
     job = tried(context, submissions)
-    with context.store.database.transaction() as connection:
-        connection.execute(text(tampering), {"job": job.id})
-    assert verdict(context, context.store.jobs.get(job.id)) == "refuted"
+    for tampering in TAMPERINGS:
+        with subtests.test(tampering=tampering), tampered(context, tampering, job=job.id):
+            assert verdict(context, context.store.jobs.get(job.id)) == "refuted"
+    assert verdict(context, job) == "verified"
 
 
 @pytest.mark.ci
@@ -198,12 +197,13 @@ def test_every_role_is_told_of_the_worlds_that_score_it(subtests) -> None:
             )
 
 
-@pytest.mark.parametrize("worlds", [0, 1, 5])
-def test_agents_are_told_of_the_worlds_that_score_them(context, worlds) -> None:
-    opened = ExternalSessions(context).open(
-        task="lift-1", agent="told", seed=worlds, simulator="pybullet", worlds=worlds
-    )
-    assert_tells(told_of_worlds(opened.briefing), worlds)
+def test_agents_are_told_of_the_worlds_that_score_them(context, subtests) -> None:
+    for worlds in [0, 1, 5]:
+        with subtests.test(worlds=worlds):
+            opened = ExternalSessions(context).open(
+                task="lift-1", agent="told", seed=worlds, simulator="pybullet", worlds=worlds
+            )
+            assert_tells(told_of_worlds(opened.briefing), worlds)
 
 
 def assert_tells(told: str, worlds: int) -> None:

@@ -1,20 +1,31 @@
+"""Whole sessions over every protocol, retries, keys."""
+
 from __future__ import annotations
 
+import itertools
+import os
 import random
+import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 from support.providers.stand_in import ProviderStandIn
 
 from buildarena_geometry import ToolDefinition
-from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry, load_registry
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_store import Usage
+from buildarena_worker.builtin.expert import reply as expert
+from buildarena_worker.providers.keys import key_report
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed
+from buildarena_worker.workflow.rounds import Loop
 
 PROTOCOLS = ["openai", "anthropic", "google"]
 
@@ -28,25 +39,28 @@ def ask(text: str = "hello") -> Request:
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("protocol", PROTOCOLS)
-def test_a_whole_session_over_http_equals_the_one_played_inside(play, protocol, client) -> None:
-    with ProviderStandIn() as standin:
-        over_http = play(client=client(standin, protocol), workflow="five-role")
-    inside = play(workflow="five-role")
-    assert over_http.suspended is not None, over_http.failure
-    assert over_http.suspended.machine.to_document() == inside.suspended.machine.to_document()
-    used = sum((entry.usage for entry in over_http.entries), Usage())
-    counts = standin.counts
-    assert used.requests == counts.requests == counts.answered
-    assert used.input_tokens == counts.input_tokens
-    assert used.output_tokens == counts.output_tokens
-    assert used.cached_tokens == counts.cached_tokens
-    wanted = (
-        2.0 * (counts.input_tokens - counts.cached_tokens)
-        + 0.5 * counts.cached_tokens
-        + 8.0 * counts.output_tokens
-    ) / 1e6
-    assert float(used.cost_usd) == pytest.approx(wanted, abs=1e-6 * counts.requests)
+def test_a_whole_session_over_http_equals_the_one_played_inside(play, client, subtests) -> None:
+    for protocol in PROTOCOLS:
+        with subtests.test(protocol=protocol):
+            with ProviderStandIn() as standin:
+                over_http = play(client=client(standin, protocol), workflow="five-role")
+            inside = play(workflow="five-role")
+            assert over_http.suspended is not None, over_http.failure
+            assert (
+                over_http.suspended.machine.to_document() == inside.suspended.machine.to_document()
+            )
+            used = sum((entry.usage for entry in over_http.entries), Usage())
+            counts = standin.counts
+            assert used.requests == counts.requests == counts.answered
+            assert used.input_tokens == counts.input_tokens
+            assert used.output_tokens == counts.output_tokens
+            assert used.cached_tokens == counts.cached_tokens
+            wanted = (
+                2.0 * (counts.input_tokens - counts.cached_tokens)
+                + 0.5 * counts.cached_tokens
+                + 8.0 * counts.output_tokens
+            ) / 1e6
+            assert float(used.cost_usd) == pytest.approx(wanted, abs=1e-6 * counts.requests)
 
 
 FAULTS = [
@@ -56,13 +70,14 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("protocol", "fault"), FAULTS)
-def test_passing_faults_are_retried(protocol, fault, client) -> None:
-    with ProviderStandIn("idle", fault=lambda n: fault if n < 2 else None) as standin:
-        answer = client(standin, protocol).complete(ask())
-    assert answer.text == "TERMINATE"
-    assert answer.attempts == 3
-    assert answer.usage.requests == 1
+def test_passing_faults_are_retried(client, subtests) -> None:
+    for protocol, fault in FAULTS:
+        with subtests.test(protocol=protocol):
+            with ProviderStandIn("idle", fault=lambda n: fault if n < 2 else None) as standin:
+                answer = client(standin, protocol).complete(ask())
+            assert answer.text == "TERMINATE"
+            assert answer.attempts == 3
+            assert answer.usage.requests == 1
 
 
 def test_retries_are_bounded(client) -> None:
@@ -82,18 +97,17 @@ def test_a_silent_provider_times_out(client) -> None:
     assert answer.attempts == 2
 
 
-@pytest.mark.parametrize(
-    ("fault", "reason"), [("401", "bad_credentials"), ("404", "model_not_found")]
-)
-def test_refusals_that_stay_are_not_retried(fault, reason, client) -> None:
-    with (
-        ProviderStandIn("idle", fault=lambda _: fault) as standin,
-        pytest.raises(PermanentError) as caught,
-    ):
-        client(standin).complete(ask())
-    assert standin.counts.requests == 1
-    assert caught.value.reason in {reason, "request_refused"}
-    assert "secret" not in str(caught.value)
+def test_refusals_that_stay_are_not_retried(client, subtests) -> None:
+    for fault, reason in [("401", "bad_credentials"), ("404", "model_not_found")]:
+        with subtests.test(fault=fault):
+            with (
+                ProviderStandIn("idle", fault=lambda _: fault) as standin,
+                pytest.raises(PermanentError) as caught,
+            ):
+                client(standin).complete(ask())
+            assert standin.counts.requests == 1
+            assert caught.value.reason in {reason, "request_refused"}
+            assert "secret" not in str(caught.value)
 
 
 def test_a_missing_key_is_named() -> None:
@@ -160,12 +174,15 @@ def test_an_overflowing_context_is_the_models_own_failure(play, client) -> None:
     assert standin.counts.requests == 1
 
 
-@pytest.mark.parametrize("finish", ["length", "content_filter"])
-def test_cut_and_filtered_replies_are_marked_in_the_transcript(play, client, finish) -> None:
-    with ProviderStandIn(respond=lambda _: Completion(text="half a", finish=finish)) as standin:
-        played = play(client=client(standin))
-    assert [turn.finish for turn in played.session.transcript.turns] == [finish] * 5
-    assert played.failure.reason == "plan_unreadable"
+def test_cut_and_filtered_replies_are_marked_in_the_transcript(play, client, subtests) -> None:
+    for finish in ["length", "content_filter"]:
+        with subtests.test(finish=finish):
+            with ProviderStandIn(
+                respond=lambda _: Completion(text="half a", finish=finish)
+            ) as standin:
+                played = play(client=client(standin))
+            assert [turn.finish for turn in played.session.transcript.turns] == [finish] * 5
+            assert played.failure.reason == "plan_unreadable"
 
 
 def test_sessions_get_through_a_provider_that_fails_one_request_in_five(play, client) -> None:
@@ -186,3 +203,139 @@ def test_sessions_get_through_a_provider_that_fails_one_request_in_five(play, cl
     assert max(tries) <= policy.attempts
     assert sum(tries) == standin.counts.requests
     assert sum(tries) > 1.1 * len(tries)
+
+
+def speakers(protocol: str, body: dict[str, Any]) -> list[str]:
+    """Who speaks, message by message, as the protocol carries it."""
+    if protocol == "google":
+        kinds = {"model": "assistant", "user": "user"}
+        return [
+            "tool" if "functionResponse" in content["parts"][0] else kinds[content["role"]]
+            for content in body["contents"]
+        ]
+    return [m["role"] for m in body["messages"] if m["role"] != "system"]
+
+
+def is_strict(roles: list[str]) -> bool:
+    """Whether nobody speaks twice in a row; a tool's result stands between a call and the next."""
+    pairs = set(itertools.pairwise(roles))
+    return (
+        roles[0] == "user"
+        and roles[-1] in {"user", "tool"}
+        and not pairs & {("user", "user"), ("assistant", "assistant")}
+    )
+
+
+def awkward(request: Request) -> Completion:
+    """The expert, but its first plan and its first program can't be read."""
+    own = [m for m in request.messages if m.role == "assistant"]
+    role = request.messages[0].text.splitlines()[0]
+    if role in {"# Role: planner", "# Role: controller"} and not own:
+        return Completion(text="Let me think aloud first.")
+    return expert(request)
+
+
+@pytest.mark.ci
+def test_a_driven_session_alternates_through_three_attempts(
+    play, rollout, client, subtests
+) -> None:
+    for protocol in PROTOCOLS:
+        with subtests.test(protocol=protocol):
+            records = [rollout(n, success=False, indicator=float(n)) for n in range(2)]
+            with ProviderStandIn(respond=awkward) as standin:
+                played = play(
+                    task="transport-1", client=client(standin, protocol), rollouts=records
+                )
+            assert played.suspended is not None, played.failure
+            assert played.suspended.number == 2
+            controls = [turn for turn in played.session.transcript.turns if turn.stage == "control"]
+            assert len(controls) == 4
+            for body in standin.counts.bodies:
+                assert is_strict(speakers(protocol, body)), speakers(protocol, body)
+
+
+@pytest.mark.ci
+def test_a_closed_loop_with_an_analyst_alternates(play, rollout, client, subtests) -> None:
+    for protocol in PROTOCOLS:
+        with subtests.test(protocol=protocol):
+            with ProviderStandIn(respond=awkward) as standin:
+                played = play(
+                    task="lift-3",
+                    client=client(standin, protocol),
+                    loop=Loop(rounds=2, analyst=True),
+                    rollouts=[rollout(0, success=False, indicator=3.0)],
+                )
+            assert played.suspended is not None, played.failure
+            assert (played.suspended.number, played.suspended.final) == (1, True)
+            assert {turn.stage for turn in played.session.transcript.turns} >= {
+                "analyse",
+                "assemble",
+            }
+            for body in standin.counts.bodies:
+                assert is_strict(speakers(protocol, body)), speakers(protocol, body)
+
+
+BARE = {"PATH": os.environ["PATH"]}
+OWN = """
+models: [{name: own/big, provider: own, model: big}]
+providers: {own: {protocol: openai, base_url: "http://vllm:8000/v1", key: OWN_API_KEY}}
+"""
+
+
+def check(*models: str, **variables: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "buildarena_worker", "--check", *models],
+        env={**BARE, **variables},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_a_key_that_no_provider_names_is_told() -> None:
+    report = key_report(load_registry(), {"GEMINI_API_KEY": "x", "GOOGLE_API_KEY": "y", "A": "z"})
+    assert report.there == ("GOOGLE_API_KEY",)
+    assert report.strangers == ("GEMINI_API_KEY",)
+    assert "google/gemini-2.0-flash" not in report.without
+    assert "OPENAI_API_KEY_FILE" in report.without["openai/gpt-5"]
+
+
+def test_an_operators_models_have_keys_too(tmp_path) -> None:
+    models = tmp_path / "models.yaml"
+    models.write_text(OWN)
+    report = key_report(load_registry(models), {"OWN_API_KEY_FILE": str(tmp_path / "none")})
+    assert not report.strangers
+    assert "No such file" in report.without["own/big"]
+    assert not [name for name in report.without if name.startswith("builtin/")]
+
+
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize(
+    ("models", "variables", "says"),
+    [
+        ((), {"GEMINI_API_KEY": "x"}, "GEMINI_API_KEY: no provider's key"),
+        (("openai/gpt-5",), {}, "openai/gpt-5: neither OPENAI_API_KEY nor"),
+        (("openai/gpt-6",), {}, "openai/gpt-6: no such model"),
+    ],
+)
+def test_the_worker_says_what_is_wrong_without_starting(models, variables, says) -> None:
+    done = check(*models, **variables)
+    assert done.returncode == 1, done.stderr
+    assert says in done.stdout
+
+
+@pytest.mark.ci
+def test_the_worker_says_what_is_there(tmp_path) -> None:
+    file = tmp_path / "key"
+    file.write_text("sk-very-secret")
+    done = check("openai/gpt-5", OPENAI_API_KEY_FILE=str(file))
+    assert done.returncode == 0, done.stdout
+    assert "OPENAI_API_KEY: there" in done.stdout
+    assert "very-secret" not in done.stdout + done.stderr
+
+
+def test_what_the_compose_file_offers_are_keys_of_providers() -> None:
+    offered = (Path(__file__).parents[3] / "deploy/docker/providers.env").read_text()
+    variables = {line.strip("# =\n") for line in offered.splitlines() if line.endswith("=")}
+    assert variables == {p.key for p in load_registry().providers.values() if p.key}

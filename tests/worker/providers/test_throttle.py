@@ -1,15 +1,20 @@
+"""How many requests are open at once, over all workers; the loop that sends them."""
+
 from __future__ import annotations
 
 import asyncio
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from redis import Redis
 
 from buildarena_worker.providers import throttle as throttle_module
+from buildarena_worker.providers.request_loop import RequestLoop
 from buildarena_worker.providers.throttle import Throttle
 
 
@@ -226,3 +231,40 @@ def test_requests_go_on_when_the_store_is_gone() -> None:
     started = time.monotonic()
     asyncio.run(main())
     assert time.monotonic() - started < 30
+
+
+THREADS = 16
+
+
+@pytest.fixture
+def hurried() -> Iterator[None]:
+    """Threads take turns so often that they meet everywhere, not only by luck."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(interval)
+
+
+@pytest.mark.usefixtures("hurried")
+def test_threads_that_start_at_once_share_one_loop() -> None:
+    assert [_loops_made() for _ in range(20)] == [1] * 20
+
+
+def _loops_made() -> int:
+    requests, together = RequestLoop(), threading.Barrier(THREADS)
+
+    async def running() -> asyncio.AbstractEventLoop:
+        return asyncio.get_running_loop()
+
+    def first_request() -> asyncio.AbstractEventLoop:
+        together.wait()
+        return requests.run(running())
+
+    with ThreadPoolExecutor(THREADS) as threads:
+        loops = {job.result() for job in [threads.submit(first_request) for _ in range(THREADS)]}
+    for loop in loops:
+        loop.call_soon_threadsafe(loop.stop)
+        while loop.is_running():
+            time.sleep(0.001)
+        loop.close()
+    return len(loops)

@@ -1,4 +1,4 @@
-"""A worker that is asked to stop throws no reply away and loses no attempt."""
+"""Workers beside each other: stops that lose nothing, places, verifications."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
 import pytest
@@ -17,9 +19,12 @@ from support.servers.construct_threads import Crew, crew, models_file
 from support.servers.stacks import wait_until
 
 from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import BudgetLimits
+from buildarena_worker.session.concurrency_gate import ConcurrencyGate
+from buildarena_worker.verification_report import Report
+from buildarena_worker.verification_runner import AT_ONCE, VerificationRunner
 
 SESSIONS = 16
 
@@ -142,3 +147,146 @@ def test_a_worker_that_is_asked_to_stop_waits_for_its_reply(context, settings, t
     assert answered(context, [job.id]) == model.counts.requests
     assert attempts(context, [job.id]) == ["handed_back"]
     assert context.store.jobs.get(job.id).state == "queued"
+
+
+class Crowd:
+    """Counts how many work at once."""
+
+    def __init__(self) -> None:
+        self.now = self.most = 0
+        self._lock = threading.Lock()
+
+    def come(self, change: int = 1) -> None:
+        with self._lock:
+            self.now += change
+            self.most = max(self.most, self.now)
+
+
+def test_few_work_at_once_and_all_get_their_turn() -> None:
+    gate, crowd = ConcurrencyGate(places=3, patience_s=60), Crowd()
+
+    def session(_: int) -> None:
+        with gate.acquired():
+            for _ in range(20):
+                crowd.come()
+                threading.Event().wait(0.0005)
+                crowd.come(-1)
+                with gate.released():
+                    threading.Event().wait(0.0005)
+
+    with ThreadPoolExecutor(16) as threads:
+        list(threads.map(session, range(16)))
+    assert crowd.most == 3
+    assert crowd.now == 0
+
+
+def test_who_waits_leaves_its_place_to_others() -> None:
+    gate, started = ConcurrencyGate(places=1, patience_s=60), threading.Event()
+
+    def other() -> None:
+        with gate.acquired():
+            started.set()
+
+    with gate.acquired(), ThreadPoolExecutor(1) as threads:
+        came = threads.submit(other)
+        with gate.released():
+            assert started.wait(30)
+        came.result()
+
+
+def test_a_stuck_session_does_not_stop_the_others() -> None:
+    gate = ConcurrencyGate(places=1, patience_s=0.01)
+
+    def other() -> str:
+        with gate.acquired(), gate.released():
+            return "done"
+
+    with gate.acquired(), ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(lambda _: other(), range(4))) == ["done"] * 4
+
+
+def test_an_error_gives_the_place_back() -> None:
+    gate = ConcurrencyGate(places=1, patience_s=60)
+    for _ in range(3):
+        with pytest.raises(ZeroDivisionError), gate.acquired(), gate.released():
+            raise ZeroDivisionError
+    with gate.acquired(), ThreadPoolExecutor(1) as threads:
+        assert not threads.submit(gate._places.acquire, blocking=False).result()
+
+
+class Slow:
+    """Stands in for the replay: counts how many run at once."""
+
+    def __init__(self, *, fails: bool = False) -> None:
+        self._lock = threading.Lock()
+        self._fails = fails
+        self.now = self.most = self.done = 0
+
+    def verify(self, _: str) -> Report:
+        with self._lock:
+            self.now += 1
+            self.most = max(self.most, self.now)
+        time.sleep(0.01)
+        with self._lock:
+            self.now -= 1
+            self.done += 1
+        if self._fails:
+            raise RuntimeError("broken")
+        return Report([])
+
+
+@pytest.fixture
+def asked(context, submissions) -> list[str]:
+    sweep = submissions.submit_sweep(
+        SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=30)
+    ).sweep.id
+    jobs = [job.id for job in context.store.jobs.page(limit=30, sweep_id=sweep)]
+    requested = context.store.verifications.request(jobs, owner="key_a")
+    assert (len(requested.ids), requested.left) == (30, ())
+    return list(requested.ids.values())
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("fails", [False, True])
+def test_one_message_has_all_done_and_few_at_once(context, asked, fails) -> None:
+    slow = Slow(fails=fails)
+    runner = VerificationRunner(context.store.verifications, slow)
+    started = time.monotonic()
+    for _ in range(50):
+        runner.wake(asked[0])
+    assert time.monotonic() - started < 1, "messages wait for no verification"
+    wait_until(lambda: slow.done == 30, 20, "all are done")
+    assert slow.most == AT_ONCE
+    states = {context.store.verifications.get(id_).state for id_ in asked[:-AT_ONCE]}
+    assert states == {"done"}
+    wait_until(lambda: runner._active == 0, 5, "its threads rest")
+
+
+def test_it_can_be_woken_again(context, asked) -> None:
+    slow = Slow()
+    runner = VerificationRunner(context.store.verifications, slow)
+    runner.wake("")
+    wait_until(lambda: slow.done == 30 and runner._active == 0, 20, "all are done")
+    job = context.store.verifications.get(asked[0]).job_id
+    again = context.store.verifications.request([job])
+    assert set(again.ids) == {job}
+    assert again.ids[job] not in asked
+    runner.wake("")
+    wait_until(lambda: slow.done == 31, 20, "the new one is done")
+    wait_until(lambda: runner._active == 0, 5, "its threads rest")
+
+
+def test_what_is_open_is_counted_by_owner(context, submissions, monkeypatch) -> None:
+    from buildarena_store.jobs import verifications
+
+    monkeypatch.setattr(verifications, "MAX_OPEN", 4)
+    sweep = submissions.submit_sweep(
+        SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=10)
+    ).sweep.id
+    jobs = [job.id for job in context.store.jobs.page(limit=30, sweep_id=sweep)]
+    request = context.store.verifications.request
+    first = request([jobs[0], *jobs[:6]], owner="key_a")
+    assert (list(first.ids), list(first.left)) == (jobs[:4], jobs[4:6])
+    assert list(request(jobs[:6], owner="key_b").ids) == jobs[:6]
+    assert not request(jobs[8:], owner="key_a").ids
+    assert list(request(jobs[8:]).ids) == jobs[8:]
