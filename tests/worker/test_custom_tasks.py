@@ -55,7 +55,7 @@ def submit(context) -> Callable[..., Job]:
 
 
 @pytest.fixture
-def play(context) -> Callable[..., Job]:
+def agent_plays(context) -> Callable[..., Job]:
     """Builds the expert's bridge of another task, as an external agent, and submits it."""
 
     def play_task(task: str, design: str = "support-1", seed: int = 0) -> Job:
@@ -86,20 +86,22 @@ def assert_verified(context, job: Job) -> None:
 
 
 @pytest.mark.ci
-def test_an_agents_bridge_is_simulated_scored_and_verified(context, play, finish) -> None:
+def test_an_agents_bridge_is_simulated_scored_and_verified(context, agent_plays, finish) -> None:
     version = add(context, EXAMPLE)
-    job = finish(play("narrow-gap").id)
+    job = finish(agent_plays("narrow-gap").id)
     assert (job.outcome, job.success, job.indicator) == ("success", True, 200.0)
     assert job.manifest["task"] == {"name": "narrow-gap", "version": version}
     assert_verified(context, job)
 
 
 @pytest.mark.ci
-def test_a_job_in_work_is_tried_and_verified_with_its_own_version(context, play, finish) -> None:
+def test_a_job_in_work_is_tried_and_verified_with_its_own_version(
+    context, agent_plays, finish
+) -> None:
     add(context, EXAMPLE)
-    old = play("narrow-gap")
+    old = agent_plays("narrow-gap")
     add(context, OTHER)
-    new = play("narrow-gap", seed=1)
+    new = agent_plays("narrow-gap", seed=1)
     assert (finish(old.id).indicator, finish(new.id).indicator) == (200.0, 300.0)
     for job in (old, new):
         assert_verified(context, context.store.jobs.get(job.id))
@@ -114,19 +116,19 @@ def test_the_expert_plays_a_level_of_besiegefield(context, submit, finish) -> No
     assert_verified(context, job)
 
 
-def test_what_a_task_asks_of_modules_is_checked(context, play) -> None:
+def test_what_a_task_asks_of_modules_is_checked(context, agent_plays) -> None:
     add(context, EXAMPLE.replace("scenario:", "constraints: {min_modules: {Winch: 2}}\nscenario:"))
-    job = play("narrow-gap")
+    job = agent_plays("narrow-gap")
     assert (job.outcome, job.reason) == ("construction_failed", "constraint_violated")
     assert "0 of Winch" in job.detail
 
 
 @pytest.mark.ci
-def test_a_trial_that_tracks_one_block_only_is_scored(context, play, finish) -> None:
+def test_a_trial_that_tracks_one_block_only_is_scored(context, agent_plays, finish) -> None:
     builtin = "transport-2"
     scenario = dict(builtin_tasks()[builtin].as_document()["scenario"])
     add(context, own("mine", builtin, scenario={**scenario, "tracked_blocks": ["1"]}))
-    job = finish(play("mine", builtin).id)
+    job = finish(agent_plays("mine", builtin).id)
     assert job.outcome in {"unsuccessful", "success"}, job.detail
     assert_verified(context, job)
 

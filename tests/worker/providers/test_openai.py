@@ -18,7 +18,7 @@ from buildarena_worker.session.messages import Message, Request, ToolCall
 from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT
 from buildarena_worker.workflow.machine_tools import ASSEMBLE, BUILD, QUERIES, REFINE, tools_named
 
-STORED = json.loads((Path(__file__).parents[3] / "data/openai.json").read_text())
+STORED = json.loads((Path(__file__).parents[2] / "data/openai.json").read_text())
 KEPT = STORED["requests"]
 CALL = ToolCall(id="c1", name="start", arguments={"block": "Wüfel", "n": 1.5})
 TALK = [
@@ -125,7 +125,7 @@ def test_schemas_are_written_as_kept_ones_were() -> None:
         assert found == {"sent": case["sent"], "strict": case["strict"]}, case["given"]
 
 
-KEPT_OF_ANSWERS = json.loads((Path(__file__).parents[3] / "data/openai.json").read_text())[
+KEPT_OF_ANSWERS = json.loads((Path(__file__).parents[2] / "data/openai.json").read_text())[
     "answers"
 ]
 URL = "http://127.0.0.1:1/v1"
