@@ -2,7 +2,6 @@
 
 import sys
 
-import pytest
 from typer.testing import CliRunner
 
 from buildarena_cli.main import app
@@ -15,21 +14,19 @@ def run(*words: str):
     return CliRunner().invoke(app, words)
 
 
-@pytest.mark.parametrize(
-    ("words", "given"),
-    [
+def test_the_runners_program_takes_the_commands_place(monkeypatch, subtests) -> None:
+    for words, given in [
         (["calibrate"], ["calibrate"]),
         (["calibrate", "--defaults"], ["calibrate", "--defaults"]),
         (["calibrate", "--try"], ["calibrate", "--try"]),
         (["doctor"], ["doctor"]),
         (["doctor", "--json"], ["doctor", "--json"]),
-    ],
-)
-def test_the_runners_program_takes_the_commands_place(monkeypatch, words, given) -> None:
-    started = []
-    monkeypatch.setattr("os.execv", lambda *found: started.append(found))
-    assert run("besiege", *words).exit_code == 0
-    assert started == [(sys.executable, [sys.executable, *RUNNER, *given])]
+    ]:
+        with subtests.test(words=words):
+            started = []
+            monkeypatch.setattr("os.execv", lambda *found: started.append(found))
+            assert run("besiege", *words).exit_code == 0
+            assert started == [(sys.executable, [sys.executable, *RUNNER, *given])]
 
 
 def test_on_windows_the_program_runs_below_and_its_exit_code_counts(monkeypatch) -> None:

@@ -56,7 +56,7 @@ def test_the_next_runner_cleans_up_and_plays_the_run_again(clean, screen) -> Non
     assert report["modifiers"] == []
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_log_in_a_file_takes_the_place_of_the_log_window(clean, screen) -> None:
     task, machine = short_trial("transport-1")
     right = our_score(task, machine)

@@ -57,34 +57,30 @@ def test_without_files_nothing_is_said(tmp_path) -> None:
         assert installed(folder).as_facts() == {}
 
 
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
+def test_another_build_or_mod_than_the_calibrated_one_is_not_played(tmp_path, subtests) -> None:
+    for changes, says in [
         ({"build": "25400"}, "the game's build was 25346 when it was calibrated and is 25400"),
         ({"version": "1.5"}, "the mod was 1.4 when it was calibrated and is 1.5"),
         ({"version": ""}, "and is not found"),
-    ],
-)
-def test_another_build_or_mod_than_the_calibrated_one_is_not_played(
-    tmp_path, changes, says
-) -> None:
-    kept = installed(library(tmp_path)).as_facts()
-    installed(library(tmp_path)).require(kept)
-    with pytest.raises(GameChangedError, match=says):
-        installed(library(tmp_path, **changes)).require(kept)
-    installed(library(tmp_path, **changes)).require({})
+    ]:
+        with subtests.test(changes=changes):
+            kept = installed(library(tmp_path)).as_facts()
+            installed(library(tmp_path)).require(kept)
+            with pytest.raises(GameChangedError, match=says):
+                installed(library(tmp_path, **changes)).require(kept)
+            installed(library(tmp_path, **changes)).require({})
 
 
-@pytest.mark.parametrize("command", ["/nowhere/besiege", 'C:\\Program "Files', "  "])
-def test_the_doctor_names_a_command_that_starts_nothing(tmp_path, command) -> None:
-    found = doctor._command(BesiegeSettings(command=command, state=tmp_path))
-    assert not found.ok
-    assert "BUILDARENA_BESIEGE_COMMAND" in found.advice
+def test_the_doctor_names_a_command_that_starts_nothing(tmp_path, subtests) -> None:
+    for command in ["/nowhere/besiege", 'C:\\Program "Files', "  "]:
+        with subtests.test(command=command):
+            found = doctor._command(BesiegeSettings(command=command, state=tmp_path))
+            assert not found.ok
+            assert "BUILDARENA_BESIEGE_COMMAND" in found.advice
 
 
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [
+def test_commands_are_split_as_windows_does(subtests) -> None:
+    for command, words in [
         (
             r'"C:\Program Files (x86)\Steam\steam.exe" -applaunch 346010',
             [r"C:\Program Files (x86)\Steam\steam.exe", "-applaunch", "346010"],
@@ -95,10 +91,9 @@ def test_the_doctor_names_a_command_that_starts_nothing(tmp_path, command) -> No
         (r'a "b\"c" ""', ["a", 'b"c', ""]),
         ("\ta  b\t", ["a", "b"]),
         ("", []),
-    ],
-)
-def test_commands_are_split_as_windows_does(command, words) -> None:
-    assert command_words(command, windows=True) == words
+    ]:
+        with subtests.test(command=command):
+            assert command_words(command, windows=True) == words
 
 
 def test_commands_are_split_as_a_shell_does_elsewhere() -> None:
@@ -108,23 +103,22 @@ def test_commands_are_split_as_a_shell_does_elsewhere() -> None:
             command_words('"a b', windows=windows)
 
 
-@pytest.mark.parametrize("name", ["Besiege.exe", "besiege", "Besiege.x86_64", " BESIEGE.EXE "])
-def test_a_program_is_known_by_its_name_without_the_systems_ending(name) -> None:
-    assert executable_stem(name) == "besiege"
+def test_a_program_is_known_by_its_name_without_the_systems_ending(subtests) -> None:
+    for name in ["Besiege.exe", "besiege", "Besiege.x86_64", " BESIEGE.EXE "]:
+        with subtests.test(name=name):
+            assert executable_stem(name) == "besiege"
 
 
-@pytest.mark.parametrize(
-    ("copied", "shown"),
-    [
+def test_a_name_is_compared_without_what_nobody_sees(subtests) -> None:
+    for copied, shown in [
         ("ba1n0\u200b", "ba1n0"),
         ("\ufeffba1n0\u200d \r\n", "ba1n0"),
         ("\u2060ba1\u00adn0\u200e", "ba1n0"),
         ("ba1 n0", "ba1 n0"),
         ("", ""),
-    ],
-)
-def test_a_name_is_compared_without_what_nobody_sees(copied, shown) -> None:
-    assert shown_text(copied) == shown
+    ]:
+        with subtests.test(copied=copied):
+            assert shown_text(copied) == shown
 
 
 class User32:
@@ -231,21 +225,22 @@ class Clip:
         self.text = text
 
 
-@pytest.mark.parametrize("busy", [0, 3, 1000])
 def test_a_clipboard_that_another_program_keeps_is_waited_for_and_then_a_fault(
-    monkeypatch, busy
+    monkeypatch, subtests
 ) -> None:
-    monkeypatch.setitem(sys.modules, "pyperclip", Clip(busy))
-    monkeypatch.setattr(clipboard, "TRY_AGAIN_S", 0.0)
-    reached = clipboard._SystemClipboard()
-    if busy < clipboard.TRIES:
-        assert reached.get() == "text"
-        reached.put("other")
-        assert reached.get() == "other"
-        return
-    for use in (reached.get, lambda: reached.put("x")):
-        with pytest.raises(ScreenError, match="another program keeps it"):
-            use()
+    for busy in [0, 3, 1000]:
+        with subtests.test(busy=busy):
+            monkeypatch.setitem(sys.modules, "pyperclip", Clip(busy))
+            monkeypatch.setattr(clipboard, "TRY_AGAIN_S", 0.0)
+            reached = clipboard._SystemClipboard()
+            if busy < clipboard.TRIES:
+                assert reached.get() == "text"
+                reached.put("other")
+                assert reached.get() == "other"
+                return
+            for use in (reached.get, lambda: reached.put("x")):
+                with pytest.raises(ScreenError, match="another program keeps it"):
+                    use()
 
 
 class CornerError(Exception):
@@ -267,22 +262,24 @@ class Gui:
         return refuse
 
 
-@pytest.mark.parametrize(
-    ("error", "says"),
-    [
+def test_a_screen_that_takes_nothing_is_a_fault(subtests) -> None:
+    for error, says in [
         (OSError(5, "Access is denied"), "mouse and keyboard cannot be used: .*Access is denied"),
         (RuntimeError(), "mouse and keyboard cannot be used: RuntimeError|cannot be used"),
         (CornerError(), "moved the mouse into the screen's corner"),
-    ],
-)
-def test_a_screen_that_takes_nothing_is_a_fault(error, says) -> None:
-    screen = ScreenInput.__new__(ScreenInput)
-    screen._gui, screen._pace = Gui(error), 20.0
-    for act in (lambda: screen.click(1, 1), lambda: screen.press("a"), lambda: screen.write("a")):
-        with pytest.raises(DesktopError, match=says):
-            act()
-    with pytest.raises(DesktopError, match=says):
-        screen.hotkey("ctrl", "l")
+    ]:
+        with subtests.test(error=error):
+            screen = ScreenInput.__new__(ScreenInput)
+            screen._gui, screen._pace = Gui(error), 20.0
+            for act in (
+                lambda: screen.click(1, 1),
+                lambda: screen.press("a"),
+                lambda: screen.write("a"),
+            ):
+                with pytest.raises(DesktopError, match=says):
+                    act()
+            with pytest.raises(DesktopError, match=says):
+                screen.hotkey("ctrl", "l")
 
 
 def test_a_lock_is_of_one_game_and_ends() -> None:

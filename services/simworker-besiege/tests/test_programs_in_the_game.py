@@ -167,12 +167,13 @@ def down(game: LuaGame, key: str, first: int, last: int) -> int:
     return sum(max(0, min(end or 10**6, last) - max(start, first)) for start, end in spans)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.1, 0.25, 0.5, 0.75, 0.99, 1.0, 7.0])
-def test_a_share_is_a_share_of_the_updates(share) -> None:
-    game, _ = tried(program(f"return {{ spinning_forward = {share} }}"))
-    for key in keys_of(piloted(), "spinning_forward"):
-        assert down(game, key, 1, 200) == pytest.approx(199 * min(share, 1), abs=1.01)
-    assert all(not game.held(key) for key in keys_of(piloted(), "spinning_backward"))
+def test_a_share_is_a_share_of_the_updates(subtests) -> None:
+    for share in [0.0, 0.1, 0.25, 0.5, 0.75, 0.99, 1.0, 7.0]:
+        with subtests.test(share=share):
+            game, _ = tried(program(f"return {{ spinning_forward = {share} }}"))
+            for key in keys_of(piloted(), "spinning_forward"):
+                assert down(game, key, 1, 200) == pytest.approx(199 * min(share, 1), abs=1.01)
+            assert all(not game.held(key) for key in keys_of(piloted(), "spinning_backward"))
 
 
 def test_below_0_an_action_is_its_opposite_and_a_name_of_one_block_counts_alone() -> None:
@@ -202,29 +203,27 @@ def test_what_is_only_on_or_off_is_on_above_a_half() -> None:
     assert game.held(key) == [[100, 200]]
 
 
-@pytest.mark.parametrize(
-    ("body", "words"),
-    [
+def test_a_program_that_fails_lets_go_of_all_keys_and_its_log_says_why(subtests) -> None:
+    for body, words in [
         ("if t >= 1 then local x = sense.nothing.x end", "line 2, tick 25 (1.00 s): attempt to"),
         ("return { spinning = 1 }", "there is no action 'spinning'; there is spinning_forward"),
         ("return 5", "tick 0 (0.00 s): it answers a number"),
         ("return { spinning_forward = 0 / 0 }", "is no number"),
         ("return { spinning_forward = 'x' }", "is a string"),
-    ],
-)
-def test_a_program_that_fails_lets_go_of_all_keys_and_its_log_says_why(body, words) -> None:
-    text = program(body + "\nif t < 1 then return { spinning_forward = 0.3 } end")
-    if body.startswith("return"):
-        text = program(body)
-    machine, scenario = piloted(text), drive()
-    run = recorded(piloted(), scenario)  # moves as another, and runs this one's script
-    own = replace(run, prepared=prepared_machine(machine, scenario, run_id=RUN))
-    game = game_of(own, scenario)
-    assert sum(",f," in line for line in game.lines) >= 1
-    assert all(not calls or not calls[-1][1] for calls in game.calls.values())
-    with pytest.raises(ControllerFailed) as caught:
-        read_back(game, machine, scenario)
-    assert words in caught.value.reason
+    ]:
+        with subtests.test(body=body):
+            text = program(body + "\nif t < 1 then return { spinning_forward = 0.3 } end")
+            if body.startswith("return"):
+                text = program(body)
+            machine, scenario = piloted(text), drive()
+            run = recorded(piloted(), scenario)  # moves as another, and runs this one's script
+            own = replace(run, prepared=prepared_machine(machine, scenario, run_id=RUN))
+            game = game_of(own, scenario)
+            assert sum(",f," in line for line in game.lines) >= 1
+            assert all(not calls or not calls[-1][1] for calls in game.calls.values())
+            with pytest.raises(ControllerFailed) as caught:
+                read_back(game, machine, scenario)
+            assert words in caught.value.reason
 
 
 def test_a_delay_counts_ticks_and_noise_is_drawn() -> None:
@@ -285,10 +284,13 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize(("scenario", "words"), REFUSED.values(), ids=REFUSED)
-def test_what_the_game_cannot_tell_or_do_is_refused(scenario, words) -> None:
-    with pytest.raises((MachineNotPlayableError, ControllerFailed), match=words):
-        prepare_run(piloted(), scenario, name="m", run_id="r")
+def test_what_the_game_cannot_tell_or_do_is_refused(subtests) -> None:
+    for scenario, words in REFUSED.values():
+        with (
+            subtests.test(scenario=scenario),
+            pytest.raises((MachineNotPlayableError, ControllerFailed), match=words),
+        ):
+            prepare_run(piloted(), scenario, name="m", run_id="r")
 
 
 NOT_STAGED = [
@@ -300,10 +302,10 @@ NOT_STAGED = [
 ]
 
 
-@pytest.mark.parametrize("name", NOT_STAGED)
-def test_tasks_that_the_game_cannot_stage_stay_refused(name) -> None:
-    with pytest.raises(MachineNotPlayableError, match="the game"):
-        prepare_run(piloted(), builtin_tasks()[name].scenario, name="m", run_id="r")
+def test_tasks_that_the_game_cannot_stage_stay_refused(subtests) -> None:
+    for name in NOT_STAGED:
+        with subtests.test(name=name), pytest.raises(MachineNotPlayableError, match="the game"):
+            prepare_run(piloted(), builtin_tasks()[name].scenario, name="m", run_id="r")
 
 
 def test_a_program_that_cannot_be_read_is_refused_when_it_is_exported() -> None:

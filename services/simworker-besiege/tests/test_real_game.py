@@ -15,7 +15,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import level_file
 from buildarena_simworker_besiege.screen.calibration import PathClick
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.nightly, pytest.mark.timeout(300)]
 
 
 @pytest.fixture
@@ -47,7 +47,6 @@ def is_right(found: Any, task: str) -> bool:
     return found == [right.success, pytest.approx(right.indicator, rel=0.02)]
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("opened", ["", "support-2"])
 def test_a_bridge_in_another_level_is_a_fault_that_waits_for_a_person(
     clean, screen, tmp_path, opened
@@ -65,7 +64,6 @@ def test_a_bridge_in_another_level_is_a_fault_that_waits_for_a_person(
     assert not list(clean.machines.iterdir())
 
 
-@pytest.mark.ci
 @pytest.mark.parametrize("worked", [True, False])
 def test_a_calibration_is_tried_in_the_level_that_is_open(clean, screen, tmp_path, worked) -> None:
     file = tmp_path / "opened.blv"
@@ -87,7 +85,6 @@ def test_a_calibration_is_tried_in_the_level_that_is_open(clean, screen, tmp_pat
     assert done.returncode == (0 if worked else 1)
 
 
-@pytest.mark.ci
 def test_a_bridge_in_its_own_level_is_scored(clean, screen, tmp_path) -> None:
     file = tmp_path / "opened.blv"
     file.write_bytes(level_file(builtin_tasks()["support-1"].scenario))
@@ -95,7 +92,6 @@ def test_a_bridge_in_its_own_level_is_scored(clean, screen, tmp_path) -> None:
     assert is_right(told(clean, screen, "support-1", LEVEL="support-1", COMMAND=game), "support-1")
 
 
-@pytest.mark.ci
 def test_a_window_of_another_size_is_a_fault_that_names_both(clean, screen) -> None:
     clean.calibrate(window=(1100, 700), screen=(1100, 700))
     found = told(clean, screen)
@@ -103,14 +99,12 @@ def test_a_window_of_another_size_is_a_fault_that_names_both(clean, screen) -> N
     assert found["pictures"] == 3
 
 
-@pytest.mark.ci
 def test_what_the_game_says_of_its_size_counts_too(clean, screen) -> None:
     clean.calibrate(screen=(2560, 1600))
     found = told(clean, screen)
     assert "the game draws 1280x800, and was calibrated at 2560x1600" in found["fault"]
 
 
-@pytest.mark.ci
 def test_a_launcher_that_ends_is_not_started_again_and_a_path_leads_to_the_level(
     clean, screen
 ) -> None:
@@ -131,7 +125,6 @@ def test_a_launcher_that_ends_is_not_started_again_and_a_path_leads_to_the_level
     assert started.read_text() == 3 * "started\n"
 
 
-@pytest.mark.ci
 def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, screen) -> None:
     page = (
         "import tkinter as tk; from stand_in_game.ownership import sign;"
@@ -166,7 +159,6 @@ def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, s
             other.kill()
 
 
-@pytest.mark.ci
 def test_a_second_runner_of_the_same_screen_does_not_start(clean, screen) -> None:
     program = (
         "from buildarena_simworker_besiege.game_lock import *; import time;"

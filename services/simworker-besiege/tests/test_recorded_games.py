@@ -2,7 +2,6 @@
 
 import zipfile
 
-import pytest
 from game_rig import GAMES
 from record_games import Recorded, log_lines, played_runs, recorded
 
@@ -11,11 +10,12 @@ from buildarena_besiege.run import prepared_machine
 RUNS = played_runs()
 
 
-@pytest.mark.parametrize("name", RUNS)
-def test_each_run_that_is_played_was_recorded(name) -> None:
+def test_each_run_that_is_played_was_recorded(subtests) -> None:
     """A script's begin line holds the digest of machine and scenario."""
-    begin = next(iter(lines_of(name))).removeprefix("b,")
-    assert f'local begin = "{begin}"' in prepared_machine(*RUNS[name], run_id="x").script
+    for name in RUNS:
+        with subtests.test(name=name):
+            begin = next(iter(lines_of(name))).removeprefix("b,")
+            assert f'local begin = "{begin}"' in prepared_machine(*RUNS[name], run_id="x").script
 
 
 def test_a_recording_is_what_the_engine_says() -> None:

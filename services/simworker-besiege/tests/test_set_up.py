@@ -164,18 +164,18 @@ def test_without_the_extra_the_doctor_says_what_to_install(rig, tmp_path) -> Non
     assert "pip install buildarena-simworker-besiege[window]" in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("changes", "named"),
-    [
+def test_what_is_missing_is_named_with_advice(rig, subtests) -> None:
+    for changes, named in [
         ({"MACHINES": "/nowhere"}, "folder of machine files"),
         ({"GAME": ""}, "versions"),
         ({"COMMAND": "/nowhere/besiege"}, "restart"),
-    ],
-)
-def test_what_is_missing_is_named_with_advice(rig, changes, named) -> None:
-    found = findings(rig, {f"BUILDARENA_BESIEGE_{name}": to for name, to in changes.items()})
-    assert not found[named]["ok"]
-    assert "BUILDARENA_BESIEGE_" in found[named]["advice"]
+    ]:
+        with subtests.test(changes=changes):
+            found = findings(
+                rig, {f"BUILDARENA_BESIEGE_{name}": to for name, to in changes.items()}
+            )
+            assert not found[named]["ok"]
+            assert "BUILDARENA_BESIEGE_" in found[named]["advice"]
 
 
 def test_the_doctor_names_versions_that_differ(rig, tmp_path) -> None:
@@ -214,9 +214,8 @@ def spoiled(**changes: object) -> dict[str, object]:
     return {**made, **changes}
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
+def test_a_spoiled_calibration_is_refused_with_what_to_do(tmp_path, subtests) -> None:
+    for content in [
         "",
         "[]",
         "{}",
@@ -229,13 +228,12 @@ def spoiled(**changes: object) -> dict[str, object]:
         json.dumps(spoiled(positions={name: [0.5] for name in POSITIONS})),
         json.dumps(spoiled(pixels={"log_window": [1, 1], "lua_panel": [1, -1]})),
         json.dumps(spoiled(pixels={"log_window": [1, 1], "lua_panel": [0.5, 0.5]})),
-    ],
-)
-def test_a_spoiled_calibration_is_refused_with_what_to_do(tmp_path, content) -> None:
-    file = tmp_path / "calibration.json"
-    file.write_text(content)
-    with pytest.raises(NotSetUpError, match="buildarena besiege calibrate"):
-        load_calibration(file)
+    ]:
+        with subtests.test(content=content):
+            file = tmp_path / "calibration.json"
+            file.write_text(content)
+            with pytest.raises(NotSetUpError, match="buildarena besiege calibrate"):
+                load_calibration(file)
 
 
 def test_a_log_file_is_read_by_whole_lines_and_begun_anew(tmp_path) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from game_rig import TRIALS, Rig, our_score, short_trial, trial_of
-from stand_in_game.faults import KINDS, ONLY_AT, POINTS
+from stand_in_game.faults import KINDS, MOVABLE, POINTS
 
 from buildarena_benchmark import Score, Task, score
 from buildarena_geometry import Machine
@@ -43,11 +43,11 @@ def drawn_faults(seed: int) -> list[dict[str, Any]]:
     for _ in range(draw.randint(1, 3)):
         kind = draw.choice(sorted(KINDS))
         fault: dict[str, Any] = {"fault": kind}
-        if kind not in ONLY_AT:
+        if kind in MOVABLE:
             fault["at"] = draw.choice([point for point in POINTS if point != "copy"])
         if kind == "freeze":
             fault["seconds"] = draw.choice([1.0, 3.0, None])
-        if fault.get("at", KINDS[kind][0]) == "simulating" and "after_s" in KINDS[kind][1]:
+        if kind in {"freeze", "crash"} and fault["at"] == "simulating":
             fault["after_s"] = draw.uniform(0.0, 5.0)
         fault["times"] = draw.choice([1, 1, 1, 3, None]) if kind not in {"freeze", "crash"} else 1
         found.append(fault)

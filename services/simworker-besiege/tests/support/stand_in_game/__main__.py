@@ -4,11 +4,9 @@ import argparse
 import ctypes
 import sys
 from pathlib import Path
-from xml.etree.ElementTree import ParseError
 
-from stand_in_game.faults import FaultError, Faults, read_faults
+from stand_in_game.faults import Faults, read_faults
 from stand_in_game.game import Game, Settings
-from stand_in_game.levels import Level
 from stand_in_game.report import Report
 from stand_in_game.window import Window
 
@@ -19,15 +17,9 @@ def main() -> int:
     """Starts the game with the options of the command line."""
     options = _parser().parse_args()
     faults = []
-    try:
-        if options.faults_once is not None and options.faults_once.exists():
-            faults = read_faults(options.faults_once)
-            options.faults_once.unlink()
-        if options.level:
-            Level(options.level)
-    except (FaultError, ValueError, OSError, ParseError) as error:
-        sys.stderr.write(f"stand_in_game: {error}\n")
-        return 2
+    if options.faults_once is not None and options.faults_once.exists():
+        faults = read_faults(options.faults_once)
+        options.faults_once.unlink()
     settings = Settings(
         games=options.games,
         speed=options.speed,

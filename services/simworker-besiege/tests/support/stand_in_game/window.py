@@ -1,4 +1,4 @@
-"""The game's window."""
+"""The game's window: nothing is drawn in it, but where things would be, clicks and keys do them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from stand_in_game.faults import Fault
 from stand_in_game.game import Game
 from stand_in_game.interface import Interface
 from stand_in_game.ownership import sign
-from stand_in_game.panels import Panels
 from stand_in_game.report import Report
 
 TITLE: Final = "Besiege"
@@ -40,11 +39,9 @@ class Window:
         self._canvas.pack()
         self._breakage = Breakage(self._root)
         self._shown = Interface(game, machines, self, scene="title" if title else "level")
-        self._panels = Panels(self._canvas, SIZE)
         self._modifiers: set[str] = set()
         self._caps_lock = False
         self._pressed_on = ""
-        self._drawn: object = None
         self._last_s = time.monotonic()
         self._bind()
 
@@ -88,8 +85,6 @@ class Window:
         width, height = self._size = self._shown.size = self._game.screen = size
         self._root.geometry(f"{width}x{height}+0+0")
         self._canvas.config(width=width, height=height)
-        self._panels.resize(size)
-        self._drawn = None
 
     def _bind(self) -> None:
         self._canvas.bind("<ButtonPress-1>", self._mouse_down)
@@ -136,29 +131,9 @@ class Window:
         if self._game.simulating:
             for fault in self._game.faults.at("simulating", self._game.time_s):
                 self._shown.carry_out(fault)
-        self._draw()
         self._report.write(self._state())
         spent = time.monotonic() - now
         self._root.after(max(1, round((1 / FRAMES_PER_S - spent) * 1000)), self._frame_due)
-
-    def _draw(self) -> None:
-        game, shown = self._game, self._shown
-        state = (
-            game.machine_name,
-            game.grounded,
-            game.message,
-            game.counts["loads"],
-            game.simulating and game.time_s,
-        )
-        panels = (
-            game.log.version if shown.lua_panel else None,
-            *(shown.phase, shown.loading, shown.confirm, shown.lua_panel, shown.dialog),
-            *(shown.focus, shown.log_selected, shown.name_box.text, shown.name_box.selected),
-        )
-        if (state, panels) == self._drawn:
-            return
-        self._drawn = (state, panels)
-        self._panels.draw(shown)
 
     def _state(self) -> dict[str, object]:
         game, shown = self._game, self._shown
