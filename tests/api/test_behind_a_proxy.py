@@ -155,7 +155,7 @@ def test_a_forwarded_host_that_is_none_is_ignored(context) -> None:
 @pytest.mark.parametrize(
     ("trusted", "seen", "least", "most"),
     [
-        (PROXIES, "10.0.0.{}", 6, 6),
+        (PROXIES, "10.0.0.{}", 4, 4),
         ("", "10.0.0.{}", 1, 2),
         # What stands in front of the proxy's own words, a client can have made up.
         (PROXIES, "10.0.0.{}, 10.1.1.1", 1, 2),
@@ -173,7 +173,7 @@ def test_rate_limits_go_by_the_client_that_a_trusted_proxy_saw(
     ):
         found = [
             client.get("/v1/models", headers={"X-Forwarded-For": seen.format(number)}).status_code
-            for number in range(6)
+            for number in range(4)
         ]
     assert set(found) <= {200, 429}
     assert least <= found.count(200) <= most
