@@ -17,7 +17,6 @@ from support.statements import statements_of
 from buildarena_api.app import all_routes
 from buildarena_api.http.concurrency import MAX_WAITING, ConcurrencyLimit, usual_limits
 from buildarena_api.http.fair_cache import FairCache
-from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.weights import HEAVIEST, MAX_QUERY_BYTES, Weight, Weights
 from buildarena_pipeline.catalog.specs import SweepSpec
 
@@ -217,18 +216,6 @@ def test_whoever_leaves_while_waiting_keeps_no_place() -> None:
         await asyncio.gather(first, staying)
         assert not lane.limit._shares
         assert lane.limit._used == 0
-
-    asyncio.run(play())
-
-
-def test_one_too_many_is_told_its_weight() -> None:
-    async def play() -> None:
-        limit = ConcurrencyLimit("questions", per_caller=1, total=1)
-        async with limit.slot("a", weight=7):
-            with pytest.raises(ProblemError, match="this one weighs 7") as raised:
-                async with limit.slot("a", weight=7):
-                    pass
-        assert raised.value.headers == {"Retry-After": "2"}
 
     asyncio.run(play())
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import signal
 import zlib
 from concurrent.futures import ThreadPoolExecutor
@@ -180,21 +179,6 @@ def place(number: int) -> list[float]:
     return [3.0 * (number % 13), 3.0 * (number // 13 % 13), 3.0 * (number // 169)]
 
 
-def starting_blocks() -> bytes:
-    """A file of the game with nothing but starting blocks, each at a place of its own."""
-    text = published_files()["single_1_support_hard"].decode("utf-8-sig")
-    blocks = re.findall(r"<Block .*?</Block>", text, re.DOTALL)
-    start = next(block for block in blocks if 'id="0"' in block)
-    made = []
-    for number in range(MAX_PARTS - 10):
-        where = '<Position x="{}" y="{}" z="{}" />'.format(*place(number))
-        moved = re.sub(r"<Position[^>]*/>", where, start, count=1)
-        guid = f'guid="{number:08d}-0000-0000-0000-000000000000"'
-        made.append(re.sub(r'guid="[^"]*"', guid, moved))
-    head, tail = text.index(blocks[0]), text.rindex(blocks[-1]) + len(blocks[-1])
-    return (text[:head] + "".join(made) + text[tail:]).encode()
-
-
 def many_blocks() -> bytes:
     blocks = bridge().to_document()["blocks"]
     loose = {**blocks[1], "mount": None}
@@ -213,7 +197,7 @@ def test_bombs_are_answered_in_words_and_leave_the_process_well(api) -> None:
     numbers = ("1e308, 1e308, 1e308", "1e999, 0, 0", "9" * 1_000_000, "1e" + "9" * 1_000_000)
     origin = b'"position": [0.0, 0.0, 0.0]'
     for bomb in (
-        *(starting_blocks(), many_blocks(), many_connectors()),
+        *(many_blocks(), many_connectors()),
         *(b'{"blocks":' + b'{"a":' * 300_000, b"<Machine>" + b"<a>" * 400_000),
         *(written().replace(origin, b'"position": [%b]' % n.encode(), 1) for n in numbers),
         written(log=[{"name": "x" * 1_900_000}]),

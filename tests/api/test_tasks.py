@@ -1,11 +1,22 @@
-"""Custom tasks over HTTP: uploaded, refused with line and field, versioned, listed, owned."""
+"""What stands in lists, and custom tasks: uploaded, refused with line and field, versioned."""
 
 import json
+import re
+from collections import Counter
 
 import yaml
 from support.clients.tenants import new_tenant
+from support.contract import contract
+from support.jobs import report_worker
 
 from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.statistics import MIN_SUCCESSES
+from buildarena_geometry import FEEDBACK_VERSION
+from buildarena_pipeline import __version__
+from buildarena_pipeline.catalog.specs import JobSpec
+from buildarena_simulation import SIMULATION_VERSION
+from buildarena_store.states import simulate_queue
 
 YAML = {"Content-Type": "application/yaml"}
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
@@ -109,3 +120,61 @@ def test_only_its_owner_changes_a_task(guarded) -> None:
         answer = who.ask("POST", "/v1/tasks", content=text.encode(), headers=YAML)
         assert answer.status_code == status, answer.text
     assert reader.ask("GET", PATH).status_code == 200
+
+
+def test_the_contract_and_its_page_need_no_other_server(api) -> None:
+    operations = (one for path in contract()["paths"].values() for one in path.values())
+    names = Counter(operation["operationId"] for operation in operations)
+    assert names.most_common(1)[0][1] == 1
+    assert "submit_sweep" in names
+    sources = re.findall(r'(?:src|href)="([^"]+)"', api.get("/docs").text)
+    assert sources
+    for source in sources:
+        assert source.startswith("/")
+        assert api.get(source).status_code == 200
+
+
+def test_lists_hold_what_can_be_submitted(api, submissions) -> None:
+    tasks = {task["name"]: task for task in api.get("/v1/tasks").json()}
+    assert tasks.keys() == builtin_tasks().keys()
+    assert tasks["support-1"]["indicator"]
+    models = {model["name"]: model for model in api.get("/v1/models").json()}
+    assert models["builtin/expert"]["baseline"]
+    modules = {one["name"]: one for one in api.get("/v1/modules").json()}
+    assert modules["Powered Wheel"]["size"] == [2, 2, 0.5]
+    assert modules["Powered Wheel"]["actions"] == ["spinning_forward", "spinning_backward"]
+    assert modules["Brace"]["size"] is None
+    assert modules["Small Wooden Block"]["faces"] == list("ABCDEF")
+    # Versions in use are those of a new job's track.
+    used = api.get("/v1/versions").json()
+    job, _ = submissions.submit_job(JobSpec(task="lift-1", model="builtin/idle", seed=0))
+    simulators = {one["name"]: one["version"] for one in used["simulators"]}
+    track = job.track_config
+    assert simulators[track["simulator"]] == track["simulation_version"]
+    assert used["feedback"] == track["feedback_version"] == FEEDBACK_VERSION
+    assert (used["buildarena"], used["min_successes"]) == (__version__, MIN_SUCCESSES)
+    assert used["error"] == 0.05
+
+
+def test_simulators_are_our_engines_and_what_workers_announce(context, api) -> None:
+    def listed() -> dict[str, dict[str, object]]:
+        return {view["name"]: view for view in api.get("/v1/simulators").json()}
+
+    ours = {"version": SIMULATION_VERSION, "kind": "engine", "repeatable": True}
+    ours |= {"workers": 0, "served": False}
+    assert listed() == {
+        name: {"name": name, "default": name == "pybullet", **ours}
+        for name in ("pybullet", "mujoco")
+    }
+    spec = {"task": "support-1", "model": "builtin/idle", "simulator": "unity"}
+    refused = api.post("/v1/jobs", json=spec)
+    assert refused.status_code == 422
+    assert refused.json()["errors"][0]["choices"] == ["pybullet", "mujoco"]
+    for number, name in enumerate(("unity", "unity", "mujoco")):
+        versions = {"simulation": "7.1", "kind": "game", "repeatable": False}
+        report_worker(context, f"worker-{number}", simulate_queue(name), versions=versions)
+    unity, mujoco = listed()["unity"], listed()["mujoco"]
+    assert (unity["version"], unity["kind"], unity["default"]) == ("7.1", "game", False)
+    assert (unity["workers"], unity["served"]) == (2, True)
+    assert (mujoco["version"], mujoco["served"]) == (SIMULATION_VERSION, True)
+    assert api.post("/v1/jobs", json=spec).status_code == 202

@@ -9,7 +9,6 @@ import pytest
 
 from buildarena_client import (
     BadArgumentError,
-    Client,
     jobs_frame,
     leaderboard_frame,
     results_frame,
@@ -100,24 +99,3 @@ def test_a_frame_has_its_columns_whatever_a_service_says(kind) -> None:
         assert pd.isna(frame[name].to_list()).tolist() == [True, False]
     with pytest.raises(BadArgumentError, match="choose from pandas, polars"):
         jobs_frame([], kind="os")
-
-
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("kind", ["pandas", "polars"])
-def test_a_services_answers_as_frames(service, kind) -> None:
-    client = Client(service.url)
-    jobs = jobs_frame(client.jobs(), kind=kind)
-    assert sorted(jobs["id"].to_list()) == sorted(service.jobs)
-    assert sum(jobs["success"].to_list()) == 3
-    assert any(name.startswith("metrics.") for name in jobs.columns)
-    board = leaderboard_frame(client.leaderboard(), kind=kind)
-    assert board["model"].to_list() == ["builtin/expert", "builtin/idle"]
-    assert board["task"].to_list() == ["lift-1", "lift-1"]
-    assert board["success_rate"].to_list() == [1.0, 0.0]
-    sweeps = sweeps_frame(client.sweeps(), kind=kind)
-    assert sweeps["progress.done"].to_list() == [6]
-    assert "spec.tasks" in sweeps.columns
-    results = results_frame(client.sweep_results(service.sweep), kind=kind)
-    assert len(results) == 6
-    overall = leaderboard_frame(client.leaderboard(), overall=True, kind=kind)
-    assert len(overall) in {0, 2}
