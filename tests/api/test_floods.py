@@ -94,10 +94,9 @@ def test_the_stream_of_a_key_that_ended_ends(as_key, context, sweep_id) -> None:
         assert read_lines(staying, 4)
         time.sleep(0.3)
         assert not any(one.done() for one in reading)
-        for ending, client in gone.items():
+        for (ending, client), one in zip(gone.items(), reading, strict=True):
             ends = f"UPDATE api_keys SET {ending} = now() WHERE id = :id"
             execute(context, ends, {"id": client.key_id})
-        for one in reading:
             one.result(8)
         assert staying.status_code == 200
         # An answer about a key is used again for half a second.

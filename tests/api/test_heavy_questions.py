@@ -17,6 +17,7 @@ from support.statements import statements_of
 from buildarena_api.app import all_routes
 from buildarena_api.http.concurrency import MAX_WAITING, ConcurrencyLimit, usual_limits
 from buildarena_api.http.fair_cache import FairCache
+from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.weights import HEAVIEST, MAX_QUERY_BYTES, Weight, Weights
 from buildarena_pipeline.catalog.specs import SweepSpec
 
@@ -216,6 +217,21 @@ def test_whoever_leaves_while_waiting_keeps_no_place() -> None:
         await asyncio.gather(first, staying)
         assert not lane.limit._shares
         assert lane.limit._used == 0
+
+    asyncio.run(play())
+
+
+def test_one_too_many_is_refused_and_told_its_weight() -> None:
+    async def play() -> None:
+        lane = Lane(per_caller=1, total=1)
+        waiting = [asyncio.create_task(lane.ask("a")) for _ in range(1 + MAX_WAITING)]
+        await lane.until(1)
+        with pytest.raises(ProblemError, match="this one weighs 7") as raised:
+            async with asyncio.timeout(5), lane.limit.slot("a", weight=7):
+                pass
+        assert raised.value.headers == {"Retry-After": "2"}
+        for task in waiting:
+            task.cancel()
 
     asyncio.run(play())
 
