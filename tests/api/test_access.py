@@ -2,7 +2,7 @@
 
 import pytest
 from pydantic import SecretStr
-from support.clients.tenants import ADMIN, WITH_KEYS
+from support.clients.tenants import ADMIN, WITH_KEYS, Tenant, new_tenant, operator
 from support.jobs import execute
 from support.servers.live_api import api_client, changed
 from support.servers.stacks import wait_until
@@ -10,174 +10,148 @@ from support.servers.stacks import wait_until
 from buildarena_api.http.access import check_binding
 from buildarena_pipeline.runtime.settings import Settings
 
-CHANGES = [
-    *(f"/v1/sweeps/{{sweep}}/{what}" for what in ("pause", "resume", "cancel", "retry")),
-    *(f"/v1/jobs/{{job}}/{what}" for what in ("cancel", "retry")),
-]
+METRICS = "a-key-for-prometheus-alone"
 
 
 def bearer(secret: str) -> dict[str, str]:
     return {"Authorization": f"Bearer {secret}"}
 
 
-@pytest.fixture
-def make_key(guarded) -> object:
-    def make(*scopes: str, **more: object) -> str:
-        body = {"name": "somebody", "scopes": list(scopes), **more}
-        answer = guarded.post("/v1/keys", json=body, headers=bearer(ADMIN))
-        assert answer.status_code == 201, answer.text
-        return answer.json()["secret"]
-
-    return make
-
-
-def test_without_a_key_only_health_and_the_contract_answer(guarded) -> None:
-    assert guarded.get("/v1/health").status_code == 200
-    assert guarded.get("/openapi.json").status_code == 200
-    for path in ("/v1/tasks", "/v1/jobs", "/v1/leaderboard", "/v1/keys", "/v1/sweeps"):
-        answer = guarded.get(path)
-        assert answer.status_code == 401, path
-        assert answer.headers["www-authenticate"] == "Bearer"
-        assert answer.headers["content-type"] == "application/problem+json"
+def test_without_a_good_key_only_health_and_the_contract_answer(guarded) -> None:
+    secrets = ["", "nonsense", "ba_", "ba_" + "x" * 43, "ü", "ba_'; DROP TABLE api_keys; --"]
+    for path in ("/v1/health", "/openapi.json", "/jobs/job_1"):
+        assert guarded.get(path).status_code == 200
+    for path in ("/v1/tasks", "/v1/jobs", "/v1/leaderboard", "/v1/keys", "/v1/jobs/job_x/replay"):
+        for secret in (None, *(secrets if path == "/v1/tasks" else ())):
+            headers = {} if secret is None else {"Authorization": f"Bearer {secret}".encode()}
+            answer = guarded.get(path, headers=headers)
+            assert answer.status_code == 401, (path, secret)
+            assert answer.headers["www-authenticate"] == "Bearer"
+            assert answer.headers["content-type"] == "application/problem+json"
+    assert operator(guarded).get("/v1/keys") == []
 
 
-@pytest.mark.parametrize(
-    "secret", ["", "nonsense", "ba_", "ba_" + "x" * 43, "ü", "ba_'; DROP TABLE api_keys; --"]
-)
-def test_malformed_and_unknown_keys_are_refused(guarded, secret) -> None:
-    headers = {"Authorization": f"Bearer {secret}".encode()}
-    assert guarded.get("/v1/tasks", headers=headers).status_code == 401
-    assert guarded.get("/v1/keys", headers=bearer(ADMIN)).json() == []
-
-
-def test_expired_and_revoked_keys_are_refused_and_say_so(guarded, make_key, context) -> None:
-    secret = make_key("submit", days=1)
-    assert guarded.get("/v1/jobs", headers=bearer(secret)).status_code == 200
-    execute(context, "UPDATE api_keys SET expires_at = now()")
+def test_expired_and_revoked_keys_are_refused_and_say_so(guarded, context) -> None:
+    mine, other = new_tenant(guarded, "mine"), new_tenant(guarded, "other", "admin")
+    assert mine.ask("GET", "/v1/jobs").status_code == 200
+    execute(context, "UPDATE api_keys SET expires_at = now() WHERE id = :id", {"id": mine.id})
 
     def refused() -> str:
-        return guarded.get("/v1/jobs", headers=bearer(secret)).json().get("detail", "")
+        return mine.ask("GET", "/v1/jobs").json().get("detail", "")
 
     assert "expired" in wait_until(refused, 5, "a key that expired is refused")
-    other = make_key("admin")
-    key_id = guarded.get("/v1/keys", headers=bearer(other)).json()[-1]["id"]
-    assert guarded.post(f"/v1/keys/{key_id}/revoke", headers=bearer(ADMIN)).status_code == 200
-    answer = guarded.get("/v1/jobs", headers=bearer(other))
+    assert other.ask("GET", "/v1/keys").status_code == 200
+    operator(guarded).post(f"/v1/keys/{other.id}/revoke")
+    answer = other.ask("GET", "/v1/keys")
     assert (answer.status_code, "revoked" in answer.json()["detail"]) == (401, True)
 
 
-def test_each_scope_allows_its_part(guarded, make_key, sweep) -> None:
-    def tried(secret: str) -> list[int]:
-        headers = bearer(secret)
-        return [
-            guarded.get("/v1/tasks", headers=headers).status_code,
-            guarded.post("/v1/sweeps", json=sweep, headers=headers).status_code,
-            guarded.get("/v1/keys", headers=headers).status_code,
-            guarded.post(
-                "/v1/keys", json={"name": "x", "scopes": ["admin"]}, headers=headers
-            ).status_code,
-        ]
+def test_each_scope_allows_its_part_and_is_told(guarded, api, sweep) -> None:
+    def tried(who: Tenant) -> list[int]:
+        new = {"name": "x", "scopes": ["admin"]}
+        asked = (("GET", "/v1/tasks", None), ("POST", "/v1/sweeps", sweep))
+        asked += (("GET", "/v1/keys", None), ("POST", "/v1/keys", new))
+        return [who.ask(method, path, json=body).status_code for method, path, body in asked]
 
-    assert tried(make_key("read")) == [200, 403, 403, 403]
-    assert tried(make_key("submit")) == [200, 202, 403, 403]
-    assert tried(make_key("admin")) == [200, 202, 200, 201]
-
-
-def test_nobody_changes_what_another_submitted(guarded, make_key, sweep) -> None:
-    mine, other = make_key("submit"), make_key("submit")
-    sweep_id = guarded.post("/v1/sweeps", json=sweep, headers=bearer(mine)).json()["id"]
-    job_id = guarded.get("/v1/jobs", headers=bearer(mine)).json()["jobs"][0]["id"]
-    for path in CHANGES:
-        url = path.format(sweep=sweep_id, job=job_id)
-        answer = guarded.post(url, headers=bearer(other))
-        assert answer.status_code == 403, url
-        assert "another key" in answer.json()["detail"]
-    shown = guarded.get(f"/v1/sweeps/{sweep_id}", headers=bearer(other)).json()
-    assert shown["state"] == "active"
-    assert guarded.post(f"/v1/sweeps/{sweep_id}/pause", headers=bearer(mine)).status_code == 200
-    assert guarded.post(f"/v1/sweeps/{sweep_id}/cancel", headers=bearer(ADMIN)).status_code == 200
+    for scopes, statuses in (
+        (["read"], [200, 403, 403, 403]),
+        (["read", "submit"], [200, 202, 403, 403]),
+        (["admin"], [200, 202, 200, 201]),
+    ):
+        who = new_tenant(guarded, "ada", *scopes)
+        assert tried(who) == statuses
+        told = {"key": who.id, "scope": scopes[-1], "keys_required": True}
+        assert who.get("/v1/caller") == told
+    answer = api.get("/v1/caller")
+    assert answer.json() == {"key": None, "scope": "admin", "keys_required": False}
+    assert answer.headers["cache-control"] == "no-store"
 
 
-def test_nobody_plays_anothers_session(guarded, make_key) -> None:
-    mine, other = make_key("submit"), make_key("submit")
-    payload = {"task": "support-1", "agent": "me"}
-    opened = guarded.post("/v1/sessions", json=payload, headers=bearer(mine)).json()["id"]
+def test_nobody_changes_what_another_submitted(guarded, sweep) -> None:
+    mine, other = (new_tenant(guarded, name, "read", "submit") for name in ("mine", "other"))
+    id_ = mine.post("/v1/sweeps", sweep)["id"]
+    job = mine.get("/v1/jobs")["jobs"][0]["id"]
+    session = mine.post("/v1/sessions", {"task": "support-1", "agent": "me"})["id"]
     call = {"tool": "start", "arguments": {}}
-    for path, body in (("calls", call), ("submit", None)):
-        url = f"/v1/sessions/{opened}/{path}"
-        assert guarded.post(url, json=body, headers=bearer(other)).status_code == 403
-    answer = guarded.post(f"/v1/sessions/{opened}/calls", json=call, headers=bearer(mine))
-    assert answer.status_code == 200
+    budget = f"/v1/sweeps/{id_}/budget"
+    changes = [
+        *(
+            ("POST", f"/v1/sweeps/{id_}/{do}", None)
+            for do in ("pause", "resume", "cancel", "retry")
+        ),
+        *(("POST", f"/v1/jobs/{job}/{what}", None) for what in ("cancel", "retry")),
+        *(("POST", f"/v1/sessions/{session}/{what}", call) for what in ("calls", "submit")),
+        ("POST", f"/v1/sessions/{session}/tests", None),
+        ("PUT", budget, {"max_requests": 9}),
+    ]
+    for method, path, body in changes:
+        answer = other.ask(method, path, json=body)
+        assert answer.status_code == 403, path
+        assert "another key" in answer.json()["detail"]
+    assert other.get(f"/v1/sweeps/{id_}")["state"] == "active"
+    assert other.get(f"/v1/sessions/{session}")["open"]
+    mine.post(f"/v1/sessions/{session}/calls", call, status=200)
+    assert mine.ask("PUT", budget, json={"max_requests": 7}).json()["budget"]["max_requests"] == 7
+    assert mine.ask("PUT", budget, json={"usd": 1}).status_code == 422
+    mine.post(f"/v1/sweeps/{id_}/pause", status=200)
+    operator(guarded).post(f"/v1/sweeps/{id_}/cancel", status=200)
+    assert mine.ask("PUT", budget, json={}).status_code == 409
 
 
-def test_one_keys_idempotency_keys_are_not_anothers(guarded, make_key, sweep) -> None:
-    ids = set()
-    for secret in (make_key("submit"), make_key("submit")):
-        headers = {**bearer(secret), "Idempotency-Key": "monday"}
-        ids.add(guarded.post("/v1/sweeps", json=sweep, headers=headers).json()["id"])
-    assert len(ids) == 2
+def test_one_keys_idempotency_keys_are_not_anothers(guarded, sweep) -> None:
+    headers = {"Idempotency-Key": "monday"}
+    first, second = (
+        new_tenant(guarded, "x").ask("POST", "/v1/sweeps", json=sweep, headers=headers).json()["id"]
+        for _ in range(2)
+    )
+    assert first != second
 
 
-def test_a_secret_is_shown_once_and_nowhere_again(guarded, make_key, capfd) -> None:
-    secret = make_key("submit")
-    guarded.get("/v1/nonsense", headers=bearer(secret))
-    guarded.get("/v1/tasks", headers=bearer(secret + "x"))
-    listed = guarded.get("/v1/keys", headers=bearer(ADMIN)).text
-    out, err = capfd.readouterr()
-    for place in (listed, out, err):
-        assert secret not in place
+def test_a_secret_is_shown_once_and_nowhere_again(guarded, capfd) -> None:
+    who = new_tenant(guarded, "somebody")
+    who.ask("GET", "/v1/nonsense")
+    guarded.get("/v1/tasks", headers=bearer(who.secret + "x"))
+    listed = operator(guarded).ask("GET", "/v1/keys").text
+    settings = Settings().model_copy(update={"admin_key": SecretStr(ADMIN)})
+    for place in (listed, repr(settings), *capfd.readouterr()):
+        assert who.secret not in place
         assert ADMIN not in place
-
-
-def test_settings_do_not_print_the_operators_key(context) -> None:
-    changed = context.settings.model_copy(update={"admin_key": SecretStr(ADMIN)})
-    assert ADMIN not in repr(changed)
 
 
 def test_too_many_requests_are_reported_when_to_come_back(context) -> None:
     with changed(context, rate_limit="5/minute") as own, api_client(own) as client:
         answers = [client.get("/v1/models") for _ in range(7)]
-        assert [answer.status_code for answer in answers][:5] == [200] * 5
-        assert answers[-1].status_code == 429
+        assert [answer.status_code for answer in answers] == [200] * 5 + [429] * 2
         assert 1 <= int(answers[-1].headers["retry-after"]) <= 60
         assert client.get("/v1/health").status_code == 200, "probes are not counted"
-
-
-@pytest.mark.ci
-def test_guessing_keys_is_limited(context) -> None:
-    changes = {**WITH_KEYS, "rate_limit": "3/minute"}
-    with changed(context, **changes) as own, api_client(own) as client:
+    with (
+        changed(context, **{**WITH_KEYS, "rate_limit": "3/minute"}) as own,
+        api_client(own) as client,
+    ):
         tried = [client.get("/v1/tasks", headers=bearer(f"ba_{n}")).status_code for n in range(5)]
-        assert tried == [401, 401, 401, 429, 429]
-        assert client.get("/v1/tasks", headers=bearer(ADMIN)).status_code == 200
+        assert tried == [401, 401, 401, 429, 429], "guessing keys is limited"
+        assert operator(client).ask("GET", "/v1/tasks").status_code == 200
 
 
-@pytest.mark.parametrize(
-    ("changes", "advice"),
-    [
+def test_an_open_service_stays_on_loopback() -> None:
+    check_binding(Settings())
+    for changes, advice in (
         ({"host": "0.0.0.0"}, "BUILDARENA_REQUIRE_KEYS=true"),
         ({"require_keys": True}, "BUILDARENA_ADMIN_KEY"),
-    ],
-)
-def test_an_open_service_stays_on_loopback(changes, advice) -> None:
-    with pytest.raises(ValueError, match=advice):
-        check_binding(Settings().model_copy(update=changes))
-    check_binding(Settings())
+    ):
+        with pytest.raises(ValueError, match=advice):
+            check_binding(Settings().model_copy(update=changes))
 
 
 def test_the_key_of_the_metrics_opens_them_alone(context) -> None:
-    secret = "a-key-for-prometheus-alone"
-    changes = {**WITH_KEYS, "metrics_key": SecretStr(secret), "base_path": "/arena"}
+    changes = {**WITH_KEYS, "metrics_key": SecretStr(METRICS), "base_path": "/arena"}
     with changed(context, **changes) as own, api_client(own) as client:
-        asked = {
-            path: client.get(path, headers=bearer(secret)).status_code
-            for path in ("/v1/metrics", "/arena/v1/metrics", "/v1/jobs", "/v1/keys", "/v1/tasks")
-        }
-        assert asked == {
-            **dict.fromkeys(("/v1/metrics", "/arena/v1/metrics"), 200),
-            **dict.fromkeys(("/v1/jobs", "/v1/keys", "/v1/tasks"), 401),
-        }
-        assert client.get("/v1/metrics", headers=bearer(secret + "x")).status_code == 401
+        for secret, path, status in (
+            *((METRICS, path, 200) for path in ("/v1/metrics", "/arena/v1/metrics")),
+            *((METRICS, path, 401) for path in ("/v1/jobs", "/v1/keys", "/v1/tasks")),
+            (METRICS + "x", "/v1/metrics", 401),
+            (ADMIN, "/v1/metrics", 200),
+        ):
+            assert client.get(path, headers=bearer(secret)).status_code == status, (secret, path)
         assert client.get("/v1/metrics").status_code == 401
-        assert client.get("/v1/metrics", headers=bearer(ADMIN)).status_code == 200
-        assert client.post("/v1/metrics", headers=bearer(secret)).status_code == 405
+        assert client.post("/v1/metrics", headers=bearer(METRICS)).status_code == 405

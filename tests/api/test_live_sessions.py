@@ -1,150 +1,112 @@
-"""Sessions under way: their turns as events, their transcript and their replay."""
+"""Sessions under way and ended: turns as events, transcripts, and the search through them."""
 
 import json
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import httpx
 import pytest
-from support.jobs import claim, execute, journal_entry
+from sqlalchemy import Text, bindparam, text
+from support.jobs import claim, execute, finish, journal_entry
 from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_pipeline.turns import Transcripts
-from buildarena_store import StaleLeaseError, TurnResult, Usage
-from buildarena_store.events import record_jobs
+from buildarena_store import Lease, TurnResult, Usage
+from buildarena_store.jobs import transcript_search
 from buildarena_worker.session.turn_keeper import TurnKeeper
 
 START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}
 ATTACH = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}
+SPEC = {"tasks": ["support-1"], "models": ["builtin/idle", "builtin/random"], "seeds": [0, 1]}
+SAID = "I will attach two powered wheels below the beam, so that it can drive."
+ANSWERED = "Refused: block 7 would overlap block 3."
+TOLD = {"system": "You are the drafter. Draw gearboxes.", "user": ["Lift a weight.", "Again."]}
 
 
-def submitted(api, **more: object) -> str:
-    body = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco", **more}
-    return api.post("/v1/jobs", json=body).json()["id"]
-
-
-def opened(api) -> str:
-    body = {"task": "support-1", "agent": "me", "seed": 1, "simulator": "mujoco"}
-    return api.post("/v1/sessions", json=body).json()["id"]
-
-
-def act(api, session: str, tool: str, arguments: object) -> None:
-    body = {"tool": tool, "arguments": arguments}
-    assert api.post(f"/v1/sessions/{session}/calls", json=body).status_code == 200
-
-
-def claimed(context):
-    """A lease that nobody needs to renew, however slow the machine is."""
+@pytest.fixture
+def lease(context, submit_job) -> Lease:
+    """That of the only job, which nobody needs to renew however slow the machine is."""
+    submit_job()
     lease = claim(context)
     execute(context, "UPDATE leases SET expires_at = now() + interval '1 hour'")
     return lease
 
 
-def take(context, lease, sequence: int, *calls: tuple[str, object], said: str = "") -> None:
-    """Journals a reply and what came of it, as a worker does."""
-    reply = {"text": said, "calls": [["c", *one] for one in calls], "finish": "stop"}
+def take(
+    context,
+    lease: Lease,
+    index: int,
+    *calls: tuple[str, object],
+    said: str = "",
+    answered: str | None = None,
+    **more: object,
+) -> None:
+    """Journals a reply and what came of it, as a worker does; its sequence is odd."""
+    sequence = 2 * index + 1
+    made = calls or ([("attach", {})] if answered else [])
+    reply = {"text": said, "calls": [["c", *one] for one in made], "finish": "stop"}
     usage = Usage(requests=1, input_tokens=5)
-    context.store.journal.append(lease, journal_entry(sequence, reply=reply, usage=usage))
-    results = [(True, None, "done") for _ in calls]
-    context.store.turns.append(
-        lease, TurnResult(index=sequence, sequence=sequence, sub_structure=None, results=results)
+    context.store.journal.append(lease, journal_entry(sequence, reply=reply, usage=usage, **more))
+    result = (False, "overlap", answered) if answered else (True, None, "done")
+    turn = TurnResult(
+        index=index, sequence=sequence, sub_structure=None, results=[result for _ in made]
     )
-
-
-class Stream:
-    """The events of a job, read in a thread."""
-
-    def __init__(self, url: str, job: str, last_id: int = 0) -> None:
-        self.events: list[tuple[int, str, dict]] = []
-        self._client = httpx.Client(timeout=30)
-        self._url = f"{url}/v1/jobs/{job}/events"
-        self._headers = {"Last-Event-ID": str(last_id)}
-        self._closing = False
-        self._thread = threading.Thread(target=self._read)
-        self._thread.start()
-
-    def _read(self) -> None:
-        found: dict[str, str] = {}
-        try:
-            with self._client.stream("GET", self._url, headers=self._headers) as answer:
-                for line in answer.iter_lines():
-                    name, _, value = line.partition(": ")
-                    if self._closing:
-                        return
-                    if line:
-                        found[name] = value
-                    elif "data" in found:
-                        data = json.loads(found["data"])
-                        self.events.append((int(found["id"]), found["event"], data))
-                        found = {}
-        except httpx.HTTPError:
-            return
-
-    def turns(self) -> list[int]:
-        return [data["turn"]["index"] for _, kind, data in self.events if kind == "turn"]
-
-    def wait_for(self, turns: int, within_s: float = 20.0) -> None:
-        end = time.monotonic() + within_s
-        while len(self.turns()) < turns:
-            assert time.monotonic() < end, self.turns()
-            time.sleep(0.02)
+    context.store.turns.append(lease, turn)
 
 
 @contextmanager
-def streaming(context, url: str, job: str, last_id: int = 0) -> Iterator[Stream]:
-    stream = Stream(url, job, last_id)
-    try:
-        yield stream
-    finally:
-        stream._closing = True
-        # A last event lets its thread see that it shall end.
-        with context.store.database.transaction() as connection:
-            record_jobs(connection, [job], "queued", {})
-        stream._thread.join()
-        stream._client.close()
+def turns(url: str, job: str, last_id: int = 0) -> Iterator[Iterator[tuple[int, dict]]]:
+    """The turns of a job's stream, each with its event's id."""
+
+    def read(lines: Iterator[str]) -> Iterator[tuple[int, dict]]:
+        found: dict[str, str] = {}
+        for line in lines:
+            name, _, value = line.partition(": ")
+            found = {**found, name: value} if line else {}
+            if name == "data" and found["event"] == "turn":
+                yield int(found["id"]), json.loads(value)["turn"]
+
+    path, headers = f"{url}/v1/jobs/{job}/events", {"Last-Event-ID": str(last_id)}
+    with httpx.stream("GET", path, headers=headers, timeout=30) as answer:
+        yield read(answer.iter_lines())
 
 
-@pytest.mark.ci
-def test_turns_come_soon_and_once_over_reconnects_and_restarts(api, context) -> None:
-    job = submitted(api)
-    lease = claimed(context)
-    seen: list[int] = []
+def test_turns_come_soon_and_once_over_reconnects_and_restarts(context, lease) -> None:
+    job = lease.job.id
     with live_api(context) as url:
-        with streaming(context, url, job) as first:
+        with turns(url, job) as told:
             take(context, lease, 0, ("start", START), said="I start.")
-            first.wait_for(1)
+            _, turn = next(told)
+            assert (turn["text"], turn["role"], turn["stage"]) == ("I start.", "builder", "build")
+            (action,) = turn["actions"]
+            assert (action["name"], action["arguments"]) == ("start", START)
             began = time.monotonic()
             take(context, lease, 1, ("attach_block_to", ATTACH))
-            first.wait_for(2)
+            last, turn = next(told)
             # Half a second, and what a busy machine adds.
             assert time.monotonic() - began < 8
-            turn = next(data for _, kind, data in first.events if kind == "turn")["turn"]
-            assert (turn["text"], turn["role"], turn["stage"]) == ("I start.", "builder", "build")
-            assert turn["actions"][0]["name"] == "start"
-            assert turn["actions"][0]["arguments"] == START
-            last_id = max(id_ for id_, kind, _ in first.events if kind == "turn")
-            seen += first.turns()
-        for sequence in (2, 3):
-            take(context, lease, sequence)
-        with streaming(context, url, job, last_id) as second:
-            second.wait_for(2)
-            seen += second.turns()
-            last_id = max(id_ for id_, kind, _ in second.events if kind == "turn")
-    take(context, lease, 4)
-    with live_api(context) as url, streaming(context, url, job, last_id) as third:
-        take(context, lease, 5)
-        third.wait_for(2)
-        seen += third.turns()
-    assert seen == [0, 1, 2, 3, 4, 5]
+        seen = [0, turn["index"]]
+        take(context, lease, 2)
+        with turns(url, job, last) as told:
+            last, turn = next(told)
+            seen.append(turn["index"])
+    with live_api(context) as url, turns(url, job, last) as told:
+        take(context, lease, 3, said="x" * 200_000)
+        last, turn = next(told)
+    # A very long one is sent in short.
+    assert turn["shortened"]
+    assert 0 < len(turn["text"]) < 10_000
+    assert [*seen, turn["index"]] == [0, 1, 2, 3]
+    with live_api(context) as url:
+        whole = httpx.get(f"{url}/v1/jobs/{job}/transcript").json()["turns"][3]
+    assert len(whole["text"]) == 200_000
 
 
 def test_a_sweeps_stream_has_no_turns(api, context, sweep) -> None:
     sweep_id = api.post("/v1/sweeps", json=sweep).json()["id"]
-    lease = claimed(context)
+    lease = claim(context)
     take(context, lease, 0)
     kinds = [event.kind for event in context.store.events.after(0, sweep_id=sweep_id)]
     assert "running" in kinds
@@ -153,52 +115,27 @@ def test_a_sweeps_stream_has_no_turns(api, context, sweep) -> None:
     assert of_job[-1] == "turn"
 
 
-def test_a_very_long_turn_is_sent_in_short(api, context) -> None:
-    job = submitted(api)
-    lease = claimed(context)
-    take(context, lease, 0, said="x" * 200_000)
-    with live_api(context) as url, streaming(context, url, job) as stream:
-        stream.wait_for(1)
-        turn = next(data["turn"] for _, kind, data in stream.events if kind == "turn")
-    assert turn["shortened"]
-    assert 0 < len(turn["text"]) < 10_000
-    whole = api.get(f"/v1/jobs/{job}/transcript").json()["turns"][0]
-    assert len(whole["text"]) == 200_000
-
-
-def test_the_transcript_of_a_session_under_way_is_the_one_it_will_have(api, context) -> None:
-    job = submitted(api)
-    assert api.get(f"/v1/jobs/{job}/transcript").status_code == 404
+def test_the_transcript_of_a_session_under_way_is_the_one_it_will_have(
+    api, context, submit_job
+) -> None:
+    job = submit_job()
+    path = f"/v1/jobs/{job}/transcript"
+    assert api.get(path).status_code == 404
     work(context, steps=1)
     assert context.store.jobs.get(job).state == "queued"
-    live = api.get(f"/v1/jobs/{job}/transcript")
+    live = api.get(path)
     kept = context.artifacts.get(context.store.jobs.artifacts(job)["transcript"])
     assert live.content == kept
     work(context)
-    ended = api.get(f"/v1/jobs/{job}/transcript")
-    assert ended.content == kept
-    assert "turns, " in api.get(f"/v1/jobs/{job}/transcript", params={"style": "markdown"}).text
-
-
-def test_a_session_that_is_resumed_takes_no_turn_twice(api, context) -> None:
-    job = submitted(api, task="transport-1")
-    work(context, steps=1)
-    count = context.store.turns.count(job)
-    assert count > 10
-    # Three trials: the session is run again from its start after each.
-    work(context)
-    indices = [record.index for record in context.store.turns.read(job)]
-    assert indices == list(range(len(indices)))
-    assert len(indices) > count
-    kept = api.get(f"/v1/jobs/{job}/transcript").json()["turns"]
-    assert len(kept) == len(indices)
+    assert api.get(path).content == kept
+    assert "turns, " in api.get(path, params={"style": "markdown"}).text
 
 
 @pytest.mark.ci
 def test_a_turn_that_was_journalled_and_not_told_is_told_when_the_session_resumes(
-    api, context, monkeypatch
+    context, submit_job, monkeypatch
 ) -> None:
-    job = submitted(api)
+    job = submit_job()
     told = TurnKeeper.__call__
 
     def breaks_off(self, turn, entry) -> None:
@@ -218,63 +155,134 @@ def test_a_turn_that_was_journalled_and_not_told_is_told_when_the_session_resume
     assert len(indices) > 6
 
 
-def test_a_worker_without_a_lease_tells_nothing(api, context) -> None:
-    job = submitted(api)
-    lease = claimed(context)
-    take(context, lease, 0)
-    stale = replace(lease, token=lease.token + 1)
-    context.store.turns.append(
-        stale, TurnResult(index=1, sequence=1, sub_structure=None, results=[])
-    )
-    assert context.store.turns.count(job) == 1
-    with pytest.raises(StaleLeaseError):
-        take(context, stale, 1)
-
-
-def test_texts_that_no_database_takes_are_kept_readable(api, context) -> None:
-    job = submitted(api)
-    lease = claimed(context)
-    take(context, lease, 0)
-    result = (False, "malformed_arguments", "not \0 and \ud800")
-    reply = {"text": "", "calls": [["c", "x", {}]], "finish": "stop"}
-    context.store.journal.append(lease, journal_entry(1, reply=reply))
-    turn = TurnResult(index=1, sequence=1, sub_structure="a\0b", results=[result])
-    context.store.turns.append(lease, turn)
-    shown = api.get(f"/v1/jobs/{job}/transcript").json()["turns"][1]
-    assert shown["sub_structure"] == "a\ufffdb"
-    assert shown["actions"][0]["feedback"].startswith("not \ufffd")
-
-
-def test_replays_grow_with_a_models_session(api, context) -> None:
-    job = submitted(api)
-    lease = claimed(context)
+def test_a_cancelled_session_leaves_its_transcript_and_replay(api, context, lease) -> None:
+    path = f"/v1/jobs/{lease.job.id}"
     take(context, lease, 0, ("start", START))
     take(context, lease, 1, ("attach_block_to", ATTACH))
-    first = api.get(f"/v1/jobs/{job}/replay").json()
-    assert first["exact"] is None
-    assert [step["turn"] for step in first["chapters"][0]["steps"]] == [0, 1]
-    take(context, lease, 2, ("attach_block_to", {**ATTACH, "face": "B"}))
-    again = api.get(f"/v1/jobs/{job}/replay").json()
-    assert [step["added"][0]["id"] for step in again["chapters"][0]["steps"]] == ["1", "2", "3"]
+    replay = api.get(f"{path}/replay").json()
+    assert replay["exact"] is None
+    assert [step["turn"] for step in replay["chapters"][0]["steps"]] == [0, 1]
+    # Texts that no database takes are kept readable.
+    reply = {"text": "", "calls": [["c", "x", {}]], "finish": "stop"}
+    context.store.journal.append(lease, journal_entry(5, reply=reply))
+    odd = [(False, "malformed_arguments", "not \0 and \ud800")]
+    turn = TurnResult(index=2, sequence=5, sub_structure="a\0b", results=odd)
+    context.store.turns.append(lease, turn)
+    assert api.post(f"{path}/cancel").status_code == 200
+    told = api.get(f"{path}/transcript").json()["turns"]
+    assert [turn["index"] for turn in told] == [0, 1, 2]
+    assert told[2]["sub_structure"] == "a\ufffdb"
+    assert told[2]["actions"][0]["feedback"].startswith("not \ufffd")
+    steps = api.get(f"{path}/replay").json()["chapters"][0]["steps"]
+    assert [step["added"][0]["id"] for step in steps[:2]] == ["1", "2"]
 
 
-def test_an_agents_calls_are_turns_too(api, context) -> None:
-    job = opened(api)
-    act(api, job, "start", START)
-    act(api, job, "attach_block_to", ATTACH)
+def test_an_agents_calls_are_turns_and_are_found(api, context, open_session, act) -> None:
+    job = open_session()
+    act(job, "start", START)
+    act(job, "remove_block", {"block": 7})
     events = [one for one in context.store.events.after(0, job_id=job) if one.kind == "turn"]
-    turns = Transcripts(context.store, context.artifacts).taken(job, events[1:])
-    (turn,) = turns.values()
-    assert (turn["index"], turn["actions"][0]["name"]) == (1, "attach_block_to")
+    (turn,) = Transcripts(context.store, context.artifacts).taken(job, events[1:]).values()
+    assert (turn["index"], turn["actions"][0]["name"]) == (1, "remove_block")
     shown = api.get(f"/v1/jobs/{job}/transcript").json()["turns"]
     assert [one["index"] for one in shown] == [0, 1]
     assert shown[1] == json.loads(json.dumps(turn))
+    words = turn["actions"][0]["feedback"].split()[:9]
+    assert (job, 1) in {(m["job"], m["turn"]) for m in found(api, f'"{" ".join(words)}"')}
 
 
-def test_a_cancelled_session_leaves_its_transcript(api, context) -> None:
-    job = submitted(api)
-    lease = claimed(context)
-    take(context, lease, 0, ("start", START))
-    assert api.post(f"/v1/jobs/{job}/cancel").status_code == 200
-    assert len(api.get(f"/v1/jobs/{job}/transcript").json()["turns"]) == 1
-    assert len(api.get(f"/v1/jobs/{job}/replay").json()["chapters"]) == 1
+@pytest.fixture
+def sweep_of_talkers(api, context) -> str:
+    """Four jobs, two of which say and are answered something; one of them has ended."""
+    sweep = api.post("/v1/sweeps", json=SPEC).json()["id"]
+    first, second = claim(context), claim(context)
+    take(context, first, 0, said="Nothing yet.", told=TOLD)
+    take(context, first, 1, said=SAID, answered=ANSWERED)
+    take(context, first, 2, told={"user": ["Draw the gearbox again."]})
+    said = "<b>Wheel</b> naïve 🚗, a gearbox and a kitchen sink"
+    take(context, second, 0, said=said, told={"user": ["Build a bridge."]})
+    finish(context, second)
+    return sweep
+
+
+def found(api, words: str, **more: object) -> list[dict]:
+    answer = api.get("/v1/transcripts", params={"text": words, **more})
+    assert answer.status_code == 200, answer.text
+    return answer.json()["matches"]
+
+
+def marked(match: dict) -> list[str]:
+    return [piece["text"] for piece in match["excerpt"] if piece["match"]]
+
+
+def test_words_are_found_in_all_their_forms_with_their_turns(api, sweep_of_talkers) -> None:
+    both = {match["turn"]: match for match in found(api, "wheel")}
+    assert {turn: match["where"] for turn, match in both.items()} == {0: "reply", 1: "reply"}
+    assert "".join(piece["text"] for piece in both[1]["excerpt"]) == SAID
+    assert marked(both[1]) == ["wheels"]
+    transcript = api.get(f"/v1/jobs/{both[1]['job']}/transcript").json()
+    assert transcript["turns"][1]["text"] == SAID
+    assert (both[0]["outcome"], both[0]["task"]) == ("success", "support-1")
+    assert "naïve 🚗" in "".join(piece["text"] for piece in both[0]["excerpt"])
+    # What models are answered is searched too.
+    (match,) = found(api, '"overlap block 3"')
+    assert (match["turn"], match["where"]) == (1, "feedback")
+    assert "overlap" in marked(match)
+    assert found(api, '"block 3 overlap"') == []
+    assert [match["turn"] for match in found(api, "overlaps or kitchens")] == [0, 1]
+    assert [match["turn"] for match in found(api, "wheel -kitchen")] == [1]
+    # A search is of one task, model and sweep.
+    model = both[1]["model"]
+    (other,) = {"builtin/idle", "builtin/random"} - {model}
+    where = {"model": model, "task": "support-1", "sweep": sweep_of_talkers}
+    assert len(found(api, "powered", **where)) == 1
+    assert found(api, "powered", model=other) == found(api, "powered", task="lift-1") == []
+    for name, bad, status in (
+        *(("task", "lift-9", 422), ("sweep", "sweep_0", 404)),
+        *(("text", bad, 422) for bad in ("the", "  ", "!?", "\0", '""', "-wheel", "x" * 201)),
+    ):
+        answer = api.get("/v1/transcripts", params={"text": "powered", name: bad})
+        assert answer.status_code == status, (name, bad)
+
+
+def test_what_roles_were_told_is_kept_and_found_once_a_job(api, sweep_of_talkers) -> None:
+    (match,) = found(api, "gearbox", of="prompts")
+    assert (match["turn"], match["where"], marked(match)) == (0, "prompt", ["gearboxes"])
+    assert found(api, '"lift weights"', of="prompts") == []
+    assert found(api, "gearbox")[0]["where"] == "reply"
+    both = found(api, "bridge or gearbox", of="prompts", sweep=sweep_of_talkers)
+    assert len({match["job"] for match in both}) == 2
+    assert found(api, "gearbox", of="prompts", task="lift-1") == []
+    kept = api.get(f"/v1/jobs/{match['job']}/prompts").json()["prompts"]
+    again = {"turn": 2, "system": None, "user": ["Draw the gearbox again."]}
+    assert kept == [{"turn": 0, **TOLD}, again]
+
+
+def test_of_very_many_turns_some_are_searched_and_it_says_so(
+    api, context, lease, monkeypatch
+) -> None:
+    for index in range(6):
+        take(context, lease, index, said=f"The beam, part {index}.")
+    assert [match["turn"] for match in found(api, "beam")] == list(range(6))
+    some = api.get("/v1/transcripts?text=beam&limit=4").json()
+    assert (len(some["matches"]), some["complete"]) == (4, False)
+    monkeypatch.setattr(transcript_search, "MAX_MATCHES", 3)
+    assert api.get("/v1/transcripts?text=beam").json()["complete"] is False
+
+
+@pytest.mark.usefixtures("sweep_of_talkers")
+def test_every_part_of_a_search_goes_by_an_index(context) -> None:
+    words = ("ix_journal_words", "ix_events_words", "ix_external_calls_words")
+    for query, indices, never in (
+        (transcript_search.SEARCH, words, "Seq Scan"),
+        (transcript_search.SEARCH_PROMPTS, ("ix_journal_told",), "Seq Scan on journal"),
+    ):
+        values = {"words": "wheel", "task": None, "model": None, "sweep": None}
+        more = {"most": 10, "limit": 10, "options": ""}
+        typed = (bindparam(name, type_=Text()) for name in values)
+        plan = text(f"EXPLAIN {query.text}").bindparams(*typed)
+        with context.store.database.transaction() as connection:
+            connection.execute(text("SET LOCAL enable_seqscan = off"))
+            shown = "\n".join(connection.execute(plan, {**values, **more}).scalars())
+        assert all(index in shown for index in indices), shown
+        assert never not in shown

@@ -1,30 +1,39 @@
-"""Machines that come as files: looked at, checked, tried; hostile ones refused in words."""
+"""Machines that come as files: looked at, tried, refused in words, and read in a process apart."""
 
 import json
+import os
+import signal
 import zlib
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 
+import httpx
+import psutil
 import pytest
-from support.clients.tenants import new_tenant
+from support.clients.tenants import WITH_KEYS, Tenant, new_tenant
 from support.machine_files import published_files
 from support.machines.building import BLOCK, built
+from support.servers.live_api import changed, live_api
+from support.servers.stacks import wait_until
+from support.warm_work import make
 
-from buildarena_api.machine_uploads import MAX_BYTES
+from buildarena_api import machine_uploads
+from buildarena_api.checking import Checker, CheckFailedError
+from buildarena_api.machine_uploads import MAX_BYTES, shared_checker
 from buildarena_geometry import Machine
+from buildarena_simulation.constants import MAX_PARTS
 from buildarena_store.jobs import files
 
 TRIAL = {"task": "support-1", "simulator": "mujoco"}
+SPARE = 200 << 20
 
 
 def bridge(length: int = 4) -> Machine:
     return built(*((str(n), "E" if n == 1 else "A", BLOCK) for n in range(1, length)))
 
 
-def document(machine: Machine | None = None) -> bytes:
-    return json.dumps((machine or bridge()).to_document()).encode()
-
-
-def changed(**change: object) -> bytes:
-    return json.dumps({**json.loads(document()), **change}).encode()
+def written(**change: object) -> bytes:
+    return json.dumps({**bridge().to_document(), **change}).encode()
 
 
 def check(api, data: bytes, **params: str):
@@ -35,181 +44,246 @@ def attempt(api, data: bytes, **params: object):
     return api.post("/v1/machines/trials", content=data, params={**TRIAL, **params})
 
 
-@pytest.mark.ci
-def test_a_document_is_looked_at(api) -> None:
+def test_a_machine_is_looked_at(api) -> None:
     machine = bridge()
-    seen = check(api, document(machine)).json()
+    seen = check(api, written()).json()
     assert (seen["parts"], seen["faults"], seen["detached"]) == (4, [], [])
     assert seen["mass"] == pytest.approx(machine.mass)
     assert seen["bounds"] == machine.bounds.tolist()
     assert [block["id"] for block in seen["scene"]["blocks"]] == list(machine.blocks)
     assert seen["broken_rule"] is None
+    # A broken rule of a task is named, and a file of the game read.
+    assert "asks for 2" in check(api, written(), task="lift-3").json()["broken_rule"]
+    assert check(api, written(), task="support-1").json()["broken_rule"] is None
+    game = check(api, published_files()["single_1_support_hard"]).json()
+    assert len(game["scene"]["blocks"]) + len(game["scene"]["connectors"]) == game["parts"] > 3
+    for ask, field, bad in (
+        *((check, "task", "support-9"), (attempt, "task", "support-9")),
+        (attempt, "simulator", "newton"),
+    ):
+        answer = ask(api, written(), **{field: bad})
+        (issue,) = answer.json()["errors"]
+        assert (answer.status_code, issue["field"], bool(issue["choices"])) == (422, field, True)
 
 
-def test_a_file_of_the_game_is_looked_at(api) -> None:
-    data = published_files()["single_1_support_hard"]
-    seen = check(api, data).json()
-    assert seen["parts"] > 3
-    assert len(seen["scene"]["blocks"]) + len(seen["scene"]["connectors"]) == seen["parts"]
+def hostile() -> dict[bytes, str]:
+    """Files, and what is said of each."""
+    blocks = bridge().to_document()["blocks"]
+    twice = [*blocks[:2], {**blocks[2], "position": blocks[1]["position"]}, *blocks[3:]]
+    unknown = [blocks[0], {**blocks[1], "module": "<img src=x onerror=alert(1)>"}, *blocks[2:]]
+    return {
+        b"": "neither a machine document",
+        bytes(range(256)) * 40: "neither a machine document",
+        b"[]": "neither a machine document",
+        b'[{"op": "start"}]': "neither a machine document",
+        b'{"a": 1}': "neither a machine document",
+        zlib.compress(b"0" * 1_000_000): "neither a machine document",
+        b"glTF\x02\x00\x00\x00": "shapes only",
+        b'{"blocks": ' + b"[" * 100_000: "inside each other",
+        b'{"blocks":' + b'[{"a":' * 80 + b"1" + b"}]" * 80 + b"}": "inside each",
+        b'{"blocks": ' + b"9" * 9000 + b"}": "digits",
+        written(blocks=twice): "overlap",
+        written(blocks=unknown): "Small Wooden Block",
+        written().replace(b'"next_id": 5', b'"next_id": NaN'): "next_id",
+        written(version=99): "version",
+        written(blocks=[1] * 30_000): "at most",
+        written(available={"a": {"blocks": [1] * 30_000}}): "at most",
+        written(control_sequence=[1] * 30_000): "at most",
+        b'<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "b">]><Machine>&b;</Machine>': "",
+        b"<html><script>alert(1)</script></html>": "",
+    }
 
 
-def test_a_broken_rule_of_a_task_is_named(api) -> None:
-    assert "asks for 2" in check(api, document(), task="lift-3").json()["broken_rule"]
-    assert check(api, document(), task="support-1").json()["broken_rule"] is None
-    unknown = check(api, document(), task="support-9")
-    assert unknown.status_code == 422
-    assert "support-1" in unknown.json()["errors"][0]["choices"]
-
-
-def overlapping() -> bytes:
-    content = json.loads(document())
-    content["blocks"][2]["position"] = content["blocks"][1]["position"]
-    return json.dumps(content).encode()
-
-
-def unknown_module() -> bytes:
-    content = json.loads(document())
-    content["blocks"][1]["module"] = "<img src=x onerror=alert(1)>"
-    return json.dumps(content).encode()
-
-
-HOSTILE = {
-    "nothing": (b"", "neither a machine document"),
-    "noise": (bytes(range(256)) * 40, "neither a machine document"),
-    "a list": (b"[]", "neither a machine document"),
-    "an action log": (b'[{"op": "start"}]', "neither a machine document"),
-    "another document": (b'{"a": 1}', "neither a machine document"),
-    "a GLB": (b"glTF\x02\x00\x00\x00", "shapes only"),
-    "deep": (b'{"blocks": ' + b"[" * 100_000, "inside each other"),
-    "deep, in strings": (b'{"blocks":' + b'[{"a":' * 80 + b"1" + b"}]" * 80 + b"}", "inside each"),
-    "long number": (b'{"blocks": ' + b"9" * 9000 + b"}", "digits"),
-    "overlapping": (overlapping(), "overlap"),
-    "unknown module": (unknown_module(), "Small Wooden Block"),
-    "not a number": (document().replace(b'"next_id": 5', b'"next_id": NaN'), "next_id"),
-    "later version": (changed(version=99), "version"),
-    "many blocks": (changed(blocks=[1] * 30_000), "at most"),
-    "many machines": (changed(available={"a": {"blocks": [1] * 30_000}}), "at most"),
-    "many presses": (changed(control_sequence=[1] * 30_000), "at most"),
-    "entities": (
-        b'<?xml version="1.0"?><!DOCTYPE a [<!ENTITY b "b">]><Machine>&b;</Machine>',
-        "",
-    ),
-    "a bomb": (zlib.compress(b"0" * 1_000_000), "neither a machine document"),
-    "a page": (b"<html><script>alert(1)</script></html>", ""),
-}
-
-
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("name", HOSTILE)
-@pytest.mark.parametrize("ask", [check, attempt])
-def test_hostile_files_are_refused_in_words(api, ask, name) -> None:
-    data, says = HOSTILE[name]
-    answer = ask(api, data)
-    assert answer.status_code == 422, answer.text
-    assert says in answer.json()["detail"]
-    assert answer.json()["errors"]
-
-
-def test_a_file_too_large_is_refused(api) -> None:
-    answer = check(api, b" " * (MAX_BYTES + 1))
-    assert answer.status_code == 413
-    assert f"{MAX_BYTES:,}" in answer.json()["detail"]
+def test_hostile_files_are_refused_in_words(api) -> None:
+    for data, says in hostile().items():
+        for ask in (check, attempt):
+            answer = ask(api, data)
+            assert answer.status_code == 422, data[:80]
+            assert says in answer.json()["detail"]
+            assert answer.json()["errors"]
+    large = check(api, b" " * (MAX_BYTES + 1))
+    assert (large.status_code, f"{MAX_BYTES:,}" in large.json()["detail"]) == (413, True)
 
 
 def test_a_machine_is_tried_on_no_leaderboard(api, context) -> None:
-    answer = attempt(api, document())
-    assert answer.status_code == 202
+    answer = attempt(api, written())
     job = answer.json()
-    assert (job["state"], job["stage"]) == ("queued", "simulate")
+    assert (answer.status_code, job["state"], job["stage"]) == (202, "queued", "simulate")
     assert job["model"].startswith("file/")
     assert api.get(f"/v1/jobs/{job['id']}/machine").status_code == 200
     assert api.get(f"/v1/jobs/{job['id']}/scene").json()["machine"] is not None
     assert context.queues.settle()
     # The reaper may have named it too.
     assert context.queues.waiting("simulate.mujoco") >= 1
-    again = attempt(api, document())
+    again = attempt(api, written())
     assert (again.status_code, again.json()["id"]) == (200, job["id"])
-    assert attempt(api, document(), seed=1).json()["id"] != job["id"]
-    assert attempt(api, document(bridge(3))).json()["id"] != job["id"]
-
-
-def test_a_machine_that_breaks_a_rule_ends_at_once_and_stays_off_the_board(api) -> None:
-    job = attempt(api, document(), task="lift-3").json()
-    assert (job["state"], job["outcome"]) == ("done", "construction_failed")
+    other = json.dumps(bridge(3).to_document()).encode()
+    assert (
+        len(
+            {
+                job["id"],
+                *(a.json()["id"] for a in (attempt(api, other), attempt(api, other, seed=1))),
+            }
+        )
+        == 3
+    )
+    ended = attempt(api, written(), task="lift-3").json()
+    assert (ended["state"], ended["outcome"]) == ("done", "construction_failed")
     board = api.get("/v1/leaderboard").json()
-    assert board["track"] is None
-    assert board["tracks"] == []
-
-
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize(("field", "value"), [("task", "support-9"), ("simulator", "newton")])
-def test_what_does_not_exist_is_named(api, field, value) -> None:
-    answer = attempt(api, document(), **{field: value})
-    assert answer.status_code == 422
-    (issue,) = answer.json()["errors"]
-    assert issue["field"] == field
-    assert issue["choices"]
-
-
-def test_trials_under_way_are_bounded_for_each_key(guarded, monkeypatch) -> None:
-    monkeypatch.setattr(files, "MAX_OPEN", 2)
-    mine, other = new_tenant(guarded, "mine"), new_tenant(guarded, "other")
-
-    def code(tenant, seed: int) -> int:
-        params = {**TRIAL, "seed": seed}
-        answer = tenant.ask("POST", "/v1/machines/trials", content=document(), params=params)
-        return answer.status_code
-
-    # An equal one takes no place.
-    assert [code(mine, seed) for seed in (0, 1, 0, 2)] == [202, 202, 200, 429]
-    assert code(other, 7) == 202
+    assert (board["track"], board["tracks"]) == (None, [])
 
 
 @pytest.fixture
-def tenants(guarded):
+def tenants(guarded) -> tuple[Tenant, Tenant]:
     return new_tenant(guarded, "mine"), new_tenant(guarded, "other")
 
 
-def brought(tenant, seed: int = 0):
+def brought(tenant: Tenant, seed: int = 0) -> httpx.Response:
     params = {**TRIAL, "seed": seed}
-    return tenant.ask("POST", "/v1/machines/trials", content=document(), params=params)
+    return tenant.ask("POST", "/v1/machines/trials", content=written(), params=params)
+
+
+def test_trials_under_way_are_bounded_for_each_key(tenants, context, monkeypatch) -> None:
+    monkeypatch.setattr(files, "MAX_OPEN", 2)
+    mine, other = tenants
+    # An equal one takes no place, and one that is opened again takes one.
+    first, *rest = (brought(mine, seed) for seed in (0, 1, 0))
+    assert [first.status_code, *(answer.status_code for answer in rest)] == [202, 202, 200]
+    mine.post(f"/v1/jobs/{first.json()['id']}/cancel", status=200)
+    assert brought(mine, 2).status_code == 202
+    assert brought(mine, 0).status_code == 429
+    assert mine.get(f"/v1/jobs/{first.json()['id']}")["outcome"] == "cancelled"
+    # So does one that errored and is tried again.
+    job = brought(other, 7).json()["id"]
+    lease = context.store.leases.claim("simulate.mujoco", owner="simulate@here:1", hint=job)
+    assert lease.job.id == job
+    context.store.leases.give_up(lease, "no reason", reason="simulator_fault")
+    assert [brought(other, seed).status_code for seed in (8, 9)] == [202, 202]
+    other.post(f"/v1/jobs/{job}/retry", status=429)
+    assert other.get(f"/v1/jobs/{job}")["outcome"] == "errored"
 
 
 def test_who_cancels_leaves_what_another_wants(tenants) -> None:
     mine, other = tenants
-    job = brought(mine).json()["id"]
-    assert brought(other).json()["id"] == job
-    assert mine.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 200
-    assert other.ask("GET", f"/v1/jobs/{job}").json()["state"] == "queued"
-    # The one who left has no say any more; the one who stays has.
-    assert mine.ask("POST", f"/v1/jobs/{job}/cancel").status_code == 403
-    assert other.ask("POST", f"/v1/jobs/{job}/cancel").json()["outcome"] == "cancelled"
+    for seed, first, second in ((0, mine, other), (1, other, mine)):
+        job = brought(mine, seed).json()["id"]
+        assert brought(other, seed).json()["id"] == job
+        assert first.post(f"/v1/jobs/{job}/cancel")["state"] == "queued"
+        # The one who left has no say any more; the one who stays has.
+        first.post(f"/v1/jobs/{job}/cancel", status=403)
+        assert second.post(f"/v1/jobs/{job}/cancel")["outcome"] == "cancelled"
 
 
-def test_who_only_wants_it_too_ends_nothing(tenants) -> None:
-    mine, other = tenants
-    job = brought(mine).json()["id"]
-    brought(other)
-    assert other.ask("POST", f"/v1/jobs/{job}/cancel").json()["state"] == "queued"
-    assert mine.ask("POST", f"/v1/jobs/{job}/cancel").json()["outcome"] == "cancelled"
+def place(number: int) -> list[float]:
+    """One of many places, so far from each other that no blocks overlap."""
+    return [3.0 * (number % 13), 3.0 * (number // 13 % 13), 3.0 * (number // 169)]
 
 
-def test_a_trial_that_is_opened_again_takes_a_place(tenants, monkeypatch) -> None:
-    monkeypatch.setattr(files, "MAX_OPEN", 2)
-    mine, _ = tenants
-    first = brought(mine, 0).json()["id"]
-    assert mine.ask("POST", f"/v1/jobs/{first}/cancel").status_code == 200
-    assert [brought(mine, seed).status_code for seed in (1, 2)] == [202, 202]
-    assert brought(mine, 0).status_code == 429
-    assert mine.ask("GET", f"/v1/jobs/{first}").json()["outcome"] == "cancelled"
+def many_blocks() -> bytes:
+    blocks = bridge().to_document()["blocks"]
+    loose = {**blocks[1], "mount": None}
+    more = [{**loose, "id": str(n + 2), "position": place(n + 1)} for n in range(MAX_PARTS - 10)]
+    return written(blocks=[blocks[0], *more], joints=[], next_id=MAX_PARTS + 1)
 
 
-def test_an_errored_trial_that_is_tried_again_takes_a_place(tenants, context, monkeypatch) -> None:
-    monkeypatch.setattr(files, "MAX_OPEN", 2)
-    mine, _ = tenants
-    first = brought(mine, 0).json()["id"]
-    lease = context.store.leases.claim(f"simulate.{TRIAL['simulator']}", owner="simulate@here:1")
-    context.store.leases.give_up(lease, "no reason", reason="simulator_fault")
-    assert [brought(mine, seed).status_code for seed in (1, 2)] == [202, 202]
-    assert mine.ask("POST", f"/v1/jobs/{first}/retry").status_code == 429
-    assert mine.ask("GET", f"/v1/jobs/{first}").json()["outcome"] == "errored"
+def many_connectors() -> bytes:
+    end = {"block": "2", "face": "A", "point": [0.0, 0.0, 0.0]}
+    connector = {"module": "Brace", "start": end, "end": {**end, "block": "4"}, "bindings": {}}
+    return written(connectors=[{**connector, "id": str(n + 5)} for n in range(MAX_PARTS - 10)])
+
+
+@pytest.mark.ci
+def test_bombs_are_answered_in_words_and_leave_the_process_well(api) -> None:
+    numbers = ("1e308, 1e308, 1e308", "1e999, 0, 0", "9" * 1_000_000, "1e" + "9" * 1_000_000)
+    origin = b'"position": [0.0, 0.0, 0.0]'
+    for bomb in (
+        *(many_blocks(), many_connectors()),
+        *(b'{"blocks":' + b'{"a":' * 300_000, b"<Machine>" + b"<a>" * 400_000),
+        *(written().replace(origin, b'"position": [%b]' % n.encode(), 1) for n in numbers),
+        written(log=[{"name": "x" * 1_900_000}]),
+        written(bindings={str(n): n for n in range(120_000)}),
+        b"<Machine " + b" ".join(b'a%d="1"' % n for n in range(150_000)) + b"/>",
+    ):
+        answer = check(api, bomb)
+        assert answer.status_code in {200, 422}, answer.text
+        if answer.status_code == 422:
+            assert answer.json()["errors"][0]["field"] == "file"
+            assert len(answer.json()["detail"]) < 2000
+        assert check(api, written()).status_code == 200
+
+
+@pytest.fixture
+def process() -> psutil.Process:
+    """The process that reads files, when it is ready."""
+    shared_checker().read(written())
+    return psutil.Process(shared_checker()._checker._process.pid)
+
+
+@contextmanager
+def stopped(process: psutil.Process):
+    """While it lasts, the process does nothing."""
+    process.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        if process.is_running():
+            process.send_signal(signal.SIGCONT)
+
+
+def test_others_are_answered_while_a_file_is_read(context, process) -> None:
+    with (
+        changed(context, **WITH_KEYS) as own,
+        live_api(own) as url,
+        httpx.Client(base_url=url, timeout=60) as client,
+        ThreadPoolExecutor(4) as threads,
+    ):
+        mine, other = new_tenant(client, "mine"), new_tenant(client, "other")
+        path = "/v1/machines/check"
+        with stopped(process):
+            checks = [
+                threads.submit(who.ask, "POST", path, content=written())
+                for who in (mine, mine, other)
+            ]
+            for who in (mine, other):
+                # Nor does it take the lane of heavy questions.
+                for asked in ("caller", "jobs?limit=20", "jobs?limit=1000"):
+                    assert who.ask("GET", f"/v1/{asked}").status_code == 200
+            assert not any(check.done() for check in checks)
+        assert {check.result().status_code for check in checks} == {200}
+
+
+@pytest.mark.ci
+def test_a_process_that_is_killed_or_takes_too_long_loses_nothing(
+    api, context, process, monkeypatch
+) -> None:
+    with ThreadPoolExecutor(1) as threads, stopped(process):
+        trying = threads.submit(attempt, api, written())
+        wait_until(shared_checker()._checker._lock.locked, 10, "the file is asked about")
+        process.kill()
+        assert trying.result().status_code == 202
+    second = psutil.Process(shared_checker()._checker._process.pid)
+    assert second.pid != process.pid
+    assert attempt(api, written()).status_code == 200
+    assert len(context.store.jobs.page(limit=10)) == 1
+    monkeypatch.setattr(shared_checker()._checker, "_longest_s", 0.3)
+    with stopped(second):
+        answer = check(api, written())
+    assert answer.status_code == 422
+    assert "the file is too much: it can't be read within" in answer.json()["detail"]
+    assert not second.is_running()
+    monkeypatch.undo()
+    # Nor is a file read in the API's process.
+    monkeypatch.setattr(machine_uploads.Machine, "from_document", None)
+    monkeypatch.setattr(machine_uploads, "read_machine_file", None)
+    assert check(api, written()).status_code == 200
+
+
+@pytest.mark.ci
+def test_a_file_that_kills_its_process_or_takes_its_memory_is_refused() -> None:
+    checker = Checker("work", make, spare_bytes=SPARE, longest_s=30)
+    first = checker.ask(["pid"])
+    for question in (["die"], ["take", 2 * SPARE]):
+        with pytest.raises(CheckFailedError, match="memory"):
+            checker.ask(question)
+    assert checker.ask(["pid"]) not in {first, os.getpid()}
+    checker.close()

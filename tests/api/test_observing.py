@@ -1,163 +1,91 @@
-"""Metrics, the request log and health: what an operator sees."""
+"""Metrics, the request log and health: what an operator sees, whatever the stores do."""
 
 import json
 import platform
 import shutil
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 
+import httpx
 import pytest
 import structlog
 from prometheus_client.parser import text_string_to_metric_families
+from pydantic import SecretStr
 from sqlalchemy import text
+from support.clients.tenants import ADMIN, WITH_KEYS
 from support.jobs import claim, execute, journal_entry, report_worker
-from support.servers.live_api import api_client
+from support.servers.hushed_proxy import HushedProxy, hushed_proxy
+from support.servers.live_api import api_client, changed, live_api
 from support.servers.stacks import wait_until
 
-from buildarena_api.http.probes import ARTIFACTS_FRESH_S
+from buildarena_api.http import log as request_log
+from buildarena_api.http.probes import ARTIFACTS_FRESH_S, PATIENCE_S, PartFailedError, Probe
+from buildarena_api.routes.health import FEW_LOST
 from buildarena_pipeline import __version__
+from buildarena_pipeline.runtime.logs import set_up_logs
 from buildarena_store import Usage
 
+METRICS = "a-secret-for-metrics-alone-of-some-length"
+PARTS = {"database": "database_up", "broker": "broker_up", "artifacts": "artifact_store_up"}
 
-def samples(api) -> dict[str, list[tuple[dict[str, str], float]]]:
-    text = api.get("/v1/metrics").text
+
+def samples(client, **headers: str) -> dict[str, list[tuple[dict[str, str], float]]]:
     found: dict[str, list[tuple[dict[str, str], float]]] = {}
-    for family in text_string_to_metric_families(text):
+    for family in text_string_to_metric_families(client.get("/v1/metrics", headers=headers).text):
         for sample in family.samples:
-            found.setdefault(sample.name, []).append((sample.labels, sample.value))
+            name = sample.name.removeprefix("buildarena_")
+            found.setdefault(name, []).append((sample.labels, sample.value))
     return found
 
 
+def only(found: dict[str, list[tuple[dict[str, str], float]]], name: str) -> float:
+    ((_, value),) = found[name]
+    return value
+
+
+def checks(client) -> dict[str, dict]:
+    return {check["name"]: check for check in client.get("/v1/health").json()["checks"]}
+
+
 def test_metrics_say_what_the_jobs_say(api, context, sweep) -> None:
-    api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2, 3]})
     first = claim(context)
     usage = Usage(requests=1, input_tokens=70, output_tokens=7)
     context.store.journal.append(first, journal_entry(usage=usage))
     context.store.leases.give_up(first, "no key", reason="missing_key")
-    found = samples(api)
-    queued = {"state": "queued", "stage": "construct", "outcome": ""}
-    assert (queued, 2.0) in found["buildarena_jobs"]
-    assert found["buildarena_errored_jobs"] == [({"reason": "missing_key"}, 1.0)]
-    assert ({"queue": "construct"}, 2.0) in found["buildarena_queue_jobs"]
-    assert found["buildarena_queue_oldest_seconds"][0][1] >= 0
-    model = {"model": "builtin/idle"}
-    assert (model, 1.0) in found["buildarena_model_requests_total"]
-    assert ({**model, "direction": "input"}, 70.0) in found["buildarena_model_tokens_total"]
-    assert ({"state": "active"}, 1.0) in found["buildarena_sweeps"]
-    held = {"stage": "construct", "result": "fault"}
-    assert (held, 1.0) in found["buildarena_stage_seconds_count"]
-    assert ({**held, "le": "+Inf"}, 1.0) in found["buildarena_stage_seconds_bucket"]
-
-
-def test_metrics_count_requests_by_route_and_status(api) -> None:
+    claim(context)
     for _ in range(3):
         api.get("/v1/jobs/job_x")
-    counted = samples(api)["buildarena_http_request_seconds_count"]
-    assert ({"route": "/v1/jobs/{job_id}", "method": "GET", "status": "404"}, 3.0) in counted
-
-
-@pytest.mark.parametrize(
-    ("given", "kept"),
-    [
-        ("order-17.a_B", True),
-        ("", False),
-        ("x" * 65, False),
-        ('a" level="error', False),
-        ("a\tb", False),
-    ],
-)
-def test_a_request_has_an_id_of_its_own_or_a_harmless_given_one(api, given, kept) -> None:
-    answer = api.get("/v1/models", headers={"X-Request-ID": given})
-    assert (answer.headers["x-request-id"] == given) is kept
-    assert answer.headers["x-request-id"]
-
-
-def test_each_request_is_a_line_in_the_log(api) -> None:
-    with structlog.testing.capture_logs(
-        processors=[structlog.contextvars.merge_contextvars]
-    ) as lines:
-        api.get("/v1/jobs/job_x", headers={"X-Request-ID": "r1"})
-    (line,) = [line for line in lines if line["event"] == "request"]
-    assert (line["path"], line["status"], line["request_id"]) == ("/v1/jobs/job_x", 404, "r1")
-
-
-def test_what_people_write_can_not_forge_lines_of_the_log(api, capfd, monkeypatch) -> None:
-    from buildarena_api.http import log as request_log
-    from buildarena_pipeline.runtime.logs import set_up_logs
-
-    # A logger keeps the stream of its first line, and this one is closed with the test.
-    monkeypatch.setattr(request_log, "log", structlog.get_logger())
-    set_up_logs("info")
-    try:
-        forged = '/v1/jobs/x%0A{"event": "stage_done", "job": "job_1"}'
-        api.get(forged)
-        api.post("/v1/jobs", json={"task": '\n{"event": "forged"}\n', "model": "x\r\ny"})
-    finally:
-        structlog.reset_defaults()
-    lines = [line for line in capfd.readouterr().err.splitlines() if line]
-    assert lines
-    events = [json.loads(line)["event"] for line in lines]
-    assert set(events) == {"request"}, lines
-
-
-def test_health_names_a_worker_whose_clock_is_wrong(api, context) -> None:
-    now = datetime.now(UTC)
-    report_worker(context, "good", "construct", own_time=now)
-    report_worker(context, "late", "construct", own_time=now - timedelta(hours=1))
-    checks = {check["name"]: check for check in api.get("/v1/health").json()["checks"]}
-    clocks = checks["clocks"]
-    assert not clocks["ok"]
-    assert "late is 3600 s behind" in clocks["detail"]
-    assert "good" not in clocks["detail"]
-    assert "NTP" in clocks["advice"]
-
-
-def test_metrics_say_what_the_service_stands_on(api, context) -> None:
-    facts = {"peak_memory_bytes": 7, "own_time": datetime.now(UTC) + timedelta(hours=2)}
-    report_worker(context, "a", "construct", "verify", **facts)
-    report_worker(context, "b", "simulate.mujoco", **facts)
-    execute(context, "UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = 'b'")
-    found = samples(api)
-    serving = {labels["queue"]: value for labels, value in found["buildarena_queue_workers"]}
-    assert serving["construct"] == 1
-    assert serving["simulate.mujoco"] == 0
-    lost = {labels["kind"]: value for labels, value in found["buildarena_workers_lost"]}
-    assert lost == {"construct": 0, "simulate": 1}
-    ((_, error),) = found["buildarena_worker_clock_error_seconds"]
-    assert error == pytest.approx(7200, abs=30)
-    assert found["buildarena_worker_peak_memory_bytes"] == [({"kind": "construct"}, 7)]
-    for name in ("artifact_store_up", "broker_up"):
-        assert found[f"buildarena_{name}"] == [({}, 1)]
-    ((_, free),) = found["buildarena_data_free_bytes"]
-    ((_, size),) = found["buildarena_data_size_bytes"]
-    assert 0 < free < size
-    used, most = (
-        {pool["pool"]: value for pool, value in found[f"buildarena_database_connections_{name}"]}
-        for name in ("used", "limit")
-    )
-    assert set(used) == set(most) == {"ordinary", "watching", "exporting"}
-    assert all(used[pool] <= most[pool] for pool in most)
-
-
-@pytest.mark.ci
-def test_metrics_notice_an_artifact_store_that_fails(api, context) -> None:
-    folder = context.settings.data / "artifacts"
-    shutil.rmtree(folder)
-    folder.write_text("no folder")
-    wait_until(
-        lambda: samples(api)["buildarena_artifact_store_up"] == [({}, 0)],
-        4 * ARTIFACTS_FRESH_S,
-        "the store is asked again",
-    )
-
-
-def test_metrics_say_how_many_jobs_are_at_hand_in_each_queue(api, context, sweep) -> None:
-    api.post("/v1/sweeps", json={**sweep, "seeds": [0, 1, 2]})
-    for _ in range(2):
-        claim(context)
     # Another process has read nothing yet.
     with api_client(context) as other:
-        assert ({"queue": "construct"}, 2) in samples(other)["buildarena_queue_running"]
+        assert ({"queue": "construct"}, 1.0) in samples(other)["queue_running"]
+    found = samples(api)
+    model = {"model": "builtin/idle"}
+    held = {"stage": "construct", "result": "fault"}
+    asked = {"route": "/v1/jobs/{job_id}", "method": "GET", "status": "404"}
+    program = {"version": __version__, "python": platform.python_version()}
+    for name, labels, value in (
+        ("jobs", {"state": "queued", "stage": "construct", "outcome": ""}, 2),
+        ("errored_jobs", {"reason": "missing_key"}, 1),
+        ("queue_jobs", {"queue": "construct"}, 2),
+        ("model_requests_total", model, 1),
+        ("model_tokens_total", {**model, "direction": "input"}, 70),
+        ("sweeps", {"state": "active"}, 1),
+        ("stage_seconds_count", held, 1),
+        ("stage_seconds_bucket", {**held, "le": "+Inf"}, 1),
+        ("http_request_seconds_count", asked, 3),
+        ("http_responses_total", {"status": "404"}, 3),
+        ("build_info", program, 1),
+    ):
+        assert (labels, float(value)) in found[name], name
+    assert found["queue_oldest_seconds"][0][1] >= 0
+    # A reason that no job has any more is zero.
+    api.post(f"/v1/jobs/{first.job.id}/retry")
+    with api_client(context) as other:
+        assert samples(other)["errored_jobs"] == [({"reason": "missing_key"}, 0.0)]
 
 
 def test_what_is_zero_is_said_from_the_start(api) -> None:
@@ -167,57 +95,221 @@ def test_what_is_zero_is_said_from_the_start(api) -> None:
         for labels, value in all_labels
     }
     for series in (
-        ("buildarena_jobs", "", "construct", "queued"),
-        ("buildarena_jobs", "done", "errored", "simulate"),
-        ("buildarena_sweeps", "budget_exhausted"),
-        ("buildarena_queue_jobs", "simulate.mujoco"),
-        ("buildarena_queue_oldest_seconds", "construct"),
-        ("buildarena_queue_running", "construct"),
-        ("buildarena_workers", "simulate"),
-        ("buildarena_model_requests_total", "openai/gpt-5"),
-        ("buildarena_model_tokens_total", "input", "openai/gpt-5"),
-        ("buildarena_model_cost_usd_total", "openai/gpt-5"),
-        ("buildarena_stage_seconds_count", "lost", "simulate"),
-        ("buildarena_verifications_total", "refuted"),
-        ("buildarena_http_responses_total", "500"),
-        ("buildarena_postgres_connections", "idle in transaction (aborted)"),
+        *(("jobs", "", "construct", "queued"), ("jobs", "done", "errored", "simulate")),
+        *(("sweeps", "budget_exhausted"), ("queue_jobs", "simulate.mujoco")),
+        *(("queue_oldest_seconds", "construct"), ("queue_running", "construct")),
+        *(("workers", "simulate"), ("model_requests_total", "openai/gpt-5")),
+        *(
+            ("model_tokens_total", "input", "openai/gpt-5"),
+            ("model_cost_usd_total", "openai/gpt-5"),
+        ),
+        *(("stage_seconds_count", "lost", "simulate"), ("verifications_total", "refuted")),
+        *(
+            ("http_responses_total", "500"),
+            ("postgres_connections", "idle in transaction (aborted)"),
+        ),
     ):
         assert found[series] == 0, series
 
 
-def test_a_reason_that_no_job_has_any_more_is_zero(api, context, sweep) -> None:
-    api.post("/v1/sweeps", json=sweep)
-    job = claim(context)
-    context.store.leases.give_up(job, "no key", reason="missing_key")
-    api.post(f"/v1/jobs/{job.job.id}/retry")
-    assert samples(api)["buildarena_errored_jobs"] == [({"reason": "missing_key"}, 0.0)]
-
-
-def test_metrics_say_which_program_answers(api) -> None:
-    (build,) = samples(api)["buildarena_build_info"]
-    assert build == ({"version": __version__, "python": platform.python_version()}, 1.0)
-
-
-def test_responses_are_counted_by_status(api) -> None:
-    api.get("/v1/jobs/job_x")
-    assert ({"status": "404"}, 1.0) in samples(api)["buildarena_http_responses_total"]
-
-
-def test_metrics_say_how_the_database_is(api, context) -> None:
+def test_metrics_say_what_the_service_stands_on(api, context) -> None:
+    facts = {"peak_memory_bytes": 7, "own_time": datetime.now(UTC) + timedelta(hours=2)}
+    report_worker(context, "a", "construct", "verify", **facts)
+    report_worker(context, "b", "simulate.mujoco", **facts)
+    execute(context, "UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = 'b'")
     with context.store.database.engine.connect() as connection:
         connection.execute(text("SELECT 1"))  # and no commit
         time.sleep(0.2)
         found = samples(api)
-    assert found["buildarena_postgres_size_bytes"][0][1] > 1e6
-    connections = {labels["state"]: n for labels, n in found["buildarena_postgres_connections"]}
+    serving = {labels["queue"]: value for labels, value in found["queue_workers"]}
+    assert (serving["construct"], serving["simulate.mujoco"]) == (1, 0)
+    lost = {labels["kind"]: value for labels, value in found["workers_lost"]}
+    assert lost == {"construct": 0, "simulate": 1}
+    assert only(found, "worker_clock_error_seconds") == pytest.approx(7200, abs=30)
+    assert found["worker_peak_memory_bytes"] == [({"kind": "construct"}, 7)]
+    assert only(found, "artifact_store_up") == only(found, "broker_up") == 1
+    assert 0 < only(found, "data_free_bytes") < only(found, "data_size_bytes")
+    used, most = (
+        {pool["pool"]: value for pool, value in found[f"database_connections_{name}"]}
+        for name in ("used", "limit")
+    )
+    assert set(used) == set(most) == {"ordinary", "watching", "exporting"}
+    assert all(used[pool] <= most[pool] for pool in most)
+    assert only(found, "postgres_size_bytes") > 1e6
+    connections = {labels["state"]: n for labels, n in found["postgres_connections"]}
     assert connections["idle in transaction"] >= 1
-    ((_, used),) = found["buildarena_postgres_server_connections"]
-    ((_, most),) = found["buildarena_postgres_server_connections_limit"]
-    assert sum(connections.values()) <= used + 5
-    assert used < most
-    ((_, open_s),) = found["buildarena_postgres_oldest_transaction_seconds"]
-    assert 0.1 < open_s < 60
-    assert "jobs" in {labels["table"] for labels, _ in found["buildarena_postgres_dead_rows"]}
-    ended = {labels["result"]: n for labels, n in found["buildarena_postgres_transactions_total"]}
+    servers = only(found, "postgres_server_connections")
+    assert sum(connections.values()) <= servers + 5
+    assert servers < only(found, "postgres_server_connections_limit")
+    assert 0.1 < only(found, "postgres_oldest_transaction_seconds") < 60
+    assert "jobs" in {labels["table"] for labels, _ in found["postgres_dead_rows"]}
+    ended = {labels["result"]: n for labels, n in found["postgres_transactions_total"]}
     assert ended["committed"] > 0
-    assert found["buildarena_postgres_deadlocks_total"][0][1] >= 0
+    assert only(found, "postgres_deadlocks_total") >= 0
+
+
+def test_each_request_is_a_line_in_the_log_that_nobody_forges(api, capfd, monkeypatch) -> None:
+    # A logger keeps the stream of its first line, and this one is closed with the test.
+    monkeypatch.setattr(request_log, "log", structlog.get_logger())
+    set_up_logs("info")
+    try:
+        api.get("/v1/jobs/job_x", headers={"X-Request-ID": "r1"})
+        api.get('/v1/jobs/x%0A{"event": "stage_done", "job": "job_1"}')
+        api.post("/v1/jobs", json={"task": '\n{"event": "forged"}\n', "model": "x\r\ny"})
+    finally:
+        structlog.reset_defaults()
+    lines = [json.loads(line) for line in capfd.readouterr().err.splitlines() if line]
+    assert [line["event"] for line in lines] == ["request"] * 3
+    assert [lines[0][name] for name in ("path", "status", "request_id")] == [
+        *("/v1/jobs/job_x", 404, "r1")
+    ]
+    # A request has an id of its own, or a harmless given one.
+    odd = ["", "x" * 65, 'a" level="error', "a\tb"]
+    for given in ("order-17.a_B", *odd):
+        told = api.get("/v1/models", headers={"X-Request-ID": given}).headers["x-request-id"]
+        assert told
+        assert (told == given) is (given not in odd)
+
+
+def test_health_names_workers_that_are_missing_wrong_or_silent(api, context, sweep) -> None:
+    first = checks(api)
+    assert api.get("/v1/health").json()["status"] == "degraded"
+    assert first["database"]["ok"]
+    assert first["broker"]["ok"]
+    assert first["workers of construct"]["advice"] == "start a worker for the queue construct"
+    now = datetime.now(UTC)
+    report_worker(context, "good", "construct", own_time=now)
+    report_worker(context, "late", "construct", own_time=now - timedelta(hours=1))
+    found = checks(api)
+    assert found["workers of construct"]["ok"]
+    assert not found["clocks"]["ok"]
+    assert "late is 3600 s behind" in found["clocks"]["detail"]
+    assert "good" not in found["clocks"]["detail"]
+    assert "NTP" in found["clocks"]["advice"]
+
+    api.post("/v1/sweeps", json={**sweep, "seeds": [0]})
+    for number in range(FEW_LOST - 1):
+        report_worker(context, f"w{number}", "construct")
+    execute(context, "UPDATE workers SET seen_at = seen_at - interval '2 minutes'")
+    execute(context, "UPDATE jobs SET available_at = now() - interval '61 minutes'")
+    # A budget that is used up is told, and nothing that is wrong.
+    execute(context, "UPDATE sweeps SET state = 'budget_exhausted'")
+    with api_client(context) as later:
+        wait_until(lambda: not checks(later)["waiting"]["ok"], 30, "the figures are read")
+        found = checks(later)
+    assert found["workers of construct"]["detail"] == "0 alive; 1 waiting"
+    assert found["waiting"]["detail"] == "the oldest job for 61 min, in construct"
+    assert found["waiting"]["advice"] == "start more workers for the queue construct"
+    assert found["silent workers"]["detail"] == f"{FEW_LOST + 1} of construct within the last hour"
+    assert not found["silent workers"]["ok"]
+    assert found["budgets"]["ok"]
+    assert found["budgets"]["detail"] == "1 sweeps wait for a larger one"
+
+
+@pytest.mark.ci
+def test_metrics_notice_an_artifact_store_that_fails(api, context) -> None:
+    folder = context.settings.data / "artifacts"
+    shutil.rmtree(folder)
+    folder.write_text("no folder")
+    wait_until(
+        lambda: only(samples(api), "artifact_store_up") == 0,
+        4 * ARTIFACTS_FRESH_S,
+        "the store is asked again",
+    )
+
+
+@contextmanager
+def service_behind(context, part: str, monkeypatch) -> Iterator[tuple[httpx.Client, HushedProxy]]:
+    """The API, with a proxy that can fall silent before one of its stores."""
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_REGION"):
+        monkeypatch.setenv(name, "test")
+    monkeypatch.setenv("AWS_ALLOW_HTTP", "true")
+    place = {
+        "database": context.settings.required_database_url(),
+        "broker": context.settings.required_broker_url(),
+        "artifacts": "http://127.0.0.1:9",
+    }[part]
+    with hushed_proxy(place) as proxy:
+        monkeypatch.setenv("AWS_ENDPOINT", proxy.url)
+        url = "s3://bucket" if part == "artifacts" else proxy.url
+        own = {**WITH_KEYS, "metrics_key": SecretStr(METRICS), f"{part}_url": url}
+        with (
+            changed(context, **own) as behind,
+            live_api(behind) as served,
+            httpx.Client(base_url=served) as client,
+        ):
+            yield client, proxy
+
+
+def down(client: httpx.Client) -> list[str]:
+    """Parts that metrics say are down."""
+    found = samples(client, Authorization=f"Bearer {METRICS}")
+    return [name for name in PARTS.values() if not only(found, name)]
+
+
+@pytest.mark.ci
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("part", ["database", "broker"])
+def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part, monkeypatch) -> None:
+    def ask_for_jobs(url: httpx.URL) -> None:
+        httpx.get(url.join("/v1/jobs"), headers={"Authorization": f"Bearer {ADMIN}"}, timeout=40)
+
+    with service_behind(context, part, monkeypatch) as (client, proxy):
+        wait_until(
+            lambda: all(each["ok"] for each in [*checks(client).values()][:3]), 20, "all work"
+        )
+        assert down(client) == []
+        proxy.hush()
+        # Requests that need the store, and hang as long as it is silent.
+        hanging = [
+            threading.Thread(target=ask_for_jobs, args=(client.base_url,), daemon=True)
+            for _ in range(12)
+        ]
+        for thread in hanging:
+            thread.start()
+        wait_until(lambda: not checks(client)[part]["ok"], 3 * PATIENCE_S, f"{part} fails")
+        begun = time.monotonic()
+        for _ in range(20):
+            assert next(name for name, check in checks(client).items() if not check["ok"]) == part
+            assert down(client) == [PARTS[part]]
+        # Forty answers: none waited for a store.
+        assert time.monotonic() - begun < 2 * PATIENCE_S
+        proxy.speak()
+        wait_until(lambda: checks(client)[part]["ok"], 20, f"{part} is known to work again")
+        for thread in hanging:
+            thread.join(40)
+
+
+@pytest.mark.ci
+def test_a_bucket_that_was_always_silent_is_named(context, monkeypatch) -> None:
+    with service_behind(context, "artifacts", monkeypatch) as (client, proxy):
+        proxy.hush()
+        wait_until(lambda: not checks(client)["artifacts"]["ok"], 3 * PATIENCE_S, "it is known")
+        assert client.get("/v1/health").status_code == 200
+        assert down(client) == ["artifact_store_up"]
+
+
+def test_a_probe_says_what_was_said_last_and_does_not_wait() -> None:
+    now, answers = [0.0], threading.Event()
+    answers.set()
+
+    def ask() -> int:
+        answers.wait()
+        return 7
+
+    probe = Probe("part", ask, clock=lambda: now[0])
+    with pytest.raises(PartFailedError, match="has not answered yet"):
+        probe.latest()
+    probe.start()
+    wait_until(lambda: probe.works, 10, "it answered")
+    answers.clear()
+    probe.renewed()
+    wait_until(lambda: probe._begun_at is not None, 10, "it is asked")
+    assert probe.latest() == 7
+    now[0] += PATIENCE_S + 1
+    with pytest.raises(PartFailedError, match="has not answered for 4 s"):
+        probe.latest()
+    answers.set()
+    wait_until(lambda: probe.works, 10, "it answered again")
+    probe.end()
+    probe.join(10)

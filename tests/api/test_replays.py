@@ -1,46 +1,38 @@
-"""How machines came about: replays of models' and agents' sessions."""
+"""What a job left to look at: its replay, its trial as Arrow and as a scene, and pictures."""
 
+import io
+import json
+import struct
+
+import numpy as np
+import pyarrow as pa
 import pytest
+from PIL import Image
 from support.jobs import attach
 from support.stages import work
 
+from buildarena_api.http.negotiation import prefers
 from buildarena_api.replays.making import Replays
+from buildarena_api.routes import pictures, trials
+from buildarena_geometry import load_catalogue
 from buildarena_pipeline.replays import chapters
+from buildarena_simulation import read_trajectory
+from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 
+PARQUET = trials.PARQUET
 START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}
 ATTACH = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}
-
-
-def submitted(api, model: str, task: str = "support-1", **more: object) -> str:
-    body = {"task": task, "model": model, "simulator": "mujoco", **more}
-    answer = api.post("/v1/jobs", json=body)
-    assert answer.status_code == 202, answer.text
-    return answer.json()["id"]
-
-
-def opened(api, task: str = "support-1") -> str:
-    body = {"task": task, "agent": "me", "seed": 1, "simulator": "mujoco"}
-    return api.post("/v1/sessions", json=body).json()["id"]
-
-
-def act(api, session: str, tool: str, arguments: object, machine: str = "main") -> None:
-    body = {"tool": tool, "arguments": arguments, "machine": machine}
-    assert api.post(f"/v1/sessions/{session}/calls", json=body).status_code == 200
-
-
-def final_parts(replay: dict) -> dict[str, dict]:
-    """What somebody has who only reads the steps of the last chapter."""
-    parts: dict[str, dict] = {}
-    for step in replay["chapters"][-1]["steps"]:
-        for part in (*step["added"], *step["moved"], *step["rebound"]):
-            parts[part["id"]] = part
-        for gone in step["removed"]:
-            del parts[gone]
-    return parts
+CHANGES = ("added", "moved", "removed", "rebound")
 
 
 def assert_ends_in(replay: dict, document: dict) -> None:
-    found = final_parts(replay)
+    """Who only reads the steps of the last chapter has the machine."""
+    found: dict[str, dict] = {}
+    for step in replay["chapters"][-1]["steps"]:
+        for part in (*step["added"], *step["moved"], *step["rebound"]):
+            found[part["id"]] = part
+        for gone in step["removed"]:
+            del found[gone]
     kept = {one["id"]: one for one in (*document["blocks"], *document["connectors"])}
     assert found.keys() == kept.keys()
     for id_, part in kept.items():
@@ -49,18 +41,23 @@ def assert_ends_in(replay: dict, document: dict) -> None:
             assert found[id_][name] == told[name]
 
 
-@pytest.mark.parametrize("model", ["builtin/expert", "builtin/random"])
-@pytest.mark.parametrize("workflow", ["five-role", "builder"])
-@pytest.mark.parametrize("task", ["support-1", "transport-1"])
-def test_a_replay_ends_in_the_kept_machine(api, context, model, workflow, task) -> None:
-    job = submitted(api, model, task, workflow=workflow)
+@pytest.mark.parametrize(
+    "case",
+    [
+        ("support-1", "builtin/random", "five-role"),
+        ("transport-1", "builtin/expert", "builder"),
+        ("transport-1", "builtin/random", "builder"),
+    ],
+)
+def test_a_replay_ends_in_the_kept_machine(api, context, submit_job, case) -> None:
+    task, model, workflow = case
+    job = submit_job(task, model, workflow=workflow)
     work(context, steps=1)
-    document = api.get(f"/v1/jobs/{job}/machine").json()
     turns = api.get(f"/v1/jobs/{job}/transcript").json()["turns"]
     replay = api.get(f"/v1/jobs/{job}/replay").json()
     assert replay["complete"]
     assert replay["exact"]
-    assert_ends_in(replay, document)
+    assert_ends_in(replay, api.get(f"/v1/jobs/{job}/machine").json())
     steps = [step for chapter in replay["chapters"] for step in chapter["steps"]]
     acted = [(turn["index"], action) for turn in turns for action in turn["actions"]]
     told = [step for step in steps if not step["action"].startswith("add_control")]
@@ -68,95 +65,79 @@ def test_a_replay_ends_in_the_kept_machine(api, context, model, workflow, task) 
     for step, (_, action) in zip(told, acted, strict=True):
         assert (step["action"], step["arguments"]) == (action["name"], action["arguments"])
         assert (step["accepted"], step["reason"]) == (action["ok"], action["reason"])
-    programmed = [step for step in steps if step["action"].startswith("add_control")]
+    programmed = {step["turn"] for step in steps if step["action"].startswith("add_control")}
     controlled = [turn["index"] for turn in turns if turn["stage"] == "control"]
     assert bool(programmed) == (model == "builtin/expert" and bool(controlled))
-    assert {step["turn"] for step in programmed} <= set(controlled[-1:])
+    assert programmed <= set(controlled[-1:])
+    # It is made once and not sent twice.
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Replays, "_made", None)
+        again = api.get(f"/v1/jobs/{job}/replay")
+    assert again.json() == replay
+    known = {"If-None-Match": again.headers["etag"]}
+    assert api.get(f"/v1/jobs/{job}/replay", headers=known).status_code == 304
 
 
-def test_an_agents_sub_structures_are_chapters_and_grow_while_it_builds(api) -> None:
-    job = opened(api, "support-2")
-    assert api.get(f"/v1/jobs/{job}/replay").status_code == 404
-    act(api, job, "start", START, "left")
-    act(api, job, "start", START, "right")
-    act(api, job, "attach_block_to", ATTACH, "left")
-    first = api.get(f"/v1/jobs/{job}/replay").json()
+def test_an_agents_sub_structures_are_chapters_and_grow_while_it_builds(
+    api, context, open_session, act
+) -> None:
+    job = open_session(task="support-2")
+    path = f"/v1/jobs/{job}/replay"
+    assert api.get(path).status_code == 404
+    act(job, "start", START, "left")
+    act(job, "start", START, "right")
+    act(job, "attach_block_to", ATTACH, "left")
+    first = api.get(path).json()
     steps = {one["name"]: len(one["steps"]) for one in first["chapters"]}
-    assert steps == {"left": 2, "right": 1}
-    assert first["exact"] is None
+    assert (steps, first["exact"]) == ({"left": 2, "right": 1}, None)
     for machine, shift in (("left", [0, 0, 0]), ("right", [3, 0, 0])):
         given = {"machine_id": machine, "init_shift": shift, "init_rotation": [0, 0, 0]}
-        act(api, job, "add_machine", given, "assembly")
-    act(api, job, "shift_machine", {"machine_index": "B", "position": [0, 1, 0]}, "assembly")
+        act(job, "add_machine", given, "assembly")
+    act(job, "shift_machine", {"machine_index": "B", "position": [0, 1, 0]}, "assembly")
     assert api.post(f"/v1/sessions/{job}/submit").status_code == 202
-    replay = api.get(f"/v1/jobs/{job}/replay").json()
+    replay = api.get(path).json()
     kinds = [one["kind"] for one in replay["chapters"]]
     assert kinds == ["sub_structure", "sub_structure", "assembly"]
     assert replay["exact"]
     moved = replay["chapters"][-1]["steps"][-1]
-    assert [part["id"] for part in moved["moved"]] == ["B_1"]
-    assert moved["turn"] == 5
+    assert ([part["id"] for part in moved["moved"]], moved["turn"]) == (["B_1"], 5)
     assert_ends_in(replay, api.get(f"/v1/jobs/{job}/machine").json())
+    # A machine that is none is a problem and no failure.
+    attach(context, job, {"machine": b'{"version": 99}'})
+    answer = api.get(path)
+    assert (answer.status_code, "does not read" in answer.json()["detail"]) == (404, True)
 
 
-@pytest.mark.parametrize(
-    ("tool", "arguments", "reason", "attempted"),
-    [
+def test_a_refused_action_says_why_and_where(api, open_session, act) -> None:
+    job = open_session()
+    act(job, "start", START)
+    act(job, "attach_block_to", ATTACH)
+    refusals = (
         ("attach_block_to", ATTACH, "face_occupied", [("3", "Small Wooden Block")]),
         ("attach_block_to", {**ATTACH, "new_block": "Nothing"}, "module_restriction", []),
         ("start", START, "multiple_initialization", []),
         ("no_such_tool", {}, "unknown_action", []),
         ("attach_block_to", "text", "malformed_arguments", []),
-    ],
-)
-def test_a_refused_action_says_why_and_where(api, tool, arguments, reason, attempted) -> None:
-    job = opened(api)
-    act(api, job, "start", START)
-    act(api, job, "attach_block_to", ATTACH)
-    act(api, job, tool, arguments)
-    *_, accepted, refused = api.get(f"/v1/jobs/{job}/replay").json()["chapters"][0]["steps"]
-    assert not refused["accepted"]
-    assert refused["reason"] == reason
-    assert refused["text"]
-    assert [refused[name] for name in ("added", "moved", "removed", "rebound")] == [[]] * 4
-    assert [(one["id"], one["module"]) for one in refused["attempted"]] == attempted
-    if attempted:
-        placed = accepted["added"][0]
-        assert refused["attempted"][0]["position"] == placed["position"]
-
-
-def test_an_overlapping_block_is_shown_where_it_would_have_been(api) -> None:
-    job = opened(api)
-    act(api, job, "start", START)
-    act(api, job, "attach_block_to", ATTACH)
-    # Blocks on neighbouring sides want the same corner.
-    for base in range(1, 6):
-        for face in "ABCDEFGHI":
-            act(api, job, "attach_block_to", {**ATTACH, "base_block": str(base), "face": face})
-    steps = api.get(f"/v1/jobs/{job}/replay").json()["chapters"][0]["steps"]
-    overlaps = [step for step in steps if step["reason"] == "overlap"]
-    assert overlaps
-    assert all(len(step["attempted"]) == 1 for step in overlaps)
-
-
-def test_a_replay_is_made_once_and_not_sent_twice(api, context, monkeypatch) -> None:
-    job = submitted(api, "builtin/expert")
-    work(context, steps=1)
-    first = api.get(f"/v1/jobs/{job}/replay")
-    monkeypatch.setattr(Replays, "_made", None)
-    again = api.get(f"/v1/jobs/{job}/replay")
-    assert again.content == first.content
-    known = {"If-None-Match": first.headers["etag"]}
-    assert api.get(f"/v1/jobs/{job}/replay", headers=known).status_code == 304
+    )
+    for tool, arguments, *_ in refusals:
+        act(job, tool, arguments)
+    _, accepted, *steps = api.get(f"/v1/jobs/{job}/replay").json()["chapters"][0]["steps"]
+    for step, (_, _, reason, attempted) in zip(steps, refusals, strict=True):
+        assert (step["accepted"], step["reason"], bool(step["text"])) == (False, reason, True)
+        assert [step[name] for name in CHANGES] == [[]] * 4
+        assert [(one["id"], one["module"]) for one in step["attempted"]] == attempted
+    assert steps[0]["attempted"][0]["position"] == accepted["added"][0]["position"]
 
 
 @pytest.mark.parametrize("bound", ["MAX_PARTS_TOLD", "MAX_WORK"])
-def test_a_replay_that_would_be_too_large_says_that_it_ends_early(api, monkeypatch, bound) -> None:
+def test_a_replay_that_would_be_too_large_says_that_it_ends_early(
+    api, open_session, act, monkeypatch, bound
+) -> None:
     monkeypatch.setattr(chapters, bound, 3)
-    job = opened(api)
-    act(api, job, "start", START)
+    job = open_session()
+    act(job, "start", START)
     for face in "ABCD":
-        act(api, job, "attach_block_to", {**ATTACH, "face": face})
+        act(job, "attach_block_to", {**ATTACH, "face": face})
     replay = api.get(f"/v1/jobs/{job}/replay").json()
     assert not replay["complete"]
     assert 1 <= len(replay["chapters"][0]["steps"]) <= 3
@@ -164,15 +145,149 @@ def test_a_replay_that_would_be_too_large_says_that_it_ends_early(api, monkeypat
     assert api.get(f"/v1/jobs/{job}/replay").json()["exact"] is False
 
 
-def test_a_machine_that_is_none_is_a_problem_and_no_failure(api, context) -> None:
-    job = opened(api)
-    act(api, job, "start", START)
-    assert api.post(f"/v1/sessions/{job}/submit").status_code == 202
-    attach(context, job, {"machine": b'{"version": 99}'})
-    answer = api.get(f"/v1/jobs/{job}/replay")
-    assert answer.status_code == 404
-    assert "does not read" in answer.json()["detail"]
+@pytest.mark.ci
+def test_arrow_says_what_parquet_says_and_the_scene_draws_it(
+    api, context, submit_job, monkeypatch
+) -> None:
+    job = submit_job()
+    work(context)
+    path = f"/v1/jobs/{job}/trajectory"
+    kept, answer = api.get(path), api.get(path, headers={"Accept": ARROW})
+    assert (kept.headers["content-type"], kept.headers["vary"]) == (PARQUET, "Accept")
+    assert answer.headers["content-type"] == ARROW
+    assert answer.headers["etag"] != kept.headers["etag"]
+    table = pa.ipc.open_stream(answer.content).read_all()
+    trajectory = read_trajectory(kept.content)
+    count, blocks = len(trajectory.time_s), len(trajectory.block_ids)
+    assert table.num_rows == count
+    names = ("positions", "quaternions", "pieces", "cargo_position", "heated", "joint_loads")
+    for name in (*names, "time_s", "cargo_mass"):
+        wanted = getattr(trajectory, name)
+        if name not in table.column_names:
+            assert wanted.size == 0
+            continue
+        column = table.column(name).combine_chunks()
+        flat = column.flatten() if pa.types.is_fixed_size_list(column.type) else column
+        found = flat.to_numpy(zero_copy_only=False)
+        np.testing.assert_array_equal(found, wanted.reshape(-1))
+    facts = json.loads(table.schema.metadata[b"buildarena.trajectory"])
+    assert tuple(facts["block_ids"]) == trajectory.block_ids
+    assert len(facts["joint_peaks"]) == len(trajectory.joint_peaks) > 0
+    scene = api.get(f"/v1/jobs/{job}/scene").json()
+    assert scene["scenario"]["duration_s"] == (count - 1) / 25
+    assert scene["scenario"]["cargo"]
+    _check_places(scene["machine"], trajectory, blocks)
+    known = {"Accept": ARROW, "If-None-Match": answer.headers["etag"]}
+    assert api.get(path, headers=known).status_code == 304
+    assert api.get(path, params={"number": 7}).status_code == 404
+    assert api.get(f"/v1/jobs/{job}/scene", params={"number": 7}).status_code == 404
+    monkeypatch.setattr(trials, "MAX_ARROW_BYTES", 1000)
+    refused = api.get(path, headers={"Accept": ARROW})
+    assert (refused.status_code, PARQUET in refused.json()["detail"]) == (413, True)
+    assert api.get(path).status_code == 200
 
 
-def test_replays_need_a_key_where_keys_are_needed(guarded) -> None:
-    assert guarded.get("/v1/jobs/job_x/replay").status_code == 401
+def _check_places(machine, trajectory, blocks) -> None:
+    """Everything that holds together at the start is where it was built, moved as one."""
+    assert len(machine["blocks"]) == blocks
+    roots, built = [], []
+    for place in machine["blocks"]:
+        k = trajectory.block_ids.index(place["id"])
+        module = machine["modules"][place["module"]]
+        assert module["bodies"]
+        w, *axis = trajectory.quaternions[0, k]
+        across = 2 * np.cross(axis, module["center"])
+        center = np.array(module["center"]) + w * across + np.cross(axis, across)
+        roots.append(np.array(trajectory.positions[0, k], float) - center)
+        built.append(place["position"])
+    moved, apart = np.array(roots) - roots[0], np.array(built) - built[0]
+    lengths = (np.linalg.norm(moved, axis=1), np.linalg.norm(apart, axis=1))
+    np.testing.assert_allclose(*lengths, atol=0.01)
+    joints = {peak.joint for peak in trajectory.joint_peaks}
+    for link in machine["connectors"]:
+        assert {link["start"]["block"], link["end"]["block"]} <= set(trajectory.block_ids)
+        assert link["joint"] in joints
+
+
+def test_what_is_asked_for_is_what_is_named() -> None:
+    wanted = [ARROW, ARROW.upper(), f"{PARQUET}, {ARROW}", f"{ARROW}, */*;q=0.1"]
+    others = ["", "*/*", PARQUET, f"{PARQUET}, {ARROW};q=0.5", f"{ARROW};q=0", f"{ARROW};q=x"]
+    assert [accept for accept in wanted if not prefers(accept, ARROW, over=PARQUET)] == []
+    others += [f"{ARROW}x", ",,;"]
+    assert [accept for accept in others if prefers(accept, ARROW, over=PARQUET)] == []
+
+
+def nodes(glb: bytes) -> list[str]:
+    """Names of the nodes under the root, as a viewer reads them."""
+    magic, version, length = struct.unpack_from("<III", glb)
+    assert (magic, version, length) == (0x46546C67, 2, len(glb))
+    (size,) = struct.unpack_from("<I", glb, 12)
+    scene = json.loads(glb[20 : 20 + size])
+    return [scene["nodes"][child]["name"] for child in scene["nodes"][0]["children"]]
+
+
+def test_every_module_is_a_model(api) -> None:
+    for name in load_catalogue():
+        answer = api.get(f"/v1/modules/{name}.glb")
+        assert answer.headers["content-type"] == pictures.GLB
+        assert nodes(answer.content) == [name]
+    known = {"If-None-Match": answer.headers["etag"]}
+    assert api.get(f"/v1/modules/{name}.glb", headers=known).status_code == 304
+    for name in ("Nothing", "brace", "..%2f..%2fetc", "'", "%00"):
+        answer = api.get(f"/v1/modules/{name}.glb")
+        assert answer.status_code == 404
+        assert "%" in name or "the nearest are" in answer.json()["detail"]
+
+
+def test_scenes_models_and_pictures_are_there_once_something_is_built(
+    api, context, submit_job, monkeypatch
+) -> None:
+    job = submit_job()
+    path = f"/v1/jobs/{job}"
+    before = api.get(f"{path}/scene").json()
+    assert before["machine"] is None
+    assert before["scenario"]["terrain"]
+    for name in ("machine.glb", "thumbnail.png"):
+        assert api.get(f"{path}/{name}").status_code == 404
+    work(context, steps=1)
+    assert api.get(f"{path}/scene").json()["machine"]["blocks"]
+    assert api.get(f"{path}/trajectory").status_code == 404
+    document = api.get(f"{path}/machine").json()
+    parts = [one["id"] for one in (*document["blocks"], *document["connectors"])]
+    assert nodes(api.get(f"{path}/machine.glb").content) == parts
+    drawn = api.get(f"{path}/thumbnail.png")
+    assert drawn.headers["content-type"] == "image/png"
+    image = Image.open(io.BytesIO(drawn.content))
+    assert image.size == (480, 320)
+    assert len(image.convert("RGB").getcolors(100_000)) > 8, "there is a machine on it"
+    # What may still change is no artifact.
+    assert "thumbnail" not in context.store.jobs.artifacts(job)
+    work(context)
+    ended = api.get(f"{path}/thumbnail.png")
+    assert ended.content == drawn.content
+    assert context.artifacts.get(context.store.jobs.artifacts(job)["thumbnail"]) == drawn.content
+    kept = api.get(f"{path}/artifacts/thumbnail")
+    assert kept.headers["content-security-policy"] == "sandbox"
+    assert kept.headers["content-type"] == "image/png"
+    monkeypatch.setattr(pictures, "still_png", None)
+    api.app.state.pictures = pictures.ResponseCache(1 << 20)
+    assert api.get(f"{path}/thumbnail.png").content == drawn.content
+    # Bytes that are no trajectory are a problem and no failure.
+    attach(context, job, {"trajectory-0": b"nothing"}, PARQUET)
+    answer = api.get(f"{path}/trajectory", headers={"Accept": ARROW})
+    assert (answer.status_code, "can be read" in answer.json()["detail"]) == (404, True)
+
+
+def test_answers_are_forgotten_when_there_is_no_room() -> None:
+    kept = pictures.ResponseCache(10)
+    made: list[str] = []
+
+    def get(name: str, size: int = 5) -> int:
+        return len(kept.get_or_make(name, lambda: made.append(name) or b"x" * size).body)
+
+    # c takes the place of b, which was used longest ago.
+    for name in ("a", "b", "a", "c", "a", "b"):
+        get(name)
+    assert get("huge", 1000) == 1000
+    get("a")
+    assert made == ["a", "b", "c", "b", "huge"]

@@ -42,7 +42,7 @@ def payer_of(context: Context) -> str | None:
 
 def run_until(context: Context, state: str) -> None:
     """Brings the one job into a state."""
-    if state == "queued":
+    if state in {"queued", "on_hold"}:
         return
     lease = context.store.leases.claim("construct", owner="w")
     assert lease is not None
@@ -64,39 +64,35 @@ def budget(who: Tenant, guarded: TestClient, requests: int) -> None:
 # Limits
 
 
-@pytest.mark.parametrize(
-    "limits", [{"max_requests": 1}, {"max_tokens": 1}, {"max_seconds": 0.001}, {"max_cost_usd": 1}]
-)
-def test_anothers_limits_never_become_my_result(a, b, context, limits) -> None:
-    tight = b.post("/v1/jobs", {**JOB, "limits": limits})
+def test_anothers_limits_never_become_my_result(a, b, context) -> None:
+    tight = b.post("/v1/jobs", {**JOB, "limits": {"max_requests": 1}})
     work(context)
     mine = a.post("/v1/jobs", JOB)
-    assert mine["id"] != tight["id"]
     assert mine["state"] == "queued"
     work(context)
     assert a.get(f"/v1/jobs/{mine['id']}")["outcome"] == "construction_failed"
-    # The same limits are the same job, however they are spelled.
-    spelled = {
-        name: float(value) if name.endswith("d") else value for name, value in limits.items()
-    }
-    assert a.post("/v1/jobs", {**JOB, "limits": spelled})["id"] == tight["id"]
-
-
-def test_jobs_with_limits_have_a_row_of_their_own(a, context) -> None:
-    for seed in range(2):
-        a.post("/v1/jobs", {**JOB, "seed": seed})
-        a.post("/v1/jobs", {**JOB, "seed": seed, "limits": {"max_requests": 1}})
-    work(context)
-    (task,) = [t for t in a.get("/v1/leaderboard")["tasks"] if t["task"] == "support-1"]
+    (task,) = a.get("/v1/leaderboard")["tasks"]
     rows = {row["decoding"].get("limits", {}).get("max_requests"): row for row in task["rows"]}
-    assert {limit: row["trials"] for limit, row in rows.items()} == {None: 2, 1: 2}
+    assert {limit: row["trials"] for limit, row in rows.items()} == {None: 1, 1: 1}
+    # The same limits are the same job, however they are spelled.
+    ids = {mine["id"], tight["id"]}
+    for name, one, spelled in (
+        *(("max_tokens", 1, 1), ("max_seconds", 2, 2.0), ("max_cost_usd", 1, 1.0)),
+        ("max_requests", 2, 2),
+    ):
+        job, again = (a.post("/v1/jobs", {**JOB, "limits": {name: n}}) for n in (one, spelled))
+        assert job["id"] == again["id"]
+        ids.add(job["id"])
+    assert len(ids) == 6
 
 
 # Commands over shared jobs
 
 
-@pytest.mark.parametrize("state", ["queued", "running"])
-@pytest.mark.parametrize("command", ["pause", "cancel"])
+@pytest.mark.parametrize(
+    ("command", "state"),
+    [("pause", "queued"), ("cancel", "queued"), ("cancel", "running"), ("pause", "errored")],
+)
 def test_a_command_hands_jobs_over_to_an_active_sweep_of_another_key(
     a, b, context, command, state
 ) -> None:
@@ -104,15 +100,15 @@ def test_a_command_hands_jobs_over_to_an_active_sweep_of_another_key(
     run_until(context, state)
     assert (the_job(a)["owner"], payer_of(context)) == (a.id, mine)
     a.post(f"/v1/sweeps/{mine}/{command}")
-    assert (the_job(b)["state"], the_job(b)["owner"]) == (state, b.id)
-    assert payer_of(context) == theirs
+    assert the_job(b)["owner"] == b.id
+    assert state == "errored" or (the_job(b)["state"], payer_of(context)) == (state, theirs)
 
 
-@pytest.mark.parametrize("state", ["queued", "running", "on_hold"])
+@pytest.mark.parametrize("state", ["running", "on_hold"])
 def test_a_paused_sweep_wants_its_jobs_and_lets_them_wait(a, b, context, state) -> None:
     mine, theirs = sweep_of(a), sweep_of(b)
     b.post(f"/v1/sweeps/{theirs}/pause")
-    run_until(context, "queued" if state == "on_hold" else state)
+    run_until(context, state)
     if state == "on_hold":
         a.post(f"/v1/sweeps/{mine}/pause")
     assert the_job(a)["state"] == state
@@ -176,28 +172,12 @@ def test_what_was_spent_before_a_hand_over_stays_where_it_was_spent(a, b, guarde
     )
 
 
-@pytest.mark.ci
-def test_a_budget_stop_hands_over_and_costs_the_other_nothing(a, b, guarded, context) -> None:
-    budget(b, guarded, 1000)
-    models = ["builtin/idle", "builtin/expert"]
-    mine = sweep_of(a, models=models, budget={"max_requests": 1})
-    theirs = sweep_of(b, models=models)
-    work(context)
-    assert a.get(f"/v1/sweeps/{mine}")["state"] == "budget_exhausted"
-    assert a.get(f"/v1/sweeps/{mine}")["budget"]["spent_requests"] <= 1
-    jobs = b.get("/v1/jobs")["jobs"]
-    assert {job["state"] for job in jobs} == {"done"}
-    total = sum(job["usage"]["requests"] for job in jobs)
-    assert spent(b, guarded) == total - a.get(f"/v1/sweeps/{mine}")["budget"]["spent_requests"]
-    assert b.get(f"/v1/sweeps/{theirs}")["state"] == "done"
-
-
 def test_a_keys_budget_stop_leaves_the_jobs_that_another_key_wants(a, b, guarded, context) -> None:
     budget(a, guarded, 1)
-    models = ["builtin/idle", "builtin/expert"]
-    sweep_of(a, models=models)
-    for model in models:
-        b.post("/v1/jobs", {**JOB, "model": model})
+    seeds = [0, 1]
+    sweep_of(a, seeds=seeds)
+    for seed in seeds:
+        b.post("/v1/jobs", {**JOB, "seed": seed})
     work(context)
     assert {job["state"] for job in b.get("/v1/jobs")["jobs"]} == {"done"}
     assert spent(a, guarded) <= 1
@@ -206,16 +186,11 @@ def test_a_keys_budget_stop_leaves_the_jobs_that_another_key_wants(a, b, guarded
 # Retry
 
 
-@pytest.mark.parametrize("theirs_is", ["active", "paused"])
-def test_retrying_never_touches_a_job_of_another_key(a, b, guarded, context, theirs_is) -> None:
+def test_retrying_never_touches_a_job_of_another_key(a, b, guarded, context) -> None:
     for who in (a, b):
         budget(who, guarded, 1000)
     mine, theirs = sweep_of(a), sweep_of(b)
     run_until(context, "errored")
-    if theirs_is == "paused":
-        a.post(f"/v1/sweeps/{mine}/pause")
-        assert the_job(a)["owner"] == b.id  # who goes on owns also what errored
-        return
     b.post(f"/v1/sweeps/{theirs}/retry")
     work(context)
     assert the_job(a)["outcome"] == "errored"
@@ -276,17 +251,16 @@ def test_cancelling_a_shared_job_only_ends_ones_own_wish(a, b) -> None:
     assert {mine, theirs} <= {sweep["id"] for sweep in a.get("/v1/sweeps")["sweeps"]}
 
 
-def test_an_admin_ends_a_job_whoever_wants_it(a, b, guarded) -> None:
-    sweep_of(a), sweep_of(b)
-    job = operator(guarded).post(f"/v1/jobs/{the_job(a)['id']}/cancel")
-    assert job["outcome"] == "cancelled"
-
-
-def test_who_neither_owns_nor_wants_a_job_may_not_cancel_it(a, b, context) -> None:
+def test_who_neither_owns_nor_wants_a_job_may_not_cancel_it_but_an_admin(
+    a, b, guarded, context
+) -> None:
     sweep_of(a)
+    path = f"/v1/jobs/{the_job(a)['id']}/cancel"
     before = everything(context.store.database)
-    b.post(f"/v1/jobs/{the_job(a)['id']}/cancel", status=403)
+    b.post(path, status=403)
     assert everything(context.store.database) == before
+    sweep_of(b)
+    assert operator(guarded).post(path)["outcome"] == "cancelled"
 
 
 # Refusals
@@ -343,27 +317,18 @@ def test_names_belong_to_the_key_that_first_used_them(a, b, guarded) -> None:
 
 
 def test_of_two_keys_that_use_a_new_name_at_once_one_gets_it(a, b) -> None:
-    def upload(who: Tenant, load: int) -> int:
-        text = EXAMPLE.replace("final_mass: 200", f"final_mass: {load}")
+    def upload(who: Tenant, number: int) -> int:
+        text = EXAMPLE.replace("final_mass: 200", f"final_mass: {200 + number}")
         headers = {"Content-Type": "application/yaml"}
         return who.ask("POST", "/v1/tasks", content=text.encode(), headers=headers).status_code
 
+    def opened(who: Tenant, number: int) -> int:
+        return who.ask("POST", "/v1/sessions", json={**SESSION, "seed": number}).status_code
+
+    tries = [(who, number) for number in range(4) for who in (a, b)]
     with ThreadPoolExecutor(8) as pool:
-        tries = [(who, 200 + 10 * number) for number in range(4) for who in (a, b)]
-        found = list(pool.map(lambda each: (each[0].id, upload(*each)), tries))
-        seeds = [(who, number) for number in range(4) for who in (a, b)]
-        opened = list(
-            pool.map(
-                lambda each: (
-                    each[0].id,
-                    each[0]
-                    .ask("POST", "/v1/sessions", json={**SESSION, "seed": each[1]})
-                    .status_code,
-                ),
-                seeds,
-            )
-        )
-    for answers in (found, opened):
-        assert {status for _, status in answers} == {201, 403}
-        assert len({key for key, status in answers if status == 201}) == 1
-        assert sum(status == 201 for _, status in answers) == 4
+        for use in (upload, opened):
+            statuses = list(pool.map(use, *zip(*tries, strict=True)))
+            assert sorted(statuses) == [201] * 4 + [403] * 4
+            good = zip(tries, statuses, strict=True)
+            assert len({who.id for (who, _), status in good if status == 201}) == 1

@@ -17,45 +17,35 @@ from buildarena_worker.wiring import verification_runner
 
 TASK = builtin_tasks()["identify-1"]
 DRAW = 7_654_321_987_654
-OPEN = {"task": TASK.name, "agent": "me", "seed": 1, "simulator": "mujoco", "worlds": 0}
+OPEN = {"task": TASK.name, "worlds": 0}
 
 
-def opened(api, **more) -> str:
-    answer = api.post("/v1/sessions", json={**OPEN, **more})
-    assert answer.status_code == 201, answer.text
-    return answer.json()["id"]
-
-
-def act(api, session: str, tool: str, arguments: object, **more: str):
-    body = {"tool": tool, "arguments": arguments, **more}
-    answer = api.post(f"/v1/sessions/{session}/calls", json=body)
-    assert answer.json().get("ok"), answer.text
-
-
-def built(api, session: str):
+def build(act, session: str):
     design = riser(1)
     for tool, arguments in design.parts["riser"].actions:
-        act(api, session, tool, dict(arguments))
+        act(session, tool, dict(arguments))
     for bound in design.steer([])["control_config"]:
         for key in bound["keys"]:
             told = {"block_id": bound["block"], "action": bound["action"], "new_key": key}
-            act(api, session, "change_control_key", told)
+            act(session, "change_control_key", told)
     return design
 
 
-def programmed(api, session: str, program) -> None:
-    act(api, session, "reset_control_sequence", {})
+def programmed(act, session: str, program) -> None:
+    act(session, "reset_control_sequence", {})
     for press in program["control_sequence"]:
-        act(api, session, "add_control_sequence", press)
+        act(session, "add_control_sequence", press)
 
 
 @pytest.mark.nightly
-def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -> None:
-    session = opened(api)
-    design, seen = built(api, session), []
+def test_an_agent_that_measures_succeeds_and_its_job_is_verified(
+    api, open_session, act, context
+) -> None:
+    session = open_session(**OPEN)
+    design, seen = build(act, session), []
     for number in range(1, TASK.tests + 1):
         program = design.steer(seen)
-        programmed(api, session, program)
+        programmed(act, session, program)
         asked = api.post(f"/v1/sessions/{session}/tests")
         assert asked.status_code == 202, asked.text
         early = api.post(f"/v1/sessions/{session}/submit")
@@ -73,7 +63,7 @@ def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -
         409,
         "all 5 test trials are used up: submit",
     )
-    programmed(api, session, design.steer(seen))
+    programmed(act, session, design.steer(seen))
     assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
     work(context)
     job = api.get(f"/v1/jobs/{session}").json()
@@ -89,13 +79,15 @@ def test_an_agent_that_measures_succeeds_and_its_job_is_verified(api, context) -
 
 
 @pytest.mark.ci
-def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(api, context) -> None:
-    session = opened(api)
+def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(
+    api, open_session, act, context
+) -> None:
+    session = open_session(**OPEN)
     # A draw whose figures are no part of others that an answer may well have.
     with context.store.database.transaction() as connection:
         connection.execute(text("UPDATE jobs SET draw = :draw"), {"draw": DRAW})
-    design = built(api, session)
-    programmed(api, session, design.steer([]))
+    design = build(act, session)
+    programmed(act, session, design.steer([]))
     api.post(f"/v1/sessions/{session}/tests")
     work(context)
     job = context.store.jobs.get(session)
@@ -130,15 +122,17 @@ def test_nothing_that_is_answered_tells_the_draw_while_the_session_is_open(api, 
 
 
 @pytest.mark.ci
-def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(api, context) -> None:
-    session = opened(api)
-    programmed(api, session, built(api, session).steer([]))
+def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(
+    api, open_session, act, context
+) -> None:
+    session = open_session(**OPEN)
+    programmed(act, session, build(act, session).steer([]))
     assert api.post(f"/v1/sessions/{session}/tests").status_code == 202
     work(context)
-    act(api, session, "start", {}, machine="other")
+    act(session, "start", {}, machine="other")
     for name, east in (("main", 0), ("other", 40)):
         copied = {"machine_id": name, "init_shift": [east, 0, 0], "init_rotation": [0, 0, 0]}
-        act(api, session, "add_machine", copied, machine="assembly")
+        act(session, "add_machine", copied, machine="assembly")
     job = api.post(f"/v1/sessions/{session}/submit").json()
     assert (job["outcome"], job["indicator"]) == ("construction_failed", 0.0), job
     (check,) = context.store.verifications.request([session]).ids.values()
@@ -147,52 +141,37 @@ def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(ap
     assert context.store.verifications.get(check).verdict == "verified"
 
 
-def test_a_machine_that_breaks_a_rule_uses_up_no_test_trial(api) -> None:
-    session = opened(api)
-    assert api.post(f"/v1/sessions/{session}/tests").status_code == 409
-    act(api, session, "start", {})
-    answer = api.post(f"/v1/sessions/{session}/tests")
-    assert answer.status_code == 409
-    assert "would not be tried" in answer.json()["detail"]
-    view = api.get(f"/v1/sessions/{session}").json()
-    assert (view["tests"], view["open"], view["calls"]) == ([], True, 1)
-
-
-@pytest.mark.parametrize("task", ["support-1", "repair-1"])
-def test_other_tasks_have_none(api, task) -> None:
-    session = opened(api, task=task)
-    act(api, session, "get_machine_summary" if task == "repair-1" else "start", {})
-    answer = api.post(f"/v1/sessions/{session}/tests")
-    assert answer.status_code == 409
-    assert "has no test trials" in answer.json()["detail"]
-    assert api.get(f"/v1/sessions/{session}").json()["most_tests"] == 0
-
-
-def test_a_call_that_only_says_so_is_no_test_trial(api) -> None:
-    session = opened(api)
+def test_what_is_no_trial_uses_up_no_test_trial(api, open_session, act) -> None:
+    session = open_session(**OPEN)
     for name in ("test_trial", "Test_Trial"):
         answer = api.post(f"/v1/sessions/{session}/calls", json={"tool": name, "arguments": {}})
         assert answer.status_code == 409
+    assert api.post(f"/v1/sessions/{session}/tests").status_code == 409
+    act(session, "start", {})
+    answer = api.post(f"/v1/sessions/{session}/tests")
+    assert (answer.status_code, "would not be tried" in answer.json()["detail"]) == (409, True)
+    view = api.get(f"/v1/sessions/{session}").json()
+    assert (view["tests"], view["open"], view["calls"]) == ([], True, 1)
+    for task, tool in (("support-1", "start"), ("repair-1", "get_machine_summary")):
+        other = open_session(**{**OPEN, "task": task})
+        act(other, tool, {})
+        answer = api.post(f"/v1/sessions/{other}/tests")
+        assert (answer.status_code, "no test trials" in answer.json()["detail"]) == (409, True)
+        assert api.get(f"/v1/sessions/{other}").json()["most_tests"] == 0
 
 
 @pytest.mark.ci
-def test_machines_from_files_have_a_world_of_their_own_each_time(api, context) -> None:
+def test_machines_from_files_have_a_world_of_their_own_each_time(
+    api, open_session, act, context
+) -> None:
     """So that a file is no further test trial of anybody's session."""
-    session = opened(api)
-    design = built(api, session)
-    programmed(api, session, design.steer([]))
-    machine = api.get(f"/v1/sessions/{session}")
-    assert machine.status_code == 200
+    session = open_session(**OPEN)
+    design = build(act, session)
+    programmed(act, session, design.steer([]))
     api.post(f"/v1/sessions/{session}/submit")
     document = json.dumps(api.get(f"/v1/jobs/{session}/machine").json()).encode()
     asked = {"task": TASK.name, "simulator": "mujoco", "seed": 1}
-    tried = api.post(
-        "/v1/machines/trials",
-        params=asked,
-        content=document,
-        headers={"content-type": "application/octet-stream"},
-    )
-    assert tried.status_code in (201, 202), tried.text
+    tried = api.post("/v1/machines/trials", params=asked, content=document)
     work(context)
     first, second = (api.get(f"/v1/jobs/{i}").json() for i in (session, tried.json()["id"]))
     assert first["manifest"]["drawn"] != second["manifest"]["drawn"]

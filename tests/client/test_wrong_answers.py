@@ -1,12 +1,24 @@
-"""Servers that refuse, are busy, break off, or are none of ours: what both clients make of it."""
+"""Servers that refuse, break off, or are none of ours, what both make of it, and their keys."""
 
+import contextlib
 import inspect
 import json
+import socket
+import ssl
+import threading
 import time
+import traceback
+from datetime import UTC, datetime, timedelta
+from ipaddress import ip_address
 from itertools import islice, product
+from pathlib import Path
 from typing import Any
 
 import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.x509.oid import NameOID
 from support.servers.wrong_server import answer, wrong_server
 
 from buildarena_client import (
@@ -23,9 +35,12 @@ from buildarena_client import (
     UnavailableError,
     UnreachableError,
 )
+from buildarena_client.config import stored_key
 from buildarena_client.event_streams import MAX_EVENT_BYTES
 from buildarena_client.retries import BREAK_PAUSE_S, LONGEST_PAUSE_S
+from buildarena_pipeline.secret_files import MAX_BYTES, SecretFileError, read_secret
 
+SECRET = "ba_secret-that-nobody-sees"
 JOB = "job_0a1b2c3d4e5f60718293"
 SWEEP = "sweep_0a1b2c3d4e5f60718293"
 SPEC = {"tasks": ["lift-1"], "models": ["builtin/idle"]}
@@ -42,16 +57,8 @@ NOTHING_TWICE = {
 }
 """Methods that change something more when they are sent again."""
 GENERAL = {
-    "get",
-    "get_bytes",
-    "get_patiently",
-    "health",
-    "post",
-    "put",
-    "upload",
-    "download",
-    "pages",
-    "close",
+    *("get", "get_bytes", "get_patiently", "health", "post", "put"),
+    *("upload", "download", "pages", "close"),
 }
 WAITING = {"wait_for_job", "wait_for_verification", "wait_for_sweep"}
 GIVEN: dict[str, Any] = {
@@ -65,18 +72,11 @@ GIVEN: dict[str, Any] = {
 }
 
 
-def methods() -> list[str]:
-    return [
-        name
-        for name, found in inspect.getmembers(Client, callable)
-        if not name.startswith("_") and name not in GENERAL
-    ]
-
-
-def named(name: str) -> list[str]:
-    """Arguments of a method that become a part of a path."""
-    known = inspect.signature(getattr(Client, name)).parameters
-    return [one for one in known if one.endswith("_id") or (one, name) == ("name", "task")]
+METHODS = [
+    name
+    for name, found in inspect.getmembers(Client, callable)
+    if not name.startswith("_") and name not in GENERAL
+]
 
 
 def arguments(name: str, target, **instead: Any) -> dict[str, Any]:
@@ -96,30 +96,23 @@ def ask(client, name: str, given: dict[str, Any]) -> Any:
     return next(iter(answered)) if inspect.isgenerator(answered) else answered
 
 
-@pytest.mark.parametrize(
-    ("said", "error", "says"),
-    [
-        (HTML, NotAnApiError, "does not answer in JSON"),
-        (answer(200, b"\xff"), NotAnApiError, "does not answer in JSON"),
-        (answer(200, b"[" * 100_000), NotAnApiError, "does not answer in JSON"),
-        (answer(200, b""), NotAnApiError, "does not answer in JSON"),
-        (SHORT, UnreachableError, "no BuildArena answers"),
-        (SHORT_PIECES, UnreachableError, "no BuildArena answers"),
+def test_what_is_no_answer_of_an_api_is_one_sentence(make) -> None:
+    for said, error, says in (
+        *((page, NotAnApiError, "does not answer in JSON") for page in (HTML, answer(200, b""))),
+        *((answer(200, n), NotAnApiError, "answer in JSON") for n in (b"\xff", b"[" * 100_000)),
+        *((cut, UnreachableError, "no BuildArena answers") for cut in (SHORT, SHORT_PIECES, b"")),
         (b"SSH-2.0-OpenSSH\r\n", UnreachableError, "no BuildArena answers"),
         (b"\x1b[2Jx\r\n\r\n", UnreachableError, "no BuildArena answers"),
-        (b"", UnreachableError, "no BuildArena answers"),
         (answer(302, Location="http://127.0.0.1:1/"), RefusedError, "HTTP 302"),
         (answer(500, b"<html>"), ServiceFaultError, "HTTP 500"),
         (answer(418, b"[]"), RefusedError, "HTTP 418"),
         (answer(422, b'{"detail": 5, "errors": [7]}'), RefusedError, "HTTP 422"),
         (answer(422, b'{"detail": "no", "errors": null}'), RefusedError, "HTTP 422"),
-    ],
-)
-def test_what_is_no_answer_of_an_api_is_one_sentence(make, said, error, says) -> None:
-    with wrong_server(said) as server, pytest.raises(error, match=says) as raised:
-        make(server.url).tasks()
-    assert isinstance(raised.value, ClientError)
-    assert str(raised.value).isprintable()
+    ):
+        with wrong_server(said) as server, pytest.raises(error, match=says) as raised:
+            make(server.url).tasks()
+        assert isinstance(raised.value, ClientError)
+        assert str(raised.value).isprintable()
 
 
 def test_nobody_there(make, pauses) -> None:
@@ -130,81 +123,73 @@ def test_nobody_there(make, pauses) -> None:
     assert pauses == []
 
 
-@pytest.mark.parametrize("name", methods())
 @pytest.mark.usefixtures("pauses")
-def test_only_what_may_be_carried_out_twice_is_sent_twice(make, name, tmp_path) -> None:
+def test_only_what_may_be_carried_out_twice_is_sent_twice(make, tmp_path) -> None:
     """After a cut and after 503 nobody knows what was done."""
-    once = name in NOTHING_TWICE
-    streams = name.endswith("_events") or name in WAITING or name == "watch_sweep"
-    retries = RetryPolicy(restart_s=0.0)
-    for said in (b"", AWAY):
+    for name, said in product(METHODS, (b"", AWAY)):
+        streams = name.endswith("_events") or name in WAITING or name == "watch_sweep"
         with wrong_server(said, said, answer(404)) as server:
-            client = make(server.url, retries=retries)
+            client = make(server.url, retries=RetryPolicy(restart_s=0.0))
             with pytest.raises(ClientError) as raised:
                 ask(client, name, arguments(name, tmp_path))
-        if once:
-            assert len(server.received) == 1, (said, server.lines)
+        if name in NOTHING_TWICE:
+            assert len(server.received) == 1, (name, said, server.lines)
             assert isinstance(raised.value, UnreachableError)
         elif not streams and name != "download_artifact":
-            assert len(server.received) == 3, (said, server.lines)
+            assert len(server.received) == 3, (name, said, server.lines)
             assert len(set(server.headers("Idempotency-Key"))) == 1
             assert len(set(server.received)) == 1
 
 
-@pytest.mark.parametrize("name", methods())
-def test_what_was_refused_as_one_too_many_is_sent_again(make, name, tmp_path) -> None:
-    with wrong_server(BUSY, BUSY, answer(404)) as server, pytest.raises(RefusedError) as raised:
-        ask(make(server.url), name, arguments(name, tmp_path))
-    assert raised.value.status == 404
-    assert len(server.received) == 3
-    assert len(set(server.received)) == 1
+def test_what_was_refused_as_one_too_many_is_sent_again(make, tmp_path) -> None:
+    for name in METHODS:
+        with wrong_server(BUSY, BUSY, answer(404)) as server, pytest.raises(RefusedError) as raised:
+            ask(make(server.url), name, arguments(name, tmp_path))
+        assert raised.value.status == 404
+        assert len(server.received) == 3, name
+        assert len(set(server.received)) == 1
 
 
-@pytest.mark.parametrize("name", [one for one in methods() if named(one)])
-def test_what_is_no_name_is_never_sent(make, name, tmp_path) -> None:
-    given = arguments(name, tmp_path)
+def test_what_is_no_name_or_path_is_never_sent(make, tmp_path) -> None:
     bad = ["..", ".", "", "a/b", "../keys", "a\nb", "a\0b", None, 5]
     with wrong_server(answer(200)) as server:
         client = make(server.url)
-        for one, word in product(named(name), bad):
-            with pytest.raises(BadArgumentError, match="is not a name"):
-                ask(client, name, {**given, one: word})
+        for name in METHODS:
+            # Arguments that become a part of a path.
+            known = inspect.signature(getattr(Client, name)).parameters
+            named = [n for n in known if n.endswith("_id") or (n, name) == ("name", "task")]
+            for one, word in product(named, bad):
+                with pytest.raises(BadArgumentError, match="is not a name"):
+                    ask(client, name, {**arguments(name, tmp_path), one: word})
+        for path in ("/v1/jobs/../keys", "/v1/x#y", "//evil/v1", "http://evil/v1/x"):
+            for send in (client.get, client.post, client.get_bytes):
+                with pytest.raises(BadArgumentError, match="not a path of the service"):
+                    send(path)
+        with pytest.raises(BadArgumentError, match="can't be sent as Idempotency-Key"):
+            client.submit_sweep(SPEC, request_key="a\r\nX: y")
+        for nonsense in (float("nan"), {1, 2}, object()):
+            with pytest.raises(BadArgumentError, match="can't be sent as JSON"):
+                client.submit_sweep({**SPEC, "seeds": nonsense})
     assert server.received == []
 
 
-@pytest.mark.parametrize("path", ["/v1/jobs/../keys", "/v1/x#y", "//evil/v1", "http://evil/v1/x"])
-def test_no_other_path_is_ever_sent(make, path) -> None:
-    with wrong_server(answer(200)) as server:
-        client = make(server.url)
-        for send in (client.get, client.post, client.get_bytes):
-            with pytest.raises(BadArgumentError, match="not a path of the service"):
-                send(path)
-    assert server.received == []
-
-
-@pytest.mark.parametrize(
-    ("asked", "retries"),
-    [
-        ("9999", RetryPolicy(too_many_s=0.2)),
-        ("soon", RetryPolicy()),
-        ("", RetryPolicy()),
-        ("-1", RetryPolicy()),
-    ],
-)
-def test_retries_end(make, pauses, asked, retries) -> None:
-    busy = answer(429, b'{"detail": "too many", "errors": []}', Retry_After=asked)
-    with wrong_server(busy) as server, pytest.raises(TooManyRequestsError, match="too many"):
-        make(server.url, retries=retries).tasks()
-    assert len(server.received) == 1
+def test_as_much_time_passes_as_the_service_asks_for_and_retries_end(make, pauses) -> None:
+    for asked, seconds in (("1", 1.0), ("7", 7.0), ("30", LONGEST_PAUSE_S)):
+        pauses.clear()
+        with wrong_server(answer(429, Retry_After=asked), answer(200, b"[]")) as server:
+            assert make(server.url).tasks() == []
+        assert pauses == [seconds]
+    pauses.clear()
+    given = {
+        "9999": RetryPolicy(too_many_s=0.2),
+        **dict.fromkeys(("soon", "", "-1"), RetryPolicy()),
+    }
+    for asked, retries in given.items():
+        busy = answer(429, b'{"detail": "too many", "errors": []}', Retry_After=asked)
+        with wrong_server(busy) as server, pytest.raises(TooManyRequestsError, match="too many"):
+            make(server.url, retries=retries).tasks()
+        assert len(server.received) == 1
     assert pauses == []
-
-
-@pytest.mark.parametrize(("asked", "seconds"), [("1", 1.0), ("7", 7.0), ("30", LONGEST_PAUSE_S)])
-def test_as_much_time_passes_as_the_service_asks_for(make, pauses, asked, seconds) -> None:
-    busy = answer(429, Retry_After=asked)
-    with wrong_server(busy, answer(200, b"[]")) as server:
-        assert make(server.url).tasks() == []
-    assert pauses == [seconds]
 
 
 def test_pauses_take_their_time(make) -> None:
@@ -229,12 +214,9 @@ def test_a_silent_server_is_given_up_and_asked_once(make) -> None:
         assert len(server.received) == 2
 
 
-@pytest.mark.parametrize("older", [None, b"old"])
-def test_a_download_is_there_whole_or_not_at_all(make, tmp_path, older) -> None:
-    target = tmp_path / "x.zip"
-    if older:
-        target.write_bytes(older)
-    before = list(tmp_path.iterdir())
+def test_a_download_is_there_whole_or_not_at_all(make, tmp_path) -> None:
+    fresh, target = tmp_path / "fresh.zip", tmp_path / "x.zip"
+    target.write_bytes(b"old")
     for said, error in (
         (SHORT, UnreachableError),
         (SHORT_PIECES, UnreachableError),
@@ -243,10 +225,11 @@ def test_a_download_is_there_whole_or_not_at_all(make, tmp_path, older) -> None:
         (answer(302), RefusedError),
         (answer(503), UnavailableError),
     ):
-        with wrong_server(said) as server, pytest.raises(error):
-            make(server.url).download("/v1/x", target)
-        assert list(tmp_path.iterdir()) == before
-        assert older is None or target.read_bytes() == older
+        with wrong_server(said) as server:
+            for file in (target, fresh):
+                with pytest.raises(error):
+                    make(server.url).download("/v1/x", file)
+        assert [(file, file.read_bytes()) for file in tmp_path.iterdir()] == [(target, b"old")]
     with wrong_server(BUSY, answer(200, b"PK01")) as server:
         make(server.url).download("/v1/x", target)
         with pytest.raises(FileNotFoundError):
@@ -281,17 +264,19 @@ def event(number: int, **data: Any) -> bytes:
     return f"id: {number}\r\nevent: turn\r\ndata: {told}\r\n\r\n".encode()
 
 
-@pytest.mark.parametrize("size", [1, 2, 3, 7, 1000])
-def test_events_are_the_same_wherever_the_stream_is_cut(make, size) -> None:
+def test_events_are_the_same_wherever_the_stream_is_cut(make) -> None:
     texts = ["a", "é\u2028", "b"]
     stream = b": ping\r\n\r\n".join(event(n, said=text) for n, text in enumerate(texts, 1))
-    pieces = [stream[at : at + size] for at in range(0, len(stream), size)]
-    chunks = b"".join(b"%x\r\n%b\r\n" % (len(piece), piece) for piece in pieces)
     head = STREAM.replace(b"\r\n\r\n", b"\r\nTransfer-Encoding: chunked\r\n\r\n")
-    with wrong_server(head + chunks + b"0\r\n\r\n") as server:
-        seen = list(islice(make(server.url).job_events(JOB), 3))
-    assert [(each["id"], each["data"]["said"]) for each in seen] == list(enumerate(texts, 1))
-    assert {(each["kind"], each["job"], each["sweep"]) for each in seen} == {("turn", JOB, None)}
+    for size in (1, 2, 3, 7, 1000):
+        pieces = [stream[at : at + size] for at in range(0, len(stream), size)]
+        chunks = b"".join(b"%x\r\n%b\r\n" % (len(piece), piece) for piece in pieces)
+        with wrong_server(head + chunks + b"0\r\n\r\n") as server:
+            seen = list(islice(make(server.url).job_events(JOB), 3))
+        assert [(each["id"], each["data"]["said"]) for each in seen] == list(enumerate(texts, 1))
+        assert {(each["kind"], each["job"], each["sweep"]) for each in seen} == {
+            ("turn", JOB, None)
+        }
 
 
 @pytest.mark.usefixtures("pauses")
@@ -323,13 +308,10 @@ def test_streams_that_end_at_once_are_given_up(make) -> None:
         assert 2 <= len(server.received) <= 4
 
 
-@pytest.mark.parametrize("page", [b"[]", b"{}", b'{"next_cursor": 5}', b"null"])
-def test_what_is_no_page_is_refused(make, page) -> None:
-    with wrong_server(answer(200, page)) as server, pytest.raises(NotAnApiError):
-        next(iter(make(server.url).jobs()))
-
-
-def test_a_stream_of_nonsense_is_refused(make) -> None:
+def test_pages_and_streams_of_nonsense_are_refused(make) -> None:
+    for page in (b"[]", b"{}", b'{"next_cursor": 5}', b"null"):
+        with wrong_server(answer(200, page)) as server, pytest.raises(NotAnApiError):
+            next(iter(make(server.url).jobs()))
     endless = b"data: " + b"x" * MAX_EVENT_BYTES
     bodies = (b"id: x\ndata: {}\n\n", b"id: 1\ndata: [\n\n", b"id: 1\ndata: 5\n\n", endless)
     for nonsense in (*(STREAM + body for body in bodies), HTML):
@@ -338,3 +320,133 @@ def test_a_stream_of_nonsense_is_refused(make) -> None:
             pytest.raises(NotAnApiError, match="the stream holds no events"),
         ):
             next(iter(make(server.url).job_events(JOB)))
+
+
+def test_a_key_goes_to_one_host_alone(make, monkeypatch) -> None:
+    with wrong_server(answer(200, b"[]")) as other:
+        for name in ("http_proxy", "HTTP_PROXY", "https_proxy", "ALL_PROXY", "all_proxy"):
+            monkeypatch.setenv(name, other.url)
+        for status in (301, 302, 303, 307, 308):
+            moved = answer(status, Location=f"{other.url}/v1/tasks")
+            with wrong_server(moved) as server:
+                client = make(server.url, SECRET)
+                for send in (client.tasks, lambda: client.submit_job("a", "b")):  # noqa: B023
+                    with pytest.raises(RefusedError, match=f"HTTP {status}"):
+                        send()
+                assert server.headers("Authorization") == [f"Bearer {SECRET}"] * 2
+        assert other.received == []
+
+
+def test_a_key_is_in_no_error(make) -> None:
+    problem = {
+        "detail": f"Bearer {SECRET} is bad",
+        "errors": [{"field": SECRET, "message": f"not {SECRET}", "choices": [SECRET]}],
+    }
+    for status in (401, 422, 429, 503):
+        with wrong_server(answer(status, json.dumps(problem).encode())) as server:
+            client = make(server.url, SECRET)
+            with pytest.raises(ClientError) as raised:
+                client.tasks()
+        error = raised.value
+        told = [str(error), repr(error), str(vars(error)), *traceback.format_exception(error)]
+        assert SECRET not in "".join(told)
+        assert SECRET not in repr(client.made)
+        assert server.url in repr(client.made)
+
+
+def test_what_is_no_key_or_url_is_refused_unseen(make) -> None:
+    for key in ("a\r\nHost: x", "é", "a\0b"):
+        with pytest.raises(BadArgumentError, match="is not a key") as refused:
+            make("http://127.0.0.1:1", key)
+        assert key not in str(refused.value)
+    for url in (
+        *("ftp://x", "nonsense", "http://", "http://x:99999", "http://x:0", "http://["),
+        *("http://x/?a=b", "http://x/#y", "http://x/\r\n", "file:///etc/passwd", ""),
+    ):
+        with pytest.raises(BadArgumentError, match="is not the URL of an API"):
+            make(url)
+    with pytest.raises(BadArgumentError, match="no user or password") as refused:
+        make("http://me:hush@127.0.0.1:1")
+    assert "hush" not in str(refused.value)
+
+
+def read_key(environment: dict[str, str]) -> str | None:
+    """As the client reads it, and the service in the same way."""
+    found: list[str | None] = []
+    for read in (stored_key, lambda given: read_secret("BUILDARENA_KEY", given)):
+        try:
+            found.append(read(environment))
+        except (BadArgumentError, SecretFileError) as error:
+            found.append(f"refused: {error}")
+    assert found[0] == found[1] or all("refused: " in str(one) for one in found)
+    return found[0]
+
+
+def test_keys_stand_in_variables_or_files(tmp_path) -> None:
+    file = tmp_path / "key"
+    of_file = {"BUILDARENA_KEY_FILE": str(file)}
+    assert "No such file" in read_key(of_file)
+    for data, key in {b"k\n": "k", b"k\r\n": "k", b"k\n\n": "k\n", b" k ": " k "}.items():
+        file.write_bytes(data)
+        assert read_key(of_file) == key, "one line end is cut"
+    for data, says in (
+        *((b"", "is empty"), (b" \r\n", "is empty"), (b"\xff", "not UTF-8")),
+        (b"secret" * MAX_BYTES, "more than"),
+    ):
+        file.write_bytes(data)
+        told = read_key(of_file)
+        assert "BUILDARENA_KEY_FILE" in told
+        assert says in told
+        assert "secret" not in told
+    assert read_key({}) is read_key({"BUILDARENA_KEY": "", "BUILDARENA_KEY_FILE": ""}) is None
+    assert read_key({"BUILDARENA_KEY": " k \n", "BUILDARENA_KEY_FILE": ""}) == " k \n"
+    assert "are both set" in read_key({"BUILDARENA_KEY": "secret", **of_file})
+
+
+def test_a_server_that_nobody_vouches_for_gets_no_key(make, tmp_path) -> None:
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(self_signed(tmp_path))
+    received = []
+
+    def serve() -> None:
+        connection, _ = listening.accept()
+        with (
+            contextlib.suppress(OSError),
+            connection,
+            context.wrap_socket(connection, server_side=True) as secured,
+        ):
+            received.append(secured.recv(65536))
+
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        thread = threading.Thread(target=serve)
+        thread.start()
+        url = f"https://127.0.0.1:{listening.getsockname()[1]}"
+        with pytest.raises(UnreachableError, match=r"(?i)certificate.verify"):
+            make(url, SECRET).tasks()
+        thread.join()
+    assert received in ([], [b""])
+
+
+def self_signed(folder) -> Path:
+    """A certificate with its key, which says of itself that it is good."""
+    key = ec.generate_private_key(ec.SECP256R1())
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "127.0.0.1")])
+    start = datetime.now(UTC) - timedelta(days=1)
+    made = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(1)
+        .not_valid_before(start)
+        .not_valid_after(start + timedelta(days=2))
+        .add_extension(
+            x509.SubjectAlternativeName([x509.IPAddress(ip_address("127.0.0.1"))]), critical=False
+        )
+        .sign(key, hashes.SHA256())
+    )
+    file = folder / "server.pem"
+    pem = serialization.Encoding.PEM
+    form, secret = serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+    file.write_bytes(key.private_bytes(pem, form, secret) + made.public_bytes(pem))
+    return file
