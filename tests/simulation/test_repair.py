@@ -14,7 +14,7 @@ from buildarena_simulation import simulate
 
 
 @pytest.mark.ci
-@pytest.mark.parametrize("seed", [0, *(nightly(seed) for seed in range(1, 40))])
+@pytest.mark.parametrize("seed", [0, *(nightly(seed) for seed in range(1, 12))])
 def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
     result, _ = trial(task, faulty(task), engine)
@@ -24,29 +24,18 @@ def test_a_faulty_car_fails_and_the_whole_one_drives_straight(engine, tasks, see
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
 
 
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("seed", [0, 1, nightly(2), nightly(3)])
-def test_the_expert_repairs_it(engine, tasks, seed) -> None:
-    task = tasks["repair-1"].drawn(seed)
+def test_a_repaired_car_stays_straight_in_another_world(engine, tasks) -> None:
+    task = tasks["repair-1"].drawn(4)
     machine = repaired(task)
     assert broken_constraint(task, machine) is None
-    result, _ = trial(task, machine, engine)
+    result = score(task, machine, simulate(machine, task.scenario, engine, seed=11))
     assert (result.success, result.indicator, result.flags) == (True, 1.0, ())
-
-
-@pytest.mark.nightly(engine="pybullet")
-@pytest.mark.parametrize("seed", [4, 5])
-def test_a_repaired_car_stays_straight_in_another_world(engine, tasks, seed) -> None:
-    task = tasks["repair-1"].drawn(seed)
-    for world in (11, 12):
-        path = simulate(repaired(task), task.scenario, engine, seed=world)
-        assert score(task, repaired(task), path).indicator == 1.0
 
 
 @pytest.mark.nightly(keep=3)
 @pytest.mark.nightly(engine="pybullet")
+@pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("trick", TRICKS)
-@pytest.mark.parametrize("seed", [0, 1, 2, nightly(3), nightly(4)])
 def test_what_finds_no_fault_regains_little(engine, tasks, trick, seed) -> None:
     task = tasks["repair-1"].drawn(seed)
     machine = TRICKS[trick](task)
@@ -57,9 +46,8 @@ def test_what_finds_no_fault_regains_little(engine, tasks, trick, seed) -> None:
 
 
 @pytest.mark.nightly(engine="pybullet")
-@pytest.mark.parametrize("seed", [1, 3])
-def test_a_fault_that_stays_keeps_it_from_driving_straight(engine, tasks, seed) -> None:
-    task = tasks["repair-1"].drawn(seed)
+def test_a_fault_that_stays_keeps_it_from_driving_straight(engine, tasks) -> None:
+    task = tasks["repair-1"].drawn(1)
     result, _ = trial(task, repaired(task, count=1), engine)
     assert not result.success
 
@@ -86,15 +74,9 @@ def test_a_new_car_drives_straight_and_is_refused(engine, tasks) -> None:
     assert "edits, the task allows 4" in sentence
 
 
-def test_the_car_of_another_seed_is_refused(tasks) -> None:
-    for seed in range(1, 6):
-        whole = whole_machine(tasks["repair-1"].beginning, seed)
-        assert broken_constraint(tasks["repair-1"].drawn(0), whole) is not None
-
-
 def test_all_faults_are_on_one_side_and_each_is_one_edit(tasks) -> None:
     given, sides, faults, sizes = tasks["repair-1"].beginning, set(), set(), set()
-    for seed in range(60):
+    for seed in range(30):
         car = drawn_car(seed, given.faults)
         wrong = [wheel for wheel in car.wheels if wheel.fault]
         assert len(wrong) == given.faults
