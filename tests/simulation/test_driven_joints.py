@@ -132,16 +132,6 @@ def test_a_fly_wheel_turns_on_when_its_key_is_let_go(engine) -> None:
     assert speed[-1] == pytest.approx(speed[32] * math.exp(-drag * (73 - 32) / 25), rel=0.03)
 
 
-def test_a_motor_turns_at_its_speed_and_brakes(engine) -> None:
-    rig = Rig()
-    wheel = rig.bound(rig.attach(rig.top, UP, "Large Wheel"), spinning_backward="UpArrow")
-    rig.press("UpArrow", 0.2, 1.0)
-    trajectory = rig.tried(engine, 2.4)
-    speed = np.diff(turned_by(trajectory, wheel, (0, 0, 1))) * 25.0
-    assert speed[27] == pytest.approx(RPM_100, rel=0.03)
-    assert speed[-1] == pytest.approx(0.0, abs=0.05)
-
-
 MEDIUM, LARGE = "Cog Medium Unpowered", "Cog Large Unpowered"
 
 
@@ -176,15 +166,6 @@ def test_cogs_that_do_not_touch_leave_each_other_alone(engine) -> None:
     driving, driven = _speeds(rig.tried(engine, 1.2), motor, cog)
     assert driving[-1] == pytest.approx(-RPM_100, rel=0.03)
     assert abs(driven).max() < 0.01
-
-
-def test_a_cog_that_is_held_stalls_the_other(engine) -> None:
-    rig, motor, cog = _pair(MEDIUM, 2)
-    arm = rig.attach(cog, UP)
-    rig.connect(arm, rig.attach(rig.top, (0, 1, 0)), EAST, EAST)
-    driving, driven = _speeds(rig.tried(engine, 1.2), motor, cog)
-    assert abs(driving).max() < 0.02
-    assert abs(driven).max() < 0.02
 
 
 @pytest.mark.parametrize(("weights", "lifted"), [(1, True), (2, False)])

@@ -232,17 +232,3 @@ def test_what_lets_go_is_told_and_is_no_break(engine) -> None:
     again = read_trajectory(write_trajectory(trajectory))
     assert again.events == trajectory.events
     assert write_trajectory(_fallen(machine, engine)) == write_trajectory(trajectory)
-
-
-def test_one_that_is_braced_across_lets_go_and_stays(engine) -> None:
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    decoupler = draft.attach(start, UP, "Decoupler")
-    top = draft.attach(decoupler, UP)
-    draft.bind(decoupler, "decouple", "UpArrow")
-    draft.connect(start, top, EAST)
-    trajectory = _fallen(draft.machine, engine)
-    assert [event.what for event in trajectory.events] == ["decoupled"]
-    assert (trajectory.pieces == 0).all()
-    speed = np.diff(trajectory.positions[-3:, 0].astype(float), axis=0)[-1] * 25.0
-    assert np.abs(speed[:2]).max() < 0.1, "what it pushes against itself moves nothing"

@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from support.machines.drafts import KeyedDraft
+from support.machines.expert_calls import built as built_by
 from support.machines.families import beam, car, rocket_assembly, rocket_parts
 from support.machines.headroom import drafted, propped_beam
 from support.machines.light_bridges import hanging_post, three_pieces, with_ballast
@@ -15,12 +17,20 @@ from support.machines.references import GOLDENS, REFERENCES, load_machine, outco
 from support.machines.trials import changed, trial
 from support.marks import nightly
 
-from buildarena_benchmark import TaskError, broken_constraint, load_task
+from buildarena_benchmark import (
+    Task,
+    TaskError,
+    broken_constraint,
+    load_task,
+    parse_custom_task,
+    score,
+)
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_benchmark.tasks import loading
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.builtin.designs.arms import geared_lift, loaded_lift, swinging_arm
+from buildarena_simulation import simulate
+from buildarena_worker.builtin.designs import DESIGNS, LEVEL_DESIGNS
+from buildarena_worker.builtin.designs.arms import geared_lift, loaded_lift
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, SIDES, UP, Draft
 from buildarena_worker.builtin.designs.flyers import stepping_hoverer
 from buildarena_worker.builtin.designs.rockets import payload_rocket
@@ -52,19 +62,12 @@ def test_a_long_bridge_counts_and_tells_its_load_over_its_mass(engine, tasks) ->
     assert asking == {f"support-{level}" for level in (4, 5, 6, 7)}
 
 
-@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
-def test_neither_debris_nor_stilts_on_the_floor_change_a_long_bridges_load(engine, tasks) -> None:
+def test_debris_on_the_floor_takes_nothing_back(engine, tasks) -> None:
     fallen = bridge(30, overlap=8, depth=1)
-    result, path = trial(tasks["support-4"], fallen, engine, duration_s=10.0)
+    result, path = trial(tasks["support-4"], fallen, engine, duration_s=8.0)
     assert path.bearing.ground.max() > 100.0, "it does come down"
     assert (result.success, result.flags) == (True, ())
-    bare, stilted = (
-        trial(tasks["support-4"], propped_beam(30, at, height=4, foot=1), engine, duration_s=8.0)
-        for at in ((), (-3, 3))
-    )
-    # They weigh a fifth of the machine, so the cargo bounces a little less.
-    assert stilted[0].indicator <= 1.1 * bare[0].indicator
 
 
 def test_an_honest_car_loses_nothing(engine, tasks) -> None:
@@ -119,16 +122,6 @@ def test_balloons_that_rise_hover(engine, tasks) -> None:
         machine = balloons_on_a_mast("below", height=height, rise_s=rise_s).machine
         result, _ = trial(tasks["flight-1"], machine, engine, duration_s=17.0)
         assert result.success, result
-
-
-@pytest.mark.ci
-@pytest.mark.nightly(engine="pybullet")
-def test_an_arm_may_take_its_time(engine, tasks) -> None:
-    presses = [(2.0, "LeftArrow", 3.96), (10.0, "Alpha1", 0.2), (11.0, "RightArrow", 0.4)]
-    machine = drafted(swinging_arm(0), presses)
-    result, _ = trial(tasks["mechanisms-6"], machine, engine, duration_s=20.0)
-    assert result.success, result
-    assert result.indicator == pytest.approx(1 / result.metrics["distance_to_mark"], rel=1e-4)
 
 
 @pytest.mark.nightly(engine="pybullet")
@@ -274,3 +267,35 @@ def test_a_token_frame_is_refused(tasks) -> None:
         assert (reason, told.startswith(problem)) == ("constraint_violated", True), told
     for draw, height in ((_cross, 2), (_with_a_foot, 4), (_column(7), 2)):
         assert broken_constraint(tasks["lift-3"], _framed(draw, height=height)) is None
+
+
+FOLDER = Path(__file__).parents[2] / "examples" / "tasks" / "besiegefield"
+
+
+LEVELS = sorted(path.stem for path in FOLDER.glob("*.yaml"))
+
+
+def level(name: str) -> Task:
+    return parse_custom_task((FOLDER / f"{name}.yaml").read_text(), origin=name)
+
+
+@pytest.mark.nightly(keep=2)
+@pytest.mark.parametrize("name", LEVELS)
+def test_each_can_be_read_and_a_machine_of_nothing_fails(name) -> None:
+    task = level(name)
+    assert task.name == name
+    machine = task.new_machine(task.constraints.catalogue)
+    assert machine.act("start", {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}).ok
+    trajectory = simulate(machine, task.scenario, "mujoco")
+    failed = score(task, machine, trajectory)
+    assert not failed.success
+    assert failed.indicator < 0.5
+
+
+@pytest.mark.ci
+@pytest.mark.parametrize("name", sorted(LEVEL_DESIGNS))
+def test_the_experts_design_solves_a_level_of_besiegefield(name, engine) -> None:
+    task = level(name)
+    made = built_by(LEVEL_DESIGNS[name](0), task.new_machine(task.constraints.catalogue))
+    told = score(task, made, simulate(made, task.scenario, engine))
+    assert told.success, told

@@ -328,18 +328,3 @@ def test_cannons_burn_it_as_if_they_were_heated(engine) -> None:
     ]
     assert trials[0] == pytest.approx(trials[1], abs=1e-6)
     assert np.linalg.norm(trials[2] - trials[0]) > 1
-
-
-def test_a_seed_draws_it_and_it_is_no_part_of_other_scenarios() -> None:
-    drawn = fuelled(fuel_s=7, draws={"fuel_s": [6, 9]})
-    fuels = [drawn.world(seed).fuel_s for seed in range(30)]
-    assert len(set(fuels)) == 30
-    low, high = min(fuels), max(fuels)
-    assert 6 <= low < 6.5
-    assert 8.5 < high <= 9
-    assert drawn.world(None).fuel_s == 7
-    assert "fuel_s" not in fuelled().model_dump(mode="json")
-    with pytest.raises(ValidationError, match="there is no 'fuel_s'"):
-        fuelled(draws={"fuel_s": [6, 9]})
-    with pytest.raises(ValidationError, match="fuel_s"):
-        fuelled(fuel_s=-1)
