@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import psutil
 import pytest
+from support.machines.expert_calls import played
 
 from buildarena_benchmark import TaskError, builtin_tasks
-from buildarena_environment import Environment, Evaluator, UnknownChoiceError, try_machine
+from buildarena_environment import (
+    Environment,
+    Evaluator,
+    TrialPool,
+    UnknownChoiceError,
+    try_machine,
+)
 from buildarena_geometry import DocumentError, Machine
+from buildarena_simulation import SimulationError
 
 
 @pytest.fixture(scope="module")
@@ -41,28 +51,12 @@ def test_results_come_in_order_whatever_the_number_of_processes(short, bridge) -
     with Evaluator(short, processes=1) as one, Evaluator(short, processes=3) as three:
         alone = [found.trial.score for found in one.map(machines)]
         apart = [found.trial.score for found in three.map(reversed(machines))]
+        assert one.evaluate(bridge.to_document()).trial.score == alone[0]
+        with pytest.raises(DocumentError):
+            one.evaluate({"no": "machine"})
     assert alone == apart[::-1]
     assert alone == [try_machine(short, machine).score for machine in machines]
     assert alone[-1].indicator == 0.0
-
-
-@pytest.mark.ci
-def test_documents_do_as_well_and_nonsense_is_refused_before_it_is_sent(short, bridge) -> None:
-    with Evaluator(short, processes=1) as evaluator:
-        found = evaluator.evaluate(bridge.to_document())
-        assert found.trial.score == evaluator.evaluate(bridge).trial.score
-        with pytest.raises(DocumentError):
-            evaluator.evaluate({"no": "machine"})
-        broken = evaluator.evaluate(Machine())
-        assert (broken.trial.reason, broken.error) == ("empty_machine", "")
-
-
-@pytest.mark.ci
-def test_trajectories_come_along_when_asked_for(short, bridge) -> None:
-    with Evaluator(short, processes=1, trajectories=True) as evaluator:
-        trajectory = evaluator.evaluate(bridge).trial.trajectory
-    assert trajectory is not None
-    assert len(trajectory.time_s) == short.scenario.sample_count
 
 
 @pytest.mark.ci
@@ -70,10 +64,7 @@ def test_a_process_that_dies_costs_one_trial_and_is_replaced(bridge) -> None:
     task = builtin_tasks()["support-1"]
     with Evaluator(task, processes=1) as evaluator:
         evaluator.evaluate(Machine())
-        child = max(
-            (p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())),
-            key=psutil.Process.create_time,
-        )
+        child = max(children(), key=psutil.Process.create_time)
         threading.Timer(0.1, os.kill, (child.pid, signal.SIGKILL)).start()
         lost, kept = evaluator.map([bridge, Machine()])
         assert (lost.trial, kept.error) == (None, "")
@@ -98,7 +89,7 @@ def test_machines_are_taken_as_they_are_needed_and_stopping_early_leaves_nothing
             taken.append(len(taken))
             yield Machine()
 
-    with Evaluator(short, processes=2) as evaluator:
+    with Evaluator(short, processes=1) as evaluator:
         found = evaluator.map(endless())
         assert [next(found).trial.reason for _ in range(3)] == ["empty_machine"] * 3
         found.close()
@@ -120,14 +111,6 @@ def test_names_and_numbers_are_checked() -> None:
 
 
 @pytest.mark.ci
-def test_environments_and_evaluators_agree(short, bridge) -> None:
-    environment = Environment(short)
-    environment.restore(replace(environment.state(), machines={"main": bridge.logged}))
-    with Evaluator(short, processes=1) as evaluator:
-        assert environment.submit().trial.score == evaluator.evaluate(bridge).trial.score
-
-
-@pytest.mark.ci
 def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> None:
     task = builtin_tasks()["support-1"]
     weak = bridge.copy()
@@ -144,3 +127,58 @@ def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> No
         assert (lengths[0] < lengths[1]) is (
             decided or whole.score.metrics["fall_time_s"] is not None
         )
+
+
+TASKS = ("lift-1", "lift-2", "lift-1")
+
+
+def children() -> list[psutil.Process]:
+    return [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
+
+
+@pytest.mark.ci
+def test_environments_of_several_tasks_share_it_and_score_as_without(experts) -> None:
+    with TrialPool(2) as pool, ThreadPoolExecutor(3) as threads:
+        shared = [
+            played(Environment(task, tries=pool.try_machine), experts[task]["calls"])
+            for task in TASKS
+        ]
+        found = list(threads.map(lambda environment: environment.submit().trial, shared))
+        alone = {
+            task: played(Environment(task), experts[task]["calls"]).submit().trial.score
+            for task in set(TASKS)
+        }
+    assert [trial.score for trial in found] == [alone[task] for task in TASKS]
+
+
+@pytest.mark.ci
+def test_a_process_that_dies_costs_one_submission_which_can_be_made_again(experts) -> None:
+    before = set(children())
+    with TrialPool(1) as pool:
+        environment = played(
+            Environment("transport-1", tries=pool.try_machine), experts["transport-1"]["calls"]
+        )
+        played(Environment("lift-1", tries=pool.try_machine), experts["lift-1"]["calls"]).submit()
+        (child,) = set(children()) - before
+        child.suspend()  # stopped, it can't be done before it is killed
+        threading.Timer(0.2, os.kill, (child.pid, signal.SIGKILL)).start()
+        with pytest.raises(SimulationError, match="ended with code -9"):
+            environment.submit()
+        assert not environment.done
+        assert environment.submit().trial.score.success
+
+
+def test_closing_with_trials_under_way_leaves_no_process(experts) -> None:
+    before = set(children())
+    pool = TrialPool(1)
+    environment = played(Environment("transport-1"), experts["transport-1"]["calls"])
+    text = json.dumps(environment.machines["main"].to_document())
+    waiting = [pool.submit(environment.task, text, "mujoco") for _ in range(20)]
+    while not set(children()) - before:
+        time.sleep(0.01)
+    started = time.monotonic()
+    pool.close()
+    assert time.monotonic() - started < 60
+    assert set(children()) == before
+    assert all(future.done() for future in waiting)
+    assert any(future.cancelled() for future in waiting)
