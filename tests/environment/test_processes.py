@@ -168,26 +168,6 @@ def test_a_program_ends_with_its_parent(how, child, within_s) -> None:
                 os.kill(int(pid), signal.SIGKILL)
 
 
-@pytest.mark.ci
-def test_a_program_that_nobody_told_of_a_parent_goes_on() -> None:
-    code = WATCHING.format(extra="")
-    launcher = (
-        "import subprocess, sys; "
-        f"p = subprocess.Popen([sys.executable, '-c', {code!r}], "
-        "stdout=subprocess.PIPE, stderr=subprocess.DEVNULL); "
-        "p.stdout.readline(); print(p.pid, flush=True)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", launcher], capture_output=True, text=True, check=True
-    )
-    pid = int(done.stdout)
-    try:
-        time.sleep(0.8)
-        assert not gone(pid)
-    finally:
-        os.kill(pid, signal.SIGKILL)
-
-
 def gone(pid: int) -> bool:
     try:
         return bool(psutil.Process(pid).status() == psutil.STATUS_ZOMBIE)
