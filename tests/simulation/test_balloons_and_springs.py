@@ -49,30 +49,6 @@ def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     assert trajectory.joint_loads[-25:, -1].mean() * 1000 == pytest.approx(net, abs=1.96)
 
 
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
-def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine) -> None:
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    balloon = draft.attach(start, UP, "Balloon")
-    for base in (draft.attach(start, NORTH), draft.attach(start, SOUTH)):
-        for side in (EAST, WEST):
-            draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
-    module = WORKSHOP["Balloon"]
-    trajectory = _stood(draft.machine, engine, 12.0, press("UpArrow", 0.5, 20.0))
-    rows = slice(-25, None)
-    root = trajectory.positions[rows, 0].astype(float) + np.array([0.0, 0.0, 0.5])
-    at = trajectory.positions[rows, trajectory.block_ids.index(balloon)].astype(float)
-    speed = float(np.diff(root[:, 1]).mean()) * 25.0
-    assert speed > 8.0
-    net = (module.lift.force - module.mass) * GRAVITY
-    lean = math.atan2(module.physics.linear_drag * module.mass * speed, net)
-    reach = module.rope_mount.length + module.center[2]
-    behind, above = -(at - root).mean(axis=0)[1], (at - root).mean(axis=0)[2]
-    assert behind == pytest.approx(reach * math.sin(lean), rel=0.05)
-    assert above == pytest.approx(reach * math.cos(lean), rel=0.02)
-
-
 def _aloft(load: int) -> tuple[Machine, str]:
     draft = KeyedDraft(modules="workshop")
     start = draft.start()

@@ -157,26 +157,15 @@ def test_each_axle_of_a_standing_car_bears_its_share(engine) -> None:
         assert axle.moment == pytest.approx(0.25 * axle.force, rel=0.35)
 
 
-@pytest.mark.nightly(keep=2)
-@pytest.mark.parametrize("mass", [5.0, 50.0, 500.0, 1500.0])
+@pytest.mark.parametrize("mass", [5.0, 1500.0])
 def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine, mass) -> None:
-    scenario = Scenario(
-        duration_s=4.0,
-        cargo=Cargo(
-            size=(2.5, 2.5, 1.5),
-            drop_height=0.02,
-            initial_mass=mass / 2,
-            final_mass=mass,
-            ramp_s=1.0,
-        ),
-    )
+    box = {"size": (2.5, 2.5, 1.5), "drop_height": 0.02, "initial_mass": mass / 2, "ramp_s": 1.0}
+    scenario = Scenario(duration_s=4.0, cargo=Cargo(**box, final_mass=mass))
     trajectory = simulate(_slab(), scenario, engine)
     assert not trajectory.breaks
-    assert trajectory.cargo_position is not None
     height = trajectory.cargo_position[50:, 2].astype(float)
-    resting = 1.0 + 0.75
     assert np.ptp(height) < 0.005
-    assert height.mean() == pytest.approx(resting - 2 * COLLISION_MARGIN, abs=0.06)
+    assert height.mean() == pytest.approx(1.75 - 2 * COLLISION_MARGIN, abs=0.06)
 
 
 def test_a_cargo_falls_as_fast_however_it_grows(engine) -> None:

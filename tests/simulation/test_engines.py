@@ -142,26 +142,19 @@ def test_a_file_that_says_nothing_of_physics_is_simulated_like_its_kind(tmp_path
 
 
 def test_a_cannon_pushes_and_is_heated_as_its_entry_says(tmp_path) -> None:
-    thrust = {
-        **BASIC["Water Cannon"]["thrust"],
-        "along": -0.5,
-        "cold": 2.0,
-        "heated": 20.0,
-        "spheres": [{"along": 3.0, "radius": 0.5}],
-    }
+    heated = {"cold": 2.0, "heated": 20.0, "spheres": [{"along": 3.0, "radius": 0.5}]}
+    thrust = BASIC["Water Cannon"]["thrust"] | {"along": -0.5} | heated
     catalogue = _catalogue(tmp_path, _other("Water Cannon", thrust=thrust))
     structure = structure_of(built(("1", "A", "Other"), ("1", "B", "Torch"), catalogue=catalogue))
     (cannon,), (torch,) = structure.cannons, structure.torches
     expected = structure.shown[cannon] - 0.5 * structure.directions[cannon]
     assert structure.thrust_points[0] == pytest.approx(expected)
     shown, ways = np.zeros((len(structure), 3)), np.zeros((len(structure), 3))
-    ways[cannon], ways[torch] = (0, 0, -1), (0, 0, -1)
-    shown[torch] = (0, 0, -2)
-    assert heated_cannons(structure, shown, ways)[0]
-    shown[torch] = (0, 0, 0)
-    assert not heated_cannons(structure, shown, ways)[0]
-    fired = np.array([True])
-    cold, hot = (recoil(structure, fired, np.array([heat]))[0] for heat in (False, True))
+    ways[[cannon, torch]] = (0, 0, -1)
+    for height, hot in ((-2, True), (0, False)):
+        shown[torch] = (0, 0, height)
+        assert heated_cannons(structure, shown, ways)[0] == hot
+    cold, hot = (recoil(structure, np.array([True]), np.array([heat]))[0] for heat in (False, True))
     assert hot / cold == pytest.approx(10)
 
 

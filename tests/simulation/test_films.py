@@ -87,17 +87,6 @@ def test_the_ground_rolls_by_as_far_as_it_is_round(around) -> None:
     assert places[:, 0] == pytest.approx(0, abs=1e-2)
 
 
-def test_what_is_upright_there_is_upright_in_the_picture(around) -> None:
-    flight, scene = Flight(around, RADIUS), Scene(built(), SCENARIO, around)
-    for sample in range(0, len(around.time_s), 7):
-        corners = np.concatenate(
-            [face for face, _ in flight.unrolled(scene.at(sample), sample).faces]
-        )
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        assert high - low == pytest.approx([1, 1, 1], abs=0.01)
-        assert (low + high) / 2 == pytest.approx(flight.focus(sample), abs=0.01)
-
-
 def test_a_film_has_the_map(around, tmp_path) -> None:
     write_film(built(), SCENARIO, around, tmp_path / "flight.png")
     with Image.open(tmp_path / "flight.png") as sheet:

@@ -8,7 +8,6 @@ from support.landings import (
     cargo_path,
     in_game,
     landing_figures,
-    logged,
 )
 from support.machines.families import beam, deck
 from support.machines.trials import trial
@@ -32,19 +31,6 @@ def test_the_beam_of_seven_fails_as_in_the_game(engine, tasks) -> None:
     assert broken.cargo_mass == pytest.approx(61.0, abs=15.0)
     result, _ = trial(tasks["support-1"], beam(7), engine)
     assert (result.success, result.indicator) == (False, 0.0)
-
-
-def test_the_log_has_the_figures_that_engines_are_held_to() -> None:
-    figures = logged("support-1_seven_blocks.csv")
-    assert figures == {
-        "contact_s": 0.52,
-        "peak": 6.66,
-        "peak_s": pytest.approx(0.82, abs=0.03),
-        "again_s": pytest.approx(1.06, abs=0.03),
-        "crossing_s": 1.48,
-    }
-    assert logged("support-2_sagging_bridge_y.csv")["peak"] is None, "a bridge that sags"
-    assert logged("support-2_through_y.csv")["contact_s"] is None, "a deck that is gone through"
 
 
 def test_each_bounce_has_its_share_of_the_speed_before(engine, tasks) -> None:

@@ -1,7 +1,5 @@
 """Where a trial starts: in the air, tilted, turned, at a place of its own, or where it is taken."""
 
-import json
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -108,18 +106,6 @@ def test_the_scenarios_own_place_given_as_a_start_changes_nothing(beam, engine) 
     assert given.cargo_position is not None
     assert usual.cargo_position is not None
     assert np.array_equal(given.cargo_position, usual.cargo_position)
-
-
-def test_the_settings_tell_one_start_from_another(beam) -> None:
-    high = [
-        Start(position=np.array([0.0, 0.0, z]), rotation=np.eye(3), cargo=None) for z in (2, 2, 3)
-    ]
-    first, same, other = (
-        simulate(beam, SHORT, "mujoco", start=start).settings["start"] for start in high
-    )
-    assert first == same != other
-    assert "start" not in simulate(beam, SHORT, "mujoco").settings
-    json.dumps(first)
 
 
 def test_a_start_that_contradicts_the_rest_is_refused(beam) -> None:

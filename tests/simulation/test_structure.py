@@ -39,43 +39,26 @@ def test_a_beam_is_one_cluster_and_a_car_five() -> None:
     assert clusters.seated_is_outer[1:].all()
 
 
-def test_a_block_on_a_wheels_outer_face_turns_with_it() -> None:
+def test_axles_leave_free_what_nothing_else_holds() -> None:
+    def clusters_of(*ways: tuple[int, int, int], north: int = 0) -> int:
+        """Blocks on wheels to these ways, joined by a brace to each other or to the start."""
+        draft = KeyedDraft()
+        middle = draft.start()
+        seats = [middle, draft.row(middle, NORTH, north)[-1] if north else middle]
+        ends = [draft.attach(draft.wheel(s, w), w) for s, w in zip(seats, ways, strict=False)]
+        if ways:
+            draft.connect(*(ends if len(ends) > 1 else (middle, *ends)), UP)
+        return len(_clusters(structure_of(draft.machine)))
+
+    assert clusters_of(EAST) == 1, "a brace across an axle locks it"
+    assert clusters_of(EAST, WEST) == 2, "a second axle on the same line leaves the first free"
+    assert clusters_of(EAST, EAST, north=2) == 1, "one beside the first locks both"
     draft = KeyedDraft()
-    wheel = draft.wheel(draft.start(), EAST)
-    draft.attach(wheel, EAST)
-    structure = structure_of(draft.machine)
-    clusters = _clusters(structure)
+    draft.attach(draft.wheel(draft.start(), EAST), EAST)
+    clusters = _clusters(structure_of(draft.machine))
     assert sorted(map(len, clusters.blocks)) == [1, 2]
     # The larger cluster is the root, so the wheel's mount hangs on it.
     assert not clusters.seated_is_outer[1]
-
-
-def test_a_brace_across_an_axle_locks_it() -> None:
-    draft = KeyedDraft()
-    middle = draft.start()
-    wheel = draft.wheel(middle, EAST)
-    outer = draft.attach(wheel, EAST)
-    draft.connect(middle, outer, UP)
-    assert len(_clusters(structure_of(draft.machine))) == 1
-
-
-def test_a_second_axle_on_the_same_line_leaves_the_first_free() -> None:
-    draft = KeyedDraft()
-    middle = draft.start()
-    right = draft.attach(draft.wheel(middle, EAST), EAST)
-    left = draft.attach(draft.wheel(middle, WEST), WEST)
-    draft.connect(left, right, UP)
-    assert len(_clusters(structure_of(draft.machine))) == 2
-
-
-def test_a_second_axle_beside_the_first_locks_both() -> None:
-    draft = KeyedDraft()
-    middle = draft.start()
-    other = draft.row(middle, NORTH, 2)[-1]
-    first = draft.attach(draft.wheel(middle, EAST), EAST)
-    second = draft.attach(draft.wheel(other, EAST), EAST)
-    draft.connect(first, second, UP)
-    assert len(_clusters(structure_of(draft.machine))) == 1
 
 
 def test_a_small_blocks_far_end_grabs_what_it_touches() -> None:

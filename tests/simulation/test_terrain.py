@@ -74,15 +74,6 @@ def test_a_pipes_inside_is_a_circle_without_gaps() -> None:
         assert inside.max() <= 0.5 + stray + 0.01
 
 
-def test_a_cylinder_is_solid_and_round() -> None:
-    angles = np.linspace(-180, 180, 120)
-    for radius in (0.1, 1.0, 1.95):
-        assert distances(HUMP, points=circle(HUMP["center"], radius, angles, 0)).max() < 1e-6
-    outside = distances(HUMP, points=circle(HUMP["center"], 3.0, angles, 0))
-    assert outside.min() > 0.95
-    assert outside.max() < 1.0 + 1e-6
-
-
 def test_a_cone_is_solid_and_narrows() -> None:
     """At each height its radius is that of a cone, within half a step."""
     cone = {
@@ -130,17 +121,6 @@ def test_a_field_of_heights_is_a_box_for_each_run_of_cells() -> None:
     ]
 
 
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_what_falls_onto_a_field_of_heights_lies_as_high_as_that(engine) -> None:
-    field = {
-        **STEPS,
-        "center": [0, 0, 0],
-        "cell": [6, 6],
-        "rows": [[1, 1, 1], [1, 2, 1], [1, 1, 1]],
-    }
-    assert fallen(engine, field, height=3.0)[-1, 0, 2] == pytest.approx(2.5, abs=0.05)
-
-
 def test_what_is_round_is_boxes_from_then_on_and_boxes_stay_as_they_were() -> None:
     wall = {"center": [0, 9, 1], "size": [2, 1, 2]}
     world = scenario(wall, RING)
@@ -157,16 +137,6 @@ def fallen(engine: str, *terrain, height: float) -> np.ndarray:
     return simulate(
         draft.machine, scenario(*terrain, duration_s=3.0, placement=placement), engine
     ).positions.astype(float)
-
-
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_a_ring_that_is_seen_from_the_south_bears_what_falls_into_it(engine) -> None:
-    ring = {**RING, "center": [0, 0, 4], "length": 4}
-    block, boulder = fallen(engine, ring, height=2).swapaxes(0, 1)
-    assert block[-1, 2] == pytest.approx(1.5, abs=0.1)
-    for path, reach in ((block, 0.5), (boulder, 0.85)):
-        apart = np.hypot(path[:, 0], path[:, 2] - 4)
-        assert apart.max() < 3.2 - reach
 
 
 @pytest.mark.parametrize("engine", FASTER_FIRST)

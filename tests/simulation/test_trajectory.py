@@ -222,25 +222,3 @@ def test_the_processor_is_said_by_what_rounds() -> None:
     assert set(processor()) == {"blas", "numpy", "machine", "libm"}
     if kernels.PINNED is not None:
         assert processor()["blas"] == kernels.PINNED
-
-
-@several
-def test_a_program_that_loaded_numpy_first_is_warned_where_it_matters() -> None:
-    program = (
-        "import numpy, warnings\n"
-        "from buildarena_simulation.processor import warn_if_late\n"
-        "with warnings.catch_warnings(record=True) as caught:\n"
-        "    warn_if_late(); warn_if_late()\n"
-        "print(*(str(warning.message) for warning in caught), sep='\\n')"
-    )
-    for name, warned in ((OTHERS[0], True), (kernels.PINNED, False)):
-        environment = {**os.environ, "OPENBLAS_CORETYPE": name}
-        done = subprocess.run(
-            [sys.executable, "-c", program],
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        assert (f"kernels {name} in place of" in done.stdout) == warned
-        assert done.stdout.count("Import buildarena first") == warned
