@@ -1,4 +1,4 @@
-"""Bridges: which carries more, whichever way they stand, and what earns nothing more."""
+"""Bridges: which carries more, whichever way they stand, and how a cargo rests on them."""
 
 import itertools
 from collections.abc import Sequence

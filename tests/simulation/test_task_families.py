@@ -197,12 +197,9 @@ def test_files_that_nobody_could_play_are_refused() -> None:
         ("cargo: {size: [2, 2, 1], at: [0, 0, 0],", "cargo: {size: [2, 2, 1],", "cargo.at"),
         ("max_off: 2", "max_off: 12", "no less than reach"),
         ("gravity: [24, 40]", "gravity: [40, 24]", "no range"),
-        ("gravity: [24, 40]", "gravity: [2, 40]", "gravity"),
         ("gravity: [24, 40]", "gravity: [24, 400]", "gravity"),
         ("drive_strength: [0.8, 1.25]", "drive_strength: [0.8, 125]", "drive_strength"),
-        ("tests: 5", "tests: 0", "tests"),
         ("tests: 5", "tests: 21", "tests"),
-        ("tests: 5", "tests: 5\n  friction: [0.1, 1]", "friction"),
         ("control: {mode: agent}", "control: {mode: none}", "control"),
     ):
         assert was in text
