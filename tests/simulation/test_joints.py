@@ -174,3 +174,14 @@ def test_a_steering_hinge_swings_where_it_is_said_to(engine, twist, flip) -> Non
     start, hinge = (base.rotation_of(trajectory.quaternions[-1, i].astype(float)) for i in (0, 1))
     far_end = start.T @ hinge[:, 2]  # its own z axis, as the starting block has it
     assert far_end @ side > 0.2
+
+
+def test_what_swings_freely_never_rises_above_its_start(engine) -> None:
+    rig = Rig()
+    first = rig.attach(rig.row(rig.top, NORTH, 2)[-1], NORTH, "Swivel")
+    second = rig.attach(rig.row(first, EAST, 2)[-1], EAST, "Ball Joint")
+    bob = rig.attach(rig.row(second, EAST, 2)[-1], EAST, "Weight")
+    trajectory = rig.tried(engine, 8.0)
+    height = place_of(trajectory, bob)[:, 2]
+    assert height.min() < height[0] - 4.0
+    assert height.max() < height[0] + 0.05

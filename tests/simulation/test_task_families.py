@@ -7,7 +7,7 @@ from importlib import resources
 
 import pytest
 from support.machines.drafts import KeyedDraft
-from support.machines.repairs import TRICKS, faulty, faulty_side, repaired, wheels_of
+from support.machines.repairs import TRICKS, faulty, faulty_side, new_car, repaired, wheels_of
 from support.machines.trials import trial
 from support.marks import nightly
 
@@ -102,6 +102,8 @@ def test_what_is_undone_is_no_edit_and_what_is_put_back_is_two(tasks) -> None:
     assert edits_between(given, machine) == 1
     machine.act("attach_block_to", {"base_block": base, "face": face, "new_block": "Powered Wheel"})
     assert edits_between(given, machine) == 2
+    reason, sentence = broken_constraint(task, new_car()) or ("", "")
+    assert (reason, "edits, the task allows 4" in sentence) == ("constraint_violated", True)
 
 
 TASK = builtin_tasks()["identify-1"]
