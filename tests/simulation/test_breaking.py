@@ -320,3 +320,10 @@ def test_a_cargo_bounces_less_on_a_heavier_machine(engine, tasks) -> None:
         first = int(height[:20].argmin())
         peaks.append(height[first:].max() - height[first])
     assert peaks[1] < 0.6 * peaks[0]
+
+
+def test_what_lies_does_not_hop(engine, tasks) -> None:
+    """A cargo that grows heavier where it lies is never thrown up again."""
+    _, trajectory = trial(tasks["support-1"], deck(5, 7, cross=True), engine)
+    at_rest = (trajectory.time_s > 3.0) & (trajectory.time_s < 5.0)
+    assert np.ptp(trajectory.cargo_position[at_rest, 2]) < 0.02

@@ -241,7 +241,9 @@ def test_no_program_goes_on_for_ever() -> None:
         began = time.process_time()
         assert ENDED.search(_reason(at_a_tick.format(body=body))), name
         assert time.process_time() - began < 10 * bounds.MAX_TICK_S, name
-    for name in ("a loop", "recursion", "a growing text", "a long text again and again"):
+    doubled = "local s = 'x' for i = 1, 24 do s = s .. s end"
+    assert "8 MiB of memory" in _reason(at_a_tick.format(body=doubled)), "16 MiB, and it ends"
+    for name in ("a loop", "recursion", "a long text again and again"):
         assert ENDED.search(_reason(as_it_is_read.format(body=ENDLESS[name]))), name
 
 

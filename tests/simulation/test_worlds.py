@@ -54,6 +54,10 @@ def test_each_seed_has_its_world_within_the_ranges_and_none_has_what_is_written(
         values = [figure(world) for world in worlds]
         assert low <= min(values) < low + 0.15 * (high - low)
         assert high >= max(values) > high - 0.15 * (high - low)
+    drawn_alike = np.corrcoef(
+        [(world.placement.height, world.gravity) for world in worlds], rowvar=False
+    )
+    assert abs(drawn_alike[0, 1]) < 0.5, "each range has draws of its own"
     assert all(not world.draws and world.duration_s == 2 for world in worlds)
     exact = drawn().world(None)
     assert (exact.placement.height, exact.gravity, exact.draws) == (50, GRAVITY, {})
@@ -229,3 +233,13 @@ def test_a_scenario_that_uses_none_of_it_reads_and_hashes_as_before() -> None:
     assert Scenario(duration_s=1).model_dump(mode="json") == plain
     usual = Scenario(duration_s=1, gravity=GRAVITY, drive_strength=1, senses=Senses())
     assert usual.model_dump(mode="json").keys() - plain.keys() == {"senses"}
+
+
+def test_pushes_and_wind_add_up(engine) -> None:
+    gusts = {"strength": 4}
+    trials = [
+        simulate(beam_of(3), falling(**fields), engine).positions[-1].astype(float)
+        for fields in ({}, {"gusts": gusts}, {"pushes": PUSHES}, {"gusts": gusts, "pushes": PUSHES})
+    ]
+    calm, blown, pushed, both = trials
+    assert both - calm == pytest.approx((blown - calm) + (pushed - calm), abs=0.05)
