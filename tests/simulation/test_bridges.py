@@ -29,7 +29,7 @@ def test_more_bracing_carries_more(engine, tasks) -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly(engine="pybullet")
 def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tasks) -> None:
     # Over a gap so deep that its pillars hang free; over the task's they stand on the floor.
     deep = tasks["support-1"].scenario.model_copy(

@@ -65,7 +65,7 @@ def path(trial: Any) -> np.ndarray:
 
 
 @pytest.mark.ci
-@pytest.mark.nightly(keep=1)
+@pytest.mark.nightly(engine="pybullet")
 def test_a_free_fall_round_the_planet_keeps_keplers_laws(engine) -> None:
     radius = RADIUS + 400.5
     speed = 1.1 * math.sqrt(PULL * RADIUS**2 / radius)
