@@ -20,6 +20,7 @@ from buildarena_simulation.scenario import SpanPlacement, TerrainBox, gap_terrai
 from buildarena_worker.builtin.designs.drafting import BRACE, NORTH, SOUTH, UP
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 def test_more_bracing_carries_more(engine, tasks) -> None:
     beams = [beam(7, braces) for braces in ("", "t", "12")]

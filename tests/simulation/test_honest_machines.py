@@ -62,6 +62,7 @@ def test_a_long_bridge_counts_and_tells_its_load_over_its_mass(engine, tasks) ->
     assert asking == {f"support-{level}" for level in (4, 5, 6, 7)}
 
 
+@pytest.mark.ci
 @pytest.mark.nightly(engine="pybullet")
 def test_debris_on_the_floor_takes_nothing_back(engine, tasks) -> None:
     fallen = bridge(30, overlap=8, depth=1)

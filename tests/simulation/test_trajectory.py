@@ -51,6 +51,7 @@ def test_a_file_gives_back_the_trajectory(tasks) -> None:
     assert len(write_trajectory(bridge)) < 200_000
 
 
+@pytest.mark.ci
 def test_a_trajectory_tells_what_bears_the_machine_and_what_it_bears(engine, tasks) -> None:
     machine = deck(5, 7)
     cargo = tasks["support-1"].scenario.cargo.model_copy(update={"final_mass": 100.0})
