@@ -1,4 +1,4 @@
-"""Programs that end with their parent."""
+"""Processes apart: what ends one costs one piece of work, and none outlives its parent."""
 
 from __future__ import annotations
 
@@ -6,11 +6,107 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Iterator
+from multiprocessing.context import SpawnProcess
 
 import psutil
 import pytest
 from support.servers.stacks import wait_until
+from support.warm_work import make
+
+from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
+
+SPARE = 200 << 20
+
+
+@pytest.fixture
+def process() -> Iterator[WarmProcess]:
+    made = WarmProcess("work", make, spare_bytes=SPARE)
+    yield made
+    made.close()
+
+
+def test_it_stays_warm_between_questions_and_threads_until_it_is_closed(process) -> None:
+    """A service's threads come and go."""
+    pids: list[int] = []
+    for _ in range(2):
+        thread = threading.Thread(target=lambda: pids.append(process.ask(["pid"])))
+        thread.start()
+        thread.join()
+        time.sleep(0.2)
+    assert process.ask(["hello"]) == "hello"
+    assert pids == [process.ask(["pid"])] * 2
+    assert pids[0] != os.getpid()
+    process.close()
+    assert not psutil.pid_exists(pids[0])
+
+
+@pytest.mark.ci
+def test_one_that_dies_is_started_again(process) -> None:
+    first = process.ask(["pid"])
+    with pytest.raises(ProcessEndedError, match="of work ended with code -9") as raised:
+        process.ask(["die"])
+    assert raised.value.code == -signal.SIGKILL
+    assert process.ask(["pid"]) != first
+    psutil.Process(process.ask(["pid"])).kill()  # between two questions
+    time.sleep(0.2)
+    assert process.ask(["hello"]) == "hello"
+
+
+@pytest.mark.ci
+def test_memory_is_bounded(process) -> None:
+    assert process.ask(["take", SPARE // 4]) == SPARE // 4
+    with pytest.raises(ProcessEndedError):
+        process.ask(["take", 2 * SPARE])
+    assert process.ask(["hello"]) == "hello"
+
+
+@pytest.mark.ci
+def test_work_that_is_given_up_is_broken_off(process) -> None:
+    pid = process.ask(["pid"])
+
+    def enough() -> None:
+        raise TimeoutError("enough")
+
+    started = time.monotonic()
+    with pytest.raises(TimeoutError, match="enough"):
+        process.ask(["sleep", 60], meanwhile=enough)
+    assert time.monotonic() - started < 5
+    assert not psutil.pid_exists(pid)
+    assert process.ask(["hello"]) == "hello"
+
+
+def test_one_that_is_just_being_started_is_ended_too(process, monkeypatch) -> None:
+    starts, closes = threading.Event(), threading.Event()
+    start_process = SpawnProcess.start
+
+    def start_slowly(self: SpawnProcess) -> None:
+        starts.set()
+        closes.wait(10)
+        time.sleep(0.2)  # time for the other thread to get as far as it can
+        start_process(self)
+
+    monkeypatch.setattr(SpawnProcess, "start", start_slowly)
+    answers: list[object] = []
+
+    def ask() -> None:
+        try:
+            answers.append(process.ask(["sleep", 60]))
+        except ProcessEndedError as ended:
+            answers.append(ended)
+
+    asker = threading.Thread(target=ask)
+    asker.start()
+    assert starts.wait(10)
+    closes.set()
+    process.close()
+    asker.join(10)
+    assert not asker.is_alive()
+    assert isinstance(answers[0], ProcessEndedError)
+    assert process.pid is None
+
 
 PARENT = """
 import subprocess, sys, os, signal
@@ -24,6 +120,8 @@ child = subprocess.Popen(
 print(child.pid, child.stdout.readline().decode().strip(), flush=True)
 signal.pause()
 """
+
+
 WATCHING = """
 import signal, time
 from buildarena_environment.processes import end_with_parent
@@ -32,6 +130,8 @@ end_with_parent()
 print("ready", flush=True)
 time.sleep(60)
 """
+
+
 STALLED = "signal.signal(signal.SIGTERM, lambda *_: None)"
 
 
@@ -66,26 +166,6 @@ def test_a_program_ends_with_its_parent(how, child, within_s) -> None:
         finally:
             if not gone(int(pid)):
                 os.kill(int(pid), signal.SIGKILL)
-
-
-@pytest.mark.ci
-def test_a_program_that_nobody_told_of_a_parent_goes_on() -> None:
-    code = WATCHING.format(extra="")
-    launcher = (
-        "import subprocess, sys; "
-        f"p = subprocess.Popen([sys.executable, '-c', {code!r}], "
-        "stdout=subprocess.PIPE, stderr=subprocess.DEVNULL); "
-        "p.stdout.readline(); print(p.pid, flush=True)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", launcher], capture_output=True, text=True, check=True
-    )
-    pid = int(done.stdout)
-    try:
-        time.sleep(0.8)
-        assert not gone(pid)
-    finally:
-        os.kill(pid, signal.SIGKILL)
 
 
 def gone(pid: int) -> bool:

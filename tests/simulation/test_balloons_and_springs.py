@@ -33,12 +33,11 @@ def _foot(draft: KeyedDraft) -> str:
     return start
 
 
-@pytest.mark.ci
 def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     draft = KeyedDraft(modules="workshop")
     balloon = draft.attach(_foot(draft), UP, "Balloon")
     module = WORKSHOP["Balloon"]
-    trajectory = _stood(draft.machine, engine, 12.0)
+    trajectory = _stood(draft.machine, engine, 8.0)
     top = trajectory.positions[-1, 0, 2] + 0.5
     at = trajectory.positions[-1, trajectory.block_ids.index(balloon)]
     assert not trajectory.breaks
@@ -48,30 +47,6 @@ def test_a_balloon_stands_over_its_rope_and_pulls_what_it_can(engine) -> None:
     weight = structure_of(draft.machine).masses.sum() - module.lift.force
     assert trajectory.bearing.ground[-25:].mean() == pytest.approx(weight, rel=0.02)
     assert trajectory.joint_loads[-25:, -1].mean() * 1000 == pytest.approx(net, abs=1.96)
-
-
-@pytest.mark.ci
-@pytest.mark.nightly(keep=1)
-def test_a_balloon_that_is_pulled_along_leans_as_drag_and_lift_say(engine) -> None:
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    balloon = draft.attach(start, UP, "Balloon")
-    for base in (draft.attach(start, NORTH), draft.attach(start, SOUTH)):
-        for side in (EAST, WEST):
-            draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
-    module = WORKSHOP["Balloon"]
-    trajectory = _stood(draft.machine, engine, 12.0, press("UpArrow", 0.5, 20.0))
-    rows = slice(-25, None)
-    root = trajectory.positions[rows, 0].astype(float) + np.array([0.0, 0.0, 0.5])
-    at = trajectory.positions[rows, trajectory.block_ids.index(balloon)].astype(float)
-    speed = float(np.diff(root[:, 1]).mean()) * 25.0
-    assert speed > 8.0
-    net = (module.lift.force - module.mass) * GRAVITY
-    lean = math.atan2(module.physics.linear_drag * module.mass * speed, net)
-    reach = module.rope_mount.length + module.center[2]
-    behind, above = -(at - root).mean(axis=0)[1], (at - root).mean(axis=0)[2]
-    assert behind == pytest.approx(reach * math.sin(lean), rel=0.05)
-    assert above == pytest.approx(reach * math.cos(lean), rel=0.02)
 
 
 def _aloft(load: int) -> tuple[Machine, str]:
@@ -84,8 +59,8 @@ def _aloft(load: int) -> tuple[Machine, str]:
     return draft.machine, balloon
 
 
-@pytest.mark.nightly(keep=2)
-@pytest.mark.parametrize("load", [0, 6, 14])
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("load", [6, 0, 14])
 def test_a_balloon_holds_the_height_that_its_keys_ask_for(engine, load) -> None:
     machine, balloon = _aloft(load)
     altitude = WORKSHOP["Sqr Balloon"].altitude
@@ -151,18 +126,6 @@ def test_a_load_swings_on_a_spring_as_mass_and_stiffness_say(engine) -> None:
 
 
 @pytest.mark.ci
-def test_a_spring_bears_its_load_at_rest(engine) -> None:
-    machine, load = _hung(1)
-    spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
-    trajectory = _stood(machine, engine, 14.0)
-    stretch = _springs_stretch(trajectory, load)
-    assert stretch[-25:].mean() == pytest.approx(mass / spring.stiffness, rel=0.02)
-    assert trajectory.joint_loads[-1, -1] * spring.limit == pytest.approx(mass, abs=1.96)
-    weight = structure_of(machine).masses.sum()
-    assert trajectory.bearing.ground[-25:].mean() == pytest.approx(weight, rel=0.01)
-
-
-@pytest.mark.ci
 def test_springs_between_the_same_faces_are_worth_one(engine) -> None:
     single, load = _hung(1)
     double, other = _hung(2)
@@ -174,7 +137,6 @@ def test_springs_between_the_same_faces_are_worth_one(engine) -> None:
     assert found[1] == pytest.approx(found[0], rel=0.03)
 
 
-@pytest.mark.ci
 def test_a_spring_draws_together_while_its_key_is_held(engine) -> None:
     machine, load = _hung(1, bind=True)
     spring, mass = WORKSHOP["Spring"].spring, _mass_of(machine, load)
@@ -186,28 +148,6 @@ def test_a_spring_draws_together_while_its_key_is_held(engine) -> None:
     assert stretch[7 * 25 : 8 * 25].mean() == pytest.approx(sag - drawn, abs=0.05)
     assert stretch[-25:].mean() == pytest.approx(sag, abs=0.02)
     assert not trajectory.breaks
-
-
-def test_a_machine_without_such_keys_says_so() -> None:
-    machine, _ = _hung(1)
-    spring = next(iter(machine.connectors))
-    told = machine.act(
-        "add_control_key", {"block_id": spring, "action": "pull", "new_key": "UpArrow"}
-    )
-    assert not told.ok
-    assert "contract" in told.text
-    other = machine.act(
-        "add_control_key", {"block_id": "1", "action": "pull", "new_key": "UpArrow"}
-    )
-    assert not other.ok
-    assert spring in other.text
-
-
-def test_a_springs_keys_are_kept_in_documents() -> None:
-    machine, _ = _hung(1, bind=True)
-    again = Machine.from_document(machine.to_document(), catalogue=WORKSHOP)
-    assert [one.bindings for one in again.connectors.values()] == [{"contract": ("UpArrow",)}]
-    assert again.to_document() == machine.to_document()
 
 
 def test_a_balloon_belongs_to_its_machine_until_its_rope_gives_way(engine) -> None:

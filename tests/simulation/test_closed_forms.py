@@ -1,28 +1,27 @@
-"""Physics that can be worked out by hand, held on both engines."""
+"""Falling, bearing, climbing and tipping as worked out by hand."""
 
 import math
 
 import numpy as np
 import pytest
 from support.machines.drafts import KeyedDraft
-from support.machines.families import beam, car, rocket
+from support.machines.families import beam, car
 
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY
 from buildarena_simulation.scenario import (
     Cargo,
-    Control,
     SpanPlacement,
     TerrainBox,
     gap_terrain,
 )
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SIDES, SOUTH, UP, WEST
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SIDES, SOUTH, UP, WEST
 
 BLOCK = load_catalogue()["Small Wooden Block"].physics
+
+
 FRICTION_BLOCK, LINEAR_DRAG = BLOCK.friction, BLOCK.linear_drag
-HEATED_THRUST = load_catalogue()["Water Cannon"].thrust.heated
-WHEEL_SPEED = load_catalogue()["Powered Wheel"].motor.speed
 
 
 def _lone_block() -> Machine:
@@ -37,10 +36,11 @@ def _peak(trajectory: Trajectory, joint: str) -> tuple[float, float]:
 
 
 def test_a_block_falls_as_gravity_and_drag_say(engine) -> None:
-    scenario = Scenario(duration_s=1.0, placement=SpanPlacement(gap=1.0, lowest_center=30.0))
+    place, gravity = SpanPlacement(gap=1.0, lowest_center=30.0), 20.0
+    scenario = Scenario(duration_s=1.0, placement=place, gravity=gravity)
     trajectory = simulate(_lone_block(), scenario, engine)
     t = trajectory.time_s
-    drop = GRAVITY / LINEAR_DRAG * (t - (1 - np.exp(-LINEAR_DRAG * t)) / LINEAR_DRAG)
+    drop = gravity / LINEAR_DRAG * (t - (1 - np.exp(-LINEAR_DRAG * t)) / LINEAR_DRAG)
     fallen = 30.0 - trajectory.positions[:, 0, 2]
     assert fallen[-1] == pytest.approx(drop[-1], rel=0.015)  # semi-implicit steps lead by dt / t
     assert np.abs(fallen - drop).max() < 0.2
@@ -140,21 +140,6 @@ def test_a_beam_on_two_supports_bears_the_moments_of_statics(engine) -> None:
         assert gained == pytest.approx(share * (full[joint] - light[joint]), rel=0.05)
 
 
-def test_a_rocket_climbs_as_thrust_weight_and_drag_say(engine) -> None:
-    machine = rocket()
-    scenario = Scenario(duration_s=7.0, control=Control(mode="held", from_s=2.0))
-    trajectory = simulate(machine, scenario, engine)
-    height = trajectory.positions[:, 0, 2].astype(float)
-    rise = height - height[50]
-    t = trajectory.time_s - 2.0
-    acceleration = 4 * HEATED_THRUST / machine.mass * GRAVITY - GRAVITY
-    # Wooden and iron blocks all have the same drag, so the whole rocket has it too.
-    climbed = acceleration / LINEAR_DRAG * (t - (1 - np.exp(-LINEAR_DRAG * t)) / LINEAR_DRAG)
-    for second in (1, 2, 3, 4, 5):
-        sample = 50 + 25 * second
-        assert rise[sample] == pytest.approx(climbed[sample], rel=0.03)
-
-
 def test_each_axle_of_a_standing_car_bears_its_share(engine) -> None:
     machine = car(drive=())
     trajectory = simulate(machine, Scenario(duration_s=2.0), engine)
@@ -172,55 +157,72 @@ def test_each_axle_of_a_standing_car_bears_its_share(engine) -> None:
         assert axle.moment == pytest.approx(0.25 * axle.force, rel=0.35)
 
 
-def test_a_wheel_rolls_without_slip(engine) -> None:
-    machine = car(drive=[("UpArrow", 0.5, 10.0)])
-    scenario = Scenario(duration_s=4.0, control=Control(mode="agent"))
-    trajectory = simulate(machine, scenario, engine)
-    north = trajectory.positions[:, 0, 1].astype(float)
-    speed = (north[-1] - north[-26]) / 1.0
-    assert speed == pytest.approx(WHEEL_SPEED * 1.0, rel=0.02)
-
-
-@pytest.mark.nightly(keep=3)
-@pytest.mark.parametrize("mass", [5.0, 50.0, 500.0, 1500.0])
+@pytest.mark.parametrize("mass", [5.0, 1500.0])
 def test_no_cargo_mass_makes_an_intact_structure_jitter_or_sink(engine, mass) -> None:
-    scenario = Scenario(
-        duration_s=4.0,
-        cargo=Cargo(
-            size=(2.5, 2.5, 1.5),
-            drop_height=0.02,
-            initial_mass=mass / 2,
-            final_mass=mass,
-            ramp_s=1.0,
-        ),
-    )
+    box = {"size": (2.5, 2.5, 1.5), "drop_height": 0.02, "initial_mass": mass / 2, "ramp_s": 1.0}
+    scenario = Scenario(duration_s=4.0, cargo=Cargo(**box, final_mass=mass))
     trajectory = simulate(_slab(), scenario, engine)
     assert not trajectory.breaks
-    assert trajectory.cargo_position is not None
     height = trajectory.cargo_position[50:, 2].astype(float)
-    resting = 1.0 + 0.75
     assert np.ptp(height) < 0.005
-    assert height.mean() == pytest.approx(resting - 2 * COLLISION_MARGIN, abs=0.06)
+    assert height.mean() == pytest.approx(1.75 - 2 * COLLISION_MARGIN, abs=0.06)
 
 
 def test_a_cargo_falls_as_fast_however_it_grows(engine) -> None:
     machine = Machine()
     machine.act("start")
     for final in (5.0, 1000.0):
-        scenario = Scenario.model_validate(
-            {
-                "duration_s": 2,
-                "cargo": {
-                    "size": (2.5, 2.5, 1.5),
-                    "drop_height": 90,
-                    "final_mass": final,
-                    "ramp_start_s": 0,
-                    "ramp_s": 2,
-                },
-            }
+        cargo = Cargo(
+            size=(2.5, 2.5, 1.5), drop_height=90, final_mass=final, ramp_start_s=0, ramp_s=2
         )
-        rollout = simulate(machine, scenario, engine)
+        rollout = simulate(machine, Scenario(duration_s=2, cargo=cargo), engine)
         assert rollout.cargo_position is not None
         fallen = rollout.cargo_position[0, 2] - rollout.cargo_position[:, 2]
         expected = 0.5 * GRAVITY * rollout.time_s**2
         assert fallen[-1] == pytest.approx(expected[-1], rel=0.03), final
+
+
+def _leaning(arm: int, height: int) -> Machine:
+    """A foot three wide with a column on it and an arm to the east on top."""
+    draft = KeyedDraft()
+    middle = draft.start()
+    for side in (EAST, WEST, NORTH, SOUTH):
+        draft.row(middle, side, 1)
+    top = draft.row(middle, UP, height)[-1]
+    draft.row(top, EAST, arm)
+    return draft.machine
+
+
+def test_a_machine_tips_when_its_weight_leaves_its_foot(engine) -> None:
+    edge = 1.5 - COLLISION_MARGIN
+    shares = {
+        (arm, height): float(_leaning(arm, height).center_of_mass[0]) / edge
+        for arm in range(3, 9)
+        for height in range(2, 14)
+    }
+    inside = max((pair for pair in shares if shares[pair] < 1.0), key=lambda p: shares[p])
+    outside = min((pair for pair in shares if shares[pair] > 1.0), key=lambda p: shares[p])
+    assert shares[inside] > 0.97
+    assert shares[outside] < 1.03
+    for pair, falls in ((inside, False), (outside, True)):
+        trajectory = simulate(_leaning(*pair), Scenario(duration_s=8.0), engine)
+        drop = trajectory.positions[0, :, 2].max() - trajectory.positions[-1, :, 2].max()
+        assert (drop > 1.0) == falls
+
+
+def test_a_rope_bears_what_hangs_on_it(engine) -> None:
+    draft = KeyedDraft()
+    middle = draft.start()
+    for side in (EAST, WEST, NORTH, SOUTH):
+        draft.row(middle, side, 4)
+    top = draft.row(middle, UP, 8)[-1]
+    tip = draft.row(top, EAST, 3)[-1]
+    load = draft.attach(tip, DOWN)
+    for _ in range(4):
+        draft.do("shift_block", block_id=load, shift_real=[0.0, 0.0, -0.5])
+    below = draft.row(load, DOWN, 2)
+    draft.connect(tip, load, DOWN, UP, connector="Winch")
+    weight = 0.3 * (1 + len(below)) + 0.2
+    trajectory = simulate(draft.machine, Scenario(duration_s=4.0), engine)
+    rope = next(peak for peak in trajectory.joint_peaks if peak.kind == "rope")
+    assert rope.force == pytest.approx(weight, rel=0.03)

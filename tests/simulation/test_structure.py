@@ -1,4 +1,4 @@
-"""Clusters, joints and loads, without any engine."""
+"""Clusters, joints, loads and what rests on what, without any engine."""
 
 import math
 
@@ -11,12 +11,15 @@ from support.machines.families import beam, car, deck
 
 from buildarena_geometry import Machine
 from buildarena_simulation.constants import JointKind
+from buildarena_simulation.engines.base import CargoBox, CargoPose, World
 from buildarena_simulation.machine import structure_of
+from buildarena_simulation.resting import FaceFinder
+from buildarena_simulation.scenario import gap_terrain
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import ContactForces, EvenSharing
+from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces, EvenSharing
 from buildarena_simulation.structure.model import JOINT_KINDS, Structure
-from buildarena_simulation.structure.motion import Motion
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
+from buildarena_simulation.structure.motion import Motion, at_rest
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, UP, WEST
 
 
 def _clusters(structure: Structure) -> Clusters:
@@ -36,43 +39,26 @@ def test_a_beam_is_one_cluster_and_a_car_five() -> None:
     assert clusters.seated_is_outer[1:].all()
 
 
-def test_a_block_on_a_wheels_outer_face_turns_with_it() -> None:
+def test_axles_leave_free_what_nothing_else_holds() -> None:
+    def clusters_of(*ways: tuple[int, int, int], north: int = 0) -> int:
+        """Blocks on wheels to these ways, joined by a brace to each other or to the start."""
+        draft = KeyedDraft()
+        middle = draft.start()
+        seats = [middle, draft.row(middle, NORTH, north)[-1] if north else middle]
+        ends = [draft.attach(draft.wheel(s, w), w) for s, w in zip(seats, ways, strict=False)]
+        if ways:
+            draft.connect(*(ends if len(ends) > 1 else (middle, *ends)), UP)
+        return len(_clusters(structure_of(draft.machine)))
+
+    assert clusters_of(EAST) == 1, "a brace across an axle locks it"
+    assert clusters_of(EAST, WEST) == 2, "a second axle on the same line leaves the first free"
+    assert clusters_of(EAST, EAST, north=2) == 1, "one beside the first locks both"
     draft = KeyedDraft()
-    wheel = draft.wheel(draft.start(), EAST)
-    draft.attach(wheel, EAST)
-    structure = structure_of(draft.machine)
-    clusters = _clusters(structure)
+    draft.attach(draft.wheel(draft.start(), EAST), EAST)
+    clusters = _clusters(structure_of(draft.machine))
     assert sorted(map(len, clusters.blocks)) == [1, 2]
     # The larger cluster is the root, so the wheel's mount hangs on it.
     assert not clusters.seated_is_outer[1]
-
-
-def test_a_brace_across_an_axle_locks_it() -> None:
-    draft = KeyedDraft()
-    middle = draft.start()
-    wheel = draft.wheel(middle, EAST)
-    outer = draft.attach(wheel, EAST)
-    draft.connect(middle, outer, UP)
-    assert len(_clusters(structure_of(draft.machine))) == 1
-
-
-def test_a_second_axle_on_the_same_line_leaves_the_first_free() -> None:
-    draft = KeyedDraft()
-    middle = draft.start()
-    right = draft.attach(draft.wheel(middle, EAST), EAST)
-    left = draft.attach(draft.wheel(middle, WEST), WEST)
-    draft.connect(left, right, UP)
-    assert len(_clusters(structure_of(draft.machine))) == 2
-
-
-def test_a_second_axle_beside_the_first_locks_both() -> None:
-    draft = KeyedDraft()
-    middle = draft.start()
-    other = draft.row(middle, NORTH, 2)[-1]
-    first = draft.attach(draft.wheel(middle, EAST), EAST)
-    second = draft.attach(draft.wheel(other, EAST), EAST)
-    draft.connect(first, second, UP)
-    assert len(_clusters(structure_of(draft.machine))) == 1
 
 
 def test_a_small_blocks_far_end_grabs_what_it_touches() -> None:
@@ -171,8 +157,60 @@ def test_sharing_a_patch_evenly_keeps_its_resultant(contacts) -> None:
         assert np.allclose(now, kept, atol=1e-3 * (1.0 + np.abs(kept).max()))
 
 
-def test_south_and_down_faces_carry_as_north_and_up_do() -> None:
-    for way in (NORTH, SOUTH, UP, DOWN):
-        draft = KeyedDraft()
-        draft.row(draft.start(), way, 3)
-        assert _kinds(draft.machine) == [JointKind.ATTACHMENT] * 3
+def _beside(height: float, cargo_height: float, *, turn: np.ndarray | None = None) -> ContactForces:
+    """What is found for a beam over a gap of 5 whose first end block alone is in touch."""
+    structure = structure_of(beam(7))
+    clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
+    box = CargoBox(size=np.array([2.5, 2.5, 1.5]), position=np.zeros(3), mass=5.0)
+    world = World(
+        structure=structure, ground=True, terrain=gap_terrain(5.0), cargo=box, gravity=1.0
+    )
+    ends = np.argsort(structure.positions[:, 1])
+    touching = ContactForces(
+        block=ends[:1],
+        other=np.array([WORLD]),
+        surface=np.array([1]),
+        weight=np.ones(1),
+        area=np.zeros(1),
+        normal=np.array([[0.0, 0.0, 1.0]]),
+        point=np.array([[0.0, -3.0, 5.0]]),
+        force=np.array([[0.0, 0.0, 9.0]]),
+    )
+    pose = CargoPose(
+        position=np.array([0.0, 0.0, height + 0.5 + 0.75 + cargo_height]),
+        quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
+        velocity=np.zeros(3),
+        spin=np.zeros(3),
+    )
+    motion = at_rest(clusters, np.array([0.0, 0.0, height]), np.eye(3) if turn is None else turn)
+    faces = FaceFinder(world).find(clusters, motion, pose)
+    found = faces.joined_to(touching, clusters.cluster_of)
+    assert (found.force[1:] == 0.0).all()
+    return found
+
+
+def test_both_ends_and_all_blocks_below_the_cargo_rest() -> None:
+    found = _beside(5.5 + 0.01, 0.01)
+    structure = structure_of(beam(7))
+    across = np.round(structure.positions[found.block, 1]).astype(int)
+    assert sorted(across[found.other == WORLD]) == [-3, -3, 3]
+    assert sorted(across[found.other == CARGO]) == [-1, 0, 1]
+    assert np.allclose(found.normal[found.other == CARGO], [0, 0, -1])
+    # The end blocks overhang the terrain's edge; their points lie on it.
+    assert (np.abs(found.point[found.other == WORLD, 1]) >= 2.5).all()
+    # The cargo, 2.5 wide, covers the outer blocks in part.
+    assert np.allclose(sorted(found.area[found.other == CARGO]), [0.75, 0.75, 1.0])
+    # What the engine reports keeps its force and leaves its weight to the face.
+    assert (found.weight[0], found.force[0, 2]) == (0.0, 9.0)
+    assert sorted(found.surface[found.other == WORLD]) == [1, 1, 2]
+
+
+def test_what_is_farther_than_a_hair_does_not() -> None:
+    found = _beside(5.5 + 0.06, 0.06)
+    assert len(found.block) == 1
+
+
+def test_what_does_not_lie_flat_does_not() -> None:
+    c, s = np.cos(0.5), np.sin(0.5)
+    rolled = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    assert len(_beside(5.5, 3.0, turn=rolled).block) == 1

@@ -1,5 +1,6 @@
 """Trials of machines by the benchmark's tasks, and what is pressed in them."""
 
+from dataclasses import replace
 from typing import Any
 
 from buildarena_benchmark import Score, Task, score
@@ -9,6 +10,11 @@ from buildarena_simulation import Trajectory, simulate
 
 def press(key: str, time: float, hold_for: float = 0.1) -> KeyPress:
     return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
+
+
+def changed(task: Task, **changes: Any) -> Task:
+    """The task with changes of its scenario, for its scorer too."""
+    return replace(task, scenario=task.scenario.model_copy(update=changes))
 
 
 def trial(task: Task, machine: Machine, engine: str, **changes: Any) -> tuple[Score, Trajectory]:

@@ -1,18 +1,20 @@
-"""Hinges, swivels, balls, shafts and free wheels as worked out by hand, on both engines."""
+"""Hinges, balls, shafts, drives, sliders and stops as worked out by hand."""
 
 import math
 
 import numpy as np
 import pytest
+from support.machines.building import built
 from support.machines.rigs import Rig, period_of, place_of, rotation_of, tried, turned_by
+from support.marks import nightly
 
+from buildarena_geometry import module_set
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.engines import base
 from buildarena_simulation.scenario import Control, SpanPlacement, TerrainBox
 from buildarena_simulation.structure.model import Structure
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
-
-pytestmark = pytest.mark.usefixtures("root")
 
 
 def _swinging(rig: Rig, joint: str) -> tuple[float, float, np.ndarray]:
@@ -26,21 +28,36 @@ def _swinging(rig: Rig, joint: str) -> tuple[float, float, np.ndarray]:
     return mass, inertia, lever
 
 
-def test_a_pendulum_on_a_hinge_swings_in_its_time(engine) -> None:
+@pytest.mark.usefixtures("root")
+@pytest.mark.parametrize("name", ["Hinge", "Ball Joint"])
+def test_a_pendulum_swings_in_its_time(engine, name) -> None:
+    """On a hinge in the plane that its pin leaves free, on a ball in any."""
     rig = Rig()
-    hinge = rig.attach(rig.top, EAST, "Hinge")
-    bob = rig.row(hinge, DOWN, 4)[-1]
-    rig.attach(bob, EAST)
-    mass, inertia, lever = _swinging(rig, hinge)
-    expected = 2 * math.pi * math.sqrt(inertia[1, 1] / (mass * GRAVITY * np.linalg.norm(lever)))
+    pin = rig.top if name == "Hinge" else rig.attach(rig.top, EAST)
+    joint = rig.attach(pin, EAST if name == "Hinge" else DOWN, name)
+    bob = rig.row(joint, DOWN, 3 if name == "Hinge" else 5)[-1]
+    ways = [EAST] if name == "Hinge" else [EAST, NORTH]
+    for way in ways:
+        rig.attach(bob, way)
+    mass, inertia, lever = _swinging(rig, joint)
+    about = np.array([0.0, 1.0, 0.0] if name == "Hinge" else [1.0, -1.0, 0.0]) / len(ways) ** 0.5
+    lasts = (
+        2
+        * math.pi
+        * math.sqrt(
+            float(about @ inertia @ about) / (mass * GRAVITY * float(np.linalg.norm(lever)))
+        )
+    )
     trajectory = rig.tried(engine, 5.0)
-    swing = place_of(trajectory, bob)[:, 0]
+    path = place_of(trajectory, bob)[:, :2]
+    swing = path @ np.sum(ways, axis=0)[:2]
     assert swing.max() - swing.min() > 0.5
-    assert period_of(trajectory.time_s, swing) == pytest.approx(expected, rel=0.02)
-    assert abs(place_of(trajectory, bob)[:, 1]).max() < 0.01
+    assert period_of(trajectory.time_s, swing) == pytest.approx(lasts, rel=0.03)
+    assert name == "Ball Joint" or abs(path[:, 1]).max() < 0.01
 
 
-@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.usefixtures("root")
+@pytest.mark.parametrize("side", [1, nightly(-1)])
 def test_a_hinge_stops_at_a_right_angle(engine, side) -> None:
     rig = Rig()
     hinge = rig.attach(rig.top, UP, "Hinge")
@@ -78,22 +95,7 @@ def _torque(structure: Structure, about: np.ndarray) -> float:
     return float(np.cross(arms, pushes)[:, 2].sum())
 
 
-def test_a_pendulum_on_a_ball_swings_in_any_plane(engine) -> None:
-    rig = Rig()
-    ball = rig.attach(rig.attach(rig.top, EAST), DOWN, "Ball Joint")
-    bob = rig.row(ball, DOWN, 5)[-1]
-    rig.attach(bob, EAST)
-    rig.attach(bob, NORTH)
-    mass, inertia, lever = _swinging(rig, ball)
-    across = np.array([1.0, -1.0, 0.0]) / math.sqrt(2)
-    about = float(across @ inertia @ across)
-    expected = 2 * math.pi * math.sqrt(about / (mass * GRAVITY * np.linalg.norm(lever)))
-    trajectory = rig.tried(engine, 5.0)
-    swing = place_of(trajectory, bob)[:, :2] @ [1.0, 1.0]
-    assert swing.max() - swing.min() > 0.5
-    assert period_of(trajectory.time_s, swing) == pytest.approx(expected, rel=0.03)
-
-
+@pytest.mark.usefixtures("root")
 def test_a_shaft_bent_by_thirty_degrees_turns_as_its_motor(engine) -> None:
     rig = Rig()
     wedge = rig.attach(rig.attach(rig.top, EAST), DOWN, "Wedge")
@@ -119,7 +121,7 @@ def test_a_shaft_bent_by_thirty_degrees_turns_as_its_motor(engine) -> None:
     assert abs(turns[25:].sum()) > 20.0
 
 
-@pytest.mark.nightly(keep=5)
+@pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("wheel", ["Wheel Unpowered", "Large Wheel Unpowered", "Fly Wheel"])
 def test_a_cart_rolls_downhill_as_its_inertia_says(engine, wheel) -> None:
     rig = Rig()
@@ -150,7 +152,30 @@ def test_a_cart_rolls_downhill_as_its_inertia_says(engine, wheel) -> None:
     assert gained == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.nightly(keep=3)
+WAYS = {"<East>": (1, 0, 0), "<North>": (0, 1, 0), "<Up>": (0, 0, 1), "<Down>": (0, 0, -1)}
+
+
+@pytest.mark.parametrize(("twist", "flip"), [(0, False), (90, False), (0, True)])
+def test_a_steering_hinge_swings_where_it_is_said_to(engine, twist, flip) -> None:
+    hinge = ("1", "A", "Steering Hinge")
+    machine = built(hinge, catalogue=module_set("workshop"), init_shift=[0, 0, 20])
+    assert machine.act("twist_block", {"block_id": "2", "angle": twist}).ok
+    if flip:
+        assert machine.act("flip_spin", {"block_id": "2"}).ok
+    told = machine.act("get_block_details", {"block_id": "2"}).text
+    way = told.partition("swings its far end ")[2].split(">")[0] + ">"
+    side = np.array(WAYS.get(way, (0, -1, 0)))  # the only other one here is <South>
+    key = {"block_id": "2", "action": "turn_right", "new_key": "RightArrow"}
+    assert machine.act("change_control_key", key).ok
+    press = {"time": 0, "key": "RightArrow", "hold_for": 1}
+    assert machine.act("add_control_sequence", press).ok
+    scenario = Scenario(duration_s=0.4, control=Control(mode="agent"))
+    trajectory = simulate(machine, scenario, engine=engine, seed=0)
+    start, hinge = (base.rotation_of(trajectory.quaternions[-1, i].astype(float)) for i in (0, 1))
+    far_end = start.T @ hinge[:, 2]  # its own z axis, as the starting block has it
+    assert far_end @ side > 0.2
+
+
 def test_what_swings_freely_never_rises_above_its_start(engine) -> None:
     rig = Rig()
     first = rig.attach(rig.row(rig.top, NORTH, 2)[-1], NORTH, "Swivel")

@@ -1,4 +1,4 @@
-"""Films of flights round a planet: level ground that rolls by, and a map of the path."""
+"""Films: gates, marks and lines where scorers look for them, and flights round a planet."""
 
 from __future__ import annotations
 
@@ -11,12 +11,54 @@ import pytest
 from PIL import Image
 from support.machines.building import built
 
+from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation.line import Line
 from buildarena_simulation.render.film import write_film
 from buildarena_simulation.render.planet import Flight
 from buildarena_simulation.render.scene import Scene
+from buildarena_simulation.scenario import Gate, Mark
+
+
+def lines(scenario: Scenario) -> list[np.ndarray]:
+    machine = Machine()
+    assert machine.act("start").ok
+    picture = Scene(machine, scenario, simulate(machine, scenario, "mujoco")).at(0)
+    return [ends for ends, _ in picture.lines]
+
+
+@pytest.mark.parametrize(
+    ("heading_deg", "posts"),
+    [(0, [(2.5, 10), (5.5, 10)]), (90, [(4, 11.5), (4, 8.5)]), (180, [(5.5, 10), (2.5, 10)])],
+)
+def test_a_gates_posts_stand_across_the_way_it_is_crossed(heading_deg, posts) -> None:
+    gate = Gate(name="g", center=(4, 10), half_width=1.5, heading_deg=heading_deg)
+    west, east, between = lines(Scenario(duration_s=0.2, gates=(gate,)))
+    for post, (x, y) in zip((west, east), posts, strict=True):
+        assert post == pytest.approx(np.array([[x, y, 0], [x, y, 2]]))
+    assert between == pytest.approx(np.array([[*posts[0], 0], [*posts[1], 0]]))
+
+
+def test_a_mark_is_a_circle_of_its_radius() -> None:
+    mark = Mark(name="goal", center=(4, 3, 1), radius=2)
+    rim = np.array(lines(Scenario(duration_s=0.2, marks=(mark,))))
+    apart = np.linalg.norm(rim - np.array([4, 3, 1]), axis=2)
+    assert apart == pytest.approx(np.full(apart.shape, 2.0))
+    assert np.ptp(rim[..., 2]) == 0
+
+
+def test_a_lines_edges_lie_beside_it() -> None:
+    line = Line(radius=11, bends=((0.1, -0.12), (0.04, 0.03)), side=-1, half_width=0.4)
+    edges = np.array(lines(Scenario(duration_s=0.2, line=line))).reshape(-1, 3)
+    assert (edges[:, 2] == 0).all()
+    ways, apart = line.nearest(edges)
+    assert apart == pytest.approx(np.full(len(edges), 0.4), abs=0.03)
+    assert np.ptp(ways) > 0.95 * line.length
+
 
 RADIUS, HEIGHT = 600.0, 40.0
+
+
 SCENARIO = Scenario.model_validate({"duration_s": 4, "planet": {"radius": RADIUS}})
 
 
@@ -43,17 +85,6 @@ def test_the_ground_rolls_by_as_far_as_it_is_round(around) -> None:
     assert places[:, 2] == pytest.approx(HEIGHT, abs=1e-3)
     assert places[-1, 1] == pytest.approx(2 * math.pi * RADIUS, rel=1e-3)
     assert places[:, 0] == pytest.approx(0, abs=1e-2)
-
-
-def test_what_is_upright_there_is_upright_in_the_picture(around) -> None:
-    flight, scene = Flight(around, RADIUS), Scene(built(), SCENARIO, around)
-    for sample in range(0, len(around.time_s), 7):
-        corners = np.concatenate(
-            [face for face, _ in flight.unrolled(scene.at(sample), sample).faces]
-        )
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        assert high - low == pytest.approx([1, 1, 1], abs=0.01)
-        assert (low + high) / 2 == pytest.approx(flight.focus(sample), abs=0.01)
 
 
 def test_a_film_has_the_map(around, tmp_path) -> None:

@@ -1,4 +1,4 @@
-"""Pipes, rings and cylinders as terrain: what their boxes are, and that engines touch them."""
+"""Pipes, rings, cylinders and fields of heights as terrain, and a line on the ground."""
 
 import math
 
@@ -7,8 +7,13 @@ import pytest
 from pydantic import ValidationError
 from support.machines.drafts import KeyedDraft
 from support.machines.piloted import FASTER_FIRST
+from support.marks import nightly
 
+from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate
+from buildarena_simulation.line import Line
+from buildarena_simulation.offered import Senses
+from buildarena_simulation.scenario import Control
 from buildarena_simulation.terrain import shape_of
 from buildarena_worker.builtin.designs.drafting import UP
 
@@ -20,8 +25,14 @@ QUARTER = {
     "from_deg": 0,
     "to_deg": 90,
 }
+
+
 RING = {"shape": "pipe", "center": [0, 8, 4], "radius": 3, "length": 1, "heading_deg": 90}
+
+
 STEPS = {"shape": "heights", "center": [0, 10, 0], "cell": [2, 3], "rows": [[0, 1, 1], [2, 0, 1]]}
+
+
 HUMP = {"shape": "cylinder", "center": [0, 5, 0], "radius": 2, "length": 8}
 
 
@@ -45,35 +56,22 @@ def circle(center, radius: float, angles: np.ndarray, heading_deg: float) -> np.
     return np.array(center) + np.array(offsets).T
 
 
-@pytest.mark.parametrize(
-    ("pipe", "angles"),
-    [
-        (QUARTER, np.linspace(0, 90, 50)),
-        ({**QUARTER, "heading_deg": 30}, np.linspace(0, 90, 50)),
-        ({**QUARTER, "from_deg": -90}, np.linspace(-90, 90, 50)),
-        (RING, np.linspace(-180, 180, 90)),
-    ],
-    ids=["quarter", "turned", "half", "ring"],
-)
-def test_a_pipes_inside_is_a_circle_without_gaps(pipe, angles) -> None:
+def test_a_pipes_inside_is_a_circle_without_gaps() -> None:
     """Within what a polygon of so many sides strays from its circle; it is free inside."""
-    center, radius = pipe["center"], pipe["radius"]
-    stray = radius / math.cos(math.radians(180 / 12)) - radius
-    heading = pipe.get("heading_deg", 0)
-    middle = circle(center, radius + 0.25, angles, heading)
-    assert distances(pipe, points=middle).max() < 0.01
-    inside = distances(pipe, points=circle(center, radius - 0.5, angles, heading))
-    assert inside.min() >= 0.5 - 1e-6
-    assert inside.max() <= 0.5 + stray + 0.01
-
-
-def test_a_cylinder_is_solid_and_round() -> None:
-    angles = np.linspace(-180, 180, 120)
-    for radius in (0.1, 1.0, 1.95):
-        assert distances(HUMP, points=circle(HUMP["center"], radius, angles, 0)).max() < 1e-6
-    outside = distances(HUMP, points=circle(HUMP["center"], 3.0, angles, 0))
-    assert outside.min() > 0.95
-    assert outside.max() < 1.0 + 1e-6
+    for pipe, from_deg, to_deg in (
+        ({**QUARTER, "heading_deg": 30}, 0, 90),
+        ({**QUARTER, "from_deg": -90}, -90, 90),
+        (RING, -180, 180),
+    ):
+        angles = np.linspace(from_deg, to_deg, 90)
+        center, radius = pipe["center"], pipe["radius"]
+        stray = radius / math.cos(math.radians(180 / 12)) - radius
+        heading = pipe.get("heading_deg", 0)
+        middle = circle(center, radius + 0.25, angles, heading)
+        assert distances(pipe, points=middle).max() < 0.01
+        inside = distances(pipe, points=circle(center, radius - 0.5, angles, heading))
+        assert inside.min() >= 0.5 - 1e-6
+        assert inside.max() <= 0.5 + stray + 0.01
 
 
 def test_a_cone_is_solid_and_narrows() -> None:
@@ -123,17 +121,6 @@ def test_a_field_of_heights_is_a_box_for_each_run_of_cells() -> None:
     ]
 
 
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_what_falls_onto_a_field_of_heights_lies_as_high_as_that(engine) -> None:
-    field = {
-        **STEPS,
-        "center": [0, 0, 0],
-        "cell": [6, 6],
-        "rows": [[1, 1, 1], [1, 2, 1], [1, 1, 1]],
-    }
-    assert fallen(engine, field, height=3.0)[-1, 0, 2] == pytest.approx(2.5, abs=0.05)
-
-
 def test_what_is_round_is_boxes_from_then_on_and_boxes_stay_as_they_were() -> None:
     wall = {"center": [0, 9, 1], "size": [2, 1, 2]}
     world = scenario(wall, RING)
@@ -153,17 +140,7 @@ def fallen(engine: str, *terrain, height: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_a_ring_that_is_seen_from_the_south_bears_what_falls_into_it(engine) -> None:
-    ring = {**RING, "center": [0, 0, 4], "length": 4}
-    block, boulder = fallen(engine, ring, height=2).swapaxes(0, 1)
-    assert block[-1, 2] == pytest.approx(1.5, abs=0.1)
-    for path, reach in ((block, 0.5), (boulder, 0.85)):
-        apart = np.hypot(path[:, 0], path[:, 2] - 4)
-        assert apart.max() < 3.2 - reach
-
-
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-@pytest.mark.parametrize("heading_deg", [0, 90])
+@pytest.mark.parametrize("heading_deg", [90, nightly(0)])
 def test_what_falls_beside_the_middle_of_a_half_pipe_slides_there(engine, heading_deg) -> None:
     """From where its wall rises by 50 degrees: more than friction holds."""
     aside = 4 * math.sin(math.radians(50))
@@ -178,9 +155,8 @@ def test_what_falls_beside_the_middle_of_a_half_pipe_slides_there(engine, headin
     assert np.abs(along).max() < 0.5
 
 
-@pytest.mark.parametrize(
-    ("entry", "why"),
-    [
+def test_what_is_round_and_wrong_is_named() -> None:
+    for entry, why in (
         ({**RING, "segments": 1}, "1 segments are too few for 360 degrees"),
         ({**QUARTER, "to_deg": -10}, "not beyond from_deg"),
         ({**HUMP, "sides": 5}, "multiple of 2"),
@@ -192,13 +168,75 @@ def test_what_falls_beside_the_middle_of_a_half_pipe_slides_there(engine, headin
         ({**STEPS, "rows": [[float("nan")]]}, "0.heights.rows"),
         ({**STEPS, "rows": []}, "0.heights.rows"),
         ({**STEPS, "cell": [1, 0]}, "0.heights.cell"),
-    ],
-)
-def test_what_is_round_and_wrong_is_named(entry, why) -> None:
-    with pytest.raises(ValidationError, match=why):
-        scenario(entry)
-
-
-def test_more_boxes_than_a_scenario_may_have_are_refused() -> None:
+    ):
+        with pytest.raises(ValidationError, match=why):
+            scenario(entry)
     with pytest.raises(ValidationError, match="at most 64"):
         scenario({**RING, "segments": 40}, {**RING, "segments": 40})
+
+
+BENT = Line(radius=11, bends=((0.1, -0.12), (0.04, 0.03)))
+
+
+IDLE = "function control() return {} end"
+
+
+def told(line: Line, *, north: float = 0.0, delay_ticks: int = 0) -> dict[str, list[float]]:
+    """What the ground sensors of a block that stands at (0, 0) tell."""
+    machine = Machine()
+    assert machine.act("start").ok
+    scenario = Scenario(
+        duration_s=0.2,
+        line=line.model_copy(update={"ahead": north}),
+        control=Control(mode="agent"),
+        senses=Senses(offers=("line",), delay_ticks=delay_ticks),
+    )
+    piloting = simulate(machine.with_controller(IDLE), scenario, "mujoco").piloting
+    assert piloting is not None
+    return {name: piloting.senses[:, k].tolist() for k, name in enumerate(piloting.sense_names)}
+
+
+def test_a_line_begins_at_the_origin_towards_the_north() -> None:
+    points = BENT.points(1000)
+    assert points[0] == pytest.approx([0, 0])
+    assert points[1][1] > 0
+    assert abs(points[1][0]) < 0.01 * points[1][1]
+    assert points[500][0] < -15
+    mirrored = BENT.model_copy(update={"side": -1.0})
+    assert mirrored.points(1000) == pytest.approx(points * [-1, 1])
+
+
+def test_curvature_is_what_three_points_of_it_show() -> None:
+    points = BENT.points(400)
+    before, after = np.roll(points, 1, axis=0) - points, np.roll(points, -1, axis=0) - points
+    lengths = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    shown = 2 * np.abs(cross) / (lengths[0] * lengths[1] * np.linalg.norm(before - after, axis=1))
+    assert shown.max() == pytest.approx(BENT.greatest_curvature, rel=0.02)
+
+
+def test_the_nearest_point_of_a_place_is_found() -> None:
+    points = BENT.points(360)
+    ahead = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    right = np.column_stack([ahead[:, 1], -ahead[:, 0]]) / np.linalg.norm(ahead, axis=1)[:, None]
+    for aside in (-0.8, 0.0, 0.8):
+        ways, apart = BENT.nearest(points + aside * right)
+        assert apart == pytest.approx(np.full(360, abs(aside)), abs=0.01)
+        missing = ways - np.arange(360) * BENT.length / 360
+        missing -= BENT.length * np.round(missing / BENT.length)
+        assert np.abs(missing).max() < 0.05
+
+
+def test_sensors_tell_whether_the_line_is_below_them() -> None:
+    line = Line(radius=12, half_width=0.5, apart=0.6)
+    assert told(line)["line.middle"][0] == 1
+    assert told(line)["line.left"][0] == told(line)["line.right"][0] == 0
+    wide = told(line.model_copy(update={"half_width": 0.7}))
+    assert [wide[f"line.{sensor}"][0] for sensor in ("left", "middle", "right")] == [1, 1, 1]
+    # After three units a circle of 12 has bent by 0.38 to the left, and to the right its mirror.
+    left = told(line, north=3.0)
+    assert [left[f"line.{sensor}"][0] for sensor in ("left", "middle", "right")] == [1, 1, 0]
+    right = told(line.model_copy(update={"side": -1.0}), north=3.0)
+    assert [right[f"line.{sensor}"][0] for sensor in ("left", "middle", "right")] == [0, 1, 1]
+    far = told(line, north=8.0)
+    assert [far[f"line.{sensor}"][0] for sensor in ("left", "middle", "right")] == [0, 0, 0]

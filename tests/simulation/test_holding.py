@@ -1,4 +1,4 @@
-"""What grabbers hold, and how much, on both engines."""
+"""What grabbers hold and how much, and what decouplers let go."""
 
 import numpy as np
 import pytest
@@ -8,15 +8,21 @@ from support.machines.trials import press
 
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
-from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation import Scenario, Trajectory, read_trajectory, simulate, write_trajectory
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY, JOINT_STRENGTH
 from buildarena_simulation.machine import structure_of
-from buildarena_simulation.scenario import Cargo, Control, TerrainBox
+from buildarena_simulation.scenario import Cargo, Control, ReleasedPlacement, TerrainBox
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 WORKSHOP = module_set("workshop")
+
+
 GRIP = WORKSHOP["Grabber"].grip
+
+
 DRIVEN = Control(mode="agent")
+
+
 END = 3.0 - COLLISION_MARGIN
 """Height of the grabber's end, units."""
 
@@ -56,7 +62,7 @@ def _told(trajectory: Trajectory) -> list[tuple[str, str]]:
     return [(event.what, event.held) for event in trajectory.events]
 
 
-@pytest.mark.nightly(keep=3)
+@pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("mass", [2.0, 50.0, 150.0])
 def test_a_grabber_holds_a_load_against_its_weight(engine, mass) -> None:
     machine, grabber = _stool(bound=False)
@@ -142,32 +148,6 @@ def test_a_grabber_holds_a_block_of_another_piece(engine) -> None:
     assert height[-1] == pytest.approx(0.5, abs=0.1)
 
 
-def test_an_arm_carries_what_it_holds(engine) -> None:
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    for side in (EAST, WEST, NORTH, SOUTH):
-        draft.row(start, side, 3)
-    hinge = draft.attach(draft.row(start, UP, 5)[-1], EAST, "Steering Hinge")
-    grabber = draft.attach(draft.attach(hinge, EAST), DOWN, "Grabber")
-    draft.bind(hinge, "turn_left", "LeftArrow")
-    draft.bind(grabber, "release", "DownArrow")
-    x, y, z = (float(v) for v in draft.machine.blocks[grabber].center)
-    cargo = Cargo(
-        size=(1.0, 1.0, 1.0), initial_mass=3.0, final_mass=3.0, ramp_s=1.0, at=(x, y, z - 1.05)
-    )
-    scenario = Scenario(duration_s=4.0, cargo=cargo, control=DRIVEN)
-    keys = (press("LeftArrow", 0.5, 1.0), press("DownArrow", 3.0))
-    trajectory = simulate(draft.machine, scenario, engine, controls=keys)
-    assert _told(trajectory) == [("grabbed", "cargo"), ("released", "cargo")]
-    assert not trajectory.breaks
-    held = slice(1, 75)
-    way = trajectory.cargo_position[held].astype(float)
-    gap = way - trajectory.positions[held, trajectory.block_ids.index(grabber)].astype(float)
-    assert np.linalg.norm(way[-1] - way[0]) > 0.5, "the arm turns"
-    assert np.ptp(np.linalg.norm(gap, axis=1)) < 0.05
-    assert trajectory.cargo_position[-1, 2] < way[-1, 2] - 1.0
-
-
 def test_an_arm_that_has_turned_takes_hold_of_a_cargo_that_has_sunk(engine) -> None:
     """Both are held as they are by then, not as they were at the start."""
     draft = KeyedDraft(modules="workshop")
@@ -194,3 +174,61 @@ def test_an_arm_that_has_turned_takes_hold_of_a_cargo_that_has_sunk(engine) -> N
     moved = np.linalg.norm(np.diff(trajectory.cargo_position[since:], axis=0), axis=1)
     assert moved.max() < 0.05
     assert np.ptp(trajectory.positions[since:, 0], axis=0).max() < 0.1
+
+
+IMPULSE = WORKSHOP["Decoupler"].decouple.impulse
+
+
+PRESSED = (KeyPress(time_s=0.4, key="UpArrow", hold_for_s=0.1),)
+
+
+def _staged(below: int, above: int, *, across: bool = False) -> tuple[Machine, list[str]]:
+    """A row with a decoupler in it, and the blocks that leave with it."""
+    draft = KeyedDraft(modules="workshop")
+    start = draft.start()
+    draft.row(start, WEST if across else DOWN, below)
+    way = EAST if across else UP
+    decoupler = draft.attach(start, way, "Decoupler")
+    draft.bind(decoupler, "decouple", "UpArrow")
+    return draft.machine, [decoupler, *draft.row(decoupler, way, above)]
+
+
+def _fallen(machine: Machine, engine: str, *, pressed: bool = True) -> Trajectory:
+    place = ReleasedPlacement(height=100.0, velocity=(0.0, 0.0, 0.0))
+    scenario = Scenario(duration_s=1.0, placement=place, control=Control(mode="agent"))
+    return simulate(machine, scenario, engine, controls=PRESSED if pressed else ())
+
+
+@pytest.mark.parametrize(("below", "above", "across"), [(6, 2, False), (2, 9, True)])
+def test_both_sides_leave_with_the_same_momentum(engine, below, above, across) -> None:
+    machine, leaving = _staged(below, above, across=across)
+    trajectory = _fallen(machine, engine)
+    structure = structure_of(machine)
+    gone = np.isin(structure.block_ids, leaving)
+    axis = 0 if across else 2
+    velocity = np.diff(trajectory.positions[:, :, axis].astype(float), axis=0)[13] * 25.0
+    # What both would have had: free fall with the drag of the mean.
+    alone = _fallen(machine, engine, pressed=False)
+    common = np.diff(alone.positions[:, :, axis].astype(float), axis=0)[13] * 25.0
+    gained = velocity - common
+    masses = structure.masses
+    assert masses[gone] @ gained[gone] == pytest.approx(IMPULSE, rel=0.05)
+    assert masses[~gone] @ gained[~gone] == pytest.approx(-IMPULSE, rel=0.05)
+    assert masses @ gained == pytest.approx(0.0, abs=0.02 * IMPULSE)
+
+
+def test_what_lets_go_is_told_and_is_no_break(engine) -> None:
+    machine, leaving = _staged(1, 1)
+    trajectory = _fallen(machine, engine)
+    assert trajectory.breaks == ()
+    (event,) = trajectory.events
+    assert (event.what, event.joint, event.held) == ("decoupled", f"1-{leaving[0]}", "")
+    assert event.time_s == pytest.approx(0.4, abs=0.021)
+    pieces = trajectory.pieces
+    assert (pieces[5] == 0).all()
+    gone = np.isin(trajectory.block_ids, leaving)
+    assert (pieces[-1][gone] == pieces[-1][gone][0]).all()
+    assert not (pieces[-1][gone] == pieces[-1, 0]).any()
+    again = read_trajectory(write_trajectory(trajectory))
+    assert again.events == trajectory.events
+    assert write_trajectory(_fallen(machine, engine)) == write_trajectory(trajectory)

@@ -1,0 +1,329 @@
+"""What joints, blows and landings break, as in a log of the game, and what the record tells."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from support.landings import (
+    BEGINS_S,
+    FALL_HEIGHT,
+    cargo_path,
+    in_game,
+    landing_figures,
+    logged,
+)
+from support.machines.families import beam, car, deck
+from support.machines.people.bridges import arch
+from support.machines.rigs import Rig
+from support.machines.trials import trial
+from support.marks import nightly
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory, rollout, simulate
+from buildarena_simulation.constants import (
+    BOUNCE_MASS,
+    CARGO_BOUNCE,
+    JOINT_STRENGTH,
+    MIN_LANDING_SPEED,
+    JointKind,
+)
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.rollout import simulate_structure
+from buildarena_simulation.scenario import Control, ReleasedPlacement
+from buildarena_simulation.structure.contacts import ContactForces
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, Draft
+
+KINDS = {
+    "Hinge": "hinge",
+    "Swivel": "hinge",
+    "Slider": "slider",
+    "Ball Joint": "ball",
+    "Axle": "constant_velocity",
+    "Steering Block": "hinge",
+}
+
+
+def _hung(joint: str, weights: int) -> tuple[Rig, str]:
+    """Weights that hang from a joint under an arm, clear of the mast."""
+    rig = Rig()
+    seat = rig.attach(rig.row(rig.top, EAST, 4)[-1], DOWN, joint)
+    end = seat
+    for _ in range(weights):
+        end = rig.attach(end, DOWN, "Weight")
+    return rig, seat
+
+
+def _rig_tried(rig: Rig, engine: str, duration_s: float = 2.0) -> Trajectory:
+    scenario = Scenario(duration_s=duration_s, control=Control(mode="agent"))
+    return simulate(rig.machine, scenario, engine)
+
+
+@pytest.mark.nightly(keep=3)
+@pytest.mark.parametrize("joint", KINDS)
+def test_a_joint_bears_what_hangs_on_it(engine, joint) -> None:
+    rig, seat = _hung(joint, 3)
+    trajectory = _rig_tried(rig, engine, 3.0)
+    assert not trajectory.breaks
+    peak = next(peak for peak in trajectory.joint_peaks if peak.joint == f"6-{seat}")
+    assert peak.kind == KINDS[joint]
+    place = [p.joint for p in trajectory.joint_peaks].index(peak.joint)
+    settled = trajectory.joint_loads[-1, place] * JOINT_STRENGTH[JointKind(peak.kind)].force
+    load = 30 + rig.machine.blocks[seat].module.mass
+    assert settled == pytest.approx(load, rel=0.04)
+
+
+@pytest.mark.nightly(keep=6)
+@pytest.mark.parametrize("joint", KINDS)
+@pytest.mark.parametrize(("strength", "holds"), [(1.15, True), (0.9, False)])
+def test_a_joint_breaks_above_its_strength_and_lets_go(
+    engine: str, joint: str, strength: float, *, holds: bool
+) -> None:
+    rig, seat = _hung(joint, 3)
+    structure = structure_of(rig.machine)
+    k = structure.members.names.index(f"6-{seat}")
+    # A stop that is reached in falling bears more than the weight for a moment.
+    extra = 3.0 if joint == "Slider" else 1.0
+    load = (30 + rig.machine.blocks[seat].module.mass) * strength * (extra if holds else 1.0)
+    structure.members.limits[k, 0] = load
+    scenario = Scenario(duration_s=2.0)
+    trajectory = simulate_structure(structure, scenario, engine)
+    assert [(one.joint, one.kind) for one in trajectory.breaks[:1]] == (
+        [] if holds else [(f"6-{seat}", KINDS[joint])]
+    )
+    height = trajectory.positions[:, trajectory.block_ids.index(seat), 2]
+    assert (height[0] - height[-1] > 2.0) != holds
+
+
+def test_what_a_motor_exerts_goes_into_its_base(engine) -> None:
+    # A block that spins an arm against gravity's moment hands that moment on to its mount.
+    rig = Rig()
+    block = rig.attach(rig.row(rig.top, NORTH, 3)[-1], NORTH, "Steering Block")
+    rig.attach(rig.attach(block, EAST), EAST, "Weight")
+    trajectory = _rig_tried(rig, engine)
+    moment = next(p.moment for p in trajectory.joint_peaks if p.joint == f"5-{block}")
+    level = next(p.moment for p in trajectory.joint_peaks if p.joint == "4-5")
+    assert moment == pytest.approx(10 * 2 + 0.3, rel=0.15)
+    assert level > moment * 0.9
+
+
+INTERVAL_S = 0.04
+
+
+STANDING = Scenario(duration_s=1.0, control=Control(mode="agent"))
+
+
+OVER_A_GAP = builtin_tasks()["support-1"].scenario.model_copy(update={"duration_s": 1.0})
+
+
+CASES = {
+    "beam": (beam(5), STANDING),
+    "deck": (deck(3, 5), STANDING),
+    "car": (car(), STANDING),
+    "arch": (arch(5, rise=2, step=1), OVER_A_GAP),
+}
+
+
+ENOUGH = 1e6
+"""A push that breaks any of them, mass·unit/s²."""
+
+
+class _Liar:
+    """An engine that reports blows which are not there.
+
+    Args:
+        engine: The true engine.
+        pushes: By the number of an interval, from 0, what it adds upwards to a contact in it at the
+            usual step and in finer ones, mass·unit/s².
+    """
+
+    def __init__(self, engine: Any, pushes: dict[int, tuple[float, float]]) -> None:
+        self._engine, self._pushes = engine, pushes
+        self._number, self._finer = -1, 1
+        self.repeated: list[int] = []
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._engine, name)
+
+    @property
+    def struck(self) -> bool:
+        """Whether something hit the machine, or is said to have."""
+        return self._push > 0.0 or bool(self._engine.struck)
+
+    def enter(self, *arguments: Any, finer: int = 1, **places: Any) -> None:
+        """See `Engine`."""
+        self._finer = finer
+        self._engine.enter(*arguments, finer=finer, **places)
+
+    def advance(self, *arguments: Any) -> None:
+        """See `Engine`."""
+        if self._finer == 1:
+            self._number += 1
+        else:
+            self.repeated.append(self._number)
+        self._engine.advance(*arguments)
+
+    def contacts(self) -> ContactForces:
+        """See `Engine`."""
+        true = self._engine.contacts()
+        added = np.zeros_like(true.force)
+        added[:1, 2] = self._push
+        return replace(true, force=true.force + added)
+
+    @property
+    def _push(self) -> float:
+        return self._pushes.get(self._number, (0.0, 0.0))[self._finer > 1]
+
+
+@pytest.fixture
+def tried(engine: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Tries a case with an engine that lies."""
+    create = rollout.create_engine
+
+    def simulated(
+        name: str, pushes: dict[int, tuple[float, float]]
+    ) -> tuple[Trajectory, list[int]]:
+        liars: list[_Liar] = []
+
+        def lying(*arguments: Any) -> Any:
+            liars.append(_Liar(create(*arguments), pushes))
+            return liars[-1]
+
+        monkeypatch.setattr(rollout, "create_engine", lying)
+        trajectory = simulate(*CASES[name], engine)
+        monkeypatch.setattr(rollout, "create_engine", create)
+        return trajectory, liars[0].repeated
+
+    return simulated
+
+
+@pytest.mark.nightly(keep=3)
+@pytest.mark.parametrize(
+    ("name", "at"), [("beam", (12,)), ("deck", (13,)), ("arch", (12, 20)), ("car", (12,))]
+)
+def test_a_blow_that_finer_steps_do_not_show_breaks_nothing(engine, tried, name, at) -> None:
+    trajectory, repeated = tried(name, dict.fromkeys(at, (ENOUGH, 0.0)))
+    assert repeated == list(at)
+    assert not trajectory.breaks
+    assert trajectory.joint_loads.max() < 1.0
+    still = simulate(*CASES[name], engine)
+    assert trajectory.positions[-1] == pytest.approx(still.positions[-1], abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["beam", nightly("arch")])
+def test_a_blow_counts_as_finer_steps_show_it(tried, name) -> None:
+    """A peak far above the strength at the usual step, and a quarter of it in finer ones."""
+    whole = tried(name, {12: (ENOUGH, ENOUGH)})[0].joint_loads[13].max()
+    push = 2.4 * ENOUGH / whole
+    trajectory, repeated = tried(name, {12: (push, 0.25 / 2.4 * push)})
+    assert repeated == [12]
+    assert not trajectory.breaks
+    assert 0.1 < trajectory.joint_loads[12:15].max() < 0.6
+
+
+@pytest.mark.parametrize("name", ["deck", nightly("beam"), nightly("arch")])
+def test_a_blow_that_finer_steps_show_breaks(tried, name) -> None:
+    trajectory, repeated = tried(name, {12: (ENOUGH, ENOUGH)})
+    assert repeated[0] == 12
+    assert trajectory.breaks[0].time_s == pytest.approx(13 * INTERVAL_S)
+
+
+def test_a_machine_that_hits_the_ground_hard_breaks(engine) -> None:
+    trajectory = _thrown(car(21, 3), 100.0, engine)
+    assert trajectory.breaks[0].time_s == pytest.approx(0.12, abs=0.05)
+
+
+def test_what_is_repeated_gives_the_same_bytes(engine) -> None:
+    first, second = (_thrown(car(15, 3), 100.0, engine) for _ in range(2))
+    assert first.positions.tobytes() == second.positions.tobytes()
+    assert first.joint_loads.tobytes() == second.joint_loads.tobytes()
+    assert first.breaks == second.breaks
+
+
+def _thrown(machine: Machine, speed: float, engine: str) -> Trajectory:
+    thrown = ReleasedPlacement(height=10.0, velocity=(0.0, 0.0, -speed))
+    return simulate(machine, Scenario(duration_s=1.0, placement=thrown), engine)
+
+
+STEP_S, STEPS, SPEED = 0.002, 10, 6.0
+
+
+def _table() -> Machine:
+    """A plank of nine blocks on a post."""
+    draft = Draft()
+    middle = draft.start()
+    for way, count in ((DOWN, 2), (NORTH, 4), (SOUTH, 4)):
+        draft.row(middle, way, count)
+    return draft.machine
+
+
+def _peak_of_landing(machine: Machine, engine: str, height: float) -> float:
+    """The largest share of its strength that a joint bears when it is thrown down."""
+    place = ReleasedPlacement(height=height, velocity=(0.0, 0.0, -SPEED))
+    scenario = Scenario(duration_s=0.48, control=Control(mode="agent"), placement=place)
+    return float(np.max(simulate(machine, scenario, engine).joint_loads))
+
+
+def test_a_landing_loads_alike_in_any_step_of_an_evaluation(engine) -> None:
+    machine = _table()
+    # Faster by the fall, the machine takes about a step for each of these differences in height.
+    apart = STEP_S * (SPEED + 1.2)
+    peaks = [_peak_of_landing(machine, engine, 1.5 + k * apart) for k in range(STEPS)]
+    assert max(peaks) < 1.4 * min(peaks)
+
+
+@pytest.mark.nightly(keep=1)
+def test_the_beam_of_seven_fails_as_in_the_game(engine, tasks) -> None:
+    scenario = in_game(tasks["support-1"].scenario)
+    trajectory = simulate(beam(7), scenario, engine)
+    figures = landing_figures(*cargo_path(trajectory, scenario), lost_below=FALL_HEIGHT)
+    game = logged("support-1_seven_blocks.csv")
+    for name, apart in (("contact_s", 0.06), ("peak", 0.25), ("peak_s", 0.06), ("again_s", 0.08)):
+        assert figures[name] == pytest.approx(game[name], abs=apart), name
+    assert figures["crossing_s"] < 1.7
+    broken = trajectory.breaks[0]
+    assert abs(broken.time_s + BEGINS_S - figures["again_s"]) < 0.1, "at the second landing"
+    assert broken.cargo_mass == pytest.approx(61.0, abs=15.0)
+    result, _ = trial(tasks["support-1"], beam(7), engine)
+    assert (result.success, result.indicator) == (False, 0.0)
+
+
+def test_each_bounce_has_its_share_of_the_speed_before(engine, tasks) -> None:
+    scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 3.0})
+    machine = beam(7, "tb")
+    _, height = cargo_path(simulate(machine, scenario, engine), scenario)
+    floor = float(np.median(height[-10:]))
+    inside, before, after = height[1:-1], height[:-2], height[2:]
+    tops = [height[0], *inside[(inside > before + 1e-3) & (inside >= after)]]
+    speeds = np.sqrt(2 * scenario.gravity * (np.array(tops[:3]) - floor))
+    share = CARGO_BOUNCE / (1 + machine.mass / BOUNCE_MASS)
+    assert speeds[1:] == pytest.approx(share * (speeds[:-1] - MIN_LANDING_SPEED), abs=1.3)
+    assert height[-10:].std() < 0.01, "it comes to rest"
+
+
+def test_a_cargo_that_lands_beside_the_machine_stays_where_it_lands(engine, tasks) -> None:
+    scenario = tasks["transport-2"].scenario
+    cargo = scenario.cargo.model_copy(update={"at": (9.0, 0.0, 5.0)})
+    trajectory = simulate(beam(3), scenario.model_copy(update={"cargo": cargo}), engine)
+    height = trajectory.cargo_position[:, 2]
+    landed = int((height < scenario.cargo.size[2] / 2 + 0.1).argmax())
+    assert landed > 0
+    assert height[landed:].max() < scenario.cargo.size[2] / 2 + 0.1
+
+
+def test_a_cargo_bounces_less_on_a_heavier_machine(engine, tasks) -> None:
+    scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 1.2})
+    peaks = []
+    for machine in (beam(7, "tb"), deck(5, 7, cross=True)):
+        _, height = cargo_path(simulate(machine, scenario, engine), scenario)
+        first = int(height[:20].argmin())
+        peaks.append(height[first:].max() - height[first])
+    assert peaks[1] < 0.6 * peaks[0]
+
+
+def test_what_lies_does_not_hop(engine, tasks) -> None:
+    """A cargo that grows heavier where it lies is never thrown up again."""
+    _, trajectory = trial(tasks["support-1"], deck(5, 7, cross=True), engine)
+    at_rest = (trajectory.time_s > 3.0) & (trajectory.time_s < 5.0)
+    assert np.ptp(trajectory.cargo_position[at_rest, 2]) < 0.02

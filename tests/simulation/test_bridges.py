@@ -1,0 +1,121 @@
+"""Bridges: which carries more, whichever way they stand, and how a cargo rests on them."""
+
+import itertools
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from benchmarks.agreement import compared
+from support.machines.drafts import KeyedDraft
+from support.machines.families import beam, deck
+from support.machines.random_machines import TASKS
+from support.machines.references import load_machine
+from support.machines.trials import trial
+from support.marks import nightly
+
+from buildarena_benchmark import Task
+from buildarena_geometry import Machine
+from buildarena_simulation import simulate
+from buildarena_simulation.scenario import SpanPlacement, TerrainBox, gap_terrain
+from buildarena_worker.builtin.designs.drafting import BRACE, NORTH, SOUTH, UP
+
+
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
+def test_more_bracing_carries_more(engine, tasks) -> None:
+    beams = [beam(7, braces) for braces in ("", "t", "12")]
+    loads = [trial(tasks["support-1"], actions, engine)[0].indicator for actions in beams]
+    assert loads == sorted(loads)
+    assert all(b > 1.2 * a for a, b in itertools.pairwise(loads))
+
+
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
+def test_the_one_shot_bridge_breaks_where_the_paper_reports_its_load(engine, tasks) -> None:
+    # Over a gap so deep that its pillars hang free; over the task's they stand on the floor.
+    deep = tasks["support-1"].scenario.model_copy(
+        update={
+            "terrain": gap_terrain(5.0, height=25.0),
+            "placement": SpanPlacement(gap=5.0, lowest_center=26.0),
+        }
+    )
+    first = simulate(load_machine("one-shot-bridge"), deep, engine).breaks[0]
+    assert first.cargo_mass == pytest.approx(1000.0, rel=0.03)
+
+
+def _beam_with(braces: Sequence[tuple[int, int]], connector: str, length: int = 7) -> Machine:
+    draft = KeyedDraft()
+    middle = draft.start()
+    ahead = draft.row(middle, NORTH, length // 2)
+    row = [*reversed(draft.row(middle, SOUTH, length // 2)), middle, *ahead]
+    for first, second in braces:
+        draft.connect(row[first], row[second], UP, connector=connector)
+    return draft.machine
+
+
+@pytest.mark.nightly(engine="pybullet")
+@pytest.mark.parametrize(
+    ("connector", "spans"),
+    [
+        (BRACE, ((0, 3), (3, 6))),
+        nightly(BRACE, ((0, 6), (0, 5), (1, 6), (1, 5))),
+        nightly("Winch", ((0, 3), (3, 6), (0, 6))),
+    ],
+)
+def test_connectors_stacked_on_the_same_faces_are_worth_one(
+    engine, tasks, connector, spans
+) -> None:
+    once, often = (
+        trial(tasks["support-1"], _beam_with(spans * n, connector), engine)[0] for n in (1, 5)
+    )
+    assert often.indicator <= max(1.05 * once.indicator, 1.0)
+    if connector == BRACE:
+        first = "load_at_first_break"
+        assert often.metrics[first] <= 1.02 * once.metrics[first]
+
+
+TOLERANCE = {"mujoco": 0.02, "pybullet": 0.05}
+
+
+def _turned(machine: Machine, yaw_deg: float) -> Machine:
+    whole = Machine(available={"m": machine})
+    assert whole.act("add_machine", {"machine_id": "m", "init_rotation": [yaw_deg, 0, 0]}).ok
+    return whole
+
+
+@pytest.mark.ci
+@pytest.mark.nightly(engine="pybullet")
+@pytest.mark.parametrize("yaw_deg", [90, nightly(180), nightly(270)])
+def test_a_turned_bridge_carries_the_same(engine, tasks, yaw_deg) -> None:
+    task = tasks["support-1"]
+    for machine in (deck(5, 7), beam(9, "t")):
+        # A deck is as long across as along, so the gap turns with it.
+        terrain = task.scenario.terrain
+        if yaw_deg != 180:
+            terrain = tuple(_turned_box(box) for box in terrain)
+        straight = trial(task, machine, engine)[0].metrics["load_at_first_break"]
+        changes = {"terrain": terrain, **_unturned(task)}
+        turned, _ = trial(task, _turned(machine, yaw_deg), engine, **changes)
+        found = turned.metrics["load_at_first_break"]
+        assert found == pytest.approx(straight, rel=TOLERANCE[engine])
+
+
+def _turned_box(box: TerrainBox) -> TerrainBox:
+    x, y, z = box.center
+    width, length, height = box.size
+    return TerrainBox(center=(-y, x, z), size=(length, width, height))
+
+
+def _unturned(task: Task) -> dict[str, Any]:
+    """A placement that never turns a machine: none is longer than this gap."""
+    return {"placement": task.scenario.placement.model_copy(update={"gap": 99.0})}
+
+
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize(
+    "task", [nightly(task) if task in {"transport-2", "transport-3"} else task for task in TASKS]
+)
+def test_engines_agree_on_machines_that_nobody_chose(task) -> None:
+    result = compared("basic", task, seed=5)
+    assert result.same
+    assert result.close
