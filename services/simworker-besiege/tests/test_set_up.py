@@ -50,6 +50,7 @@ def test_the_published_positions_are_tried_with_a_small_machine(rig, screen) -> 
     assert not list(rig.machines.iterdir())
 
 
+@pytest.mark.nightly
 def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     places = {**Calibration().positions, "open_machine": (0.9, 0.9)}
     Calibration(positions=places).save(rig.folder / "state" / "calibration.json")
@@ -59,6 +60,7 @@ def test_wrong_positions_are_found_out_and_named(rig, screen) -> None:
     assert "load the machine batry: the list of machines stayed open" in done.stdout
 
 
+@pytest.mark.nightly
 def test_a_person_points_at_each_place(rig, screen) -> None:
     with GamePlayed(rig, screen) as person:
         done = person.calibrate()

@@ -30,7 +30,6 @@ TOOLBAR: Final = {
     "set_ground": around(0.403, 0.0185, 0.060, 0.032),
     "delete": around(0.707, 0.038, 0.034, 0.040),
 }
-BAR: Final = Box(0.0, 0.0, 1.0, 0.070)
 LOAD_PANEL: Final = Box(0.370, 0.120, 0.700, 0.420)
 LOAD_ITEMS: Final = {
     "name_box": around(0.476, 0.215, 0.190, 0.040),

@@ -1,4 +1,4 @@
-"""The game's window: nothing is drawn in it, but where things would be, clicks and keys do them."""
+"""The game's window."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from stand_in_game.faults import Fault
 from stand_in_game.game import Game
 from stand_in_game.interface import Interface
 from stand_in_game.ownership import sign
+from stand_in_game.panels import Shape, draw, shapes
 from stand_in_game.report import Report
 
 TITLE: Final = "Besiege"
@@ -39,6 +40,7 @@ class Window:
         self._canvas.pack()
         self._breakage = Breakage(self._root)
         self._shown = Interface(game, machines, self, scene="title" if title else "level")
+        self._drawn: list[Shape] = []
         self._modifiers: set[str] = set()
         self._caps_lock = False
         self._pressed_on = ""
@@ -85,6 +87,7 @@ class Window:
         width, height = self._size = self._shown.size = self._game.screen = size
         self._root.geometry(f"{width}x{height}+0+0")
         self._canvas.config(width=width, height=height)
+        self._drawn = []
 
     def _bind(self) -> None:
         self._canvas.bind("<ButtonPress-1>", self._mouse_down)
@@ -131,6 +134,10 @@ class Window:
         if self._game.simulating:
             for fault in self._game.faults.at("simulating", self._game.time_s):
                 self._shown.carry_out(fault)
+        seen = shapes(self._shown)
+        if seen != self._drawn:
+            draw(self._canvas, self._size, seen)
+            self._drawn = seen
         self._report.write(self._state())
         spent = time.monotonic() - now
         self._root.after(max(1, round((1 / FRAMES_PER_S - spent) * 1000)), self._frame_due)
