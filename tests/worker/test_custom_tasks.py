@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Callable
@@ -10,7 +11,6 @@ from pathlib import Path
 
 import pytest
 import yaml
-from support.machines.suspension_bridge import suspension_bridge
 from support.providers.scripted import Scripted, call
 from support.stages import work
 
@@ -30,6 +30,7 @@ from buildarena_worker.session.session import Session
 from buildarena_worker.wiring import verifier
 
 BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
+SUSPENSION = json.loads((Path(__file__).parents[1] / "data/suspension-bridge.json").read_text())
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
 
 
@@ -142,7 +143,7 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
     add(context, BRIDGE.read_text())
     sessions = ExternalSessions(context)
     job = sessions.open(task="suspension-bridge", agent="me", seed=0, simulator="mujoco").job
-    for machine, actions in suspension_bridge(roped=roped).items():
+    for machine, actions in SUSPENSION["with ropes" if roped else "without ropes"].items():
         for tool, arguments in actions:
             done = sessions.call(job.id, machine=machine, tool=tool, arguments=arguments)
             assert done.ok, done.feedback

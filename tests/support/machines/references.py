@@ -4,10 +4,12 @@ Run as a module (`python -m support.machines.references` in tests/), it writes t
 tests/data/simulation again; see the README there.
 """
 
+import gzip
 import json
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
@@ -44,6 +46,17 @@ def load_machine(name: str) -> Machine:
     content = _CONTENTS[name]
     parts = {key: _replayed(log, {}) for key, log in content.get("sub_structures", {}).items()}
     return _replayed(content["actions"], parts)
+
+
+@cache
+def built_designs() -> dict[str, dict[str, Any]]:
+    """Designs of people and machines that once earned points, as documents, by name."""
+    return dict(json.loads(gzip.decompress((DATA / "built.json.gz").read_bytes())))
+
+
+def stored(name: str) -> Machine:
+    """One of these machines."""
+    return Machine.from_document(built_designs()[name]["machine"])
 
 
 def outcome(name: str, engine: str) -> dict[str, Any]:
