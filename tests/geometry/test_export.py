@@ -111,31 +111,12 @@ def test_only_faces_that_look_at_the_eye_are_labelled(build):
     assert labels == ["A", "C", "F"]  # seen from south-east above: east, up, south
 
 
-def test_nearer_faces_are_painted_over_farther_ones(build):
-    machine = build(("1", "F", "Small Wooden Block"))  # stands to the south, towards the eye
-    drawing = ET.fromstring(machine_svg(machine, View(azimuth_deg=0, elevation_deg=0)))
-    last = list(drawing.iter(f"{SVG}polygon"))[-1].get("fill")
-    red, green, _ = (int(last[index : index + 2], 16) for index in (1, 3, 5))
-    assert green > red / 2, "the wooden block's colour, not the starting block's"
-
-
-def test_an_empty_machine_gives_an_empty_drawing():
-    drawing = ET.fromstring(machine_svg(Machine()))
-    assert not list(drawing.iter(f"{SVG}polygon"))
-
-
 MODULES = [module for module in module_set("all").values() if module.kind != "cargo"]
 
 
 def test_pictures_show_the_body_and_its_faces():
     wrong = {module.name: faults for module in MODULES if (faults := faults_of(module))}
     assert not wrong
-
-
-def test_large_modules_are_drawn_as_large_as_small_ones():
-    barrel, block = module_set("all")["Big Barrel"], module_set("all")["Small Wooden Block"]
-    assert width(module_svg(barrel)) < 3 * width(module_svg(block))
-    assert width(module_svg(block, View(scale=160))) > 1.5 * width(module_svg(block))
 
 
 def faults_of(module: Module) -> list[str]:
@@ -146,7 +127,3 @@ def faults_of(module: Module) -> list[str]:
     written = {element.text for element in elements if element.tag.endswith("text")}
     upward = {face.label for face in module.faces if face.normal[2] > 0.5}
     return [name for name in (body,) if name not in kinds] + sorted(upward - written)
-
-
-def width(svg):
-    return float(ET.fromstring(svg).get("width"))

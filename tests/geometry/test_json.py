@@ -62,15 +62,6 @@ def test_each_level_has_what_the_one_above_holds(subtests) -> None:
             assert list(levels(value)) == found
 
 
-def test_no_level_is_collected_before_it_is_asked_for() -> None:
-    endless: list[object] = []
-    endless.append(endless)
-    for depth, level in enumerate(levels(endless)):
-        assert level[0] is endless
-        if depth == 100:
-            break
-
-
 FIRST_READS = """
 import sys
 import threading

@@ -12,7 +12,6 @@ from support.machines.module_files import FILES, SCHEMA, entries, like, module_f
 
 from buildarena_geometry import CatalogueError, Machine, RefusalClass, load_catalogue, module_set
 from buildarena_geometry.modules.forces import FORCE_FIELDS
-from buildarena_geometry.modules.joints import MOVING_JOINTS
 
 BASIC = json.loads(FILES.joinpath("modules.yaml").read_text())
 CRATE = {
@@ -73,21 +72,6 @@ def test_what_a_module_does_stands_in_its_entry():
     }
     assert [name for name, module in basic.items() if module.grabs] == ["Small Wooden Block"]
     assert [name for name, module in basic.items() if module.link == "rope"] == ["Winch"]
-
-
-def test_what_models_are_reported_of_a_module_agrees_with_what_it_does():
-    basic = load_catalogue()
-    wheel, cannon, torch = (basic[name] for name in ("Powered Wheel", "Water Cannon", "Torch"))
-    assert f"turns at {wheel.motor.speed_rpm:g} rpm" in wheel.description
-    assert f"carries a mass of {cannon.thrust.cold:g}." in cannon.description
-    assert f"({cannon.thrust.heated:g})" in cannon.description
-    flame = torch.flames[0]
-    assert f"radius {flame.radius:g} whose centre lies {flame.along:g} ahead" in torch.description
-    heights = [
-        (ball.along - ball.radius, ball.along + ball.radius) for ball in cannon.thrust.spheres
-    ]
-    ends = {mark.name: mark.along for mark in cannon.landmarks}
-    assert (min(heights)[0], max(heights)[1]) == (ends["inlet"], ends["outlet"])
 
 
 def test_a_file_without_them_gives_a_module_what_its_kind_does(tmp_path, subtests):
@@ -313,23 +297,6 @@ def test_senseless_joints_are_refused_with_what_belongs_there(tmp_path, subtests
             _loaded(tmp_path, seat, **fields)
 
 
-def test_every_joint_of_the_workshop_says_where_its_figures_come_from():
-    moving = [
-        m
-        for m in module_set("workshop").values()
-        if m.physics and m.physics.joint_type in MOVING_JOINTS
-    ]
-    assert len(moving) >= 19
-    for module in moving:
-        if module.motor is None:
-            origins = [module.joint.origin]
-            if module.joint.drive is not None:
-                origins.append(module.joint.drive.origin)
-            assert any(origins), module.name
-            for origin in filter(None, origins):
-                assert any(word in origin for word in ("known", "community", "chosen")), module.name
-
-
 def test_driven_joints_can_be_flipped_and_passive_ones_cannot(subtests):
     for name in ["Steering Hinge", "Steering Block", "Spinning Block"]:
         with subtests.test(name=name):
@@ -426,9 +393,3 @@ def test_a_springs_key_is_bound_like_a_blocks():
     assert not machine.act("add_control_sequence", {**press, "key": "Alpha2"}).ok
     copy_of = Machine.from_document(machine.to_document(), catalogue=module_set("workshop"))
     assert copy_of.to_document() == machine.to_document()
-
-
-def test_documents_of_braces_and_winches_tell_no_keys():
-    machine = built(*(("1", face, BLOCK) for face in "EF"))
-    assert connect(machine, "2", "A", "3", "A").ok
-    assert "bindings" not in machine.to_document()["connectors"][0]

@@ -14,7 +14,6 @@ from support.machines.module_files import BASIC, like, module_file
 from buildarena_geometry import (
     MODULE_SETS,
     Ball,
-    Catalogue,
     CatalogueError,
     Machine,
     catalogue_of,
@@ -25,7 +24,6 @@ from buildarena_geometry import (
     simulated_modules,
 )
 from buildarena_geometry.feedback.data_sheets import data_sheet
-from buildarena_geometry.feedback.modules import modules_text
 from buildarena_geometry.feedback.words import number, plain, point
 from buildarena_geometry.modules.catalogue import read_modules
 
@@ -128,20 +126,6 @@ def test_every_type_can_be_attached_and_comes_back_from_its_document(subtests):
             assert again.mass == pytest.approx(0.25 + module_set("all")[name].mass)
 
 
-def test_lists_of_a_category_are_short(subtests):
-    for category in ["basic", "locomotion", "mechanical", "flight"]:
-        with subtests.test(category=category):
-            lines = (
-                built(catalogue=module_set("workshop"))
-                .act("list_modules", {"category": category})
-                .text
-            )
-            assert all(len(line) < 130 for line in lines.splitlines())
-            assert all(
-                line.endswith(".") and not line.endswith("..") for line in lines.splitlines()
-            )
-
-
 def test_documents_know_all_types_and_a_machine_only_its_own():
     machine = built(("1", "A", "Hinge"), ("2", "E", "Wing Panel"), catalogue=module_set("workshop"))
     assert Machine.from_document(machine.to_document()) == machine
@@ -185,14 +169,6 @@ def test_a_wrong_name_is_answered_with_the_nearest_ones(subtests):
             assert meant in named
             assert len(named) == 6
             assert named[-1] == f"{len(module_set('all').attachable) - 5} more."
-
-
-def test_names_like_no_other_are_refused_in_short(subtests):
-    for written in ["", " ", "x" * 500, "\n"]:
-        with subtests.test(written=written):
-            outcome = attach(built(catalogue=module_set("all")), "1", "A", written)
-            assert not outcome.ok
-            assert len(outcome.text) < 400
 
 
 def test_a_root_offset_lifts_a_block_off_its_face(tmp_path):
@@ -388,36 +364,8 @@ def test_figures_are_the_modules_own():
     assert "torque and brake up to 13.5" in data_sheet(slower, None)
 
 
-def test_a_cog_says_the_radius_that_it_meshes_at_and_no_other(subtests):
-    for name in [name for name in NAMES if WORKSHOP[name].gear]:
-        with subtests.test(name=name):
-            cog = WORKSHOP[name]
-            for text in (cog.description, cog.brief):
-                assert {float(r) for r in re.findall(r"radius ([\d.]*\d)", text)} == {
-                    cog.gear.pitch_radius
-                }
-
-
-def test_lists_have_data_only_where_they_are_told():
-    plain_list = modules_text(WORKSHOP).splitlines()
-    told = modules_text(WORKSHOP.with_data_sheets()).splitlines()
-    assert not any("Data:" in line for line in plain_list)
-    assert len(plain_list) == len(WORKSHOP)
-    with_data = [name for name in NAMES if sheet(name)]
-    assert sum(line.startswith("  Data: ") for line in told) == len(with_data)
-    assert len(told) == len(WORKSHOP) + len(with_data)
-
-
 def test_who_looks_a_module_up_reads_its_data_where_they_are_told():
     for catalogue in (WORKSHOP, WORKSHOP.with_data_sheets()):
         machine = Machine(catalogue=catalogue)
         answer = machine.act("describe_module", {"module": "Steering Hinge"}).text
         assert ("torque up to 40" in answer) == catalogue.data_sheets
-
-
-def test_a_catalogue_with_data_sheets_has_the_same_modules():
-    told = WORKSHOP.with_data_sheets()
-    assert dict(told) == dict(WORKSHOP)
-    assert told is WORKSHOP.with_data_sheets() is told.with_data_sheets()
-    assert isinstance(told, Catalogue)
-    assert not WORKSHOP.data_sheets

@@ -40,21 +40,6 @@ def test_every_step_tells_verdict_kind_and_state(tmp_path, replay):
     assert [step["state"]["n"] for step in results["steps"]] == [1, 2, 2]
 
 
-def test_the_last_state_alone_can_be_asked_for(tmp_path, replay):
-    file = tmp_path / "one.json"
-    file.write_text(json.dumps([{"seed": 7, "steps": STEPS}]))
-    (results,) = replay(file, "--states", "last").results
-    assert ["state" in step for step in results["steps"]] == [False, False, True]
-
-
-def test_a_bare_list_of_actions_is_one_sequence(tmp_path, replay):
-    file = tmp_path / "bare.json"
-    file.write_text(json.dumps(STEPS))
-    (results,) = replay(file).results
-    assert results["seed"] is None
-    assert len(results["steps"]) == 3
-
-
 def test_compressed_files_and_many_sequences_are_read(tmp_path, replay):
     file = tmp_path / "many.json.gz"
     sequences = [{"seed": seed, "steps": STEPS} for seed in (1, 2)]
@@ -102,12 +87,6 @@ def test_input_that_is_no_sequence_is_refused_with_its_place(tmp_path, replay, c
     result = replay(file)
     assert result.code == 1
     assert message in result.error
-
-
-def test_a_missing_file_is_named(tmp_path, replay):
-    result = replay(tmp_path / "nowhere.json")
-    assert result.code == 1
-    assert "nowhere.json" in result.error
 
 
 def test_the_module_runs_as_a_command(tmp_path):
