@@ -41,7 +41,7 @@ def forged_trials(arena: Arena) -> Tried:
             arena.operator.post(f"/v1/jobs/{job}/cancel")
     jobs = {}
     for job in brought:
-        wait_until(lambda: _verified(arena, job), 300, f"{job} is verified")  # noqa: B023
+        wait_until(lambda: _verified(arena, job), 300, f"{job} is verified")
         jobs[job] = arena.operator.get(f"/v1/jobs/{job}")
     audits = Counter(str(job["audit"]) for job in jobs.values())
     for id_, job in jobs.items():
@@ -97,7 +97,7 @@ def harmful_runner(arena: Arena) -> Tried:
         "/hand-back": {},
     }
     for job in jobs:
-        lease = wait_until(lambda: leased(runner, job), 60, f"{job} waits")  # noqa: B023
+        lease = wait_until(lambda: leased(runner, job), 60, f"{job} waits")
         path, more = list(ways.items())[jobs.index(job) % 2]
         runner.ask("POST", runner.at(lease, path), **more)
     for _ in range(20):

@@ -147,7 +147,7 @@ def lying_provider(arena: Arena) -> Tried:
             "limits": {"max_requests": 3},
         }
         id_ = arena.attacker.post("/v1/jobs", body)["id"]
-        wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 90, name)  # noqa: B023
+        wait_until(lambda: arena.attacker.get(f"/v1/jobs/{id_}")["state"] == "done", 90, name)
         job = arena.attacker.get(f"/v1/jobs/{id_}")
         used = job["usage"]
         seen.append(f"{name}: {job['outcome']}, {used['requests']} requests")

@@ -53,7 +53,7 @@ def two_processes(arena: Arena) -> Tried:
             arena.operator.post(f"/v1/keys/{tenant.id}/revoke")
             started = time.monotonic()
             wait_until(
-                lambda: httpx.get(f"{url}/v1/jobs", headers=asked).status_code == 401,  # noqa: B023
+                lambda: httpx.get(f"{url}/v1/jobs", headers=asked).status_code == 401,
                 10,
                 "the key is refused",
             )

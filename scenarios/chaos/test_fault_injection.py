@@ -142,7 +142,7 @@ def test_nothing_is_lost_or_done_twice(folder, play, way) -> None:
                 ),
             ]
             for sweep_id in sweeps:
-                wait_until(lambda: ended(client, sweep_id), 3000, f"{sweep_id} ended")  # noqa: B023
+                wait_until(lambda: ended(client, sweep_id), 3000, f"{sweep_id} ended")
             fire.stop()
             seconds = time.monotonic() - started
         wait_until(lambda: reachable(database), 60, "the last strike is over")

@@ -104,7 +104,7 @@ def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) ->
         with database.transaction() as connection:
             connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{revision}'")
 
-    stamp("2026_11_22_annotations")
+    stamp("2026_11_27_what_goes")
     try:
         done = subprocess.run(
             [sys.executable, "-m", module],
@@ -119,7 +119,7 @@ def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) ->
             },
         )
         assert done.returncode == 1
-        assert "schema 2026_11_22_annotations" in done.stderr
+        assert "schema 2026_11_27_what_goes" in done.stderr
     finally:
         stamp(SCHEMA)
         database.close()

@@ -330,7 +330,7 @@ def test_a_key_goes_to_one_host_alone(make, monkeypatch) -> None:
             moved = answer(status, Location=f"{other.url}/v1/tasks")
             with wrong_server(moved) as server:
                 client = make(server.url, SECRET)
-                for send in (client.tasks, lambda: client.submit_job("a", "b")):  # noqa: B023
+                for send in (client.tasks, lambda: client.submit_job("a", "b")):
                     with pytest.raises(RefusedError, match=f"HTTP {status}"):
                         send()
                 assert server.headers("Authorization") == [f"Bearer {SECRET}"] * 2

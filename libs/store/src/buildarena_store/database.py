@@ -33,13 +33,20 @@ GIVEN_UP_THERE = {
     "tcp_user_timeout": 20_000,
 }
 """When the server does: a machine that is gone holds the locks of its transactions until then."""
-SCHEMA = "2026_11_27_what_goes"
+SCHEMA = "0001_fe7855c0"
 """The newest revision of the migrations: what this code was written for. Said here, so that a
 process that starts need not read them all."""
 AS_THEY_ARE = {"bytes": "as they are"}
 """Options of a statement whose rows have many bytes, each of which is two as text."""
 MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once take turns
 LOCK_PAUSE_S = 0.2
+
+
+def _unknown(schema: str) -> str:
+    return (
+        f"the database has schema {schema}, which this program ({SCHEMA}) does not know: it is of "
+        "a release candidate or of a later version, and was left as it is"
+    )
 
 
 def ping_after_idling(engine: Engine) -> None:
@@ -172,8 +179,12 @@ class Database:
 
         Returns:
             The revision the database has now.
+
+        Raises:
+            SchemaVersionError: It is of a release candidate or of a later version; it is left as
+                it is.
         """
-        from buildarena_store.migrating import migrate_to_newest
+        from buildarena_store.migrating import known_schemas, migrate_to_newest
 
         # Indexes that are made while others write wait for every transaction, so whoever has the
         # lock, or waits for it, is in none.
@@ -182,6 +193,8 @@ class Database:
             while not connection.execute(lock, {"key": MIGRATION_LOCK}).scalar():
                 time.sleep(LOCK_PAUSE_S)
             try:
+                if (found := self.schema()) is not None and found not in known_schemas():
+                    raise SchemaVersionError(_unknown(found))
                 migrate_to_newest(self.url)
                 with self.engine.begin() as owner:
                     grant_rights(owner)
@@ -210,13 +223,13 @@ class Database:
         from buildarena_store.migrating import known_schemas
 
         known = known_schemas()
-        if found is not None and found not in known and self._compatible_since() in known:
-            return
-        advice = "run `buildarena admin migrate` with the program's version that is to be used"
         if found is not None and found not in known:
-            advice = "it is of a later version, which this one does not work with: upgrade"
+            if self._compatible_since() in known:
+                return
+            raise SchemaVersionError(_unknown(found))
         raise SchemaVersionError(
-            f"the database has schema {found or 'none'}, this program needs {SCHEMA}: {advice}"
+            f"the database has schema {found or 'none'}, this program needs {SCHEMA}: "
+            "run `buildarena admin migrate`"
         )
 
     def _compatible_since(self) -> str | None:

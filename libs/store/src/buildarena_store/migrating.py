@@ -12,6 +12,8 @@ from psycopg.errors import DeadlockDetected
 from sqlalchemy.exc import OperationalError
 
 MIGRATIONS: Final = Path(__file__).parent / "migrations"
+"""The folder at the top of the repository, by a link that wheels follow."""
+TRIGGERS: Final = MIGRATIONS / "sql" / "triggers.sql"
 TRIES: Final = 5
 
 

@@ -259,14 +259,14 @@ journal = Table(
 # agents were answered. Of very long texts the beginning: a row that no index takes is no row.
 REPLY_WORDS = text("to_tsvector('english'::regconfig, \"left\"(reply ->> 'text'::text, 100000))")
 FEEDBACK_WORDS = text(
-    "\nCASE\n    WHEN length(data::text) < 100000 THEN to_tsvector('english'::regconfig, "
+    "(\nCASE\n    WHEN length(data::text) < 100000 THEN to_tsvector('english'::regconfig, "
     "jsonb_path_query_array(data, '$.\"results\"[*][2]'::jsonpath))\n    "
-    "ELSE NULL::tsvector\nEND"
+    "ELSE NULL::tsvector\nEND)"
 )
 ANSWER_WORDS = text("to_tsvector('english'::regconfig, \"left\"(feedback, 100000))")
 TOLD_WORDS = text(
-    "\nCASE\n    WHEN length(told::text) < 100000 "
-    "THEN to_tsvector('english'::regconfig, told)\n    ELSE NULL::tsvector\nEND"
+    "(\nCASE\n    WHEN length(told::text) < 100000 "
+    "THEN to_tsvector('english'::regconfig, told)\n    ELSE NULL::tsvector\nEND)"
 )
 Index("ix_journal_words", REPLY_WORDS, postgresql_using="gin", _table=journal)
 Index(
