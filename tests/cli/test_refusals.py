@@ -103,6 +103,7 @@ def test_a_process_refuses_a_foreign_schema(database_url, broker_url, module) ->
     def stamp(revision: str) -> None:
         with database.transaction() as connection:
             connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{revision}'")
+            connection.exec_driver_sql(f"UPDATE schema_compatibility SET since = '{revision}'")
 
     stamp("2026_11_27_what_goes")
     try:
