@@ -95,7 +95,7 @@ def test_a_result_of_other_kernels_is_held_to_those_that_it_names(context, job) 
     assert verifier(context).verify(job.id).verdict == Verdict.INCONCLUSIVE
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 @several
 def test_a_result_that_names_no_processor_is_tried_with_all_kernels(
     context, job, monkeypatch

@@ -139,7 +139,7 @@ def test_a_program_is_no_answer_where_keys_alone_count() -> None:
     assert played.suspended is None or played.suspended.machine.controller == ""
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_a_job_is_scored_over_the_worlds_that_its_trials_drew(context, submissions) -> None:
     job, _ = submissions.submit_job(
         JobSpec(task=TASK, model="builtin/expert", workflow="builder", worlds=2)

@@ -77,14 +77,14 @@ def test_each_world_is_a_trial_of_the_same_machine_and_the_job_has_their_mean(
     assert verdict(context, job) == "verified"
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_seeds_are_drawn_anew_for_each_job(context, submissions) -> None:
     jobs = [tried(context, submissions, seed=seed) for seed in (0, 1)]
     seeds = [{r.seed for r in rollouts(context, job)[1]} for job in jobs]
     assert not seeds[0] & seeds[1]
 
 
-@pytest.mark.ci
+@pytest.mark.nightly
 def test_the_best_of_several_trials_is_what_worlds_try(context, submissions) -> None:
     # Its controller tries several times; a closed loop ends in its session, not in a trial.
     loop = ClosedLoop(rounds=2)

@@ -43,8 +43,8 @@ def test_a_whole_session_over_http_equals_the_one_played_inside(play, client, su
     for protocol in PROTOCOLS:
         with subtests.test(protocol=protocol):
             with ProviderStandIn() as standin:
-                over_http = play(client=client(standin, protocol), workflow="five-role")
-            inside = play(workflow="five-role")
+                over_http = play(client=client(standin, protocol), workflow="guidance-builder")
+            inside = play(workflow="guidance-builder")
             assert over_http.suspended is not None, over_http.failure
             assert (
                 over_http.suspended.machine.to_document() == inside.suspended.machine.to_document()
