@@ -124,6 +124,15 @@ def with_pieces(trajectory: Trajectory, *groups: Sequence[str], since_s: float =
     return replace(trajectory, pieces=pieces)
 
 
+def shifted(trajectory: Trajectory, by: object, *blocks: str) -> Trajectory:
+    """The trajectory with blocks, or all, moved by (3,) or (T, 3)."""
+    columns = [trajectory.block_ids.index(block) for block in blocks or trajectory.block_ids]
+    positions = trajectory.positions.copy()
+    way = np.broadcast_to(np.asarray(by, dtype=np.float32), (len(positions), 3))
+    positions[:, columns] += way[:, None]
+    return replace(trajectory, positions=positions)
+
+
 @pytest.fixture(scope="session")
 def tasks() -> dict[str, Task]:
     return dict(builtin_tasks())
