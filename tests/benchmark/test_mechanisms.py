@@ -20,7 +20,7 @@ from tests.benchmark.conftest import (
 from buildarena_benchmark import Score, Task, score
 from buildarena_geometry import Machine
 from buildarena_simulation import Event, Trajectory
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, UP, WEST, Draft
 
 
 def only_wheels(machine: Machine, trial: Trajectory, **forces: object) -> Trajectory:
@@ -319,8 +319,6 @@ def test_what_the_gears_must_be(tasks) -> None:
     assert winch(tasks, draft.machine).flags == ("not_geared",), "the base holds the cargo"
     draft.connect(base, "13", UP, connector="Winch")
     assert winch(tasks, draft.machine).flags == ("not_geared",), "a rope goes round the axle"
-
-
 
 
 def test_the_keys_that_were_played_decide(tasks, train) -> None:
