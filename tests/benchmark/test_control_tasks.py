@@ -333,9 +333,3 @@ def test_worlds_are_as_the_statements_say() -> None:
     lines = [TASKS["line-1"].scenario.world(seed).line for seed in range(100)]
     assert all(60 <= line.length <= 90 and line.greatest_curvature <= 1 / 6 for line in lines)
     assert 30 < sum(line.side >= 0 for line in lines) < 70
-
-
-def test_there_are_no_wheels_and_no_fans_where_an_arm_is_asked_for() -> None:
-    modules = TASKS["place-2"].constraints.catalogue
-    assert not any(module.motor or module.thrust for module in modules.values())
-    assert "Flying Block" not in modules

@@ -14,7 +14,7 @@ from tests.benchmark.conftest import expert, honest, strict
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, simulate
-from buildarena_worker.builtin.designs import piloted, throwers, vehicles
+from buildarena_worker.builtin.designs import throwers, vehicles
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
 
 TASKS: Final = builtin_tasks()
@@ -151,19 +151,6 @@ def test_a_tower_that_topples_onto_the_ball(engine) -> None:
     fails(scored(TASKS["deliver-1"], expert("deliver-1", []), engine, None))
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_what_is_too_high_stays_before_the_barrier(engine) -> None:
-    high, base = expert("deliver-1"), "1"
-    for _ in range(2):
-        block = high.blocks[base]
-        (top,) = (f.label for f in block.module.faces if block.face_normal(f.label)[2] > 0.99)
-        told = {"base_block": base, "face": top, "new_block": "Small Wooden Block"}
-        assert high.act("attach_block_to", told).ok
-        base = list(high.blocks)[-1]
-    assert not scored(TASKS["deliver-3"], high, engine, None).success
-
-
 # Courses
 
 
@@ -171,13 +158,6 @@ def straight() -> Machine:
     """A car that drives north and never steers."""
     presses = [("UpArrow", 0.4, 19.0)]
     return drafted(vehicles._vehicle(length=5, track=1, deck=None, presses=presses))
-
-
-@pytest.mark.nightly
-def test_who_never_steers_does_not_get_through() -> None:
-    """Wider than the gap it stays before that; along the track walls turn it once, not twice."""
-    for name in ("drive-3", "drive-4"):
-        assert not scored(TASKS[name], straight(), "mujoco", None).success
 
 
 @pytest.mark.nightly
@@ -249,29 +229,3 @@ def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
         assert program.count(before) == 1, before
         program = program.replace(before, after)
     fails(scored(TASKS["place-2"], machine.with_controller(program), engine, None))
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_what_topples_over_has_placed_nothing(engine, monkeypatch) -> None:
-    """The same arm on a small foot."""
-    monkeypatch.setattr(piloted, "_FOOT", 2)
-    monkeypatch.setattr(piloted, "_TOES", 1)
-    result = scored(TASKS["place-2"], expert("place-2"), engine, None)
-    fails(result)
-    assert result.metrics["base_shift"] > 0.5
-
-
-@pytest.mark.nightly
-def test_who_remembers_where_things_were_fails_where_they_are_not() -> None:
-    """It looks at one of the two only; for the other it takes the exact world's place."""
-    task, machine, _ = honest("place-2")
-    for what, place in (
-        ("cargo", task.scenario.cargo.at),
-        ("goal", task.scenario.marks[0].center),
-    ):
-        known = f"reach(sense, answer, {{ x = {place[0]}, y = {place[1]} }})"
-        program = machine.controller.replace(f"reach(sense, answer, seen.{what})", known)
-        blind = machine.with_controller(program)
-        assert scored(task, blind, "mujoco", None).success
-        assert sum(scored(task, blind, "mujoco", seed).success for seed in range(4)) < 2

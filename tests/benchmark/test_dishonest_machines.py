@@ -8,10 +8,9 @@ from typing import Final
 import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.piloted import FASTER_FIRST, scored
-from tests.benchmark.conftest import expert, honest, strict
+from tests.benchmark.conftest import expert, strict
 
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_benchmark.scorers.measures.walking import links_of, touching, walked
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_simulation.scenario import Push
@@ -65,52 +64,21 @@ def tandem() -> KeyedDraft:
     return draft
 
 
-def flat() -> KeyedDraft:
-    """On a wheel that lies, as on a foot, with the second wheel on the same axis above."""
-    draft, middle = workshop()
-    draft.attach(middle, DOWN, "Large Wheel")
-    top = draft.attach(draft.attach(middle, UP, "Log"), UP, "Log")
-    draft.attach(top, UP, "Powered Wheel")
-    return draft
-
-
-def north_south() -> KeyedDraft:
-    """Its axle lies along the tilt, which its wheels bear; forwards it stands exactly upright."""
-    draft, middle = workshop()
-    for way in (NORTH, SOUTH):
-        draft.attach(draft.row(middle, way, 2)[-1], way, "Powered Wheel")
-    for _ in range(3):
-        middle = draft.attach(middle, UP, "Log")
-    return draft
-
-
-def with_pole() -> KeyedDraft:
-    """Leans on poles that reach the ground far before and behind it."""
-    draft = cart()
-    top = list(draft.machine.blocks)[-1]
-    for way in (NORTH, SOUTH):
-        end = draft.attach(top, way)
-        for side in (way, way, DOWN, DOWN, DOWN):
-            end = draft.attach(end, side, "Log")
-    return draft
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize(
     ("build", "flags"),
     [
         (cart, ()),
-        (with_pole, None),
         (short, ("propped",)),
-        *((build, ("not_on_two_wheels",)) for build in (third_wheel, tandem, flat, north_south)),
+        *((build, ("not_on_two_wheels",)) for build in (third_wheel, tandem)),
     ],
 )
 def test_who_does_nothing_does_not_balance(build, flags, engine) -> None:
     result = scored(TASKS["balance-1"], build().machine.with_controller(IDLE), engine, None)
     assert not result.success, result
     assert result.indicator < 15
-    assert flags is None or result.flags == flags
+    assert result.flags == flags
     assert result.indicator == 0 or not flags
 
 
@@ -134,17 +102,6 @@ def test_spinning_in_place_does_not_balance(engine) -> None:
     spins = f'["3.spinning_forward"] = {share}, ["5.spinning_forward"] = -{share}'
     result = scored(TASKS["balance-1"], moved_by(draft, spins), engine, None)
     assert (result.success, result.indicator < 5) == (False, True)
-
-
-@pytest.mark.nightly
-def test_who_keeps_its_place_earns_more_and_who_falls_only_its_time() -> None:
-    task, machine, trial = honest("balance-2")
-    roams = machine.with_controller(machine.controller.replace("clip(place, 3)", "0.3"))
-    away = scored(task, roams, "mujoco", None)
-    assert away.success
-    assert 25 < away.indicator < score(task, machine, trial).indicator < 26
-    fallen = scored(task, machine.with_controller(IDLE), "mujoco", None)
-    assert fallen.indicator == fallen.metrics["balanced_s"] < 3
 
 
 # Walking
@@ -238,35 +195,6 @@ def test_who_is_pushed_and_slides_does_not_walk(build, engine) -> None:
     result = score(WALK, machine, trial)
     assert float(trial.positions[:, 0, 1].max()) > 8
     assert (result.success, result.indicator < 3) == (False, True), result
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_feet_take_turns_and_the_least_of_all_counts(engine) -> None:
-    machine = expert("walk-1")
-    trial = simulate(machine, LEVEL, engine)
-    links = links_of(machine, trial)
-    assert len(set(links.tolist())) == 6  # a body, a frame, a hinge's far side, and between pistons
-    touches = touching(LEVEL, machine, trial, links)
-    assert touches.any(axis=0).sum() == 2
-    assert (touches.sum(axis=1) == 1).mean() > 0.7
-    result = score(WALK, machine, trial)
-    assert 8 < result.indicator < float(trial.positions[:, 0, 1].max()) + 0.01
-    north = walked(machine, trial, links, touches, axis=1, since=0)
-    assert result.indicator == pytest.approx(float(north.max()), abs=1e-5)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_the_corner_must_be_walked_to_and_round(engine) -> None:
-    """Who only walks north, or east at once, does not pass, and north counts to the corner."""
-    machine = expert("walk-2")
-    for aim in ("return 0, 2", "return math.pi / 2, 2"):
-        program = machine.controller.replace(
-            "local corner = sense", f"do {aim} end local corner = sense"
-        )
-        result = scored(TASKS["walk-2"], machine.with_controller(program), engine, None)
-        assert (result.success, result.indicator < 6) == (False, True), result
 
 
 # Landing and keeping a place

@@ -4,7 +4,6 @@ import csv
 import json
 import threading
 import time
-from typing import Any
 
 import pytest
 from sqlalchemy import insert, select, update
@@ -13,7 +12,6 @@ from support.clients.terminals import on_terminal, piped
 from support.stages import work
 
 from buildarena_cli.commands.job_lists import COLUMNS
-from buildarena_cli.terminal import boards
 from buildarena_cli.terminal.output import columns, print_table
 from buildarena_pipeline.agents.sessions import ExternalSessions
 from buildarena_pipeline.catalog.specs import SweepSpec
@@ -143,62 +141,6 @@ def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(
 
 
 # Tables: whole through a pipe; on a terminal columns give way, and ids and figures never do
-
-TASKS = [f"{kind}-{level}" for kind in ("transport", "support", "lift") for level in (1, 2, 3)]
-MODELS = ["builtin/expert", "openai/gpt-5", "x/" + "long-name-" * 3]
-
-
-def board_row(place: int, model: str, task: str) -> dict[str, Any]:
-    return {
-        "model": model,
-        "configuration": "c",
-        "baseline": model.startswith("builtin/"),
-        "decoding": {},
-        "by_runner": 0,
-        "unverified": 0,
-        "refuted": 0,
-        "successes": place,
-        "trials": 4,
-        "success_low": 0.1,
-        "success_high": 0.9,
-        "too_few_data": False,
-        "indicator_mean": 1000.0 * place + TASKS.index(task),
-    }
-
-
-def test_an_overview_has_every_figure_within_the_terminals_width(capsys, monkeypatch) -> None:
-    board = {
-        "tasks": [
-            {
-                "task": task,
-                "indicator": "height" if task.startswith("lift") else "distance",
-                "unit": "units",
-                "rows": [board_row(n, model, task) for n, model in enumerate(MODELS, 1)],
-            }
-            for task in TASKS
-        ],
-        "overall": [
-            {"model": model, "configuration": "c", "rank": n} for n, model in enumerate(MODELS, 1)
-        ],
-        "flags": [],
-    }
-    boards.overview(board)
-    head, first, *_ = capsys.readouterr().out.splitlines()
-    assert head.split() == ["#", "model", *TASKS]
-    assert first.count("1/4  10-90 %  1,00") == 9
-    monkeypatch.setattr(boards, "is_terminal", lambda: True)
-    for width in (300, 150, 80, 60):
-        monkeypatch.setattr(boards, "terminal_width", lambda width=width: width)
-        boards.overview(board)
-        text = capsys.readouterr().out.partition("Successes of jobs, the rate's exact")[0]
-        assert max(map(len, text.splitlines())) <= width
-        figures = [f"{place},00{task}.0" for place in (1, 2, 3) for task in range(9)]
-        assert [figure for figure in figures if figure not in text] == []
-    board["tasks"][1]["rows"].pop()
-    board["overall"][2]["rank"] = None
-    boards.overview({**board, "tasks": board["tasks"][:2]})
-    last = capsys.readouterr().out.partition("Successes")[0].strip().splitlines()[-1]
-    assert last.split()[-3:] == ["-", "-", "-"], "what was not tried is a dash"
 
 
 @pytest.mark.usefixtures("sweep")

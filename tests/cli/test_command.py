@@ -11,7 +11,7 @@ from itertools import chain
 
 import psutil
 import pytest
-from support.clients.terminals import on_terminal, piped
+from support.clients.terminals import piped
 from support.machines.experts import experts_machine
 from typer.core import TyperArgument
 from typer.main import get_command
@@ -76,13 +76,6 @@ def test_each_shell_is_offered_commands_and_options() -> None:
         assert word in piped(**completing(shell, line)).stdout, line
         script = piped(_BUILDARENA_COMPLETE=f"source_{shell}").stdout
         assert f"_BUILDARENA_COMPLETE=complete_{shell}" in script
-
-
-def test_help_is_one_line_a_sentence_through_a_pipe_and_fits_a_terminal() -> None:
-    lines = piped("--help").stdout.splitlines()
-    assert any(line.endswith(COMMANDS["demo"].help) for line in lines)
-    code, shown = on_terminal(60, "--help")
-    assert (code, max(map(len, shown.splitlines())) <= 60) == (0, True)
 
 
 # Refusals

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 from support.clients.commands import printed, run, run_cli
-from support.jobs import finish
 from support.machines.experts import experts_machine
 from support.stages import work
 
@@ -14,7 +13,7 @@ from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_besiege import MachineNotPlayableError, read_any_machine, with_own_keys
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
+from buildarena_pipeline.catalog.specs import JobSpec
 
 SUSPENSION_BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 
@@ -194,19 +193,3 @@ def test_added_tasks_are_listed_shown_and_kept_by_version(url, tmp_path) -> None
     assert done.returncode == 1
     for part in ("nowhere", "choose from transport-1", "narrow-gap"):
         assert part in done.stderr
-
-
-def test_a_leaderboard_of_own_tasks_alone_has_no_overall_table(
-    url, context, submissions, tmp_path
-) -> None:
-    file = tmp_path / "mine.yaml"
-    file.write_text(EXAMPLE)
-    printed(url, "task", "add", str(file))
-    spec = SweepSpec(tasks=["narrow-gap", "lift-1"], models=["builtin/random"], samples=2)
-    submissions.submit_sweep(spec)
-    while (lease := context.store.leases.claim("construct", owner="w")) is not None:
-        finish(context, lease, "success", 150.0, metrics={"parts": 7})
-    text = printed(url, "leaderboard")
-    assert "narrow-gap: load in mass units" in text
-    assert "Over lift-1\n" in text
-    assert "Over lift-1" not in printed(url, "leaderboard", "--task", "narrow-gap")

@@ -7,7 +7,6 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 from support.clients.commands import printed, run, run_cli
-from support.clients.terminals import on_terminal
 from support.jobs import execute
 
 from buildarena_benchmark import parse_custom_task
@@ -84,15 +83,6 @@ def test_what_the_service_does_not_know_is_reported_with_its_line(url, file, tmp
     options.write_text("simulator: mujoco\n")
     done = run_cli(url, "job", "submit", "lift-9", *words[3:])
     assert (done.returncode, done.stderr[:20]) == (1, "TASK: task: there is")
-
-
-@pytest.mark.ci
-def test_a_dry_run_says_what_the_sweep_could_show(url, file) -> None:
-    words = ["sweep", "run", str(file), "--dry-run", "--url", url, "--samples"]
-    code, told = on_terminal(120, *words, "64", NO_COLOR="1")
-    assert code == 0, told
-    assert "64 trials of each model on each task" in told
-    assert "trials of each model on each task show 10 points over all tasks" in told
 
 
 def test_flags_take_the_place_of_the_files_fields(url, file) -> None:

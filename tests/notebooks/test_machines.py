@@ -1,4 +1,4 @@
-"""Machines, trials and their pages in notebooks: those of the libraries, and no stranger's markup."""
+"""Machines, trials and their pages in notebooks: those of the libraries, and no stray markup."""
 
 import base64
 import gzip
@@ -29,7 +29,7 @@ ROW = "Small Wooden Block"
 HOSTILE = "</script><script>window.hurt=1</script><img src=x onerror=window.hurt=1>'\"&"
 
 
-def row(each_side: int, note: str = "") -> ba.Machine:
+def row(each_side: int, **more: str) -> ba.Machine:
     """A row over the gap."""
     machine = ba.Machine()
     machine.start()
@@ -37,7 +37,7 @@ def row(each_side: int, note: str = "") -> ba.Machine:
         base = "1"
         for _ in range(each_side):
             face_of = face if base == "1" else "E"
-            base = machine.attach_block_to(base, face_of, ROW, note=note).changed[0]
+            base = machine.attach_block_to(base, face_of, ROW, **more).changed[0]
     return machine
 
 

@@ -117,20 +117,6 @@ def test_the_published_policy_reads_the_metric_that_was_published() -> None:
     assert [t.indicator for t in counted_trials(found)] == [50.0, 11.0, 0.0, 0.0]
 
 
-def bridges(model: str, successes: int, load: float, *given: str) -> list[EndedJob]:
-    found = trials("support-1", model, successes, 64)
-    return [replace(t, indicator=load, flags=given) if t.success else t for t in found]
-
-
-def test_a_bridge_that_carries_everything_is_the_best_result() -> None:
-    board = board_of(bridges("all", 40, 1500.0, "never_fell"), bridges("some", 6, 200.0))
-    first, second = board.board(ALL).tasks[0].rows
-    assert (first.cell.model, first.rank, first.cell.censored) == ("all", 1, 40)
-    assert (second.cell.model, second.rank) == ("some", 2)
-    published = board.board(BoardQuery(policy=PUBLISHED)).tasks[0].rows
-    assert [(row.cell.model, row.cell.trials) for row in published] == [("some", 64), ("all", 24)]
-
-
 def test_who_cheats_does_not_gain_by_it() -> None:
     """Not in our policy: neither by far-off figures nor by having few trials that count."""
     cheat = trials("lift-1", "a", 60, 64, flags=("not_driven",), indicator=1e6)
@@ -201,13 +187,6 @@ def test_only_the_current_version_of_a_task_counts() -> None:
         for t in own
     ]
     assert board_of(own, newer).board(ALL).tasks[0].version == "v0"
-
-
-def test_one_model_with_two_decodings_has_two_rows() -> None:
-    plain = trials("lift-1", "a", 2, 4)
-    warm = [replace(t, configuration="warm", job_id=f"w{t.job_id}") for t in plain]
-    rows = board_of(plain, warm).board(ALL).tasks[0].rows
-    assert {row.cell.configuration for row in rows} == {"a", "warm"}
 
 
 def test_queries_choose_tasks_models_and_time() -> None:

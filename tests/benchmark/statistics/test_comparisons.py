@@ -29,6 +29,8 @@ def test_mcnemar_of_a_hand_worked_case() -> None:
     test = paired_successes(first, second)
     assert test.p_value == pytest.approx(18 / 256)
     assert (test.pairs, test.difference) == (12, 0.5)
+    assert paired_successes([], []) is paired_indicators([], []) is None
+    assert paired_indicators([0.0, 3.0], [0.0, 3.0]).p_value == 1.0
 
 
 def test_wilcoxon_of_a_case_that_can_be_counted() -> None:
@@ -39,12 +41,6 @@ def test_wilcoxon_of_a_case_that_can_be_counted() -> None:
     ]
     p_value = 2 * min(np.mean([s >= 10 for s in sums]), np.mean([s <= 10 for s in sums]))
     assert paired_indicators(difference, [0.0] * 5).p_value == pytest.approx(p_value)
-
-
-def test_no_pairs_and_no_differences() -> None:
-    assert paired_successes([], []) is paired_indicators([], []) is None
-    assert paired_successes([True, False], [True, False]).p_value == 1.0
-    assert paired_indicators([0.0, 3.0], [0.0, 3.0]).p_value == 1.0
 
 
 def test_mcnemar_finds_nothing_between_equal_models() -> None:
@@ -94,14 +90,6 @@ def test_token_bins_of_a_hand_worked_case() -> None:
     assert (second.low, second.high, second.trials) == (100, 1000, 3)
     assert first.mean == pytest.approx(0.125)
     assert (second.mean, second.median) == (pytest.approx(0.5), pytest.approx(0.5))
-
-
-@given(st.lists(st.tuples(st.integers(0, 10**6), st.floats(0, 1500)), max_size=40))
-def test_every_trial_is_in_one_bin(trials) -> None:
-    tokens = np.array([t for t, _ in trials], float)
-    bins = token_bins(tokens, np.array([v for _, v in trials], float))
-    assert sum(b.trials for b in bins) == len(trials)
-    assert all(b.mean is None or 0 <= b.mean <= 1 for b in bins)
 
 
 def test_the_cost_of_a_success_includes_the_failures() -> None:
@@ -208,7 +196,6 @@ def test_models_of_equal_means_and_unequal_spread_are_not_told_apart() -> None:
 
 SHAPES = {
     "exponential": lambda rng, n: rng.exponential(1.0, n),
-    "normal": lambda rng, n: rng.normal(100, 20, n),
     "heavy": lambda rng, n: rng.lognormal(3, 1, n),
     "two designs": lambda rng, n: np.where(
         rng.random(n) < 0.5, rng.normal(10, 1, n), rng.normal(500, 30, n)

@@ -205,11 +205,3 @@ def test_the_expert_scores_one_and_a_failure_nothing() -> None:
         assert summarise([*made(task, *[expert] * 12), *failed]).score == pytest.approx(0.5)
     own = summarise(made("custom", *[3.0] * 12))
     assert (own.score, own.score_low, own.score_high, own.indicator_mean) == (None, None, None, 3)
-
-
-def test_one_lucky_trial_carries_a_mean_of_indicators_but_no_score() -> None:
-    task, expert = next(iter(references().items()))
-    steady = summarise(made(task, *[expert] * 20))
-    lucky = summarise(made(task, 30 * expert, *[0.1 * expert] * 19))
-    assert lucky.indicator_mean > steady.indicator_mean
-    assert lucky.score < steady.score
