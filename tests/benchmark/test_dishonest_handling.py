@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any, Final
 
 import pytest
+from support.machines.boulders import car_with_boulder
 from support.machines.drafts import KeyedDraft
 from support.machines.headroom import drafted
 from support.machines.piloted import FASTER_FIRST, scored
@@ -65,15 +66,7 @@ def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_throwing_by_driving(engine) -> None:
     """A car that carries the boulder north and brakes at the line."""
-    draft = KeyedDraft(modules="all")
-    start = draft.start()
-    beam = draft.row(start, SOUTH, 3)
-    for base in (start, beam[-1]):
-        for side in (EAST, WEST):
-            draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
-    draft.attach(draft.attach(beam[1], UP, "Bomb Holder"), UP, "Boulder")
-    draft.press("UpArrow", 1.0, 3.0)
-    fails(scored(strict(THROW, min_distance=0.0), draft.machine, engine, None))
+    fails(scored(strict(THROW, min_distance=0.0), car_with_boulder(), engine, None))
 
 
 @pytest.mark.nightly(keep=1)
