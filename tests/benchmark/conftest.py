@@ -3,14 +3,18 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 from support.machines.building import BLOCK, built
+from support.machines.headroom import Presses, drafted
+from support.machines.piloted import experts_machine
 
-from buildarena_benchmark import Task, builtin_tasks
+from buildarena_benchmark import Task, builtin_tasks, score
 from buildarena_geometry import Machine
-from buildarena_simulation import Bearing, Trajectory
+from buildarena_simulation import Bearing, Trajectory, simulate
+from buildarena_worker.builtin.designs import DESIGNS
 
 Path = Callable[[np.ndarray], np.ndarray]
 
@@ -122,6 +126,45 @@ def with_pieces(trajectory: Trajectory, *groups: Sequence[str], since_s: float =
         for column in columns:
             pieces[trajectory.time_s >= since_s, column] = columns[0]
     return replace(trajectory, pieces=pieces)
+
+
+def shifted(trajectory: Trajectory, by: object, *blocks: str) -> Trajectory:
+    """The trajectory with blocks, or all, moved by (3,) or (T, 3)."""
+    columns = [trajectory.block_ids.index(block) for block in blocks or trajectory.block_ids]
+    positions = trajectory.positions.copy()
+    way = np.broadcast_to(np.asarray(by, dtype=np.float32), (len(positions), 3))
+    positions[:, columns] += way[:, None]
+    return replace(trajectory, positions=positions)
+
+
+def lost(trajectory: Trajectory, since: int, columns: object) -> Trajectory:
+    """The trajectory in which what is at columns comes off at a sample, in one piece."""
+    pieces = trajectory.pieces.copy()
+    pieces[since:, columns] = pieces.max() + 1
+    return replace(trajectory, pieces=pieces)
+
+
+def strict(task: Task, **scoring: object) -> Task:
+    """The task with other thresholds."""
+    return replace(task, scoring=task.scoring.model_copy(update=scoring))
+
+
+def expert(name: str, presses: Presses | None = None) -> Machine:
+    """The expert's machine for a task, driven by other presses if given."""
+    task = builtin_tasks()[name]
+    if task.takes_programs and presses is None:
+        return experts_machine(task)
+    modules = "all" if name.startswith("throw") else "workshop"
+    return drafted(DESIGNS[name](0), presses, modules=modules)
+
+
+@cache
+def honest(name: str, engine: str = "mujoco") -> tuple[Task, Machine, Trajectory]:
+    """A task, the expert's machine for it, and its trial in the exact world."""
+    task, machine = builtin_tasks()[name], expert(name)
+    trial = simulate(machine, task.scenario, engine)
+    assert score(task, machine, trial).success
+    return task, machine, trial
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 from itertools import pairwise
 
-import pytest
 import yaml
 from support.machines.building import BLOCK, built, connect
 
@@ -25,156 +24,88 @@ def assembly(*lengths: int, joined: bool = True, connector: str = "Brace") -> Ma
     machine = Machine(available={f"row {n}": row(n) for n in lengths})
     for place, length in enumerate(lengths):
         shift = [3 * place, 0, 0]
-        done = machine.act("add_machine", {"machine_id": f"row {length}", "init_shift": shift})
-        assert done.ok, done.text
+        assert machine.act("add_machine", {"machine_id": f"row {length}", "init_shift": shift}).ok
     letters = list(machine.sub_structures)
     for one, other in pairwise(letters if joined else ()):
-        ends = {"block_a": f"{one}_1", "face_a": "A", "block_b": f"{other}_1", "face_b": "B"}
-        done = machine.act("connect_blocks", {**ends, "connector": connector})
-        assert done.ok, done.text
+        assert connect(machine, f"{one}_1", "A", f"{other}_1", "B", connector=connector).ok
     return machine
 
 
-def test_a_machine_without_anything_built_is_empty(tasks) -> None:
-    for machine in (Machine(), row(1)):
-        broken = broken_constraint(tasks["support-1"], machine)
-        assert broken is not None
-        assert broken[0] == "empty_machine"
+def without(machine: Machine, *blocks: str) -> Machine:
+    for block in blocks:
+        assert machine.act("remove_block", {"block_id": block}).ok
+    return machine
 
 
-def test_each_sub_structure_may_have_its_blocks(tasks) -> None:
-    task = task_with(tasks, max_sub_structures=2, max_blocks=4)
-    assert broken_constraint(task, assembly(4, 4)) is None
-    says = "sub-structure B has 5 blocks, the task allows 4 in one"
-    assert broken_constraint(task, assembly(3, 5)) == ("constraint_violated", says)
-
-
-def test_copies_count_against_the_blocks_of_all(tasks) -> None:
-    task = task_with(tasks, max_sub_structures=2, max_blocks=4)
-    says = "the machine has 11 blocks, the task allows 8 in all"
-    assert broken_constraint(task, assembly(4, 4, 3)) == ("constraint_violated", says)
-
-
-def test_connectors_are_no_blocks(tasks) -> None:
-    machine = row(4)
-    done = connect(machine, "2", "A", "4", "A", connector="Winch")
-    assert done.ok, done.text
-    assert broken_constraint(task_with(tasks, max_blocks=4), machine) is None
-    assert broken_constraint(task_with(tasks, max_blocks=3), machine) is not None
-
-
-@pytest.mark.parametrize(
-    ("constraints", "says"),
-    [
-        ({"modules": ["Small Wooden Block"]}, None),
-        ({"modules": ["Brace"]}, "Small Wooden Block is not among the task's modules"),
-        ({"min_modules": {"Small Wooden Block": 3}}, None),
-        (
-            {"min_modules": {"Small Wooden Block": 3, "Winch": 2}},
-            "the machine has 0 of Winch, the task asks for 2 or more",
-        ),
-    ],
-)
-def test_modules_are_those_that_the_task_names(tasks, constraints, says) -> None:
-    broken = broken_constraint(task_with(tasks, **constraints), row(4))
-    assert broken == (None if says is None else ("constraint_violated", says))
-
-
-@pytest.mark.parametrize(
-    ("least", "most", "lengths", "says"),
-    [
-        (1, 1, (3,), None),
-        (1, 1, (3, 4), "has 2 sub-structures, the task asks for 1"),
+def test_blocks_modules_and_sub_structures_are_counted(tasks, subtests) -> None:
+    rope = row(4)
+    assert connect(rope, "2", "A", "4", "A", connector="Winch").ok
+    removed = assembly(3, 4)
+    assert removed.act("remove_machine", {"machine_index": "B"}).ok
+    two = {"max_sub_structures": 2}
+    needed = {"min_sub_structures": 2, **two}
+    up_to_three = {"min_sub_structures": 1, "max_sub_structures": 3}
+    for constraints, machine, says in (
+        ({**two, "max_blocks": 4}, assembly(4, 4), None),
+        ({**two, "max_blocks": 4}, assembly(3, 5), "B has 5 blocks, the task allows 4 in one"),
+        ({**two, "max_blocks": 4}, assembly(4, 4, 3), "has 11 blocks, the task allows 8 in all"),
+        ({"max_blocks": 4}, rope, None),  # connectors are no blocks
+        ({"max_blocks": 3}, rope, "4 blocks, the task allows 3"),
+        ({"modules": ["Small Wooden Block"]}, row(4), None),
+        ({"modules": ["Brace"]}, row(4), "Small Wooden Block is not among the task's modules"),
+        ({"min_modules": {"Small Wooden Block": 3}}, row(4), None),
+        ({"min_modules": {"Winch": 2}}, row(4), "has 0 of Winch, the task asks for 2 or more"),
+        ({}, assembly(3, 4), "has 2 sub-structures, the task asks for 1"),
         # One piece means one, however often it is copied.
-        (1, 1, (3, 3), "has 2 sub-structures, the task asks for 1"),
-        (1, 3, (3, 4, 5), None),
-        (1, 3, (3, 3, 4, 4), None),  # copies count once
-        (1, 3, (2, 3, 4, 5), "has 4 sub-structures, the task asks for 1 to 3"),
-        (2, 2, (3, 4), None),
+        ({}, assembly(3, 3), "has 2 sub-structures, the task asks for 1"),
+        ({}, removed, None),
+        (up_to_three, assembly(3, 4, 5), None),
+        (up_to_three, assembly(3, 3, 4, 4), None),  # copies count once
+        (up_to_three, assembly(2, 3, 4, 5), "has 4 sub-structures, the task asks for 1 to 3"),
         # An engine and three copies of a frame, or two copies of one thing.
-        (2, 2, (3, 4, 4, 4), None),
-        (2, 2, (3, 3), None),
-        (2, 2, (3, 4, 5), "has 3 sub-structures, the task asks for 2"),
-        (2, 2, (3, 1), "sub-structure B is nothing but its starting block"),
-    ],
-)
-def test_sub_structures_are_counted_on_the_machine(tasks, least, most, lengths, says) -> None:
-    task = task_with(tasks, min_sub_structures=least, max_sub_structures=most)
-    broken = broken_constraint(task, assembly(*lengths))
-    if says is None:
-        assert broken is None
-    else:
-        assert broken is not None
-        assert broken[0] == "constraint_violated"
-        assert broken[1].endswith(says)
+        (needed, assembly(3, 4, 4, 4), None),
+        (needed, assembly(3, 3), None),
+        (needed, row(4), "the machine has 1 sub-structure, the task asks for 2"),
+        (needed, assembly(3, 4, 5), "has 3 sub-structures, the task asks for 2"),
+        (needed, assembly(3, 1), "sub-structure B is nothing but its starting block"),
+    ):
+        with subtests.test(constraints=constraints, says=says):
+            broken = broken_constraint(task_with(tasks, **constraints), machine)
+            assert (broken is None) == (says is None), broken
+            if says is not None:
+                assert broken[0] == "constraint_violated"
+                assert says in broken[1]
 
 
-def test_a_machine_built_in_one_go_is_one_sub_structure(tasks) -> None:
-    assert broken_constraint(tasks["support-1"], row(4)) is None
-    says = "the machine has 1 sub-structure, the task asks for 2"
-    assert broken_constraint(tasks["lift-3"], row(4)) == ("constraint_violated", says)
+def test_what_is_empty_or_not_joined_is_named(tasks, subtests) -> None:
+    far = without(row(3), "2")
+    assert connect(far, "3", "C", "3", "D").ok  # from a block to itself
+    apart = "sub-structure B is not joined to the starting block A_1: join every part by an attachm"
+    singly = "sub-structure B and block A_3 (Small Wooden Block) are not joined"
+    for name, machine, reason, says in (
+        ("support-1", Machine(), "empty_machine", ""),
+        ("support-1", row(1), "empty_machine", ""),
+        ("support-2", assembly(3, 4, connector="Brace"), None, ""),
+        ("support-2", assembly(3, 4, connector="Winch"), None, ""),
+        ("support-2", assembly(3, 4, joined=False), "unjoined_parts", apart),
+        ("support-2", without(assembly(3, 4, joined=False), "A_2"), "unjoined_parts", singly),
+        ("support-1", far, "unjoined_parts", "block 3 (Small Wooden Block)"),
+        ("support-1", without(row(20), "2"), "unjoined_parts", "and 8 more are not joined"),
+    ):
+        with subtests.test(says=says or name):
+            broken = broken_constraint(tasks[name], machine)
+            assert (broken and broken[0]) == reason
+            assert says in (broken[1] if broken else "")
 
 
-def test_a_sub_structure_that_was_removed_does_not_count(tasks) -> None:
-    machine = assembly(3, 4)
-    assert machine.act("remove_machine", {"machine_index": "B"}).ok
-    assert broken_constraint(tasks["support-1"], machine) is None
-    assert broken_constraint(tasks["lift-3"], machine) is not None
-
-
-@pytest.mark.parametrize("connector", ["Brace", "Winch"])
-def test_sub_structures_must_be_joined(tasks, connector) -> None:
-    assert broken_constraint(tasks["support-2"], assembly(3, 4, connector=connector)) is None
-    broken = broken_constraint(tasks["support-2"], assembly(3, 4, joined=False))
-    assert broken is not None
-    reason, sentence = broken
-    assert reason == "unjoined_parts"
-    assert sentence == (
-        "sub-structure B is not joined to the starting block A_1: join every part by an "
-        "attachment that holds or a connector"
-    )
-
-
-def test_an_unjoined_sub_structure_is_named_with_single_blocks(tasks) -> None:
-    machine = assembly(3, 4, joined=False)
-    assert machine.act("remove_block", {"block_id": "A_2"}).ok
-    broken = broken_constraint(tasks["support-2"], machine)
-    assert broken is not None
-    assert broken[1].startswith("sub-structure B and block A_3 (Small Wooden Block) are not joined")
-
-
-@pytest.mark.parametrize("shifts", [1, 2, 3])
-def test_a_block_that_was_shifted_off_its_place_is_unjoined(tasks, shifts) -> None:
-    machine = row(4)
-    for _ in range(shifts):
-        done = machine.act("shift_block", {"block_id": "4", "shift_real": [0.5, 0, 0]})
-        assert done.ok, done.text
-    for task in tasks.values():
-        if task.constraints.min_modules or task.beginning:
-            continue
-        broken = broken_constraint(task, machine)
-        if shifts == 1 and task.name != "lift-3":  # half a unit still holds
-            assert broken is None
-        elif task.name != "lift-3":
-            assert broken is not None
-            assert broken[0] == "unjoined_parts"
-            assert broken[1].startswith("block 4 (Small Wooden Block) is not joined to the start")
+def test_a_block_that_was_shifted_off_its_place_is_unjoined(tasks) -> None:
+    machine, found = row(4), []
+    for _ in range(3):
+        assert machine.act("shift_block", {"block_id": "4", "shift_real": [0.5, 0, 0]}).ok
+        found.append(broken_constraint(tasks["support-1"], machine))
+    assert found[0] is None, "half a unit still holds"
+    for broken in found[1:]:
+        assert broken[0] == "unjoined_parts"
+        assert broken[1].startswith("block 4 (Small Wooden Block) is not joined to the start")
     assert connect(machine, "4", "C", "3", "C").ok
     assert broken_constraint(tasks["support-1"], machine) is None
-
-
-def test_a_connector_from_a_block_to_itself_joins_nothing(tasks) -> None:
-    machine = row(3)
-    assert machine.act("remove_block", {"block_id": "2"}).ok
-    assert connect(machine, "3", "C", "3", "D").ok
-    broken = broken_constraint(tasks["support-1"], machine)
-    assert broken is not None
-    assert "block 3 (Small Wooden Block)" in broken[1]
-
-
-def test_many_unjoined_blocks_are_counted_not_listed(tasks) -> None:
-    machine = row(20)
-    assert machine.act("remove_block", {"block_id": "2"}).ok
-    broken = broken_constraint(tasks["support-1"], machine)
-    assert broken is not None
-    assert "and 8 more are not joined" in broken[1]

@@ -1,31 +1,24 @@
-"""Flight: what counts, and what does not. Trajectories made by hand."""
+"""Flight, and flights round a planet: what counts, and what does not. Trajectories by hand."""
 
-from collections.abc import Callable
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.benchmark.conftest import make_trajectory, with_bearing, with_pieces
+from support.machines.piloted import experts_machine
+from tests.benchmark.conftest import Path, make_trajectory, shifted, with_bearing, with_pieces
 
-from buildarena_benchmark import Score, Task, score
+from buildarena_benchmark import score
+from buildarena_benchmark.scorers.measures.orbits import swept
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
-
-Path = Callable[[np.ndarray], np.ndarray]
-
-
-def still(t: np.ndarray) -> np.ndarray:
-    return np.zeros_like(t)
-
-
-# Hover
 
 
 def hover(
     machine: Machine,
     *,
     height: Path = lambda t: np.interp(t, [0, 5, 14, 16], [0.5, 10, 10, 0.5]),
-    aside: Path = still,
+    drift: float = 0.0,
     tilt_deg: float = 0.0,
     borne: object = 5.0,
     ground: object = 0.0,
@@ -33,7 +26,7 @@ def hover(
     start = next(iter(machine.blocks.values())).center[2]
 
     def moved(t: np.ndarray) -> np.ndarray:
-        return np.column_stack([aside(t), np.zeros_like(t), height(t) - start])
+        return np.column_stack([drift * t, np.zeros_like(t), height(t) - start])
 
     trial = make_trajectory(
         machine,
@@ -43,87 +36,64 @@ def hover(
         cargo_mass=lambda t: np.full_like(t, 5.0),
     )
     half = np.radians(tilt_deg) / 2 * (trial.time_s > 1.0)
-    turned = np.stack([np.cos(half), np.sin(half), still(half), still(half)], axis=1)
-    quaternions = np.repeat(turned[:, None], len(trial.block_ids), axis=1)
-    trial = replace(trial, quaternions=quaternions.astype(np.float32))
-    return with_bearing(trial, cargo=borne, ground=ground)
+    quaternions = np.zeros_like(trial.quaternions)
+    quaternions[:, :, 0], quaternions[:, :, 1] = np.cos(half)[:, None], np.sin(half)[:, None]
+    return with_bearing(replace(trial, quaternions=quaternions), cargo=borne, ground=ground)
 
 
-def hovered(tasks: dict[str, Task], machine: Machine, **how: object) -> Score:
-    return score(tasks["flight-1"], machine, hover(machine, **how))  # type: ignore[arg-type]
+def test_what_is_hovering(tasks, car, subtests) -> None:
+    def risen(begin: float) -> Path:
+        return lambda t: np.interp(t, [0, 3, 14, 16], [begin, 9.6, 9.6, 0])
 
-
-def test_a_machine_that_holds_its_height(tasks, car) -> None:
-    result = hovered(tasks, car)
+    whole = score(tasks["flight-1"], car, hover(car))
     # In the band from 8.5 on the way up to 8.5 on the way down.
-    assert result.success
-    assert result.indicator == pytest.approx(9 + 1.5 / 1.9 + 1.5 / 4.75, abs=0.1)
+    assert whole.indicator == pytest.approx(9 + 1.5 / 1.9 + 1.5 / 4.75, abs=0.1)
+    for name, how, flags in (
+        ("holds its height", {}, None),
+        ("thrown through the band", {"height": lambda t: 0.5 + 30 * t - 16.4 * t**2}, ()),
+        ("in and out", {"height": lambda t: 10 + 2 * np.sin(2 * t)}, ()),
+        ("within", {"height": lambda t: 0.5 + (9.5 + 1.4 * np.sin(2 * t)) * (t > 0)}, None),
+        ("goes up", {"height": lambda t: np.interp(t, [0, 2, 9, 20], [0.5, 10, 10, 60])}, ()),
+        ("tilted", {"tilt_deg": 21.0}, ()),
+        ("hardly tilted", {"tilt_deg": 19.0}, None),
+        ("drifts off", {"drift": 0.6}, ()),
+        ("drifts a little", {"drift": 0.3}, None),
+        ("without its cargo", {"borne": 0.0}, ("not_carried",)),
+        ("half of it hangs on something else", {"borne": 3.5}, ("not_carried",)),
+        ("a tower, or an anchor", {"ground": 3.0}, ("not_airborne",)),
+        ("grips the ground", {"ground": -3.0}, ("not_airborne",)),
+        ("grazes", {"ground": 0.05}, None),
+        ("rises", {"height": risen(1.9)}, None),
+        ("begins high", {"height": risen(2.7)}, ("not_risen",)),
+        ("begins up there", {"height": risen(9)}, ("not_risen",)),
+    ):
+        with subtests.test(name=name):
+            result = score(tasks["flight-1"], car, hover(car, **how))
+            assert (result.success, result.flags) == (flags is None, flags or ())
+            assert result.success or result.indicator < 8 or "not_risen" in result.flags
 
 
-@pytest.mark.parametrize(
-    ("how", "success", "flags"),
-    [
-        ({"height": lambda t: 0.5 + 30 * t - 16.4 * t**2}, False, ()),  # thrown through the band
-        ({"height": lambda t: 10 + 2 * np.sin(2 * t)}, False, ()),  # in and out
-        ({"height": lambda t: 0.5 + (9.5 + 1.4 * np.sin(2 * t)) * (t > 0)}, True, ()),
-        ({"height": lambda t: np.interp(t, [0, 2, 9, 20], [0.5, 10, 10, 60])}, False, ()),
-        ({"tilt_deg": 21.0}, False, ()),
-        ({"tilt_deg": 19.0}, True, ()),
-        ({"aside": lambda t: 0.6 * t}, False, ()),  # drifts off
-        ({"aside": lambda t: 0.3 * t}, True, ()),
-        ({"borne": 0.0}, False, ("not_carried",)),
-        ({"borne": 3.5}, False, ("not_carried",)),  # half of it hangs on something else
-        ({"ground": 3.0}, False, ("not_airborne",)),  # a tower, or an anchor on a rope
-        ({"ground": 0.05}, True, ()),
-    ],
-)
-def test_what_is_hovering(tasks, car, how, success, flags) -> None:
-    result = hovered(tasks, car, **how)
-    assert (result.success, result.flags) == (success, flags)
-    assert success or result.indicator < 8
+def test_what_stays_on_or_near_the_ground(tasks, car) -> None:
+    """A wheel, whose radius is 1, hangs low from 3 s on; what came off may lie on the ground."""
+    wheel = next(block for block in car.blocks.values() if block.module.spins)
+    upright = np.tile(np.float32([0.5**0.5, 0, 0.5**0.5, 0]), (501, 11, 1))
+    trial = replace(hover(car), quaternions=upright)
+    column, since = trial.block_ids.index(wheel.id), trial.time_s > 3
 
+    def hanging(trial: Trajectory, low: float) -> Trajectory:
+        way = np.where(since, low + 1.0 - trial.positions[:, column, 2], 0.0)
+        return shifted(trial, np.outer(way, [0, 0, 1]), wheel.id)
 
-def test_what_was_dropped_may_lie_on_the_ground(tasks, car) -> None:
+    for low, flags in ((5.05, ()), (4.95, ("not_risen",)), (0.3, ("not_risen",))):
+        result = score(tasks["flight-1"], car, hanging(trial, low))
+        assert (result.success, result.flags) == (not flags, flags)
+    came_off = with_pieces(hanging(hover(car), 0.0), [wheel.id], since_s=2.9)
+    assert score(tasks["flight-1"], car, came_off).success
     dropped = list(car.blocks)[-2:]
     weight = sum(car.blocks[block].module.mass for block in dropped)
     trial = hover(car, ground=np.where(np.arange(501) > 100, weight, 0.0))
-    kept = score(tasks["flight-1"], car, trial)
-    assert kept.flags == ("not_airborne",)
+    assert score(tasks["flight-1"], car, trial).flags == ("not_airborne",)
     assert score(tasks["flight-1"], car, with_pieces(trial, dropped, since_s=2.0)).success
-
-
-def hang_below(machine: Machine, trial: Trajectory, low: float) -> Trajectory:
-    """The trajectory in which a wheel's lowest point is at a height from 3 s on."""
-    positions = trial.positions.copy()
-    column = trial.block_ids.index(next(b.id for b in machine.blocks.values() if b.module.spins))
-    positions[trial.time_s > 3, column, 2] = low + 1.0  # its radius
-    return replace(trial, positions=positions)
-
-
-@pytest.mark.parametrize(
-    ("low", "flags"), [(5.05, ()), (4.95, ("not_risen",)), (0.3, ("not_risen",))]
-)
-def test_no_part_stays_near_the_ground(tasks, car, low, flags) -> None:
-    turned = replace(
-        hover(car), quaternions=np.tile(np.float32([0.5**0.5, 0, 0.5**0.5, 0]), (501, 11, 1))
-    )
-    result = score(tasks["flight-1"], car, hang_below(car, turned, low))
-    assert (result.success, result.flags) == (not flags, flags)
-
-
-@pytest.mark.parametrize(("begin", "success"), [(0.5, True), (1.9, True), (2.7, False), (9, False)])
-def test_the_starting_block_has_risen(tasks, car, begin, success) -> None:
-    result = hovered(
-        tasks, car, height=lambda t: np.interp(t, [0, 3, 14, 16], [begin, 9.6, 9.6, 0])
-    )
-    assert result.success == success
-    assert result.flags == (() if success else ("not_risen",))
-
-
-def test_a_part_that_came_off_may_lie_on_the_ground(tasks, car) -> None:
-    wheel = next(b.id for b in car.blocks.values() if b.module.spins)
-    trial = with_pieces(hang_below(car, hover(car), 0.0), [wheel], since_s=2.9)
-    assert score(tasks["flight-1"], car, trial).success
 
 
 # Glide
@@ -143,68 +113,158 @@ def glide(
         fall = 40.0 - np.minimum(sink * t, 40.0)
         if flare is not None:
             fall = np.where(t > end_s - 1, flare * np.maximum(end_s - t, 0), fall)
-        way = speed * np.minimum(t, end_s)
-        return np.column_stack([np.zeros_like(t), way, fall])
+        return np.column_stack([np.zeros_like(t), speed * np.minimum(t, end_s), fall])
 
     trial = make_trajectory(machine, 30.0, moved=moved)
     touches = trial.time_s > end_s - 1e-9
     return with_bearing(trial, ground=np.where(touches & land, float(machine.mass), 0.0))
 
 
-def glided(tasks: dict[str, Task], machine: Machine, **how: object) -> Score:
-    return score(tasks["flight-2"], machine, glide(machine, **how))  # type: ignore[arg-type]
-
-
-def test_a_glider_that_lands_gently(tasks, car) -> None:
-    result = glided(tasks, car)
-    assert result.success
+def test_what_is_a_glide(tasks, car, subtests) -> None:
+    result = score(tasks["flight-2"], car, glide(car))
     assert result.indicator == pytest.approx(150 / 40, rel=0.01)
     assert result.metrics["sink_at_landing"] == pytest.approx(4.0, rel=0.01)
+    for name, how, success in (
+        ("lands gently", {}, True),
+        ("not far enough", {"speed": 7.9}, False),
+        ("far enough", {"speed": 8.2}, True),
+        ("too hard", {"sink": 6.5, "speed": 20.0}, False),
+        ("a flare before the ground", {"sink": 6.5, "speed": 20.0, "flare": 3.0}, True),
+        ("a dive at the end", {"sink": 3.0, "flare": 9.0}, False),
+        ("never comes down", {"land": False}, False),
+        ("not within the trial", {"sink": 1.0}, False),
+        ("a stone", {"sink": 25.6}, False),
+    ):
+        with subtests.test(name=name):
+            assert score(tasks["flight-2"], car, glide(car, **how)).success == success
 
 
-@pytest.mark.parametrize(
-    ("how", "success"),
-    [
-        ({"speed": 7.9}, False),  # not far enough
-        ({"speed": 8.2}, True),
-        ({"sink": 6.5, "speed": 20.0}, False),  # too hard
-        ({"sink": 6.5, "speed": 20.0, "flare": 3.0}, True),  # a flare before the ground
-        ({"sink": 3.0, "flare": 9.0}, False),  # a dive at the end
-        ({"land": False}, False),  # never comes down
-        ({"sink": 1.0, "speed": 15.0, "land": True}, False),  # not within the trial
-        ({"sink": 25.6, "speed": 15.0}, False),  # a stone
-    ],
-)
-def test_what_is_a_glide(tasks, car, how, success) -> None:
-    assert glided(tasks, car, **how).success == success
-
-
-def test_the_flight_ends_at_the_first_touch(tasks, car) -> None:
-    """A machine that bounces, or slides on, flies no farther."""
-    trial = glide(car)
+def test_the_flight_ends_at_the_first_touch_of_what_is_still_joined(tasks, car) -> None:
     touched = np.zeros(751)
     touched[100] = 30.0  # touches at 4 s, and flies on
-    result = score(tasks["flight-2"], car, with_bearing(trial, ground=touched))
+    result = score(tasks["flight-2"], car, with_bearing(glide(car), ground=touched))
     assert (result.success, result.indicator) == (False, 0.0)
     assert result.metrics["range"] == pytest.approx(60, rel=0.01)
-
-
-def test_what_came_off_does_not_soften_the_landing(tasks, car) -> None:
-    """The speed is that of what is still joined to the starting block."""
     trial = glide(car, sink=8.0, speed=20.0)
-    positions = trial.positions.copy()
     light = list(car.blocks)[3:]
-    columns = [trial.block_ids.index(block) for block in light]
-    positions[:, columns, 2] = 60.0
-    result = score(
-        tasks["flight-2"], car, with_pieces(replace(trial, positions=positions), light, since_s=1)
-    )
+    positions = trial.positions.copy()
+    positions[:, 3:, 2] = 60.0  # what came off does not soften the landing
+    off = with_pieces(replace(trial, positions=positions), light, since_s=1)
+    result = score(tasks["flight-2"], car, off)
     assert result.metrics["sink_at_landing"] == pytest.approx(8.0, rel=0.01)
     assert not result.success
 
 
-@pytest.mark.parametrize("name", ["flight-1", "flight-2"])
-def test_without_forces_nothing_can_be_judged(tasks, car, name) -> None:
-    trial = hover(car) if name == "flight-1" else glide(car)
-    result = score(tasks[name], car, replace(trial, bearing=None))
-    assert (result.success, result.flags) == (False, ("forces_not_measured",))
+def test_without_forces_nothing_can_be_judged(tasks, car) -> None:
+    for name, trial in (("flight-1", hover(car)), ("flight-2", glide(car))):
+        result = score(tasks[name], car, replace(trial, bearing=None))
+        assert (result.success, result.flags) == (False, ("forces_not_measured",))
+
+
+# Round a planet
+
+RADIUS = 600.0
+
+
+def test_what_swings_to_and_fro_goes_nowhere() -> None:
+    swings = np.concatenate(
+        [np.linspace(0, 2, 50), np.linspace(2, -2, 100), np.linspace(-2, 0.5, 60)]
+    )
+    for turns, angle in ((swings, 0.5), (np.linspace(0, 6 * math.pi, 200), 6 * math.pi)):
+        path = 640 * np.stack([np.sin(turns), 0 * turns, np.cos(turns)], axis=1)
+        assert abs(swept(path, np.zeros(3))[-1]) == pytest.approx(angle)
+    assert (swept(np.zeros((4, 3)), np.zeros(3)) == 0).all()
+
+
+@pytest.fixture
+def rocket(tasks) -> Machine:
+    """The expert's, driven by a key."""
+    machine = experts_machine(tasks["orbit-1"])
+    key = {"block_id": "2", "action": "thrust_left", "new_key": "UpArrow"}
+    assert machine.act("add_control_key", key).ok
+    return machine
+
+
+def orbit(
+    machine: Machine,
+    rounds: float,
+    height: Path,
+    *,
+    end_s: float = 120.0,
+    circle: float = 0.0,
+    ground_from_s: float = np.inf,
+) -> Trajectory:
+    """So many rounds from 2 s to a time, faster for 10 s; or circles over the north."""
+    start = next(iter(machine.blocks.values())).center
+
+    def moved(t: np.ndarray) -> np.ndarray:
+        since = np.clip(t - 2, 0, end_s - 2)
+        gone = np.where(since < 10, since**2 / 20, since - 5) / (end_s - 7)
+        angle, away = 2 * np.pi * rounds * gone, RADIUS + height(t)
+        over = np.sqrt(away**2 - circle**2) if circle else np.cos(angle) * away
+        north = circle * np.cos(angle)
+        return np.stack([(circle or away) * np.sin(angle), north, over - RADIUS], axis=1) - start
+
+    settings = {"presses": '[["UpArrow", 0.0, 120.0]]'}
+    trial = make_trajectory(machine, 120.0, moved=moved, settings=settings)
+    borne = np.where(trial.time_s > ground_from_s, float(machine.mass), 0.0)
+    return with_bearing(trial, ground=borne)
+
+
+def test_what_is_a_way_round_a_planet(tasks, rocket, subtests) -> None:
+    def up(t: np.ndarray) -> np.ndarray:
+        return np.minimum(60.0, 20.0 * t)
+
+    for name, rounds, height, cycles, success in (
+        ("round", 3.1, up, 3.1, True),
+        ("not quite", 2.9, up, 2.9, False),
+        ("the other way", -3.1, up, 3.1, True),
+        ("rolls round", 3.1, lambda t: np.full_like(t, 0.5), 0.0, False),
+        ("hops", 3.1, lambda t: np.full_like(t, 19.0), 0.0, False),
+        (
+            "comes down on its way",
+            4.0,
+            lambda t: np.where(abs(t - 62) < 0.1, 19.9, up(t)),
+            2,
+            False,
+        ),
+    ):
+        with subtests.test(name=name):
+            result = score(tasks["orbit-1"], rocket, orbit(rocket, rounds, height))
+            assert (result.success, result.flags) == (success, ())
+            assert result.metrics["cycles"] == pytest.approx(cycles, abs=0.1)
+            lasted_s = 7 + 113 * 3 / abs(rounds)
+            assert result.indicator == pytest.approx(180 / lasted_s * success, rel=0.01)
+    for circle in (5.0, 50.0, 300.0):
+        trial = orbit(rocket, 10, lambda t: np.full_like(t, 60.0), circle=circle)
+        cycles = score(tasks["orbit-1"], rocket, trial).metrics["cycles"]
+        # As many units along a great circle are worth 660 / radius times as much.
+        assert cycles == pytest.approx(10 * (circle / 660) ** 2, rel=0.02)
+
+
+def test_what_is_a_return(tasks, rocket, subtests) -> None:
+    def lands(t: np.ndarray, sink: float) -> np.ndarray:
+        return np.clip(np.minimum(30.0 * t, sink * (52 - t)), 0.5, 100.0)
+
+    for name, sink, end, ground_s, success in (
+        ("softly", 5.0, 1.0, 51.8, True),
+        ("hard", 7.0, 1.0, 51.8, False),
+        ("it only hovers", 5.0, 1.0, np.inf, False),
+        ("near the start", 5.0, 1.0 + 29 / (RADIUS * 2 * np.pi), 51.8, True),
+        ("elsewhere", 5.0, 1.0 + 31 / (RADIUS * 2 * np.pi), 51.8, False),
+    ):
+        with subtests.test(name=name):
+            trial = orbit(
+                rocket,
+                end,
+                lambda t, sink=sink: lands(t, sink),
+                end_s=32.0,
+                ground_from_s=ground_s,
+            )
+            result = score(tasks["orbit-2"], rocket, trial)
+            assert result.success == success, result
+            assert (result.indicator > 0) == success
+            if success:
+                apart = with_pieces(trial, list(rocket.blocks)[2:3], since_s=54.0)
+                result = score(tasks["orbit-2"], rocket, apart)
+                assert (result.success, result.flags) == (False, ("came_apart",))

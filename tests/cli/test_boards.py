@@ -1,111 +1,170 @@
-"""The leaderboard's overview: models x tasks, as wide as there is room for, nothing left out."""
+"""Boards, comparisons, exports and lists: figures, flags, dashes, and tables that fit."""
 
-from typing import Any
+import csv
+import json
+import threading
+import time
 
 import pytest
+from sqlalchemy import insert, select, update
+from support.clients.commands import printed, run_cli
+from support.clients.terminals import on_terminal, piped
+from support.stages import work
 
-from buildarena_cli.terminal import boards
-from buildarena_cli.terminal.boards import overview
+from buildarena_cli.commands.job_lists import COLUMNS
+from buildarena_cli.terminal.output import columns, print_table
+from buildarena_pipeline.agents.sessions import ExternalSessions
+from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_store.states import Verdict
+from buildarena_store.tables import jobs, rollouts
 
-TASKS = [f"{kind}-{level}" for kind in ("transport", "support", "lift") for level in (1, 2, 3)]
-MODELS = ["builtin/expert", "openai/gpt-5", "x/" + "long-name-" * 3]
-
-
-def row(place: int, model: str, task: str) -> dict[str, Any]:
-    return {
-        "model": model,
-        "configuration": "c",
-        "baseline": model.startswith("builtin/"),
-        "decoding": {},
-        "by_runner": 0,
-        "unverified": 0,
-        "refuted": 0,
-        "successes": place,
-        "trials": 4,
-        "success_low": 0.1,
-        "success_high": 0.9,
-        "too_few_data": False,
-        "indicator_mean": 1000.0 * place + TASKS.index(task),
-    }
-
-
-def board(models: list[str], tasks: list[str]) -> dict[str, Any]:
-    return {
-        "tasks": [
-            {
-                "task": task,
-                "indicator": "height" if task.startswith("lift") else "distance",
-                "unit": "units",
-                "rows": [row(n, model, task) for n, model in enumerate(models, 1)],
-            }
-            for task in tasks
-        ],
-        "overall": [
-            {"model": model, "configuration": "c", "rank": n} for n, model in enumerate(models, 1)
-        ],
-        "flags": [],
-    }
+SCORES = {
+    "openai/gpt-5": (1500.0, ["never_fell"]),
+    "xai/grok-4": (200.0, []),
+    "builtin/random": (900.0, ["does_not_span"]),
+}
 
 
 @pytest.fixture
-def shown(capsys, monkeypatch):
-    def show(width: int | None, models: list[str] = MODELS, tasks: list[str] = TASKS) -> list[str]:
-        if width is not None:
-            monkeypatch.setattr(boards, "is_terminal", lambda: True)
-            monkeypatch.setattr(boards, "terminal_width", lambda: width)
-        overview(board(models, tasks))
-        return capsys.readouterr().out.splitlines()
-
-    return show
-
-
-def test_a_pipe_gets_one_line_for_each_model(shown) -> None:
-    lines = shown(None)
-    head, first = lines[:2]
-    assert head.split() == ["#", "model", *TASKS]
-    assert first.split("  ")[0] == "1"
-    assert "builtin/expert*" in first
-    assert first.count("1/4  10-90 %  1,00") == 9
-    assert "  lift-1, lift-2, lift-3: height in units" in lines
+def sweep(context, submissions) -> None:
+    """Bridges of one model carry everything, of another a little; a third one's are not bridges."""
+    spec = SweepSpec(name="bridges", tasks=["support-1"], models=list(SCORES), samples=6)
+    submissions.submit_sweep(spec)
+    with context.store.database.transaction() as connection:
+        for job in connection.execute(select(jobs)).all():
+            load, flags = SCORES[job.model]
+            score = {"success": True, "indicator": load, "flags": flags, "metrics": {"parts": 9}}
+            connection.execute(
+                update(jobs)
+                .where(jobs.c.id == job.id)
+                .values(state="done", outcome="success", finished_at=job.created_at, **score)
+            )
+            trial = {"number": 0, "final": True, "engine": "pybullet", "machine_hash": "machine"}
+            ended = {"job_id": job.id, "finished_at": job.created_at}
+            connection.execute(insert(rollouts).values(**ended, **trial, **score))
 
 
-@pytest.mark.parametrize("width", [300, 200, 150, 100, 80, 60])
-def test_a_terminal_gets_every_figure_within_its_width(shown, width) -> None:
-    lines = shown(width)
-    table = lines[
-        : lines.index("Successes of jobs, the rate's exact 95 % interval, and the mean indicator:")
-    ]
-    assert max(map(len, table)) <= width
-    text = "\n".join(table)
-    for place in (1, 2, 3):
-        for task in range(9):
-            assert f"{place},00{task}.0" in text
-    assert text.count("10-90 %") == 27
+@pytest.mark.usefixtures("sweep")
+def test_boards_comparisons_and_exports_count_disqualified_trials_as_failures(
+    url, tmp_path
+) -> None:
+    answer = json.loads(printed(url, "leaderboard", "--json"))
+    rows = {row["model"]: row["successes"] for row in answer["tasks"][0]["rows"]}
+    assert list(rows.items()) == [("openai/gpt-5", 6), ("xai/grok-4", 6), ("builtin/random", 0)]
+    text = printed(url, "leaderboard", "--task", "support-1")
+    assert text.count("≥ 1,500.0") == 2  # the mean and the best
+    overview = printed(url, "leaderboard")
+    assert "flags: 6 does_not_span, 6 never_fell" in overview
+    assert "  never_fell: The bridge carried everything" in overview
+    assert "not_driven" not in overview
+    words = ["compare", "openai/gpt-5", "builtin/random"]
+    (task,) = json.loads(printed(url, *words, "--json"))["tasks"]
+    assert task["successes"] == [6, 0]
+    unknown = run_cli(url, "compare", "openai/gpt-5", "x/y")
+    assert (unknown.returncode, "builtin/random@" in unknown.stderr) == (1, True)
+    for ending in ("csv", "tex", "parquet"):
+        printed(url, "export", "--out", str(tmp_path / f"board.{ending}"))
+    with (tmp_path / "board.csv").open() as file:
+        found = {row["model"]: (row["trials"], row["flags"]) for row in csv.DictReader(file)}
+    assert found["openai/gpt-5"] == ("6", '{"never_fell": 6}')
+    assert r"\textbf{$\geq$1500.0}" in (tmp_path / "board.tex").read_text()
+    assert (tmp_path / "board.parquet").read_bytes()[:4] == b"PAR1"
+    for name, says in (("board.xls", "must end in .csv"), ("no/board.csv", "can't be written")):
+        refused = run_cli(url, "export", "--out", str(tmp_path / name))
+        assert (refused.returncode, says in refused.stderr) == (1, True)
+    listed = ("job", "list", "--flag", "never_fell")
+    assert printed(url, *listed).count("≥ 1,500.00") == 6
+    job = json.loads(printed(url, *listed, "--json"))["jobs"][0]
+    assert job["censored"] is True
+    shown = printed(url, "job", "show", job["id"])
+    assert "indicator ≥ 1,500.000" in shown
+    assert "never_fell: The bridge carried everything" in shown
 
 
-def test_intervals_give_way_where_not_one_column_fits(shown) -> None:
-    text = "\n".join(lines := shown(30, models=MODELS[:2]))
-    table = lines[
-        : lines.index("Successes of jobs, the rate's exact 95 % interval, and the mean indicator:")
-    ]
-    assert max(map(len, table)) <= 30
-    assert "10-90 %" not in text
-    assert "2/4  2,008.0" in text
+@pytest.mark.ci
+@pytest.mark.usefixtures("sweep")
+def test_an_audit_tells_every_difference(url, context) -> None:
+    stopping = threading.Event()
+
+    def verify() -> None:
+        """Stands in for the worker: every second check finds another indicator."""
+        number = 0
+        while not stopping.is_set():
+            while (claimed := context.store.verifications.claim_next()) is not None:
+                number += 1
+                check = {"name": "score: indicator", "ok": number % 2 == 0, "kept": 1, "found": 2}
+                report = {"ok": check["ok"], "checks": [check]}
+                verdict = Verdict.VERIFIED if check["ok"] else Verdict.REFUTED
+                context.store.verifications.finish(claimed.id, report, verdict=verdict)
+            time.sleep(0.05)
+
+    worker = threading.Thread(target=verify)
+    worker.start()
+    try:
+        done = run_cli(url, "job", "verify", "--model", "xai/grok-4", "--sample", "4")
+    finally:
+        stopping.set()
+        worker.join()
+    assert done.returncode == 1
+    assert "4 of 6 results checked" in done.stdout
+    assert done.stdout.count("score: indicator: kept 1, found 2") == 2
 
 
-def test_few_models_become_columns_where_that_takes_fewer_blocks(shown) -> None:
-    lines = shown(90, models=MODELS[:2])
-    assert lines[0].split() == ["model", "builtin/expert*", "openai/gpt-5"]
-    assert lines[1].split() == ["#", "1", "2"]
-    assert [line.split()[0] for line in lines[2:11]] == TASKS
+def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(
+    url, context, submissions, tmp_path
+) -> None:
+    sessions = ExternalSessions(context)
+    job = sessions.open(task="support-1", agent="me", seed=0, simulator="mujoco").job
+    sessions.call(job.id, machine="main", tool="start", arguments={})
+    sessions.submit(job.id)
+    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], seeds=[0], simulator="mujoco")
+    submissions.submit_sweep(spec)
+    work(context)
+    usage = json.loads(printed(url, "job", "show", job.id, "--json"))["usage"]
+    assert set(usage.values()) == {None}
+    shown = printed(url, "job", "show", job.id)
+    assert "usage     - requests, - tokens in, - out, $-" in shown
+    assert "actions   1, 0 refused" in shown  # what the service counts itself stays
+    board = json.loads(printed(url, "leaderboard", "--json"))
+    rows = {row["model"]: row for task in board["tasks"] for row in task["rows"]}
+    means = [f"{name}_mean" for name in ("requests", "input_tokens", "output_tokens", "cost_usd")]
+    assert [rows["agent/me"][name] for name in means] == [None] * 4
+    (idle,) = json.loads(printed(url, "job", "list", "--model", "builtin/idle", "--json"))["jobs"]
+    assert idle["usage"]["requests"] > 0 == idle["usage"]["cost_usd"], "it says that it paid none"
+    table = printed(url, "leaderboard", "--task", "support-1")
+    (line,) = [line for line in table.splitlines() if "agent/me" in line and "/1" in line]
+    assert line.split()[-3:] == ["-", "-", "-"]  # requests, tokens and dollars
+    printed(url, "export", "--out", str(tmp_path / "board.csv"))
+    with (tmp_path / "board.csv").open() as file:
+        (row,) = [row for row in csv.DictReader(file) if row["model"] == "agent/me"]
+    assert [row[name] for name in means] == [""] * 4
 
 
-def test_what_was_not_tried_is_a_dash(shown, capsys) -> None:
-    made = board(MODELS, TASKS[:2])
-    made["tasks"][1]["rows"].pop()
-    made["overall"][2]["rank"] = None
-    overview(made)
-    last = capsys.readouterr().out.splitlines()[3]
-    assert last.split()[0] == "-"
-    assert last.split()[-3:] == ["-", "-", "-"]
-    assert shown
+# Tables: whole through a pipe; on a terminal columns give way, and ids and figures never do
+
+
+@pytest.mark.usefixtures("sweep")
+def test_columns_give_way_in_their_order_and_ids_stay_whole(url, context) -> None:
+    ids = [job.id for job in context.store.jobs.page(limit=100)]
+    done = piped("job", "list", "--url", url, COLUMNS="40")
+    head, *rows = done.stdout.splitlines()
+    assert head.split() == [column.name for column in COLUMNS]
+    assert [row.split()[0] for row in rows] == ids
+    assert not set("\x1b│┃─━…") & set(done.stdout)
+    leaving = [c.name for c in sorted(COLUMNS, key=lambda c: c.leaves) if c.leaves]
+    for width in (200, 80, 40):
+        code, shown = on_terminal(width, "job", "list", "--url", url, NO_COLOR="1")
+        head, *rows = shown.splitlines()[: len(ids) + 1]
+        assert code == 0
+        assert [row.split()[0] for row in rows] == ids
+        assert max(map(len, [head, *rows])) <= width
+        gone = [name for name in leaving if name not in head.split()]
+        assert gone == leaving[: len(gone)]
+        assert bool(gone) == (width < 200) == ("too narrow for: " in shown)
+
+
+def test_what_strangers_wrote_can_not_steer_the_terminal(capsys) -> None:
+    print_table(columns("name"), [("\x1b[2J\x07two\nlines",), ("",)])
+    assert capsys.readouterr().out.splitlines() == ["name", "\\x1b[2J\\x07two lines", "-"]
+    print_table(columns("name", "n"), [("日本", "1"), ("abcd", "2")])
+    assert capsys.readouterr().out.splitlines() == ["name  n", "日本  1", "abcd  2"]

@@ -20,9 +20,12 @@ def test_what_is_no_answer_of_an_api_is_one_sentence(subtests) -> None:
         (b"SSH-2.0-OpenSSH\r\n", UnreachableError, "no BuildArena answers"),
         (b"", UnreachableError, "no BuildArena answers"),
     ]:
-        with subtests.test(said=said), wrong_server(said) as server:
-            with pytest.raises(error, match=says):
-                Client(server.url).get("/v1/jobs")
+        with (
+            subtests.test(said=said),
+            wrong_server(said) as server,
+            pytest.raises(error, match=says),
+        ):
+            Client(server.url).get("/v1/jobs")
 
 
 def test_a_download_is_there_whole_or_not_at_all(tmp_path) -> None:

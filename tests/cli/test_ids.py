@@ -1,21 +1,34 @@
-"""Ids: a unique prefix is enough, nonsense never becomes part of a path, files come whole."""
+"""Ids: a unique prefix is enough, and nonsense leads no request to another route."""
 
+import asyncio
 import json
 import os
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcp.types import CallToolRequestParams
 from support.clients.commands import printed, run_cli
-from support.clients.terminals import piped
 from support.jobs import attach, claim, finish
 
+from buildarena_cli.client import Client, at
 from buildarena_cli.commands.job_files import file_name
-from buildarena_cli.suggestions import suggested_words
+from buildarena_cli.errors import CommandError
+from buildarena_cli.ids import checked_id, whole_id
+from buildarena_cli.mcp_server import _act, _manage, make_server
 from buildarena_pipeline.catalog.specs import SweepSpec
 
 JSON = "application/json"
+JOB = "job_0a1b2c3d4e5f60718293"
+CANCELS = "../sweeps/sweep_0a1b2c3d4e5f60718293/cancel#"
 
 
 @pytest.fixture
@@ -32,211 +45,216 @@ def ids(sweep, context) -> list[str]:
     return sorted(job.id for job in context.store.jobs.page(limit=100))
 
 
-def unique_prefix(ids: list[str], wanted: str) -> str:
-    others = [id_ for id_ in ids if id_ != wanted]
-    return next(
-        wanted[:n] for n in range(5, 25) if not any(o.startswith(wanted[:n]) for o in others)
+def test_a_unique_prefix_is_enough_and_an_ambiguous_one_refused(url, ids, sweep) -> None:
+    wanted = ids[0]
+    prefix = next(
+        wanted[:n] for n in range(5, 25) if not any(o.startswith(wanted[:n]) for o in ids[1:])
     )
-
-
-def test_a_unique_prefix_is_enough_with_and_without_its_kind(url, ids, sweep) -> None:
-    for wanted in (ids[0], ids[-1]):
-        prefix = unique_prefix(ids, wanted)
-        for word in (prefix, prefix.removeprefix("job_")):
-            assert json.loads(printed(url, "job", "show", word, "--json"))["id"] == wanted
+    for word in (prefix, prefix.removeprefix("job_")):
+        assert json.loads(printed(url, "job", "show", word, "--json"))["id"] == wanted
     assert json.loads(printed(url, "sweep", "status", sweep[:9], "--json"))["id"] == sweep
     assert json.loads(printed(url, "job", "list", "--sweep", sweep[6:10], "--json"))["jobs"]
-
-
-def test_an_ambiguous_prefix_is_refused_with_the_candidates(url, ids) -> None:
     doubled = next(p for p in "0123456789abcdef" if sum(i[4] == p for i in ids) > 1)
-    candidates = [id_ for id_ in ids if id_[4] == doubled]
     done = run_cli(url, "job", "cancel", doubled)
     assert done.returncode == 1
-    assert all(id_ in done.stderr for id_ in candidates)
-    assert not any(id_ in done.stderr for id_ in ids if id_ not in candidates)
+    assert {id_ for id_ in ids if id_ in done.stderr} == {i for i in ids if i[4] == doubled}
     missing = next(
         f"{a}{b}" for a in "0f" for b in "0123456789abcdef" if not any(i[4:6] == a + b for i in ids)
     )
     assert f"no job's id begins with 'job_{missing}'" in run_cli(url, "job", "show", missing).stderr
 
 
-def test_nonsense_is_no_id_and_is_never_sent(subtests) -> None:
-    for word in [
-        "../sweeps/x/cancel#",
-        "job_",
-        "",
-        "job_%2e",
-        "sweep_0",
-        "job_0A",
-        "x" * 5000,
-        "job_0\n",
-        "é",
-        ".",
-    ]:
-        with subtests.test(word=word):
-            for words in (["job", "cancel", word], ["job", "files", word], ["job", "logs", word]):
-                done = run_cli("http://127.0.0.1:1", *words)
-                assert done.returncode == 1
-                assert "is not the id of a job" in done.stderr
+def test_shells_are_offered_ids_tasks_and_models_and_nothing_where_no_api_answers(
+    url, ids, sweep
+) -> None:
+    # A busy machine's API is waited for; a shell's user would not.
+    program = (
+        "import sys\nfrom buildarena_cli.terminal import completion\n"
+        "from buildarena_cli.main import run\n"
+        "completion.WITHIN_S = 60\nsys.argv = ['buildarena']\nrun()"
+    )
 
-
-def test_names_that_are_no_ids_reach_no_other_route(url) -> None:
-    for word in ("x?limit=1", "%2e%2e", "x#y"):
-        assert "name: String should match" in run_cli(url, "task", "show", word).stderr
-    for word in ("..", "../jobs", "a/b", ""):
-        assert f"{word!r} is not a name" in run_cli(url, "task", "show", word).stderr
-
-
-PATIENT = """
-import sys
-from buildarena_cli.terminal import completion
-from buildarena_cli.main import run
-completion.WITHIN_S = 60
-sys.argv = ["buildarena"]
-run()
-"""
-"""The command, which waits for a busy machine's API; a shell's user would not."""
-
-
-def test_shells_are_offered_ids_tasks_and_models(url, ids, sweep) -> None:
-    def offered(line: str) -> list[str]:
+    def offered(line: str, url: str = url) -> list[str]:
         completing = {
             "_BUILDARENA_COMPLETE": "complete_bash",
             "COMP_WORDS": line,
             "COMP_CWORD": str(line.count(" ")),
             "BUILDARENA_URL": url,
         }
-        done = subprocess.run(
-            [sys.executable, "-c", PATIENT],
-            capture_output=True,
-            text=True,
-            check=False,
-            env=os.environ | completing,
-        )
+        command, environment = [sys.executable, "-c", program], os.environ | completing
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
         assert done.stderr == ""
         return done.stdout.split()
 
     assert sorted(offered("buildarena job show ")) == ids
-    assert offered(f"buildarena job show {ids[3]}") == [ids[3]]
     assert offered("buildarena sweep watch sw") == [sweep]
-    assert offered("buildarena job list --task lift-") == ["lift-1", "lift-2", "lift-3", "lift-4"]
     assert offered("buildarena job list --model builtin/e") == ["builtin/expert"]
-    assert offered("buildarena job show nothing") == []
+    for nowhere in ("http://127.0.0.1:1", "http://["):
+        assert offered("buildarena job show ", nowhere) == []
 
 
-def test_shells_are_offered_nothing_when_no_api_answers(subtests) -> None:
-    for url in ["http://127.0.0.1:1", "nonsense", "http://[", "ftp://x:99999"]:
-        with subtests.test(url=url):
-            done = piped(
-                _BUILDARENA_COMPLETE="complete_bash",
-                COMP_WORDS="buildarena job show ",
-                COMP_CWORD="3",
-                BUILDARENA_URL=url,
-            )
-            assert (done.stdout.strip(), done.stderr) == ("", "")
-
-
-def test_jobs_are_filtered_by_how_they_ended(url, ids, context) -> None:
+def test_jobs_are_filtered_and_pages_follow_each_other(url, ids, context, subtests) -> None:
     lease = claim(context)
     found = finish(context, lease, "unsuccessful", reason="too_weak", flags=("unstable", "odd"))
     for words in (
         ["--reason", "too_weak"],
-        ["--flag", "odd"],
         ["--flag", "unstable", "--outcome", "unsuccessful"],
         ["--state", "done", "--task", lease.job.task, "--model", lease.job.model],
     ):
         _, row = printed(url, "job", "list", *words).splitlines()
         assert row.split()[0] == found
     assert printed(url, "job", "list", "--outcome", "success").count("\n") == 1
-    assert printed(url, "job", "list", "--task", "lift-3").count("\n") == 1
-    assert len(ids) == 32
-
-
-@pytest.mark.nightly(keep=3)
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        (["--task", "lift-9"], "there is no task 'lift-9'"),
+    for words, says in (
         (["--task", "lift-9"], "did you mean lift-1 or"),
         (["--model", "builtin/idel"], "did you mean builtin/idle?"),
         (["--outcome", "sucess"], "did you mean success"),
-        (["--state", "runing"], "did you mean running"),
         (["--after", "x"], "not a cursor"),
-    ],
-)
-def test_a_filter_that_fits_nothing_is_refused_with_the_choices(url, sweep, words, says) -> None:
-    done = run_cli(url, "job", "list", *words)
-    assert (done.returncode, says in done.stderr) == (1, True), done.stderr
-    assert sweep
-
-
-def test_pages_follow_each_other(url, ids) -> None:
+    ):
+        with subtests.test(says=says):
+            done = run_cli(url, "job", "list", *words)
+            assert (done.returncode, says in done.stderr) == (1, True), done.stderr
     first = run_cli(url, "job", "list", "--limit", "20")
-    rows = first.stdout.splitlines()[1:]
     cursor = first.stderr.split("--after ")[1].split(",")[0]
     second = run_cli(url, "job", "list", "--limit", "20", "--after", cursor)
-    rows += second.stdout.splitlines()[1:]
+    rows = [*first.stdout.splitlines()[1:], *second.stdout.splitlines()[1:]]
     assert (sorted(row.split()[0] for row in rows), second.stderr) == (ids, "")
     assert len(printed(url, "job", "list", "--limit", "3", "--all").splitlines()) == 33
 
 
-@pytest.fixture
-def made(context, sweep) -> tuple[str, dict[str, bytes]]:
-    """A job with three files."""
+def test_a_jobs_files_are_fetched_whole_or_not_at_all(
+    url, sweep, context, tmp_path, monkeypatch
+) -> None:
     assert sweep
     lease = claim(context)
     files = {"machine": b"{}", "transcript": b"[]", "trajectory-0": b"PAR1"}
     attach(context, lease.job.id, files, JSON)
-    return finish(context, lease, "unsuccessful"), files
-
-
-def test_a_jobs_files_are_listed_and_fetched(url, made, tmp_path) -> None:
-    job, files = made
-    head, *rows = printed(url, "job", "files", job).splitlines()
-    assert head.split() == ["file", "type", "bytes", "sha256"]
+    job = finish(context, lease, "unsuccessful")
+    _, *rows = printed(url, "job", "files", job).splitlines()
     assert [row.split()[0] for row in rows] == sorted(files)
-    assert all(len(row.split()[-1]) == 64 for row in rows)
     out = tmp_path / "some" / "folder"
     printed(url, "job", "files", job, "--out", str(out))
-    assert {f.name: f.read_bytes() for f in out.iterdir()} == {
-        f"{name}.json": data for name, data in files.items()
-    }
+    assert {f.stem: f.read_bytes() for f in out.iterdir()} == files
     printed(url, "job", "files", job, "machine", "--out", str(tmp_path / "one"))
     assert [f.name for f in (tmp_path / "one").iterdir()] == ["machine.json"]
     assert "did you mean machine?" in run_cli(url, "job", "files", job, "machin").stderr
-
-
-def test_damaged_bytes_are_not_written(url, made, tmp_path, monkeypatch) -> None:
-    from buildarena_cli.client import Client
-
     monkeypatch.setattr(Client, "get_bytes", lambda *_, **__: b"other")
-    done = run_cli(url, "job", "files", made[0], "--out", str(tmp_path / "out"))
+    done = run_cli(url, "job", "files", job, "--out", str(tmp_path / "damaged"))
     assert (done.returncode, "arrived damaged" in done.stderr) == (1, True)
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_files_name_stays_in_its_folder(subtests) -> None:
-    for name, safe in [
-        ("machine", "machine.json"),
+    assert not (tmp_path / "damaged").exists()
+    for name, safe in (
         ("../../etc/passwd", "_.._etc_passwd.json"),
         (".hidden", "hidden.json"),
         ("a/b\\c:d\x00", "a_b_c_d_.json"),
         ("...", "file.json"),
         ("x.json", "x.json"),
-    ]:
-        with subtests.test(name=name):
-            assert file_name(name, JSON) == safe
-            assert Path(safe).name == safe
+    ):
+        assert file_name(name, JSON) == safe == Path(safe).name
 
 
-def test_near_words(subtests) -> None:
-    for word, near in [
-        ("seed", ["seeds"]),
-        ("expert", ["builtin/expert"]),
-        ("Lift-1", ["lift-1"]),
-        ("zzz", []),
-        ("", []),
-    ]:
-        with subtests.test(word=word):
-            assert suggested_words(word, ["seeds", "samples", "builtin/expert", "lift-1"]) == near
+# What a person, a model or a server gives
+
+WORDS = ("sweeps", "cancel", JOB, "job_", "HTTP/1.1", "é", "\u2215", "\uff0f")
+PARTS = ["..", ".", "/", "\\", "%2f", "%2e%2e", "#", "?", "&", ";", "\n", "\0", " ", *WORDS]
+HOSTILE = st.one_of(st.text(max_size=40), st.lists(st.sampled_from(PARTS), max_size=8).map("".join))
+
+
+class _Recorder(BaseHTTPRequestHandler):
+    paths: ClassVar[list[str]] = []
+
+    def _answer(self) -> None:
+        self.paths.append(self.path)
+        self.rfile.read(int(self.headers.get("Content-Length") or 0))
+        body = json.dumps({"ok": True, "feedback": "", "jobs": [], "sweeps": []}).encode()
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    do_GET = do_POST = do_PUT = _answer  # noqa: N815 - names of the library
+
+    def log_message(self, *_: object) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    server = ThreadingHTTPServer(("127.0.0.1", 0), _Recorder)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+    thread.start()
+    yield Client(f"http://127.0.0.1:{server.server_port}", "operator")
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+usual = settings(
+    max_examples=60,
+    deadline=None,
+    database=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+
+
+def is_safe(path: str, parts: int) -> bool:
+    """Whether a server that decodes and normalises what it likes finds the same route."""
+    segments = path.partition("?")[0].split("/")
+    return (
+        len(segments) == parts
+        and "#" not in path
+        and not any(segment in {"", ".", ".."} for segment in segments[1:])
+        and path.isprintable()
+        and path.isascii()
+    )
+
+
+@usual
+@given(word=HOSTILE)
+def test_any_part_stays_one_part_and_a_word_is_an_id_or_nothing_is_sent(client, word) -> None:
+    _Recorder.paths.clear()
+    with suppress(CommandError):
+        client.get(at("jobs", word))
+    assert all(is_safe(path, 4) for path in _Recorder.paths), _Recorder.paths
+    assert len(_Recorder.paths) < 2
+    for kind in ("job", "sweep", "key"):
+        _Recorder.paths.clear()
+        with suppress(CommandError, TypeError):
+            found = whole_id(client, kind, word)
+            assert checked_id(kind, found) == found
+        assert all(is_safe(path, 3) for path in _Recorder.paths)
+
+
+@usual
+@given(session=HOSTILE.filter(lambda text: text != JOB))
+def test_a_session_is_an_id_or_nothing_is_sent(client, session) -> None:
+    _Recorder.paths.clear()
+    for send in (
+        lambda: _act(client, "start", {"session": session}),
+        lambda: _manage(client, "submit", {"session": session}),
+        lambda: _manage(client, "get_result", {"session": session}),
+    ):
+        with pytest.raises(CommandError, match="is not the id of a job"):
+            send()
+    assert _Recorder.paths == []
+
+
+def test_nonsense_is_no_id_and_no_other_path_is_ever_sent(client, url) -> None:
+    _Recorder.paths.clear()
+    for given_id in (None, 5, ["x"], {}, JOB + "\n", JOB.upper(), "job_", "sweep_0", CANCELS):
+        with pytest.raises(CommandError, match="is not the id of a job"):
+            checked_id("job", given_id)
+    assert checked_id("job", JOB) == JOB
+    for path in ("/v1/jobs/../keys", "/v1/jobs/x#y", "/v1/./jobs", "/v1/jobs/a b", "//evil/v1"):
+        with pytest.raises(CommandError, match="not a path of the service"):
+            client.get(path)
+    for word in ("../sweeps/x/cancel#", "", "x" * 5000, "job_0\n", "é", "."):
+        for name in ("cancel", "files", "logs"):
+            done = run_cli("http://127.0.0.1:1", "job", name, word)
+            assert (done.returncode, "is not the id of a job" in done.stderr) == (1, True)
+    handler = make_server(client).get_request_handler("tools/call")
+    call = CallToolRequestParams(name="start", arguments={"session": CANCELS})
+    assert asyncio.run(handler.handler(None, call)).is_error, "a model cannot cancel a sweep"
+    assert _Recorder.paths == []
+    for word in ("x?limit=1", "%2e%2e", "x#y"):
+        assert "name: String should match" in run_cli(url, "task", "show", word).stderr
+    for word in ("..", "../jobs", "a/b", ""):
+        assert f"{word!r} is not a name" in run_cli(url, "task", "show", word).stderr

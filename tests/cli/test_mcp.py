@@ -1,10 +1,12 @@
-"""A real MCP client builds a bridge over stdio and gets its score."""
+"""A real MCP client builds a bridge over stdio and over HTTP, and gets its score."""
 
 import asyncio
 import contextlib
 import json
 import socket
 import subprocess
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 
 import pytest
 from mcp import ClientSession, StdioServerParameters, stdio_client
@@ -17,36 +19,45 @@ from buildarena_cli.local import free_port
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.wiring import verifier
 
+WANTED = {"task": "support-1", "agent": "mcp", "simulator": "mujoco"}
+BLOCK = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
 
-async def play(connected, simulate) -> dict[str, object]:
-    async with connected as (read, write, *_), ClientSession(read, write) as session:
+
+@asynccontextmanager
+async def connected(transport) -> AsyncIterator[ClientSession]:
+    async with transport as (read, write, *_), ClientSession(read, write) as session:
         await session.initialize()
-        tools = {tool.name for tool in (await session.list_tools()).tools}
-        assert {"open_session", "attach_block_to", "submit"} <= tools
-        assert "support-1" in await said(session, "list_tasks", {})
-        opened = await said(
-            session, "open_session", {"task": "support-1", "agent": "mcp", "simulator": "mujoco"}
-        )
-        session_id = opened.split()[1]
-        assert "gap" in opened
-        torch = {"base_block": "1", "face": "A", "new_block": "Torch", "note": ""}
-        refused = await session.call_tool("attach_block_to", {"session": session_id, **torch})
-        assert refused.is_error
-        for name, arguments in DESIGNS["support-1"](0).parts["bridge"].actions:
-            await said(session, name, {"session": session_id, **arguments})
-        assert "not ended" in await said(session, "submit", {"session": session_id})
-        await asyncio.to_thread(simulate)
-        wrong = await session.call_tool("get_result", {"session": "job_x"})
-        assert wrong.is_error
-        missing = await session.call_tool("submit", {})
-        assert "missing argument 'session'" in missing.content[0].text
-        return json.loads(await said(session, "get_result", {"session": session_id}))
+        yield session
 
 
 async def said(session: ClientSession, tool: str, arguments: dict[str, object]) -> str:
     result = await session.call_tool(tool, arguments)
     assert not result.is_error, result
     return result.content[0].text
+
+
+async def refused(session: ClientSession, tool: str, arguments: dict[str, object]) -> str:
+    result = await session.call_tool(tool, arguments)
+    assert result.is_error
+    return result.content[0].text
+
+
+async def play(transport, simulate) -> dict[str, object]:
+    async with connected(transport) as session:
+        tools = {tool.name for tool in (await session.list_tools()).tools}
+        assert {"open_session", "attach_block_to", "submit"} <= tools
+        assert "support-1" in await said(session, "list_tasks", {})
+        opened = await said(session, "open_session", WANTED)
+        assert "gap" in opened
+        here = {"session": opened.split()[1]}
+        await refused(session, "attach_block_to", {**here, **BLOCK, "new_block": "Torch"})
+        for name, arguments in DESIGNS["support-1"](0).parts["bridge"].actions:
+            await said(session, name, {**here, **arguments})
+        assert "not ended" in await said(session, "submit", here)
+        await asyncio.to_thread(simulate)
+        await refused(session, "get_result", {"session": "job_x"})
+        assert "missing argument 'session'" in await refused(session, "submit", {})
+        return json.loads(await said(session, "get_result", here))
 
 
 @pytest.fixture
@@ -64,71 +75,54 @@ def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
     assert report["ok"], [check for check in report["checks"] if not check["ok"]]
 
 
-async def play_against_the_rules(connected) -> dict[str, object]:
-    async with connected as (read, write, *_), ClientSession(read, write) as session:
-        await session.initialize()
-        wanted = {"task": "lift-3", "agent": "mcp", "simulator": "mujoco"}
-        opened = await said(session, "open_session", wanted)
-        here = {"session": opened.split()[1]}
-        part = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
-        for machine in ("engine", "frame"):
-            await said(session, "start", {**here, "machine": machine})
-            await said(session, "attach_block_to", {**here, "machine": machine, **part})
-        early = await session.call_tool("submit", here)
-        assert early.is_error
-        assert "2 machines ('engine', 'frame') and no assembly" in early.content[0].text
-        for height, machine in enumerate(("engine", "frame")):
-            added = {"machine_id": machine, "init_shift": [0, 0, 2 * height]}
-            await said(session, "add_machine", {**here, "machine": "assembly", **added})
-        return json.loads(await said(session, "submit", here))
-
-
-@pytest.mark.ci
-def test_an_agent_reads_which_rule_its_machine_breaks(stdio) -> None:
-    result = asyncio.run(play_against_the_rules(stdio))
-    assert (result["outcome"], result["reason"]) == ("construction_failed", "unjoined_parts")
-    assert result["detail"].startswith("sub-structure B is not joined to the starting block A_1")
-
-
 @pytest.mark.ci
 def test_an_agent_builds_over_streamable_http(context, url) -> None:
     port = free_port()
     server = subprocess.Popen([BUILDARENA, "mcp", "--url", url, "--http", str(port)])
+
+    def answers() -> bool:
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
+            return True
+        return False
+
     try:
-        wait_until(lambda: _answers(port), 60, "the MCP server answers")
-        connected = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
-        result = asyncio.run(play(connected, lambda: work(context)))
+        wait_until(answers, 60, "the MCP server answers")
+        transport = streamable_http_client(f"http://127.0.0.1:{port}/mcp")
+        result = asyncio.run(play(transport, lambda: work(context)))
     finally:
         server.terminate()
         server.wait()
     assert result["outcome"] == "success"
 
 
-def _answers(port: int) -> bool:
-    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
-        return True
-    return False
-
-
-async def side_by_side(connected) -> list[str]:
-    async with connected as (read, write), ClientSession(read, write) as session:
-        await session.initialize()
-        payload = {"task": "support-1", "agent": "mcp"}
-        opened = await said(session, "open_session", payload)
-        assert await said(session, "open_session", payload) == opened
-        ids = {"session": opened.split()[1]}
-        await said(session, "start", ids)
-        block = {**ids, "face": "E", "new_block": "small wooden block"}
-        # Each needs the one before it.
-        rows = [{**block, "base_block": str(number)} for number in range(1, 13)]
-        results = await asyncio.gather(*(said(session, "attach_block_to", row) for row in rows))
-        again = await said(session, "open_session", payload)
-        assert "It was open already, and 13 calls were made" in again
-        return results
-
-
 @pytest.mark.ci
-def test_calls_sent_side_by_side_are_done_in_the_order_sent(stdio) -> None:
-    results = asyncio.run(side_by_side(stdio))
-    blocks = [result.split(",")[0] for result in results]
+def test_calls_are_done_in_the_order_sent_and_rules_are_told(stdio) -> None:
+    async def build() -> tuple[list[str], dict[str, object]]:
+        async with connected(stdio) as session:
+            opened = await said(session, "open_session", WANTED)
+            assert await said(session, "open_session", WANTED) == opened
+            here = {"session": opened.split()[1]}
+            await said(session, "start", here)
+            # Each needs the one before it.
+            rows = [{**here, **BLOCK, "face": "E", "base_block": str(n)} for n in range(1, 13)]
+            made = await asyncio.gather(*(said(session, "attach_block_to", row) for row in rows))
+            again = await said(session, "open_session", WANTED)
+            assert "It was open already, and 13 calls were made" in again
+
+            opened = await said(session, "open_session", {**WANTED, "task": "lift-3"})
+            here = {"session": opened.split()[1]}
+            for machine in ("engine", "frame"):
+                await said(session, "start", {**here, "machine": machine})
+                await said(session, "attach_block_to", {**here, "machine": machine, **BLOCK})
+            early = await refused(session, "submit", here)
+            assert "2 machines ('engine', 'frame') and no assembly" in early
+            for height, machine in enumerate(("engine", "frame")):
+                added = {"machine_id": machine, "init_shift": [0, 0, 2 * height]}
+                await said(session, "add_machine", {**here, "machine": "assembly", **added})
+            return made, json.loads(await said(session, "submit", here))
+
+    made, result = asyncio.run(build())
+    blocks = [text.split(",")[0] for text in made]
     assert blocks == [f"Attached. {number} Small Wooden Block" for number in range(2, 14)]
+    assert (result["outcome"], result["reason"]) == ("construction_failed", "unjoined_parts")
+    assert result["detail"].startswith("sub-structure B is not joined to the starting block A_1")

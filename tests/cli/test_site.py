@@ -1,9 +1,13 @@
 """A published site holds exactly what the service answers, and is whole or not there."""
 
 import errno
+import fcntl
 import json
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from hashlib import sha256
+from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -14,11 +18,14 @@ from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import changed, live_api
 from support.stages import work
 
+from buildarena_api.dashboard.serving import POLICY
+from buildarena_cli.commands import site as command
 from buildarena_cli.defaults import KEY_VARIABLE
-from buildarena_cli.site import jobs as site_jobs
+from buildarena_cli.errors import CommandError
 from buildarena_cli.site import pages as site_pages
-from buildarena_cli.site import writing
-from buildarena_cli.site.folder import Folder
+from buildarena_cli.site.folder import MARKER, Folder
+from buildarena_cli.site.previews import best_picture, head, job_preview
+from buildarena_cli.site.scope import Scope, chosen_jobs, read_choice
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 
 PAGE = (
@@ -28,7 +35,6 @@ PAGE = (
 )
 IDLE = {"tasks": ["support-1"], "models": ["builtin/idle"], "simulator": "mujoco", "name": "idle"}
 EXPERT = {**IDLE, "name": "both", "models": ["builtin/expert", "builtin/idle"], "seeds": [0]}
-SCOPED = "/v1/leaderboard"
 
 
 @pytest.fixture(autouse=True)
@@ -67,7 +73,7 @@ def read(site: Path, name: str = "site.json"):
 def asked(url: str, question: str, sweeps: list[str]) -> httpx.Response:
     path, _, words = question.partition("?")
     params = [tuple(word.split("=", 1)) for word in words.split("&") if word]
-    if path.startswith(SCOPED):
+    if path.startswith("/v1/leaderboard"):
         params += [("sweep", id_) for id_ in sweeps]
     accept = {"Accept": ARROW} if path.endswith("/trajectory") else {}
     return httpx.get(f"{url}{path}?{urlencode(params)}", headers=accept)
@@ -82,85 +88,47 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     said = printed(url, "site", *sweeps, "--out", str(site))
     assert "3 jobs, all with transcript, replay and trials" in said
     whole = read(site)
-    made = {"/v1/tasks", "/v1/models", "/v1/sweeps?limit=50"}
-    wanted = {".nojekyll", ".buildarena-site", "index.html", "site.json", whole["jobs"]}
-    wanted |= {"scheme.js", "assets/index-1.js"}
     rows = read(site, whole["jobs"])
     indexes = [read(site, f"jobs/{job}.json")["answers"] for job in rows["kept"]]
+    wanted = {".nojekyll", MARKER, "index.html", "site.json", whole["jobs"]}
+    wanted |= {"scheme.js", "assets/index-1.js"}
     wanted |= {f"jobs/{job}.{ending}" for job in rows["kept"] for ending in ("json", "html")}
-    page = (site / "index.html").read_text()
-    picture = re.search(r'og:image" content="(data/[^"]*\.png)"', page)
-    assert picture is not None
-    assert picture[1] in files_of(site)
-    trials = 0
     for answers in (whole["answers"], *indexes):
         for question, name in answers.items():
+            answer = asked(url, question, sweeps)
             if name is None:
-                assert asked(url, question, sweeps).status_code == 404, question
+                assert answer.status_code == 404, question
                 continue
             wanted.add(name)
             content = (site / name).read_bytes()
             assert name.replace("/", "").startswith(f"data{sha256(content).hexdigest()[:40]}")
-            trials += name.endswith(".arrow")
-            if question in made:
-                continue
-            answer = asked(url, question, sweeps)
-            assert answer.status_code == 200, question
-            if question.endswith("/artifacts"):
-                kept = [f for f in answer.json() if not f["name"].startswith("trajectory")]
-                assert json.loads(content) == kept
-            elif re.fullmatch(r"/v1/sweeps/[^/]+", question):
-                # A lower bound of the events that its figures hold: it may grow by itself.
-                still = {"last_event": 0}
-                assert json.loads(content) | still == answer.json() | still
-            elif re.fullmatch(r"/v1/jobs/[^/]+", question):
-                # Asking for its thumbnail has kept that as an artifact.
-                said = answer.json()
-                said["artifacts"].pop("thumbnail", None)
-                assert json.loads(content) == said
-            elif not name.endswith(".parquet"):
+            # Lists hold what was asked for alone, and what grows meanwhile is left out here.
+            lists = question in {"/v1/tasks", "/v1/models", "/v1/sweeps?limit=50"}
+            grows = re.fullmatch(r"/v1/(sweeps|jobs)/[^/]+(/artifacts)?", question)
+            if not (lists or grows or name.endswith(".parquet")):
                 assert content == answer.content, question
     assert files_of(site) == wanted
-    assert trials == 1
-    _check_lists(url, site, sweeps, rows, whole)
-
-
-def _check_lists(url, site, sweeps, rows, whole) -> None:
+    assert sum(name.endswith(".arrow") for name in wanted) == 1
     for sweep in sweeps:
         found = httpx.get(f"{url}/v1/jobs", params={"sweep": sweep}).json()["jobs"]
-        places = rows["sweeps"][sweep]
-        assert [rows["jobs"][place] for place in places] == found
+        assert [rows["jobs"][place] for place in rows["sweeps"][sweep]] == found
     assert len(rows["jobs"]) == 3
-    tasks = read(site, whole["answers"]["/v1/tasks"])
-    assert [task["name"] for task in tasks] == ["support-1"]
-    assert {one["name"] for one in read(site, whole["answers"]["/v1/models"])} == {
-        "builtin/expert",
-        "builtin/idle",
-    }
-    listed = read(site, whole["answers"]["/v1/sweeps?limit=50"])["sweeps"]
-    assert {sweep["id"] for sweep in listed} == {*sweeps}
-    board = read(site, whole["answers"]["/v1/leaderboard"])
-    assert [task["task"] for task in board["tasks"]] == ["support-1"]
-
-
-@pytest.mark.nightly
-def test_the_first_page_finds_its_files_beside_itself(url, idle, tmp_path) -> None:
-    printed(url, "site", idle, "--out", str(tmp_path / "site"))
-    page = (tmp_path / "site" / "index.html").read_text()
+    told = {name: read(site, whole["answers"][f"/v1/{name}"]) for name in ("tasks", "models")}
+    assert [task["name"] for task in told["tasks"]] == ["support-1"]
+    assert {one["name"] for one in told["models"]} == {"builtin/expert", "builtin/idle"}
+    page = (site / "index.html").read_text()
     assert re.findall(r'(?:src|href)="([^"]*)"', page) == ["./scheme.js", "./assets/index-1.js"]
-    assert '<meta name="buildarena-site" content="site.json" />' in page
     assert page.index("Content-Security-Policy") < page.index("<script")
     assert "/v1" not in page
+    assert re.search(r'og:image" content="(data/[^"]*\.png)"', page)[1] in files_of(site)
 
 
 def test_its_policy_is_the_services() -> None:
-    from buildarena_api.dashboard.serving import POLICY
-
     told = [part for part in POLICY.split("; ") if not part.startswith("frame-ancestors")]
     assert "; ".join(told) == site_pages.POLICY
 
 
-@pytest.mark.nightly
+@pytest.mark.ci
 def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
     with changed(context, **WITH_KEYS) as own, live_api(own) as url:
         sweep = submitted(url, {**IDLE, "seeds": [0]}, Authorization=f"Bearer {ADMIN}")
@@ -171,37 +139,12 @@ def test_no_key_is_in_it(context, tmp_path, monkeypatch) -> None:
         monkeypatch.setenv(KEY_VARIABLE, ADMIN)
         printed(url, "site", sweep, "--out", str(site))
     assert len(files_of(site)) > 20
-    for name in files_of(site):
-        assert ADMIN.encode() not in (site / name).read_bytes()
+    assert not [name for name in files_of(site) if ADMIN.encode() in (site / name).read_bytes()]
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("place", ["data/", "jobs/", "site.json", "index.html"])
-def test_a_run_that_breaks_off_leaves_nothing_that_looks_whole(
-    url, idle, tmp_path, monkeypatch, place
-) -> None:
-    site = tmp_path / "site"
-    with monkeypatch.context() as patched:
-        _break(patched, place)
-        done = run_cli(url, "site", idle, "--out", str(site))
-    assert (done.returncode, "No space left" in done.stderr) == (1, True)
-    assert "index.html" not in files_of(site)
-    asked_for: list[str] = []
-    real = site_jobs.job_answers
-
-    def counting(client, job_id):
-        asked_for.append(job_id)
-        return real(client, job_id)
-
-    monkeypatch.setattr(writing, "job_answers", counting)
-    printed(url, "site", idle, "--out", str(site))
-    assert "index.html" in files_of(site)
-    assert not [name for name in files_of(site) if "partial" in name]
-    # What an earlier run has kept of jobs is not asked for again.
-    assert len(asked_for) == (0 if place.endswith((".json", ".html")) else 2)
-
-
-def _break(patched, place: str) -> None:
+@contextmanager
+def no_space_for(place: str) -> Iterator[None]:
+    """Files whose names begin so cannot be written."""
     real = Folder.write
 
     def write(self, name: str, content: bytes) -> None:
@@ -209,73 +152,152 @@ def _break(patched, place: str) -> None:
             raise OSError(errno.ENOSPC, "No space left on device")
         real(self, name, content)
 
-    patched.setattr(Folder, "write", write)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Folder, "write", write)
+        yield
 
 
-@pytest.mark.nightly
-def test_a_site_stays_whole_while_it_is_written_again(
-    url, idle, context, tmp_path, monkeypatch
-) -> None:
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("place", ["site.json", "data/", "jobs/", "index.html"])
+def test_a_run_that_breaks_off_leaves_nothing_that_looks_whole(url, idle, tmp_path, place) -> None:
+    site = tmp_path / "site"
+    with no_space_for(place):
+        done = run_cli(url, "site", idle, "--out", str(site))
+    assert (done.returncode, "No space left" in done.stderr) == (1, True)
+    assert "index.html" not in files_of(site)
+    printed(url, "site", idle, "--out", str(site))
+    assert "index.html" in files_of(site)
+    assert not [name for name in files_of(site) if "partial" in name]
+
+
+@pytest.mark.ci
+def test_a_site_stays_whole_while_it_is_written_again(url, idle, context, tmp_path) -> None:
     site = tmp_path / "site"
     printed(url, "site", idle, "--out", str(site))
     (site / "CNAME").write_text("boards.example.org")
     before = (site / "site.json").read_bytes()
     more = submitted(url, {**IDLE, "name": "more", "seeds": [7]})
     work(context)
-    with monkeypatch.context() as patched:
-        _break(patched, "site.json")
+    with no_space_for("site.json"):
         assert run_cli(url, "site", idle, more, "--out", str(site)).returncode == 1
     assert (site / "site.json").read_bytes() == before
-    old = read(site)
-    assert {name for name in old["answers"].values() if name} <= files_of(site)
-    printed(url, "site", idle, more, "--out", str(site), "--jobs", "none")
+    assert {name for name in read(site)["answers"].values() if name} <= files_of(site)
+    waiting = submitted(url, {**IDLE, "name": "waiting", "seeds": [3]})
+    words = [idle, more, waiting, "--jobs", "none"]
+    assert "1 job had not ended." in printed(url, "site", *words, "--out", str(site))
     assert not [name for name in files_of(site) if name.startswith("jobs/")]
     now = read(site)
-    assert len(now["sweeps"]) == 2
     named = {name for name in now["answers"].values() if name} | {now["jobs"]}
     assert {name for name in files_of(site) if name.startswith("data/")} == named
-    # What somebody else has put beside it is theirs.
-    assert (site / "CNAME").exists()
+    assert (site / "CNAME").exists(), "what somebody else has put beside it is theirs"
 
 
-@pytest.mark.nightly
-def test_a_job_that_changed_is_asked_for_again(url, idle, tmp_path) -> None:
-    site = tmp_path / "site"
-    printed(url, "site", idle, "--out", str(site))
-    (job, _) = read(site, read(site)["jobs"])["kept"]
-    index = site / "jobs" / f"{job}.json"
-    known = json.loads(index.read_text())
-    for damage in ({**known, "digest": "other"}, {"answers": {"/x": "../../etc/passwd"}}, [], 3):
-        index.write_text(json.dumps(damage))
-        printed(url, "site", idle, "--out", str(site))
-        assert json.loads(index.read_text()) == known
+def test_what_is_refused_leaves_no_site(url, idle, monkeypatch, tmp_path, subtests) -> None:
+    waiting = submitted(url, {**IDLE, "seeds": [9], "name": "waiting"})
+    for folder, names in (("home", ["a.tex", "b.tex"]), ("newer", []), ("locked", [])):
+        (tmp_path / folder).mkdir()
+        for name in names:
+            (tmp_path / folder / name).touch()
+    (tmp_path / "file").touch()
+    (tmp_path / "newer" / MARKER).write_text("99")
+    lock = (tmp_path / "locked" / MARKER).open("w")
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    for out, words, says in (
+        ("home", [idle], "a.tex, b.tex"),
+        ("file", [idle], "is a file"),
+        ("newer", [idle], "another version"),
+        ("locked", [idle], "another process is writing"),
+        ("site", [idle, "--track", "nobody/plays"], "choose from five-role+data-sheets/mujoco"),
+        ("site", [idle, "--jobs", "worst"], "all, best, none or a number"),
+        ("site", [idle, "--jobs=-1"], "--jobs: '-1'"),
+        ("site", [], "--track"),
+        ("site", ["sweep_00000000"], "no sweep's id begins"),
+        ("site", [waiting], "none of these jobs has ended"),
+    ):
+        with subtests.test(says=says):
+            done = run_cli(url, "site", *words, "--out", str(tmp_path / out))
+            assert (done.returncode != 0, says in done.stderr) == (True, True), done.stderr
+            assert not (tmp_path / out / "index.html").exists()
+    lock.close()
+    assert files_of(tmp_path / "home") == {"a.tex", "b.tex"}
+    monkeypatch.setattr(command, "LARGE_MB", 0)
+    done = run_cli(url, "site", idle, "--out", str(tmp_path / "site"))
+    assert "--yes writes it all the same" in done.stderr
+    assert not (tmp_path / "site").exists()
 
 
-@pytest.mark.nightly
-def test_a_track_alone_is_a_site(url, idle, context, tmp_path) -> None:
-    other = {**IDLE, "simulator": "pybullet", "seeds": [0]}
-    submitted(url, other)
-    work(context)
-    board = httpx.get(f"{url}/v1/leaderboard").json()
-    (track,) = (name for name in board["tracks"] if "mujoco" in name)
-    assert len(board["tracks"]) == 2
-    site = tmp_path / "site"
-    printed(url, "site", "--track", track, "--out", str(site))
-    whole = read(site)
-    assert whole["sweeps"] == []
-    assert len(read(site, whole["jobs"])["jobs"]) == 2
-    assert read(site, whole["answers"]["/v1/leaderboard"])["tracks"] == [track]
-    both = tmp_path / "both"
-    printed(url, "site", idle, "--track", track, "--out", str(both))
-    assert read(both)["sweeps"] == [idle]
+def test_a_page_of_another_version_is_no_first_page(pages) -> None:
+    for text in ("<html><head></head></html>", '<head><meta charset="utf-8" /></head>', ""):
+        (pages / "index.html").write_text(text)
+        with pytest.raises(CommandError, match="another version"):
+            site_pages.first_page(pages)
 
 
-@pytest.mark.nightly
-def test_jobs_that_have_not_ended_are_told(url, idle, tmp_path) -> None:
-    waiting = submitted(url, {**IDLE, "seeds": [3, 4, 5]})
-    alone = run_cli(url, "site", waiting, "--out", str(tmp_path / "none"))
-    assert (alone.returncode, "none of these jobs has ended" in alone.stderr) == (1, True)
-    said = printed(url, "site", idle, waiting, "--out", str(tmp_path / "site"))
-    assert "3 jobs had not ended." in said
-    assert "3 jobs had not ended." in read(tmp_path / "site")["left_out"]
-    assert len(read(tmp_path / "site", read(tmp_path / "site")["jobs"])["kept"]) == 2
+def row(id_: str, **change: object) -> dict[str, object]:
+    usual = {
+        **dict.fromkeys(("task", "task_version", "configuration", "track"), "x"),
+        "state": "done",
+        "success": True,
+        "indicator": 1.0,
+        "seed": 0,
+        "flags": [],
+    }
+    return {"id": id_, **usual, **change}
+
+
+def test_the_best_of_a_cell_are_kept() -> None:
+    rows = [
+        row("failed", success=False, indicator=9.0),
+        row("flagged", indicator=8.0, flags=["cheat"]),
+        row("noted", indicator=7.0, flags=["never_fell"]),
+        row("later", indicator=7.0, seed=3),
+        row("unscored", success=None, indicator=None, flags=None),
+        row("open", state="running"),
+        row("elsewhere", configuration="d", indicator=0.0),
+    ]
+    scope = Scope(sweeps=[], track="k", tracks=["k"], jobs=rows, disqualifying=frozenset({"cheat"}))
+    for choice, kept in (
+        ("best", ["noted", "elsewhere"]),
+        ("2", ["noted", "later", "elsewhere"]),
+        ("4", ["noted", "later", "failed", "flagged", "elsewhere"]),
+        ("none", []),
+        ("all", [job["id"] for job in rows if job["state"] == "done"]),
+    ):
+        assert [job["id"] for job in chosen_jobs(scope, read_choice(choice))] == kept
+
+
+# What programs that make previews read, whatever names are in it
+
+
+class Read(HTMLParser):
+    """The elements of a page, with what they say."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.elements: list[str] = []
+        self.told: dict[str, str] = {}
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append(tag)
+        said = dict(attrs)
+        if name := said.get("property") or said.get("name") or said.get("http-equiv"):
+            self.told[name] = said["content"] or ""
+
+
+def test_previews_hold_names_as_text(pages) -> None:
+    hostile = 'agent/"><script>alert(1)</script>'
+    job = {"id": "job_1", "task": "support-1", "model": hostile, "seed": 3, "reason": None}
+    job |= {"outcome": "success", "success": True, "indicator": 1234.5}
+    found = Read(job_preview(job, "data/ab/cd.png"))
+    assert "script" not in found.elements
+    assert found.told["og:title"] == f"support-1 by {hostile}, seed 3"
+    assert found.told["og:description"] == "success, 1,234.50"
+    assert found.told["og:image"] == "../data/ab/cd.png"
+    assert found.told["refresh"] == "0; url=../#/jobs/job_1"
+    first = Read(site_pages.first_page(pages, head("BuildArena", r'It holds "\1"', "data/a.png")))
+    assert first.told["description"] == r'It holds "\1"'
+    assert first.told["buildarena-site"] == "site.json"
+    jobs = [{"id": id_, "success": id_ != "a"} for id_ in "abc"]
+    stored = {job: {f"/v1/jobs/{job}/thumbnail.png": f"data/{job}.png"} for job in "ac"}
+    assert best_picture(jobs, stored) == "data/c.png", "of the best job that has one"

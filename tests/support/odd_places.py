@@ -13,7 +13,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PLACE = Path("/mnt")
 """Covered by a fresh folder in memory, where each case has its clone and its data."""
-HIDING = PLACE / "hiding"
 ORDINARY = pwd.getpwnam("daemon").pw_uid
 """An account that every system has."""
 IN_CONTAINERS = (
@@ -37,7 +36,6 @@ class Case:
         unset: Variables that are not set.
         temporary: What TMPDIR names, below `folder`; a private folder.
         contained: Whether root has only what containers usually leave it.
-        hidden: A module that can't be imported, as if it were not installed.
         before: Further commands as root, when all is mounted.
     """
 
@@ -49,7 +47,6 @@ class Case:
     unset: tuple[str, ...] = ()
     temporary: str | None = None
     contained: bool = False
-    hidden: str | None = None
     before: tuple[str, ...] = ()
 
     @property
@@ -91,8 +88,6 @@ def start_elsewhere(case: Case, arguments: list[str]) -> subprocess.Popen[str]:
         command = ["setpriv", "--bounding-set", IN_CONTAINERS, *command]
     environment = {"PATH": os.environ["PATH"], "HOME": str(case.place), "LANG": "C.UTF-8"}
     environment |= {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": _import_path(case.clone)}
-    if case.hidden is not None:
-        environment["PYTHONPATH"] += f":{HIDING}"
     if case.temporary is not None:
         environment["TMPDIR"] = str(case.place / case.temporary)
     for name in case.unset:
@@ -146,9 +141,6 @@ def _mounts(case: Case) -> list[str]:
         lines += _interpreter_for_all()
         lines.append(f"chown {ORDINARY}:{ORDINARY} {' '.join(owned)}")
     lines.append(f"chmod {case.mode:o} {owned[0]}")
-    if case.hidden is not None:
-        hide = shlex.quote(f"import sys; sys.modules[{case.hidden!r}] = None")
-        lines += [f"mkdir {HIDING}", f"echo {hide} > {HIDING}/sitecustomize.py"]
     if case.read_only:
         lines.append(f"mount -o remount,bind,ro {clone}")
     for folder in ("/tmp", "/var/tmp"):

@@ -1,3 +1,5 @@
+"""Boards: cells, what flags do under each policy, ranks, tasks' versions, queries and duels."""
+
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
@@ -5,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from buildarena_benchmark import flags
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
     BoardQuery,
@@ -19,12 +22,11 @@ from buildarena_benchmark.statistics import holm
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 ALL = BoardQuery()
+PUBLISHED = ScoringPolicy.PUBLISHED
 WEIGHTS = {
     "lift-1": {"precision": 3, "ambiguity": 1},
     "support-1": {"precision": 1, "ambiguity": 1},
 }
-
-KNOWN = known_flags()
 
 
 def trials(task: str, model: str, successes: int, of: int, **values: object) -> list[EndedJob]:
@@ -49,11 +51,10 @@ def trials(task: str, model: str, successes: int, of: int, **values: object) -> 
     ]
 
 
-def board_of(*groups: list[EndedJob], versions: dict[str, str] | None = None) -> TrackBoard:
-    board = TrackBoard({"lift-1": "v2", "support-1": "v2"} | (versions or {}), WEIGHTS)
-    for group in groups:
-        for trial in group:
-            board.put(trial)
+def board_of(*groups: list[EndedJob]) -> TrackBoard:
+    board = TrackBoard({"lift-1": "v2", "support-1": "v2"}, WEIGHTS)
+    for trial in (trial for group in groups for trial in group):
+        board.put(trial)
     return board
 
 
@@ -76,78 +77,44 @@ def test_a_cell_of_a_hand_worked_case() -> None:
     assert cell.outcomes["construction_failed"] == 1
 
 
-def test_a_disqualified_success_is_a_failure_with_nothing_in_our_reading(subtests) -> None:
-    for flag in [name for name, flag in KNOWN.items() if flag.disqualifying]:
-        with subtests.test(flag=flag):
+def test_what_a_flag_does_under_each_policy(subtests) -> None:
+    """Ours makes a disqualified success a failure with nothing; the published one leaves out."""
+    plain = summarise(trials("lift-1", "a", 3, 4))
+    for flag in (*known_flags().values(), None):
+        name = flag.name if flag else "a flag of tomorrow"
+        with subtests.test(flag=name):
             found = trials("lift-1", "a", 3, 4)
-            found[0] = replace(found[0], flags=("never_fell", flag), indicator=900.0)
-            ours = summarise(found)
-            assert (ours.flagged, ours.successes, ours.trials) == (1, 2, 4)
-            assert (ours.indicator_best, ours.censored) == (12.0, 0)
-            assert ours.indicator_mean == pytest.approx((11 + 12) / 4)
-            assert ours.flags == {"never_fell": 1, flag: 1}
-
-
-def test_an_informative_flag_changes_no_figure_of_a_rank(subtests) -> None:
-    for flag in [
-        *(name for name, flag in KNOWN.items() if not flag.disqualifying),
-        "a flag of tomorrow",
-    ]:
-        with subtests.test(flag=flag):
-            plain = trials("lift-1", "a", 3, 4)
-            cell, without = summarise([replace(t, flags=(flag,)) for t in plain]), summarise(plain)
-            for name in ("trials", "successes", "success_low", "indicator_mean", "indicator_best"):
-                assert getattr(cell, name) == getattr(without, name)
-            assert (cell.flagged, cell.flags) == (0, {flag: 4})
-            assert cell.censored == (3 if flag == "never_fell" else 0)
-
-
-def test_the_published_reading_leaves_out_what_it_calls_hacked(subtests) -> None:
-    for flag in [name for name, flag in KNOWN.items() if flag.published]:
-        for success in [True, False]:
-            with subtests.test(flag=flag, success=success):
-                found = trials("lift-1", "a", 3, 4)
-                found[0] = replace(found[0], flags=(flag,), success=success)
-                cell = summarise(found, policy=ScoringPolicy.PUBLISHED)
-                assert (cell.flagged, cell.successes, cell.trials, cell.ended) == (1, 2, 3, 4)
-
-
-def test_the_published_reading_knows_no_flags_but_its_own(subtests) -> None:
-    for flag in [name for name, flag in KNOWN.items() if not flag.published]:
-        with subtests.test(flag=flag):
-            cell = summarise(
-                trials("lift-1", "a", 3, 4, flags=(flag,)), policy=ScoringPolicy.PUBLISHED
-            )
-            assert (cell.flagged, cell.successes, cell.trials) == (0, 3, 4)
+            found[0] = replace(found[0], flags=(name,), indicator=900.0)
+            ours, theirs = summarise(found), summarise(found, policy=PUBLISHED)
+            assert ours.flags == {name: 1}
+            if flag and flag.disqualifying:
+                assert (ours.flagged, ours.successes, ours.trials) == (1, 2, 4)
+                assert ours.success_rate == 0.5
+                assert (ours.indicator_best, ours.censored) == (12.0, 0)
+                assert ours.indicator_mean == pytest.approx((11 + 12) / 4)
+            else:
+                assert (ours.flagged, ours.successes, ours.trials) == (0, 3, 4)
+                assert (ours.success_low, ours.indicator_best) == (plain.success_low, 900.0)
+                assert ours.censored == (name == "never_fell")
+            left_out = bool(flag and flag.published)
+            figures = (1, 2, 3, 4) if left_out else (0, 3, 4, 4)
+            assert (theirs.flagged, theirs.successes, theirs.trials, theirs.ended) == figures
+            assert flags.is_left_out((name,), PUBLISHED) == left_out
+            assert not flags.is_left_out((name,), ScoringPolicy.OURS)
+    assert flags.is_disqualified(("never_fell", "does_not_span"))
 
 
 def test_the_published_policy_reads_the_metric_that_was_published() -> None:
     found = [replace(t, published=3.0 * t.seed) for t in trials("throw-1", "a", 2, 4)]
     found[0] = replace(found[0], robustness=1.0, robust_indicator=50.0)
-    ours = summarise(found)
+    ours, published = summarise(found), summarise(found, policy=PUBLISHED)
     assert (ours.indicator_mean, ours.indicator_best) == ((50.0 + 11.0) / 4, 50.0)
     assert ours.score is not None
-    published = summarise(found, policy=ScoringPolicy.PUBLISHED)
     assert (published.indicator_mean, published.indicator_best) == (4.5, 9.0)
     assert (published.successes, published.score) == (2, None)
-    counted = counted_trials(found, policy=ScoringPolicy.PUBLISHED)
+    counted = counted_trials(found, policy=PUBLISHED)
     assert [trial.indicator for trial in counted] == [0.0, 3.0, 6.0, 9.0]
     assert [t.indicator for t in counted_trials(found)] == [50.0, 11.0, 0.0, 0.0]
-
-
-def bridges(model: str, successes: int, load: float, *flags: str) -> list[EndedJob]:
-    found = trials("support-1", model, successes, 64)
-    return [replace(t, indicator=load, flags=flags) if t.success else t for t in found]
-
-
-def test_a_bridge_that_carries_everything_is_the_best_result() -> None:
-    board = board_of(bridges("all", 40, 1500.0, "never_fell"), bridges("some", 6, 200.0))
-    first, second = board.board(ALL).tasks[0].rows
-    assert (first.cell.model, first.rank, first.cell.censored) == ("all", 1, 40)
-    assert (second.cell.model, second.rank) == ("some", 2)
-    published = board.board(BoardQuery(policy=ScoringPolicy.PUBLISHED)).tasks[0].rows
-    assert [(row.cell.model, row.cell.trials) for row in published] == [("some", 64), ("all", 24)]
-    assert board.board(ALL).tasks[0].rows[0].cell.successes == 40
 
 
 def test_who_cheats_does_not_gain_by_it() -> None:
@@ -157,13 +124,15 @@ def test_who_cheats_does_not_gain_by_it() -> None:
     assert [row.cell.model for row in board.board(ALL).tasks[0].rows] == ["c", "b", "a"]
 
 
-def test_errored_jobs_alone_give_no_numbers() -> None:
+def test_errored_jobs_alone_and_no_jobs_give_no_numbers() -> None:
     answer = board_of(trials("lift-1", "a", 0, 3, outcome="errored", success=False)).board(ALL)
     (row,) = answer.tasks[0].rows
     assert (row.rank, row.cell.success_rate, row.cell.indicator_mean) == (None, None, None)
     assert (row.cell.trials, row.cell.errored, row.cell.success_rate_of_ended) == (0, 3, 0.0)
     (overall,) = answer.overall
     assert (overall.rank, overall.success_rate_mean, overall.dimensions) == (None, None, {})
+    empty = board_of().board(ALL)
+    assert (list(empty.tasks), empty.overall) == ([], [])
 
 
 def test_zero_successes_have_an_interval_and_no_cost_per_success() -> None:
@@ -171,17 +140,6 @@ def test_zero_successes_have_an_interval_and_no_cost_per_success() -> None:
     assert (cell.success_low, cell.cost_per_success_usd) == (0.0, None)
     assert 0.05 < cell.success_high < 0.06  # 1 - 0.025^(1/64)
     assert (cell.indicator_low, cell.indicator_high, cell.too_few_data) == (None, None, True)
-
-
-def test_an_empty_board_is_empty() -> None:
-    answer = board_of().board(ALL)
-    assert (list(answer.tasks), answer.overall) == ([], [])
-
-
-def test_one_model_is_first_and_scores_one() -> None:
-    (row,) = board_of(trials("lift-1", "a", 1, 5)).board(ALL).overall
-    assert (row.rank, row.rank_low, row.rank_high, row.pareto) == (1, 1, 1, True)
-    assert row.dimensions == {"precision": 1.0, "ambiguity": 1.0}
 
 
 def test_models_alike_share_a_rank_and_better_ones_do_not() -> None:
@@ -192,33 +150,26 @@ def test_models_alike_share_a_rank_and_better_ones_do_not() -> None:
 
 
 def test_a_model_with_a_missing_task_is_shown_but_not_ranked() -> None:
-    board = board_of(
-        trials("lift-1", "a", 3, 9),
-        trials("support-1", "a", 3, 9),
-        trials("lift-1", "b", 9, 9),
-    )
-    ranked, unranked = board.board(ALL).overall
+    both = trials("lift-1", "a", 3, 9) + trials("support-1", "a", 3, 9)
+    ranked, unranked = board_of(both, trials("lift-1", "b", 9, 9)).board(ALL).overall
     assert (ranked.model, ranked.rank, ranked.missing) == ("a", 1, [])
     assert (unranked.model, unranked.rank, unranked.missing) == ("b", None, ["support-1"])
 
 
 def test_difficulty_dimensions_weigh_the_tasks() -> None:
-    board = board_of(
-        trials("lift-1", "a", 9, 9),
-        trials("support-1", "a", 0, 9),
-        trials("lift-1", "b", 0, 9),
-        trials("support-1", "b", 9, 9),
-    )
-    scores = {row.model: row.dimensions for row in board.board(ALL).overall}
+    first = trials("lift-1", "a", 9, 9) + trials("support-1", "a", 0, 9)
+    second = trials("lift-1", "b", 0, 9) + trials("support-1", "b", 9, 9)
+    scores = {row.model: row.dimensions for row in board_of(first, second).board(ALL).overall}
     assert scores["a"] == pytest.approx({"precision": 0.75, "ambiguity": 0.5})
     assert scores["b"] == pytest.approx({"precision": 0.25, "ambiguity": 0.5})
 
 
-def test_the_cost_front_holds_the_better_and_the_cheaper() -> None:
+def test_the_cost_front_holds_the_better_and_the_cheaper_that_ever_succeed() -> None:
     board = board_of(
         trials("lift-1", "good", 9, 9, cost_usd=2.0),
         trials("lift-1", "cheap", 4, 9, cost_usd=0.1),
         trials("lift-1", "neither", 2, 9, cost_usd=3.0),
+        trials("lift-1", "idle", 0, 9, cost_usd=0.0),
     )
     front = {row.model for row in board.board(ALL).overall if row.pareto}
     assert front == {"good", "cheap"}
@@ -230,7 +181,7 @@ def test_only_the_current_version_of_a_task_counts() -> None:
     ]
     task = board_of(old, trials("lift-1", "a", 1, 4)).board(ALL).tasks[0]
     assert (task.version, task.outdated, task.rows[0].cell.trials) == ("v2", 9, 4)
-    own = [replace(t, task="own") for t in trials("own", "a", 1, 3)]
+    own = trials("own", "a", 1, 3)
     newer = [
         replace(t, task_version="v0", job_id=f"n-{t.job_id}", finished_at=START + timedelta(days=9))
         for t in own
@@ -238,18 +189,9 @@ def test_only_the_current_version_of_a_task_counts() -> None:
     assert board_of(own, newer).board(ALL).tasks[0].version == "v0"
 
 
-def test_one_model_with_two_decodings_has_two_rows() -> None:
-    warm = [
-        replace(t, configuration="warm", job_id=f"w{t.job_id}") for t in trials("lift-1", "a", 2, 4)
-    ]
-    rows = board_of(trials("lift-1", "a", 2, 4), warm).board(ALL).tasks[0].rows
-    assert {row.cell.configuration for row in rows} == {"a", "warm"}
-
-
 def test_queries_choose_tasks_models_and_time() -> None:
-    board = board_of(
-        trials("lift-1", "a", 3, 9), trials("lift-1", "b", 3, 9), trials("support-1", "a", 3, 9)
-    )
+    lifts = trials("lift-1", "a", 3, 9) + trials("lift-1", "b", 3, 9)
+    board = board_of(lifts, trials("support-1", "a", 3, 9))
     some = board.board(BoardQuery(tasks=frozenset({"lift-1"}), models=frozenset({"b"})))
     assert [(t.task, [r.cell.model for r in t.rows]) for t in some.tasks] == [("lift-1", ["b"])]
     early = board.board(BoardQuery(until=START + timedelta(hours=3)))
@@ -259,19 +201,33 @@ def test_queries_choose_tasks_models_and_time() -> None:
     assert board.board(BoardQuery(since=START + timedelta(99))).tasks == []
 
 
-changes = st.lists(
+def test_the_ranking_is_over_the_asked_tasks_that_are_there_or_over_what_there_is() -> None:
+    found = board_of(
+        trials("lift-1", "a", 3, 4), trials("support-1", "a", 1, 4), trials("own-1", "a", 2, 4)
+    )
+    everything = ["lift-1", "own-1", "support-1"]
+    for asked, chosen, ranked in (
+        (["support-1", "lift-1"], {}, ["lift-1", "support-1"]),
+        (["lift-1", "hover-3"], {}, ["lift-1"]),
+        (["hover-3"], {}, everything),
+        (["lift-1"], {"tasks": frozenset({"own-1"})}, ["own-1"]),
+    ):
+        board = found.board(BoardQuery(overall=frozenset(asked), **chosen))
+        assert sorted(board.ranked) == ranked
+        (row,) = board.overall
+        assert (row.rank, row.rank_low, row.rank_high, row.pareto) == (1, 1, 1, True)
+
+
+CHANGES = st.lists(
     st.tuples(st.sampled_from(["put", "take", "score"]), st.integers(0, 29)), max_size=40
 )
 
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=30)
-@given(changes, st.randoms(use_true_random=False))
+@given(CHANGES, st.randoms(use_true_random=False))
 def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng) -> None:
-    pool = [
-        *trials("lift-1", "a", 4, 10),
-        *trials("lift-1", "b", 6, 10),
-        *trials("support-1", "a", 1, 10),
-    ]
+    lifts = trials("lift-1", "a", 4, 10) + trials("lift-1", "b", 6, 10)
+    pool = lifts + trials("support-1", "a", 1, 10)
     kept: dict[str, EndedJob] = {}
     board = board_of()
     for what, number in steps:
@@ -302,41 +258,7 @@ def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:
     assert lift.success_p < 0.001
     assert lift.low > 0
     assert support.low < 0 < support.high
-
-
-def test_a_duel_without_shared_seeds_has_no_test() -> None:
-    second = [replace(t, seed=t.seed + 100) for t in trials("lift-1", "b", 3, 9)]
-    (task,) = compare_models(trials("lift-1", "a", 3, 9), second).tasks
+    apart = [replace(t, seed=t.seed + 100) for t in second]  # without shared seeds, no test
+    task = compare_models(first, apart).tasks[0]
     assert (task.success, task.success_p, task.indicator_p) == (None, None, None)
     assert compare_models([], second) is None
-
-
-def test_the_ranking_is_over_the_asked_tasks_that_are_there_or_over_what_there_is() -> None:
-    found = board_of(
-        trials("lift-1", "a", 3, 4), trials("support-1", "a", 1, 4), trials("own-1", "a", 2, 4)
-    )
-    of = {
-        asked: found.board(BoardQuery(overall=frozenset(asked))).ranked
-        for asked in (("support-1", "lift-1"), ("lift-1", "hover-3"), ("hover-3",))
-    }
-    assert sorted(of["support-1", "lift-1"]) == ["lift-1", "support-1"]
-    assert of["lift-1", "hover-3"] == ("lift-1",)
-    assert sorted(of[("hover-3",)]) == ["lift-1", "own-1", "support-1"]
-    assert found.board(BoardQuery(overall=frozenset({"hover-3"}))).overall[0].rank == 1
-    only = found.board(BoardQuery(tasks=frozenset({"own-1"}), overall=frozenset({"lift-1"})))
-    assert only.ranked == ("own-1",)
-    assert only.overall[0].rank == 1
-    assert TrackBoard({}, WEIGHTS).board(BoardQuery(overall=frozenset({"lift-1"}))).ranked == ()
-
-
-def test_who_never_succeeds_is_on_no_front_however_cheap() -> None:
-    found = board_of(
-        trials("lift-1", "good", 4, 6, cost_usd=2.0),
-        trials("lift-1", "cheap", 2, 6, cost_usd=1.0),
-        trials("lift-1", "idle", 0, 6, cost_usd=0.0),
-    ).board(ALL)
-    assert {row.model: row.pareto for row in found.overall} == {
-        "good": True,
-        "cheap": True,
-        "idle": False,
-    }

@@ -1,16 +1,23 @@
-from itertools import product
+"""Tests of pairs of models: against exact values, by counting, and by simulation."""
+
+from itertools import combinations, product
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import hypergeom
 
 from buildarena_benchmark.statistics import (
+    PairTests,
+    Sample,
     agreement,
     cost_per_success,
     holm,
+    pair_tests,
     paired_indicators,
     paired_successes,
+    permutation,
     token_bins,
 )
 
@@ -22,6 +29,8 @@ def test_mcnemar_of_a_hand_worked_case() -> None:
     test = paired_successes(first, second)
     assert test.p_value == pytest.approx(18 / 256)
     assert (test.pairs, test.difference) == (12, 0.5)
+    assert paired_successes([], []) is paired_indicators([], []) is None
+    assert paired_indicators([0.0, 3.0], [0.0, 3.0]).p_value == 1.0
 
 
 def test_wilcoxon_of_a_case_that_can_be_counted() -> None:
@@ -34,17 +43,12 @@ def test_wilcoxon_of_a_case_that_can_be_counted() -> None:
     assert paired_indicators(difference, [0.0] * 5).p_value == pytest.approx(p_value)
 
 
-def test_no_pairs_and_no_differences() -> None:
-    assert paired_successes([], []) is None
-    assert paired_indicators([], []) is None
-    assert paired_successes([True, False], [True, False]).p_value == 1.0
-    assert paired_indicators([0.0, 3.0], [0.0, 3.0]).p_value == 1.0
-
-
-def test_holm_of_a_hand_worked_case() -> None:
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([]) == []
-    assert holm([0.4, 0.9]) == pytest.approx([0.8, 0.9])
+def test_mcnemar_finds_nothing_between_equal_models() -> None:
+    rng = np.random.default_rng(13)
+    found = [
+        paired_successes(*(rng.random((2, 64)) < 0.4).tolist()).p_value < 0.05 for _ in range(800)
+    ]
+    assert np.mean(found) <= 0.07
 
 
 def stepwise(p_values: list[float], error: float) -> set[int]:
@@ -58,22 +62,10 @@ def stepwise(p_values: list[float], error: float) -> set[int]:
 
 @given(st.lists(st.floats(0, 1), max_size=12), st.sampled_from([0.01, 0.05, 0.2]))
 def test_holm_rejects_what_the_stepwise_procedure_rejects(p_values, error) -> None:
-    adjusted = holm(p_values)
-    assert {i for i, p in enumerate(adjusted) if p <= error * (1 - 1e-9)} <= stepwise(
-        p_values, error
-    )
-    assert stepwise(p_values, error) <= {i for i, p in enumerate(adjusted) if p <= error * 1.000001}
-
-
-def test_mcnemar_finds_nothing_between_equal_models(subtests) -> None:
-    for error, most in [(0.05, 0.07)]:
-        with subtests.test(error=error):
-            rng = np.random.default_rng(13)
-            found = 0
-            for _ in range(800):
-                a, b = rng.random((2, 64)) < 0.4
-                found += paired_successes(a.tolist(), b.tolist()).p_value < error
-            assert found / 800 <= most
+    adjusted, expected = holm(p_values), stepwise(p_values, error)
+    assert {i for i, p in enumerate(adjusted) if p <= error * (1 - 1e-9)} <= expected
+    assert expected <= {i for i, p in enumerate(adjusted) if p <= error * 1.000001}
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
 
 
 def test_agreement_of_a_hand_worked_case() -> None:
@@ -82,13 +74,9 @@ def test_agreement_of_a_hand_worked_case() -> None:
     first = [(bool(a), float(i)) for i, (a, _) in enumerate(pairs)]
     second = [(bool(b), 2.0 * i + 1) for i, (_, b) in enumerate(pairs)]
     found = agreement(first, second)
-    assert found.same_verdict == pytest.approx(0.7)
-    assert found.kappa == pytest.approx(0.4)
+    assert (found.same_verdict, found.kappa) == (pytest.approx(0.7), pytest.approx(0.4))
     assert found.rank_correlation == pytest.approx(1.0)
-
-
-def test_agreement_where_nothing_varies() -> None:
-    found = agreement([(False, 0.0)] * 3, [(False, 0.0)] * 3)
+    found = agreement([(False, 0.0)] * 3, [(False, 0.0)] * 3)  # where nothing varies
     assert (found.same_verdict, found.kappa, found.rank_correlation) == (1.0, None, None)
     assert agreement([], []) is None
     with pytest.raises(ValueError, match="cannot be paired"):
@@ -97,22 +85,139 @@ def test_agreement_where_nothing_varies() -> None:
 
 def test_token_bins_of_a_hand_worked_case() -> None:
     tokens = np.array([10.0, 20.0, 100.0, 500.0, 1000.0])
-    bins = token_bins(tokens, np.array([1.0, 0.0, 4.0, 2.0, 0.0]), bins=2)
-    assert [(b.low, b.high, b.trials) for b in bins] == [(10, 100, 2), (100, 1000, 3)]
-    assert bins[0].mean == pytest.approx(0.125)
-    assert (bins[1].mean, bins[1].median) == (pytest.approx(0.5), pytest.approx(0.5))
-
-
-@given(st.lists(st.tuples(st.integers(0, 10**6), st.floats(0, 1500)), max_size=40))
-def test_every_trial_is_in_one_bin(trials) -> None:
-    tokens = np.array([t for t, _ in trials], float)
-    bins = token_bins(tokens, np.array([v for _, v in trials], float))
-    assert sum(b.trials for b in bins) == len(trials)
-    assert all(b.mean is None or 0 <= b.mean <= 1 for b in bins)
+    first, second = token_bins(tokens, np.array([1.0, 0.0, 4.0, 2.0, 0.0]), bins=2)
+    assert (first.low, first.high, first.trials) == (10, 100, 2)
+    assert (second.low, second.high, second.trials) == (100, 1000, 3)
+    assert first.mean == pytest.approx(0.125)
+    assert (second.mean, second.median) == (pytest.approx(0.5), pytest.approx(0.5))
 
 
 def test_the_cost_of_a_success_includes_the_failures() -> None:
     assert cost_per_success([0.5, 0.25, 0.25], 2) == pytest.approx(0.5)
-    assert cost_per_success([0.5], 0) is None
-    assert cost_per_success([None, None], 1) is None
-    assert cost_per_success([0.5, None], 1) is None
+    for costs, successes in (([0.5], 0), ([None, None], 1), ([0.5, None], 1)):
+        assert cost_per_success(costs, successes) is None
+
+
+# Unpaired models
+
+
+def evidence(pairs) -> PairTests:
+    """The tests of pairs of models, each given by its trials."""
+    return pair_tests([(Sample.of(first), Sample.of(second)) for first, second in pairs])
+
+
+def counts(first: tuple[int, int], second: tuple[int, int], value: float = 300.0):
+    """Trials of two models by their successes, which are all worth the same."""
+    return tuple(
+        np.column_stack([won, won * value])
+        for successes, trials in (first, second)
+        for won in [(np.arange(trials) < successes).astype(float)]
+    )
+
+
+def dealt(pooled: np.ndarray, number: int) -> float:
+    """The two-sided p-value by dealing the labels in every way."""
+    standard = (pooled - pooled.mean(axis=0)) / pooled.std(axis=0)
+    weight = standard.sum(axis=1)
+    sums = [weight[list(chosen)].sum() for chosen in combinations(range(len(pooled)), number)]
+    return 2 * float(np.mean(np.array(sums) >= abs(weight[:number].sum()) - 1e-9))
+
+
+def test_counts_alone_give_fishers_p_value_from_above() -> None:
+    for first, second in (
+        ((9, 64), (1, 64)),
+        ((10, 64), (0, 64)),
+        ((38, 64), (2, 64)),
+        ((7, 8), (4, 64)),
+        ((8, 8), (3, 64)),
+        ((2, 2), (1, 64)),
+        ((12, 16), (0, 16)),
+        ((260, 740), (140, 740)),
+    ):
+        (won, of), (lost, among) = first, second
+        exact = 2 * float(hypergeom.sf(won - 1, of + among, won + lost, of))
+        found = evidence([counts(first, second), counts(second, first)])
+        assert exact * 0.98 <= found.p_value[0] <= 3 * exact, first
+        assert found.z[0] > 0
+        assert found.p_value[1] == pytest.approx(found.p_value[0])
+        assert found.z[1] == pytest.approx(-found.z[0])
+
+
+def test_p_values_are_those_of_dealing_every_label_from_above() -> None:
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        won = (rng.random(16) < [*[0.9] * 8, *[0.3] * 8]).astype(float)
+        pooled = np.column_stack([won, won * rng.lognormal(5, 0.8, 16)])
+        found = float(evidence([(pooled[:8], pooled[8:])]).p_value[0])
+        exact = min(1.0, dealt(pooled, 8))
+        # Sixteen trials make wide gaps, and the correction of half a gap is large.
+        assert exact * 0.95 <= found <= 10 * exact, seed
+
+
+def test_pairs_are_tested_alike_alone_and_among_others_and_on_any_scale() -> None:
+    rng = np.random.default_rng(4)
+    pairs = [
+        tuple(
+            np.column_stack([w, w * rng.lognormal(5, 1, n)])
+            for w in (rng.random((2, n)) < [[0.7], [0.4]]).astype(float)
+        )
+        for n in (5, 64, 200)
+    ]
+    together = evidence(pairs).p_value
+    for scale in (1, 1e-6, 1e9):
+        alone = [evidence([[each * [1, scale] for each in pair]]).p_value[0] for pair in pairs]
+        assert alone == pytest.approx(together, rel=1e-6)
+    assert len(evidence([]).p_value) == 0
+
+
+def test_where_nothing_varies_or_few_try_nothing_is_said() -> None:
+    found = evidence([counts((0, 64), (0, 64)), counts((64, 64), (64, 64))])
+    assert (found.p_value.tolist(), found.z.tolist()) == ([1.0, 1.0], [0.0, 0.0])
+    assert not found.informative.any()
+    # Digits that differ by rounding are no difference.
+    same = np.column_stack([np.ones(64), np.full(64, 0.1 + 0.2)])
+    other = np.column_stack([np.ones(64), np.full(64, 0.3)])
+    assert evidence([(same, other)]).p_value[0] == 1.0
+    assert (evidence([counts((n, n), (0, n)) for n in (1, 2, 3)]).p_value > 0.05).all()
+
+
+def test_models_of_equal_means_and_unequal_spread_are_not_told_apart() -> None:
+    """Few trials that vary much beside many that vary little: labels alone would mislead."""
+    rng = np.random.default_rng(6)
+    pairs = [
+        tuple(
+            np.column_stack([np.ones(n), rng.normal(300, spread, n)])
+            for n, spread in ((16, 100), (256, 10))
+        )
+        for _ in range(300)
+    ]
+    assert (evidence(pairs).p_value <= 0.01).sum() <= 12
+
+
+SHAPES = {
+    "exponential": lambda rng, n: rng.exponential(1.0, n),
+    "heavy": lambda rng, n: rng.lognormal(3, 1, n),
+    "two designs": lambda rng, n: np.where(
+        rng.random(n) < 0.5, rng.normal(10, 1, n), rng.normal(500, 30, n)
+    ),
+}
+
+
+def test_near_trials_together_say_what_each_says(monkeypatch, subtests) -> None:
+    for (shape, draw), trials in product(SHAPES.items(), (200, 2000)):
+        with subtests.test(shape=shape, trials=trials), monkeypatch.context() as patch:
+            rng = np.random.default_rng(1)
+            models = []
+            for _ in range(4):
+                won = rng.random(trials) < rng.uniform(0.45, 0.55)
+                share = np.where(won, rng.integers(1, 5, trials), 0) / 4
+                indicator = draw(rng, trials) * rng.uniform(0.95, 1.05)
+                models.append(np.column_stack([share, np.where(won, indicator, 0.0)]))
+            near = [Sample.of(model) for model in models]
+            for sample, each in zip(near, models, strict=True):
+                assert sample.times @ sample.figures == pytest.approx(each.sum(axis=0))
+                assert len(sample.times) < trials / 2
+            together = pair_tests(list(combinations(near, 2)))
+            patch.setattr(permutation, "MANY", trials)
+            apart = evidence(combinations(models, 2))
+            assert 0 < np.abs(together.z - apart.z).max() < 0.005

@@ -1,3 +1,5 @@
+"""Ranks, what a board claims of models alike and unlike, and scores beside the expert's."""
+
 from itertools import combinations
 
 import numpy as np
@@ -6,118 +8,200 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.stats import rankdata
+from support.boards.made_up_trials import LOADS, board, rankings
 
+from buildarena_benchmark import builtin_tasks, references
+from buildarena_benchmark.leaderboard import EndedJob, summarise
 from buildarena_benchmark.statistics import (
     PairTests,
     Sample,
     adjusted,
+    board_power,
     combined,
+    detectable_difference,
+    expert_scores,
     mean_ranks,
     pair_tests,
     rank_models,
 )
-from buildarena_benchmark.statistics.ranking import descending_ranks
 
-tables = arrays(float, (4, 5), elements=st.sampled_from([0.0, 0.1, 0.25, 0.5, 1.0]))
-
-
-@given(tables)
-def test_ranks_are_scipys(table) -> None:
-    theirs = rankdata(-table, method="average", axis=1)
-    assert np.array_equal(descending_ranks(table), theirs)
+TABLES = arrays(float, (4, 5), elements=st.sampled_from([0.0, 0.1, 0.25, 0.5, 1.0]))
+MODELS, TASKS = 12, 9
 
 
-def test_a_hand_worked_ranking() -> None:
-    # Two tasks, three models; the second and third tie in success on the first task.
-    success = np.array([[0.9, 0.1, 0.1], [0.5, 0.4, 0.6]])
-    indicator = np.array([[30.0, 10.0, 5.0], [7.0, 8.0, 9.0]])
-    assert mean_ranks(success, indicator) == pytest.approx(
-        [(1 + 1 + 2 + 3) / 4, (2.5 + 2 + 3 + 2) / 4, (2.5 + 3 + 1 + 1) / 4]
-    )
-
-
-@given(tables, tables, st.permutations(range(5)), st.permutations(range(4)))
-def test_names_and_order_of_models_and_tasks_do_not_matter(success, indicator, models, tasks):
-    plain = mean_ranks(success, indicator)
-    mixed = mean_ranks(success[tasks][:, models], indicator[tasks][:, models])
-    assert mixed == pytest.approx(plain[models])
-
-
-@given(tables, tables, st.integers(0, 3), st.integers(0, 4))
-def test_doing_better_never_harms(success, indicator, task, model) -> None:
-    before = mean_ranks(success, indicator)
-    success[task, model] += 0.3
-    after = mean_ranks(success, indicator)
-    assert after[model] <= before[model]
-    others = np.arange(5) != model
-    assert np.all(after[others] >= before[others] - 1e-12)
-
-
-def trials_of(successes: list[int], trials: int) -> list[np.ndarray]:
-    """One model's trials for each number of successes."""
-    won = [(np.arange(trials) < count).astype(float) for count in successes]
-    return [np.column_stack([w, w]) for w in won]
+@given(TABLES, TABLES)
+def test_mean_ranks_are_scipys(success, indicator) -> None:
+    theirs = [rankdata(-table, method="average", axis=1) for table in (success, indicator)]
+    assert mean_ranks(success, indicator) == pytest.approx(np.mean(np.vstack(theirs), axis=0))
 
 
 def ranked(successes: list[int], trials: int, tasks: int = 1):
-    row = trials_of(successes, trials)
-    tests = combined(
-        [pair_tests(list(combinations([Sample.of(trials) for trials in row], 2)))] * tasks
-    )
+    """Models by their successes, which are all worth the same."""
+    won = [(np.arange(trials) < count).astype(float) for count in successes]
+    row = [Sample.of(np.column_stack([w, w])) for w in won]
+    tests = combined([pair_tests(list(combinations(row, 2)))] * tasks)
     rates = np.array([[count / trials for count in successes]] * tasks)
     return rank_models((rates, rates), tests, adjusted([tests])[0])
 
 
 def test_models_that_cannot_be_told_apart_share_a_rank() -> None:
-    ranking = ranked([51, 33, 32, 6], 64, tasks=5)
-    assert ranking.rank.tolist() == [1, 2, 2, 4]
-    assert ranking.low.tolist() == [1, 2, 2, 4]
-    assert ranking.high.tolist() == [1, 3, 3, 4]
-    assert not ranking.better.diagonal().any()
+    for successes, trials, tasks, ranks, low, high in (
+        ([51, 33, 32, 6], 64, 5, [1, 2, 2, 4], [1, 2, 2, 4], [1, 3, 3, 4]),
+        ([32, 32, 32, 32], 64, 3, [1, 1, 1, 1], [1, 1, 1, 1], [4, 4, 4, 4]),
+        ([0], 1, 1, [1], [1], [1]),
+        ([3, 0], 3, 1, [1, 1], [1, 1], [2, 2]),  # too few trials to say so
+        ([8, 0], 8, 1, [1, 2], [1, 2], [1, 2]),
+    ):
+        ranking = ranked(successes, trials, tasks)
+        found = [each.tolist() for each in (ranking.rank, ranking.low, ranking.high)]
+        assert found == [ranks, low, high]
+        assert not ranking.better.diagonal().any()
 
 
-def test_equal_models_all_share_the_first_rank() -> None:
-    ranking = ranked([32, 32, 32, 32], 64, tasks=3)
-    assert ranking.rank.tolist() == [1, 1, 1, 1]
-    assert ranking.high.tolist() == [4, 4, 4, 4]
-    assert ranking.mean_rank == pytest.approx([2.5] * 4)
-
-
-def test_one_model_is_first() -> None:
-    ranking = ranked([0], 1)
-    assert (ranking.rank[0], ranking.low[0], ranking.high[0]) == (1, 1, 1)
-
-
-def test_very_few_trials_say_nothing_apart(subtests) -> None:
-    for trials, apart in [(1, False), (3, False), (8, True)]:
-        with subtests.test(trials=trials):
-            ranking = ranked([trials, 0], trials)
-            assert ranking.better[0, 1] == apart
-            assert ranking.rank.tolist() == ([1, 2] if apart else [1, 1])
-            assert (ranking.low[1], ranking.high[0]) == ((2, 1) if apart else (1, 2))
+def pair_of(z: list[float], p_value: list[float], *, informative: bool = True) -> PairTests:
+    return PairTests(
+        z=np.array(z), p_value=np.array(p_value), informative=np.full(len(z), informative)
+    )
 
 
 def test_evidence_against_the_order_makes_no_claim() -> None:
     """One figure far ahead and the other a little behind: the mean ranks tie, and so do models."""
-    tests = PairTests(z=np.array([9.0]), p_value=np.array([1e-9]), informative=np.array([True]))
+    tests = pair_of([9.0], [1e-9])
     success, indicator = np.array([[0.9, 0.1]]), np.array([[5.0, 6.0]])
     assert not rank_models((success, indicator), tests, tests.p_value).better.any()
 
 
 def test_tasks_that_say_nothing_take_nothing_from_those_that_do() -> None:
-    some = PairTests(z=np.array([3.0]), p_value=np.array([0.003]), informative=np.array([True]))
-    none = PairTests(z=np.array([0.0]), p_value=np.array([1.0]), informative=np.array([False]))
+    some, none = pair_of([3.0], [0.003]), pair_of([0.0], [1.0], informative=False)
     assert combined([some, none, none]).z[0] == pytest.approx(3.0)
     assert combined([none, none]).p_value[0] == 1.0
 
 
 def test_a_family_is_adjusted_by_holm_over_all_its_tests() -> None:
-    first, second = (
-        PairTests(z=np.zeros(2), p_value=np.array(p), informative=np.ones(2, bool))
-        for p in ([0.01, 0.5], [0.001, 0.04])
-    )
-    assert [list(p) for p in adjusted([first, second])] == [
+    first, second = pair_of([0, 0], [0.01, 0.5]), pair_of([0, 0], [0.001, 0.04])
+    assert [p.tolist() for p in adjusted([first, second])] == [
         pytest.approx([0.03, 0.5]),
         pytest.approx([0.004, 0.08]),
     ]
     assert adjusted([]) == []
+
+
+# What boards claim
+
+
+def boards(seed: int, count: int, rates, sizes, loads):
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        yield rankings(board(rng, rates, sizes, [LOADS[loads]] * len(sizes)))
+
+
+@pytest.mark.ci
+def test_of_models_alike_none_is_called_better(subtests) -> None:
+    """Testing each pair for itself, some model is called better on 77 % of such boards."""
+    for rate, size, loads in (
+        (0.3, 64, "lognormal, sigma 0.8"),
+        (0.9, 64, "censored at 1500"),
+        (0.1, 64, "near constant"),
+        (0.6, 16, "lognormal, sigma 1.2"),
+    ):
+        with subtests.test(rate=rate):
+            found = boards(31, 40, np.full((TASKS, MODELS), rate), [size] * MODELS, loads)
+            wrong = sum(any(ranking.better.any() for ranking in made) for made in found)
+            # At 5 % a board, six of forty or more are wrong in 1 of 70 trials.
+            assert wrong < 6
+
+
+def test_models_with_unequal_numbers_of_trials_are_not_called_better() -> None:
+    rates, sizes = np.full((TASKS, MODELS), 0.3), [4, 8, 16, 64] * 3
+    found = boards(32, 30, rates, sizes, "lognormal, sigma 0.8")
+    assert sum(any(ranking.better.any() for ranking in made) for made in found) < 5
+
+
+def test_a_model_that_is_better_is_found() -> None:
+    """Twice as often successful everywhere: found overall, on many tasks, and against all."""
+    rates = np.full((TASKS, MODELS), 0.3)
+    rates[:, 0] = 0.6
+    tasks = 0.0
+    for made in boards(33, 5, rates, [64] * MODELS, "lognormal, sigma 0.8"):
+        assert made[-1].better[0, 1:].all()
+        tasks += np.mean([ranking.better[0, 1:].mean() for ranking in made[:-1]]) / 5
+        assert not any(ranking.better[1:, 0].any() for ranking in made)
+    assert tasks > 0.1
+
+
+def test_a_lead_on_one_task_does_not_outweigh_being_behind_on_the_others() -> None:
+    rates = np.full((TASKS, MODELS), 0.35)
+    rates[:, 0] = 0.25
+    rates[0, :2] = 1.0, 0.0
+    for made in boards(34, 4, rates, [256] * MODELS, "near constant"):
+        assert not made[-1].better[0, 1]
+
+
+def test_places_hold_every_true_place() -> None:
+    rates, true = np.tile(np.linspace(0.1, 0.65, MODELS), (TASKS, 1)), np.arange(MODELS, 0, -1)
+    for made in boards(35, 5, rates, [64] * MODELS, "near constant"):
+        for ranking in made:
+            assert np.all((ranking.low <= true) & (true <= ranking.high))
+
+
+def test_boards_claim_what_was_said_and_hardly_half_of_it() -> None:
+    power = board_power(models=3, tasks=3, trials=24)
+    for share, least, most in ((1.0, 0.6, 1.0), (0.5, 0.0, 0.3)):
+        rates = np.full((3, 3), 0.5)
+        rates[:, 0] += share * power.overall
+        made = boards(5, 50, rates, [24] * 3, "near constant")
+        assert least <= np.mean([ranked[-1].better[0, 1] for ranked in made]) <= most
+
+
+def test_more_claims_need_more_and_more_trials_show_more() -> None:
+    few = {"models": 3, "tasks": 3, "trials": 64}
+    power = board_power(**few)
+    for more in ("models", "tasks"):
+        assert board_power(**{**few, more: 12}).on_a_task > power.on_a_task
+    assert board_power(**{**few, "tasks": 9}).overall < power.overall
+    assert board_power(**{**few, "trials": 128}).on_a_task < power.on_a_task
+    pair = board_power(models=2, tasks=1, trials=64)
+    assert pair.on_a_task == pair.overall == detectable_difference(0.5, 64)
+
+
+def test_as_many_trials_as_said_show_ten_points() -> None:
+    few = board_power(models=12, tasks=9, trials=8)
+    assert (few.trials_for_ten_points, few.on_a_task) == (127, None)
+    assert board_power(models=12, tasks=9, trials=127).overall <= 0.1
+    assert board_power(models=12, tasks=9, trials=126).overall > 0.1
+
+
+# Beside the expert's
+
+
+@given(st.lists(st.floats(0, 1e6), min_size=2), st.floats(1e-3, 1e6))
+def test_each_point_stands_for_twice_as_much_and_more_is_never_worth_less(values, expert) -> None:
+    assert (np.diff(expert_scores(np.sort(values), expert)) >= 0).all()
+    times = np.array([0, 1, 3, 7, -2])
+    assert expert_scores(times * expert, expert) == pytest.approx([0, 1, 2, 3, 0])
+
+
+def made(task: str, *indicators: float, success: bool = True) -> list[EndedJob]:
+    return [
+        EndedJob(
+            job_id=f"{success} {number}",
+            task=task,
+            model="m",
+            outcome="success" if success else "unsuccessful",
+            success=success,
+            indicator=indicator,
+        )
+        for number, indicator in enumerate(indicators)
+    ]
+
+
+def test_the_expert_scores_one_and_a_failure_nothing() -> None:
+    for task in builtin_tasks():
+        expert = references()[task]
+        cell = summarise(made(task, *[expert] * 12))
+        assert cell.score == pytest.approx(1), task
+        assert cell.score_low < 1 <= cell.score_high
+        failed = made(task, *[100 * expert] * 12, success=False)
+        assert summarise([*made(task, *[expert] * 12), *failed]).score == pytest.approx(0.5)
+    own = summarise(made("custom", *[3.0] * 12))
+    assert (own.score, own.score_low, own.score_high, own.indicator_mean) == (None, None, None, 3)

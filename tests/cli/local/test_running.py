@@ -13,9 +13,8 @@ import pytest
 from support.clients.terminals import BUILDARENA, piped
 from support.servers.stacks import wait_until
 
-from buildarena_cli.commands.running import _print_new
 from buildarena_cli.local import free_port
-from buildarena_cli.local.service import is_running, log_files, noted_run, running
+from buildarena_cli.local.service import is_running, noted_run, running
 
 
 @pytest.fixture
@@ -44,7 +43,6 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
         run = running(data)
         assert run is not None
         assert f"API http://127.0.0.1:{port}" in up.stdout
-        assert f"pid {run.pid}" in up.stdout
         assert os.getsid(run.pid) == run.pid != os.getsid(0)
         shown = json.loads(piped("admin", "status", "--json", *where).stdout)
         assert shown["healthy"] is True
@@ -52,11 +50,8 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
         assert {"supervisor", "postgres", "valkey", "api", "construct-worker"} <= names
         (api,) = (p for p in shown["processes"] if p["name"] == "api")
         assert api["ports"] == [int(port)]
-        table = piped("admin", "status", *where).stdout
-        assert table.startswith(f"ok: API http://127.0.0.1:{port}")
         again = piped("up", "--detach", *where)
         assert (again.returncode, "another BuildArena runs" in again.stderr) == (1, True)
-        assert "supervisor  " in piped("admin", "logs", "-n", "1", *where).stdout
         wrong = piped("admin", "logs", "apu", *where)
         assert (wrong.returncode, "did you mean api?" in wrong.stderr) == (1, True)
 
@@ -66,8 +61,6 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
         wait_until(lambda: gone(pids), 15, "children end with their parent")
         after = piped("admin", "status", *where)
         assert (after.returncode, f"process {run.pid}" in after.stdout) == (1, True)
-        over = piped("down", *where)
-        assert (over.returncode, over.stdout) == (0, f"nothing runs on {data}\n")
 
         assert piped("up", "--detach", "--port", port, *where).returncode == 0
         assert piped("admin", "status", *where).returncode == 0
@@ -77,23 +70,6 @@ def test_the_life_of_a_service_in_the_background(data) -> None:
     assert last is not None
     assert gone([last.pid, *last.processes.values()])
     assert not is_running(data)
-
-
-@pytest.mark.ci
-def test_a_service_that_does_not_start_says_why(data, tmp_path) -> None:
-    import socket
-
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = str(taken.getsockname()[1])
-        done = piped("up", "--detach", "--port", port, "--data", str(data))
-    assert done.returncode == 1
-    assert "choose another port with --port" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-    (tmp_path / "file").touch()
-    done = piped("up", "--detach", "--data", str(tmp_path / "file" / "data"))
-    assert (done.returncode, "choose another with --data" in done.stderr) == (1, True)
 
 
 def test_a_note_without_a_lock_is_of_a_run_that_is_over(tmp_path) -> None:
@@ -121,9 +97,6 @@ def test_logs_are_followed(tmp_path) -> None:
     (tmp_path / "logs").mkdir()
     for name in ("api", "mujoco-worker"):
         (tmp_path / "logs" / f"{name}.log").write_text("".join(f"{name} {n}\n" for n in range(9)))
-    assert list(log_files(tmp_path)) == ["api", "mujoco-worker"]
-    shown = piped("admin", "logs", "mujoco worker", "-n", "2", "--data", str(tmp_path)).stdout
-    assert shown == "mujoco-worker 7\nmujoco-worker 8\n"
     process = subprocess.Popen(
         [BUILDARENA, "admin", "logs", "-f", "-n", "1", "--data", str(tmp_path)],
         stdout=subprocess.PIPE,
@@ -141,13 +114,3 @@ def test_logs_are_followed(tmp_path) -> None:
     assert process.wait() == 130
     process.stdout.close()
     stopping.cancel()
-    assert "there are no logs" in piped("admin", "logs", "--data", str(tmp_path / "other")).stderr
-
-
-def test_a_log_that_was_cut_is_read_from_its_beginning(tmp_path, capsys) -> None:
-    log = tmp_path / "a.log"
-    log.write_text("one\ntwo\n")
-    place = _print_new(log, 0, "")
-    log.write_text("new\n")
-    assert _print_new(log, place, "") == 4
-    assert capsys.readouterr().out == "one\ntwo\nnew\n"

@@ -1,19 +1,35 @@
+"""The embedded servers: started again, given up, stopped for good, and what they leave behind."""
+
+import fcntl
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 import psutil
+import psycopg
 import pytest
 from redis import Redis
 from support.servers.stacks import wait_until
 
-from buildarena_cli.local import EmbeddedValkey, ManagedProcess, Supervisor
+from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, ManagedProcess, Supervisor
+from buildarena_cli.local.postgres import installed_postgres
+from buildarena_cli.local.program_copy import PREFIX, ProgramCopy
 from buildarena_cli.local.supervisor import LOOK_EVERY_S
 from buildarena_pipeline.errors import StartupError
+
+
+def python(*words: str, **more: object) -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-c", *words], **more)  # type: ignore[call-overload]
+
+
+def sleeper() -> subprocess.Popen[bytes]:
+    return python("import time; time.sleep(60)")
 
 
 @pytest.mark.ci
@@ -35,19 +51,13 @@ def test_a_killed_broker_is_started_again_with_its_data(tmp_path) -> None:
 
 @pytest.mark.ci
 def test_a_process_that_keeps_dying_is_given_up() -> None:
-    def start() -> subprocess.Popen[bytes]:
-        return subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"])
-
     with Supervisor() as supervisor:
-        supervisor.launch(ManagedProcess(name="mayfly", start=start))
+        mayfly = ManagedProcess(name="mayfly", start=lambda: python("raise SystemExit(3)"))
+        supervisor.launch(mayfly)
         supervisor.watch()
         wait_until(lambda: supervisor.failed is not None, 10, "it is given up")
     assert "mayfly died 6 times" in supervisor.failed
     assert "exit code 3" in supervisor.failed
-
-
-def sleeper() -> subprocess.Popen[bytes]:
-    return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
 
 
 @pytest.fixture
@@ -77,7 +87,6 @@ def test_what_is_started_again_while_all_is_stopped_is_stopped_too(started) -> N
         started[0].kill()
         assert restarting.wait(timeout=10)
         stopping.set()
-    assert len(started) == 2
     assert [process.returncode for process in started] == [-signal.SIGKILL, -signal.SIGTERM]
 
 
@@ -99,16 +108,6 @@ def test_what_dies_while_all_is_stopped_is_not_started_again(started) -> None:
     assert [process.returncode for process in started] == [-signal.SIGKILL] * 2
 
 
-def test_a_server_that_ends_at_once_is_reported(tmp_path) -> None:
-    valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
-    process = valkey.start()
-    try:
-        with pytest.raises(StartupError, match="valkey ended at once"):
-            valkey.start()  # its port is taken
-    finally:
-        valkey.stop(process)
-
-
 @pytest.mark.ci
 def test_children_do_not_outlive_a_killed_parent(tmp_path) -> None:
     program = (
@@ -118,12 +117,71 @@ def test_children_do_not_outlive_a_killed_parent(tmp_path) -> None:
         "print(EmbeddedValkey(folder / 'v', folder / 'log').start().pid, flush=True)\n"
         "time.sleep(60)\n"
     )
-    parent = subprocess.Popen(
-        [sys.executable, "-c", program, str(tmp_path)], stdout=subprocess.PIPE
-    )
+    parent = python(program, str(tmp_path), stdout=subprocess.PIPE)
     assert parent.stdout is not None
     child = int(parent.stdout.readline())
     os.kill(parent.pid, signal.SIGKILL)
     parent.wait()
     parent.stdout.close()
     wait_until(lambda: not psutil.pid_exists(child), 10, "the child ends")
+
+
+def test_a_server_that_ends_at_once_says_why(tmp_path) -> None:
+    valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "log")
+    process = valkey.start()
+    try:
+        with pytest.raises(StartupError, match="valkey ended at once"):
+            valkey.start()  # its port is taken
+    finally:
+        valkey.stop(process)
+    half = tmp_path / "pg/cluster.partial"  # of a set-up that was interrupted
+    half.mkdir(parents=True)
+    (half / "PG_VERSION").write_text("18\n")
+    postgres = EmbeddedPostgres(tmp_path / "pg", tmp_path / "log", durable=False)
+    process = postgres.start()
+    with psycopg.connect(postgres.url) as connection:
+        assert connection.execute("SELECT 1").fetchone() == (1,)
+    postgres.stop(process)
+    assert sorted(path.name for path in (tmp_path / "pg").iterdir()) == ["cluster", "password"]
+    (tmp_path / "pg/cluster/PG_VERSION").write_text("9\n")
+    with pytest.raises(StartupError) as refused:
+        postgres.start()
+    for said in (
+        "postgres ended at once: FATAL:  database files are incompatible with server",
+        "DETAIL:  The data directory was initialized by PostgreSQL version 9",
+        "choose another folder with --data",
+    ):
+        assert said in str(refused.value)
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The only folder that copies of the program are made in."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def test_a_copy_runs_and_is_gone_with_what_a_killed_process_left(place) -> None:
+    for name, age_s in (("left", 3600), ("used", 3600), ("young", 1)):
+        folder = place / f"{PREFIX}{name}"
+        (folder / "bin").mkdir(parents=True)
+        os.utime(folder, (time.time() - age_s, time.time() - age_s))
+    lock = os.open(place / f"{PREFIX}used", os.O_RDONLY)
+    fcntl.flock(lock, fcntl.LOCK_EX)
+    copy = ProgramCopy(installed_postgres(), None, places=())
+    assert copy.install.is_relative_to(place)
+    initdb = [copy.install / "bin" / "initdb", "--version"]
+    done = subprocess.run(initdb, capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("initdb (PostgreSQL)")
+    copy.remove()
+    os.close(lock)
+    assert {path.name for path in place.iterdir()} == {f"{PREFIX}used", f"{PREFIX}young"}
+
+
+def test_a_program_that_can_be_run_from_nowhere_names_the_places(place) -> None:
+    broken = place / "package" / "pginstall"
+    (broken / "bin").mkdir(parents=True)
+    (broken / "bin" / "postgres").write_text("#!/bin/sh\necho libpq is missing >&2; exit 127")
+    (broken / "bin" / "postgres").chmod(0o755)
+    with pytest.raises(StartupError, match=r"a copy of it from .* \(libpq is missing\): run"):
+        ProgramCopy(broken, None, places=())

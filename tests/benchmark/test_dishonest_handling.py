@@ -1,0 +1,224 @@
+"""Things thrown, delivered, fetched and placed in ways that must not count; and courses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Final
+
+import pytest
+from support.machines.boulders import car_with_boulder
+from support.machines.drafts import KeyedDraft
+from support.machines.headroom import drafted
+from support.machines.piloted import FASTER_FIRST, scored
+from tests.benchmark.conftest import expert, honest, strict
+
+from buildarena_benchmark import builtin_tasks, score
+from buildarena_geometry import Machine
+from buildarena_simulation import MachineNotSimulable, simulate
+from buildarena_worker.builtin.designs import throwers, vehicles
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
+
+TASKS: Final = builtin_tasks()
+THROW: Final = TASKS["throw-1"]
+
+
+def fails(result: Any, *flags: str) -> None:
+    assert (result.success, result.indicator) == (False, 0.0), result
+    assert set(flags) <= set(result.flags), result
+
+
+# Throwing
+
+
+def too_few_stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
+    """The post is held along the foot and not across: it breaks when the arm is half way up."""
+    del west
+    for base, way in ((beam[2], NORTH), (beam[1], NORTH), (beam[10], SOUTH)):
+        draft.connect(post[-1], base, way, UP)
+    for side in (EAST, WEST):
+        draft.connect(beam[5], beam[9], side)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_throwing_by_collapse(engine, monkeypatch) -> None:
+    """The same catapult on a post that breaks while it throws, and a mast that topples over."""
+    monkeypatch.setattr(throwers, "_stays", too_few_stays)
+    fails(scored(THROW, expert("throw-1"), engine, None), "came_apart")
+    draft = KeyedDraft(modules="all")
+    top = draft.row(draft.row(draft.start(), UP, 3)[-1], NORTH, 1)[-1]
+    draft.attach(draft.attach(top, UP, "Bomb Holder"), UP, "Boulder")
+    topples = strict(THROW, min_distance=0.0, max_start_height=50.0)
+    fails(scored(topples, draft.machine, engine, None))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
+    """Engines part what overlaps: whoever throws so is refused."""
+    thrown = expert("throw-1")
+    boulder = next(b.id for b in thrown.blocks.values() if b.module.name == "Boulder")
+    assert thrown.act("shift_block", {"block_id": boulder, "shift_real": [0, 0, -0.45]}).ok
+    fails(scored(THROW, thrown, engine, None), "unexplained")
+
+
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_throwing_by_driving(engine) -> None:
+    """A car that carries the boulder north and brakes at the line."""
+    fails(scored(strict(THROW, min_distance=0.0), car_with_boulder(), engine, None))
+
+
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_who_throws_at_once_or_lets_it_lie_or_drops_it_throws_nothing(engine) -> None:
+    """A boulder is borne for a second first."""
+    fails(scored(THROW, expert("throw-1", [(0.2, "Alpha1", 4.0)]), engine, None), "not_borne")
+    draft = KeyedDraft(modules="all")
+    draft.attach(draft.row(draft.start(), UP, 2)[-1], NORTH, "Boulder")
+    for machine in (draft.machine, expert("throw-1", [])):
+        fails(scored(strict(THROW, min_distance=0.0), machine, engine, None))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_a_fence_is_cleared_or_not(engine) -> None:
+    """The same throw leaves a fence of 3 untouched; one of 40 is what it touches first."""
+    _, machine, trial = honest("throw-1", engine)
+    fenced = TASKS["throw-2"]
+    over = scored(fenced, machine, engine, None)
+    assert over.success
+    assert over.indicator == pytest.approx(score(THROW, machine, trial).indicator, abs=0.5)
+    north, *rest = fenced.scenario.terrain
+    wall = north.model_copy(update={"center": (0, 5.5, 20), "size": (24, 1, 40)})
+    scenario = fenced.scenario.model_copy(update={"terrain": (wall, *rest)})
+    against = scored(replace(fenced, scenario=scenario), machine, engine, None)
+    assert not against.success
+    assert 2 < against.metrics["distance"] < 4
+
+
+def test_a_machine_in_a_things_place_is_refused() -> None:
+    """In the fence's, the ball's, the cargo's in the exact and another world, and in the well's."""
+    world = round(TASKS["place-2"].scenario.world(0).cargo.at[1])
+    for name, rows, seed, told in (
+        ("throw-2", [(EAST, 11)], None, "overlaps terrain 3"),
+        ("deliver-1", [(UP, 1), (NORTH, 7)], None, "overlaps the cargo"),
+        ("place-2", [(NORTH, 2), (WEST, 6)], None, "overlaps the cargo"),
+        ("place-2", [(NORTH if world > 0 else SOUTH, abs(world)), (WEST, 6)], 0, "the cargo"),
+        ("fetch-1", [(NORTH, 4), (WEST, 8)], None, "overlaps terrain"),
+    ):
+        draft = KeyedDraft(modules="all" if name == "throw-2" else "workshop")
+        end = draft.start()
+        for way, count in rows:
+            end = draft.row(end, way, count)[-1] if count else end
+        if name == "throw-2":
+            draft.attach(end, UP, "Boulder")
+        machine = draft.machine
+        if TASKS[name].takes_programs:
+            machine = machine.with_controller("function control() return {} end")
+        with pytest.raises(MachineNotSimulable, match=told):
+            simulate(machine, TASKS[name].scenario, "mujoco", seed=seed)
+
+
+# Delivering a ball
+
+
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_a_ball_that_is_kicked(engine) -> None:
+    """The same car brakes half way, and the ball rolls on over the line."""
+    result = scored(TASKS["deliver-1"], expert("deliver-1", [(0.4, "UpArrow", 2.4)]), engine, None)
+    assert (result.success, result.flags) == (False, ("let_go",))
+    assert 0.2 < result.indicator < 0.9
+
+
+@pytest.mark.nightly(keep=1)
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+def test_a_tower_that_topples_onto_the_ball(engine) -> None:
+    """What lies at the ball after it was knocked away brings it no farther; nor does idling."""
+    draft = KeyedDraft(modules="workshop")
+    top = draft.row(draft.start(), UP, 30)[-1]
+    draft.attach(draft.row(top, NORTH, 2)[-1], DOWN, "Log")
+    result = scored(TASKS["deliver-1"], draft.machine, engine, None)
+    assert (result.success, result.indicator < 0.2) == (False, True)
+    fails(scored(TASKS["deliver-1"], expert("deliver-1", []), engine, None))
+
+
+# Courses
+
+
+def straight() -> Machine:
+    """A car that drives north and never steers."""
+    presses = [("UpArrow", 0.4, 19.0)]
+    return drafted(vehicles._vehicle(length=5, track=1, deck=None, presses=presses))
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_car_whose_wheels_bear_in_turns_has_driven(seed) -> None:
+    """Large wheels on its rear ones lift these, so that it rocks on the front ones."""
+    car = straight()
+    wheels = [name for name, block in car.blocks.items() if block.module.motor]
+    for rear in sorted(wheels, key=lambda name: car.blocks[name].center[1])[:2]:
+        hub = {"base_block": rear, "face": "E", "new_block": "Large Wheel"}
+        assert car.act("attach_block_to", hub).ok
+    result = scored(TASKS["drive-2"], car, "mujoco", seed)
+    assert (result.success, result.flags) == (True, ())
+
+
+@pytest.mark.nightly
+def test_a_tower_that_topples_over_the_gates_drives_nothing() -> None:
+    """Its mass gets over the first two lines of drive-2, and its wheels turn in the air."""
+    draft = KeyedDraft(modules="workshop")
+    base = draft.start()
+    for side in (EAST, WEST):
+        draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
+    draft.attach(draft.row(base, UP, 30)[-1], NORTH, "Log")
+    draft.press("UpArrow", 0.5, 0.3)
+    fails(scored(TASKS["drive-2"], draft.machine, "mujoco", None))
+
+
+# Fetching and placing
+
+
+@pytest.mark.nightly
+def test_a_weight_that_is_let_lie_or_dropped_is_not_fetched() -> None:
+    """Let go at the top of its way it falls for itself by more than 3."""
+    takes = (0.6, "RightArrow", 0.38)
+    for presses in ([], [takes], [takes, (2.6, "LeftArrow", 3.0), (9.0, "Alpha1", 0.2)]):
+        result = scored(TASKS["fetch-1"], expert("fetch-1", presses), "mujoco", None)
+        assert not result.success
+        if len(presses) > 1:
+            assert result.metrics["loose_way"] > 3
+        else:
+            assert result.metrics["distance_to_mark"] > 15
+
+
+LIFTS: Final = "function(sense, answer, t) return raise(answer, t) end"
+SWINGS: Final = "function(sense, answer) return reach(sense, answer, seen.goal) end"
+RELEASES: Final = 'answer[GRIPPER .. ".release"] = t > 2.5 and 1 or 0'
+LETS_GO: Final = 'answer.extend, answer[GRIPPER .. ".release"] = HOLDS, 1 return t > 0.5'
+THROWS: Final = SWINGS.replace("return", f"{RELEASES} return", 1).replace(
+    "answer)", "answer, t)", 1
+)
+VARIANTS: Final = {
+    "pushes it along the ground": [
+        (LIFTS, "function(sense, answer, t) answer.extend = HOLDS return t > 1 end"),
+        (SWINGS, SWINGS.replace("return", "answer.extend = HOLDS return", 1)),
+    ],
+    "throws it": [(SWINGS, THROWS)],
+    "never lets go": [(LETS_GO, "answer.extend = HOLDS return false")],
+    "takes hold of nothing": [("clip((most - length) / 3, 0.2)", "0")],
+}
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("engine", FASTER_FIRST)
+@pytest.mark.parametrize("how", VARIANTS)
+def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
+    machine = expert("place-2")
+    program = machine.controller
+    for before, after in VARIANTS[how]:
+        assert program.count(before) == 1, before
+        program = program.replace(before, after)
+    fails(scored(TASKS["place-2"], machine.with_controller(program), engine, None))

@@ -1,0 +1,227 @@
+"""The command itself: what it loads, and what it refuses with one sentence and the right code."""
+
+import fcntl
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from itertools import chain
+
+import psutil
+import pytest
+from support.clients.terminals import piped
+from support.machines.experts import experts_machine
+from typer.core import TyperArgument
+from typer.main import get_command
+
+from buildarena_cli import main
+from buildarena_cli.command_table import COMMANDS
+from buildarena_store import Database
+from buildarena_store.database import SCHEMA
+
+HEAVY = {
+    *("buildarena_pipeline", "buildarena_store", "buildarena_simulation", "buildarena_geometry"),
+    *("buildarena_benchmark", "buildarena_api", "httpx", "mcp", "matplotlib", "numpy", "rich"),
+    *("pydantic", "pydantic_settings", "sqlalchemy", "structlog", "redis", "yaml", "jinja2"),
+}
+LOADED = (
+    "import json, sys\n"
+    "from buildarena_cli.main import run\n"
+    "try:\n    run()\n"
+    "finally:\n"
+    "    sys.stderr.write('LOADED' + json.dumps([n.split('.')[0] for n in sys.modules]))\n"
+)
+SHELLS = ("bash", "zsh", "fish")
+NOWHERE = "http://127.0.0.1:1"
+
+
+def loaded_by(*words: str, **environment: str) -> set[str]:
+    command, given = [sys.executable, "-c", LOADED, *words], {**os.environ, **environment}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=given)
+    return set(json.loads(done.stderr.rpartition("LOADED")[2]))
+
+
+def completing(shell: str, line: str) -> dict[str, str]:
+    return {
+        "_BUILDARENA_COMPLETE": f"complete_{shell}",
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(line.count(" ")),
+        "_TYPER_COMPLETE_ARGS": line,
+        "_TYPER_COMPLETE_FISH_ACTION": "get-args",
+        "BUILDARENA_URL": NOWHERE,
+    }
+
+
+@pytest.mark.nightly(keep=3)
+@pytest.mark.parametrize("words", [["--help"], *([name, "--help"] for name in COMMANDS)])
+def test_help_loads_no_library_that_it_does_not_need(words) -> None:
+    assert loaded_by(*words) & {*HEAVY, "ssl"} == set()
+
+
+def test_completion_and_asking_the_api_load_none_either() -> None:
+    assert loaded_by(**completing("bash", "buildarena job show ")) & {*HEAVY, "ssl"} == set()
+    for words in (["job", "list"], ["leaderboard"]):
+        assert loaded_by(*words, "--url", NOWHERE) & HEAVY == set()
+
+
+def test_each_shell_is_offered_commands_and_options() -> None:
+    for shell, line, word in zip(
+        SHELLS,
+        ("buildarena swe", "buildarena sweep wat", "buildarena job list --rea"),
+        ("sweep", "watch", "--reason"),
+        strict=True,
+    ):
+        assert word in piped(**completing(shell, line)).stdout, line
+        script = piped(_BUILDARENA_COMPLETE=f"source_{shell}").stdout
+        assert f"_BUILDARENA_COMPLETE=complete_{shell}" in script
+
+
+# Refusals
+
+
+@pytest.fixture
+def refusal(monkeypatch, capsys):
+    """Runs a command that is refused, and has its exit code and what it says."""
+
+    def run(*words: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["buildarena", *words])
+        with pytest.raises(SystemExit) as ended:
+            main.run()
+        said = capsys.readouterr()
+        assert not said.out
+        return ended.value.code, said.err
+
+    return run
+
+
+def test_a_usage_error_names_the_near_words_and_ends_with_code_2(refusal, subtests) -> None:
+    for words, says in (
+        (["leaderbord"], "did you mean leaderboard?"),
+        (["key", "list"], "did you mean admin key?"),
+        (["sweep", "wacth"], "did you mean watch?"),
+        (["job", "list", "--taks", "x"], "--task"),
+        (["job", "show"], "Missing argument 'job_id'"),
+    ):
+        with subtests.test(words=words):
+            code, said = refusal(*words)
+            assert (code, says in said) == (2, True), said
+
+
+def assert_refused(done: subprocess.CompletedProcess[str], *words: str) -> None:
+    assert done.returncode == 1, (done.stdout, done.stderr)
+    (line,) = done.stderr.strip().splitlines()
+    assert [word for word in words if word not in line] == []
+
+
+@pytest.mark.ci
+def test_what_cannot_start_is_refused_in_words_and_leaves_nothing(tmp_path, subtests) -> None:
+    (tmp_path / "file").write_text("in the way")
+    (tmp_path / "lock").touch()
+    with socket.socket() as taken, (tmp_path / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        for command, data, words, says in (
+            ("up", "new", ["--port", port], [port, "choose another port with --port"]),
+            ("demo", "new", ["--port", port], [port, "choose another port with --port"]),
+            ("up", "file/data", [], ["can't be written", "choose another with --data"]),
+            ("demo", "file/data", [], ["can't be written", "choose another with --data"]),
+            ("up", "", ["--port", "0"], ["another BuildArena runs on the data folder"]),
+        ):
+            with subtests.test(command=command, says=says):
+                done = piped(command, "--data", str(tmp_path / data), *words)
+                assert_refused(done, *says)
+    processes = [str(process.info["cmdline"]) for process in psutil.process_iter(["cmdline"])]
+    assert not [process for process in processes if str(tmp_path) in process]
+
+
+def test_no_service_and_a_port_that_is_no_port() -> None:
+    done = piped("leaderboard", "--url", NOWHERE)
+    assert_refused(done, f"no BuildArena answers at {NOWHERE}", "buildarena up")
+    assert_refused(piped("up", BUILDARENA_PORT="99999"), "BUILDARENA_PORT", "99999")
+
+
+@pytest.mark.ci
+def test_a_process_refuses_a_foreign_schema(database_url, broker_url) -> None:
+    database = Database(database_url)
+    urls = {"BUILDARENA_DATABASE_URL": database_url, "BUILDARENA_BROKER_URL": broker_url}
+
+    def stamp(revision: str) -> None:
+        with database.transaction() as connection:
+            connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{revision}'")
+            connection.exec_driver_sql(f"UPDATE schema_compatibility SET since = '{revision}'")
+
+    stamp("2026_11_27_what_goes")
+    try:
+        for module in ("buildarena_worker", "buildarena_api"):
+            command, given = [sys.executable, "-m", module], {**os.environ, **urls}
+            done = subprocess.run(
+                command, capture_output=True, text=True, check=False, timeout=60, env=given
+            )
+            assert done.returncode == 1
+            assert "schema 2026_11_27_what_goes" in done.stderr
+    finally:
+        stamp(SCHEMA)
+        database.close()
+
+
+# A file that is not there is one sentence and a usage error, whichever command it is given to
+
+WRITTEN = {"out", "video", "data", "trace"}
+"""Parameters of paths that commands write, or keep what they run on in."""
+NAMES_OR_FILES = ("or a task file", "or the path of its YAML file", "Folder or URL of")
+"""What the help of parameters says that are names or paths."""
+
+
+def commands() -> Iterator[tuple[tuple[str, ...], object]]:
+    waiting = [((), get_command(main.app))]
+    while waiting:
+        path, command = waiting.pop()
+        if not hasattr(command, "list_commands"):
+            yield path, command
+            continue
+        names = command.list_commands(None)
+        waiting.extend(((*path, name), command.get_command(None, name)) for name in names)
+
+
+def is_read(parameter) -> bool:
+    told = parameter.help or ""
+    if any(words in told for words in NAMES_OR_FILES):
+        return True
+    is_path = type(parameter.type).__name__ == "TyperPath"
+    return is_path and parameter.name not in WRITTEN and not told.startswith("Write")
+
+
+def test_a_missing_file_is_named_in_one_sentence(refusal, tmp_path, subtests) -> None:
+    there = tmp_path / "machine.json"
+    there.write_text(json.dumps(experts_machine("support-1").to_document()))
+    missing = str(tmp_path / "missing.yaml")
+    tried = set()
+    for path, command in commands():
+        others = {
+            "task": "support-1",
+            "model": "builtin/expert",
+            "out": str(tmp_path / ("out.blv" if path == ("besiege", "level") else "out.json")),
+            "video": str(tmp_path / "out.mp4"),
+            "queue": "simulate.mujoco",
+        }
+        for parameter in filter(is_read, command.params):
+            with subtests.test(path=path, parameter=parameter.name):
+                words = chain.from_iterable(
+                    [value] if isinstance(one, TyperArgument) else [one.opts[0], value]
+                    for one in command.params
+                    if one is parameter or one.required
+                    for value in [missing if one is parameter else others.get(one.name, str(there))]
+                )
+                code, said = refusal(*path, *words)
+                (line,) = said.splitlines()
+                assert line.removeprefix("error: ") == f"{missing}: No such file or directory"
+                assert (code, list(tmp_path.iterdir())) == (2, [there])
+                tried.add((path, parameter.name))
+    assert {path for path, _ in tried} >= {("sweep", "run"), ("task", "add"), ("admin", "worker")}
+    assert len(tried) >= 20
+    code, said = refusal("admin", "roles", f"api={missing}")
+    assert (code, f"{missing} can't be read" in said) == (2, True)

@@ -1,0 +1,162 @@
+"""Sweep files: every mistake named with line and field, flags, budgets, schema and examples."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+from support.clients.commands import printed, run, run_cli
+from support.jobs import execute
+
+from buildarena_benchmark import parse_custom_task
+from buildarena_cli.sweep_files import sweep_schema
+from buildarena_pipeline.catalog.specs import SweepSpec
+
+ROOT = Path(__file__).parents[2]
+NOWHERE = ("--url", "http://127.0.0.1:1")
+GOOD = """\
+name: first
+tasks:
+  - support-1
+  - lift-1
+models: [builtin/idle]
+samples: 3
+decoding:
+  temperature: 0.5
+simulator: mujoco
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "sweep.yaml"
+    path.write_text(GOOD)
+    return path
+
+
+def test_a_mistake_is_reported_with_its_line_before_anything_is_sent(file, subtests) -> None:
+    models = "models: [builtin/idle]"
+    for old, new, says in (
+        ("samples: 3", "samples: [", "8: not valid YAML"),
+        ("samples: 3", "samples: three", "6: samples: Input should be a valid integer"),
+        ("samples: 3", "samples: 0", "6: samples: Input should be greater than or equal to 1"),
+        ("samples: 3", "samples: 3\nseeds: [1]", "6: samples: give either seeds or samples"),
+        ("samples: 3", "seeds: [1, -2]", "6: seeds[1]: Input should be greater than"),
+        ("samples: 3", "sample: 3", "6: sample: there is no such field; choose from workflow, "),
+        ("samples: 3", "samples: 3\nsamples: 4", "7: samples: appears twice, first in line 6"),
+        (f"{models}\n", "", "1: models: Field required"),
+        (models, "models: builtin/idle", "5: models: Input should be a valid list"),
+        (models, "models: []", "5: models: List should have at least 1 item"),
+        ("  - lift-1", "  - [lift-1]", "4: tasks[1]: Input should be a valid string"),
+        ("  - lift-1", "  - &a lift-1\n  - *a", "4: anchors and aliases are not allowed"),
+        ("temperature: 0.5", "temperature: 5", "8: decoding.temperature: Input should be less"),
+        ("temperature: 0.5", "heat: 5", "8: decoding.heat: there is no such field; choose from "),
+        (GOOD, "- 1\n", "1: must be a mapping of fields"),
+        (GOOD, "", "1: must be a mapping of fields"),
+    ):
+        with subtests.test(new=new):
+            file.write_text(GOOD.replace(old, new))
+            done = run("sweep", "run", str(file), *NOWHERE)
+            assert done.returncode == 1
+            assert done.stderr.startswith(f"{file}:{says}"), done.stderr
+    file.write_text(GOOD.replace("samples: 3", "samples: x").replace("0.5", "hot"))
+    lines = run("sweep", "run", str(file), *NOWHERE).stderr.splitlines()
+    assert [line.split(": ")[0] for line in lines] == [f"{file}:8", f"{file}:6"]
+
+
+def test_what_the_service_does_not_know_is_reported_with_its_line(url, file, tmp_path) -> None:
+    text = GOOD.replace("lift-1", "lift-9").replace("[builtin/idle]", "\n  - gpt-6")
+    file.write_text(text.replace("simulator: mujoco", "simulator: unity"))
+    for words in ([], ["--dry-run"]):
+        done = run_cli(url, "sweep", "run", str(file), *words)
+        assert done.returncode == 1
+        task, model, simulator = done.stderr.splitlines()
+        assert task.startswith(f"{file}:4: tasks[1]: there is no task 'lift-9'; choose from ")
+        assert model.startswith(f"{file}:6: models[0]: there is no model 'gpt-6'; choose from ")
+        assert "openai/gpt-5" in model
+        assert simulator.startswith(f"{file}:10: simulator: there is no simulator 'unity'; choose")
+    options = tmp_path / "options.yaml"
+    options.write_text("simulator: mujoco\nlimits:\n  max_requests: 0\n")
+    words = ["job", "submit", "lift-1", "builtin/idle", "--options", str(options)]
+    assert run_cli(url, *words).stderr.startswith(f"{options}:3: limits.max_requests: ")
+    options.write_text("simulator: mujoco\n")
+    done = run_cli(url, "job", "submit", "lift-9", *words[3:])
+    assert (done.returncode, done.stderr[:20]) == (1, "TASK: task: there is")
+
+
+def test_flags_take_the_place_of_the_files_fields(url, file) -> None:
+    words = ["sweep", "run", str(file), "--dry-run", "--json"]
+    assert json.loads(printed(url, *words))["jobs"] == 6
+    flags = ["--task", "support-2", "--model", "builtin/idle", "--model", "builtin/random"]
+    estimate = json.loads(printed(url, *words, *flags, "--samples", "5"))
+    assert estimate["jobs"] == 10
+    assert [model["model"] for model in estimate["models"]] == ["builtin/idle", "builtin/random"]
+    file.write_text(GOOD.replace("samples: 3", "seeds: [4, 5]"))
+    assert json.loads(printed(url, *words, "--samples", "1"))["jobs"] == 2
+    detached = ("sweep", "run", str(file), "--detach", "--seed", "9", "--json")
+    assert json.loads(printed(url, *detached))["jobs"] == 2
+    done = run_cli(url, "sweep", "run", str(file), "--task", "lift-1", "--task", "lift-9")
+    assert done.returncode == 1
+    assert done.stderr.startswith("--task: tasks[1]: there is no task 'lift-9'; choose from ")
+    done = run_cli(url, "sweep", "run", str(file), "--samples", "0")
+    assert (done.returncode, done.stderr.split(":")[0]) == (1, "--samples")
+    assert run_cli(url, "sweep", "run", str(file), "--samples", "1", "--seed", "1").returncode == 2
+    file.write_text(GOOD.replace("samples: 3", "samples: many"))
+    assert run_cli(url, "sweep", "run", str(file), "--dry-run").returncode == 1
+    assert run_cli(url, "sweep", "run", str(file), "--dry-run", "--samples", "2").returncode == 0
+
+
+@pytest.fixture
+def sweep(submissions) -> str:
+    spec = SweepSpec(tasks=["lift-1"], models=["builtin/expert"], samples=10, simulator="mujoco")
+    return submissions.submit_sweep(spec).sweep.id
+
+
+def test_a_budget_is_set_while_a_sweep_runs_and_after_it_was_used_up(url, context, sweep) -> None:
+    assert "$0.00 of $5.00" in printed(url, "sweep", "budget", sweep, "--max-cost-usd", "5")
+    with context.store.lifecycle.command() as connection:
+        context.store.lifecycle.exhaust(sweep, "used up", connection=connection)
+    stopped = printed(url, "sweep", "status", sweep)
+    assert "stopped, as its budget is used up" in stopped
+    assert f"buildarena sweep budget {sweep} --max-cost-usd" in stopped
+    shown = printed(url, "sweep", "budget", sweep, "--max-cost-usd", "1")
+    assert ": active\n" in shown
+    assert "10  waiting to be built" in shown
+    refused = run_cli(url, "sweep", "budget", sweep)
+    assert (refused.returncode, "--max-requests" in refused.stderr) == (2, True)
+    execute(context, "UPDATE events SET at = now() - interval '10 minutes'")
+    execute(
+        context,
+        "UPDATE jobs SET state = 'done', outcome = 'success', success = true, cost_usd = 0.5, "
+        "finished_at = now() WHERE seed < 5",
+    )
+    lines = printed(url, "sweep", "status", sweep).splitlines()
+    assert any(line.startswith("5 jobs left at 0.5 a minute: ends about 20") for line in lines)
+    assert "about $2.50 still to spend, $5.00 in all" in lines
+    assert "the budget lacks about $1.50 for that" in lines
+    head, row = printed(url, "sweep", "list").splitlines()
+    assert (head.split()[0], row.split("  ")[0]) == ("sweep", sweep)
+
+
+def test_the_published_schema_is_the_codes_and_refuses_what_the_code_refuses() -> None:
+    schema = json.loads((ROOT / "docs" / "sweep.schema.json").read_text())
+    assert sweep_schema() == schema, "make generate NAME=sweeps"
+    Draft202012Validator.check_schema(schema)
+    validator, good = Draft202012Validator(schema), yaml.safe_load(GOOD)
+    assert validator.is_valid(good)
+    for change in ({"sample": 3}, {"tasks": []}, {"decoding": {"heat": 9}}, {"samples": "1"}):
+        assert not validator.is_valid({**good, **change}), change
+
+
+def test_the_sweeps_that_come_as_examples_can_be_submitted(context, submissions) -> None:
+    for file in (ROOT / "examples" / "tasks").glob("*.yaml"):
+        text = file.read_text()
+        context.tasks.add(parse_custom_task(text, origin=file.name), text)
+    validator = Draft202012Validator(sweep_schema())
+    for file in sorted((ROOT / "examples" / "sweeps").glob("*.yaml")):
+        document = yaml.safe_load(file.read_text())
+        validator.validate(document)
+        spec = SweepSpec.model_validate(document)
+        jobs = submissions.plan(spec)
+        assert len(jobs) == len(spec.tasks) * len(spec.models) * len(spec.all_seeds()), file.name
