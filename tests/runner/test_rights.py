@@ -1,95 +1,87 @@
-"""A runner key may lease trials and nothing else, and nobody else may do that."""
+"""A runner key may lease trials and nothing else, nobody else may, and it harms only itself."""
+
+import hashlib
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from typing import Any
 
 import pytest
-from sqlalchemy import text
-from support.clients.tenants import ADMIN, everything
+from schemathesis import GenerationMode
+from support.clients.tenants import ADMIN, WITH_KEYS, everything
 from support.contract import contract
-from support.servers.runner_rig import Caller, as_admin, runner_key, true_trajectory, waiting
+from support.jobs import execute, expire_leases
+from support.servers.contract import SCHEMA, ask, ways
+from support.servers.live_api import live_api
+from support.servers.runner_rig import (
+    Caller,
+    as_admin,
+    pause_ends,
+    runner_key,
+    true_trajectory,
+    waiting,
+)
 from support.servers.stacks import wait_until
 
 from buildarena_api.runners import lease_queue
 from buildarena_simulation import SIMULATION_VERSION, write_trajectory
 
-CONTRACT = contract()
-OTHERS = [
-    (method.upper(), path)
-    for path, methods in CONTRACT["paths"].items()
-    for method in methods
-    if not path.startswith("/v1/runner") and path != "/v1/health"
-]
-OURS = [
-    (method.upper(), path)
-    for path, methods in CONTRACT["paths"].items()
-    for method in methods
-    if path.startswith("/v1/runner")
-]
+WAYS = [(m.upper(), path) for path, methods in contract()["paths"].items() for m in methods]
+OURS = [(method, path) for method, path in WAYS if path.startswith("/v1/runner")]
+OTHERS = [way for way in WAYS if way not in OURS and way[1] != "/v1/health"]
+FAULT = {"reason": "simulator_fault", "detail": "it hangs"}
+NEVER = {**FAULT, "permanent": True}
 
 
-def filled(path: str) -> str:
-    for name, value in {"{job_id}": "job_0", "{token}": "1", "{sha256}": "0" * 64}.items():
-        path = path.replace(name, value)
-    return path.removeprefix("/v1/runner")
+@pytest.fixture
+def callers(context, url) -> list[Caller]:
+    """Three with keys of their own."""
+    return [Caller(url, runner_key(context)[1]) for _ in range(3)]
+
+
+@pytest.fixture
+def caller(callers) -> Caller:
+    return callers[0]
+
+
+def offered(caller: Caller, **about: Any) -> bool:
+    answer = caller.ask("POST", "/leases", json={**caller.about(), **about})
+    assert answer.status_code in {200, 204}, answer.text
+    return answer.status_code == 200
 
 
 @pytest.mark.ci
-def test_a_runner_key_reaches_no_other_route(context, url) -> None:
+def test_a_runner_key_reaches_no_other_route(caller) -> None:
     assert len(OTHERS) > 40
-    caller = Caller(url, runner_key(context)[1])
-    answers = {
-        (method, path): caller.ask(method, "/.." + path.removeprefix("/v1")).status_code
-        for method, path in OTHERS
-    }
-    assert set(answers.values()) == {403}, answers
+    asked = {way: caller.ask(way[0], "/.." + way[1].removeprefix("/v1")) for way in OTHERS}
+    assert [way for way, answer in asked.items() if answer.status_code != 403] == []
 
 
-@pytest.mark.nightly(keep=2)
-@pytest.mark.parametrize("scope", ["read", "submit", "admin", None])
-def test_no_other_key_is_a_runners(context, url, scope) -> None:
-    caller = as_admin(url)
-    if scope is not None:
-        caller = Caller(url, context.store.keys.create(name="a", scopes=[scope])[1])
-    answers = {
-        (method, path): caller.ask(method, filled(path), json={}).status_code
-        for method, path in OURS
-    }
-    assert len(answers) >= 9
-    assert set(answers.values()) == {403}, answers
-    nobody = {Caller(url).ask(method, filled(path)).status_code for method, path in OURS}
-    assert nobody == {401}
+def test_no_other_key_is_a_runners_and_only_admins_make_such_keys(context, url) -> None:
+    def statuses(caller: Caller) -> set[int]:
+        named = {"job_id": "job_0", "token": "1", "sha256": "0" * 64}
+        asked = [(method, path.removeprefix("/v1/runner").format(**named)) for method, path in OURS]
+        return {caller.ask(*way, json={}).status_code for way in asked}
 
-
-WRONG_KEYS = [
-    ({"scopes": ["runner"]}, "names its simulators"),
-    ({"scopes": ["runner", "read"], "simulators": ["mujoco"]}, "stands alone"),
-    ({"scopes": ["admin", "runner"], "simulators": ["mujoco"]}, "stands alone"),
-    ({"scopes": ["runner"], "simulators": []}, "at least 1"),
-    ({"scopes": ["runner"], "simulators": ["unity"]}, "there is no simulator 'unity'"),
-    ({"scopes": ["runner"], "simulators": ["mujoco"], "job_owners": ["ada"]}, "pattern"),
-    (
-        {"scopes": ["runner"], "simulators": ["mujoco"], "budget": {"max_requests": 1}},
-        "no budget",
-    ),
-    ({"scopes": ["submit"], "simulators": ["mujoco"]}, "scope runner"),
-]
-
-
-def test_keys_of_two_kinds_are_not_made(url) -> None:
-    for wrong, says in WRONG_KEYS:
-        answer = Caller(url, ADMIN).ask("POST", "/../keys", json={"name": "k", **wrong})
-        assert answer.status_code == 422, wrong
-        assert says in answer.text
-
-
-def test_only_admins_make_runner_keys(context, url) -> None:
+    assert len(OURS) >= 9
     body = {"name": "k", "scopes": ["runner"], "simulators": ["mujoco"]}
-    for scope in ("read", "submit"):
-        key = context.store.keys.create(name="a", scopes=[scope])[1]
-        assert Caller(url, key).ask("POST", "/../keys", json=body).status_code == 403
+    submits = Caller(url, context.store.keys.create(name="a", scopes=["submit"])[1])
+    assert statuses(submits) == statuses(as_admin(url)) == {403}
+    assert statuses(Caller(url)) == {401}
+    assert submits.ask("POST", "/../keys", json=body).status_code == 403
     made = as_admin(url).ask("POST", "/../keys", json=body)
     assert made.status_code == 201
-    facts = Caller(url, made.json()["secret"]).ask("GET", "").json()
-    assert facts["simulators"] == ["mujoco"]
-    assert set(facts["versions"]) == {"mujoco"}
+    assert Caller(url, made.json()["secret"]).ask("GET", "").json()["simulators"] == ["mujoco"]
+    for wrong, says in [
+        ({"simulators": None}, "names its simulators"),
+        ({"scopes": ["admin", "runner"]}, "stands alone"),
+        ({"simulators": []}, "at least 1"),
+        ({"simulators": ["unity"]}, "there is no simulator 'unity'"),
+        ({"job_owners": ["ada"]}, "pattern"),
+        ({"budget": {"max_requests": 1}}, "no budget"),
+        ({"scopes": ["submit"]}, "scope runner"),
+    ]:
+        answer = Caller(url, ADMIN).ask("POST", "/../keys", json=body | wrong)
+        assert (answer.status_code, says in answer.text) == (422, True), answer.text
 
 
 def test_a_revoked_key_writes_nothing_any_more(context, url) -> None:
@@ -103,142 +95,207 @@ def test_a_revoked_key_writes_nothing_any_more(context, url) -> None:
     assert caller.ask("POST", caller.at(lease, "/outcome"), json=body).status_code == 401
 
 
-def test_only_its_simulators_jobs_are_leased(context, url) -> None:
+def test_only_trials_of_its_simulators_and_versions_are_leased(context, url, caller) -> None:
     waiting(context)
-    caller = Caller(url, runner_key(context, "pybullet")[1])
-    for route in ("/leases", "/heartbeat", "/goodbye"):
-        asked = caller.about()
-        refused = caller.ask("POST", route, json=asked)
-        expected = 200 if route == "/goodbye" else 403
-        assert refused.status_code == expected, route
-    assert "choose from pybullet" in caller.ask("POST", "/leases", json=caller.about()).text
-    unknown = {**caller.about(), "simulators": {"unity": "3"}}
-    assert caller.ask("POST", "/leases", json=unknown).status_code == 403
-    own = {**caller.about(), "simulators": {"pybullet": "3"}}
-    assert caller.ask("POST", "/leases", json=own).status_code == 204
+    other = Caller(url, runner_key(context, "pybullet")[1])
     both = dict.fromkeys(("pybullet", "mujoco"), SIMULATION_VERSION)
-    asked = {**caller.about(), "simulators": both}
-    assert caller.ask("POST", "/leases", json=asked).status_code == 403
-
-
-def test_jobs_of_other_versions_are_not_leased(context, url) -> None:
-    waiting(context)
-    caller = Caller(url, runner_key(context)[1])
+    for simulators in (other.about()["simulators"], {"unity": "3"}, both):
+        refused = other.ask("POST", "/leases", json={**other.about(), "simulators": simulators})
+        assert (refused.status_code, "choose from pybullet" in refused.text) == (403, True)
+    assert other.ask("POST", "/heartbeat", json=other.about()).status_code == 403
+    assert not offered(other, simulators={"pybullet": SIMULATION_VERSION})
     for faults in (0, 1):  # nor when it comes first
-        with context.store.database.transaction() as connection:
-            connection.execute(text(f"UPDATE jobs SET faults = {faults}"))
+        execute(context, "UPDATE jobs SET faults = :faults", {"faults": faults})
         for version in ("2", f"{SIMULATION_VERSION}.0", SIMULATION_VERSION * 2, "999"):
-            other = {**caller.about(), "simulators": {"mujoco": version}}
-            assert caller.ask("POST", "/leases", json=other).status_code == 204
+            assert not offered(caller, simulators={"mujoco": version}), version
     assert caller.lease()["version"] == SIMULATION_VERSION
 
 
-def test_a_key_for_ones_own_jobs_leases_no_others(context, url) -> None:
+def test_a_key_for_ones_own_jobs_leases_no_others(context, url, caller) -> None:
     ada, bob = (context.store.keys.create(name=n, scopes=["submit"])[0].id for n in ("ada", "bob"))
     theirs = waiting(context, seed=0, owner=bob)
     nobodys = waiting(context, seed=1)
     own = waiting(context, seed=2, owner=ada)
-    with context.store.database.transaction() as connection:
-        connection.execute(text(f"UPDATE jobs SET faults = 1 WHERE id = '{theirs.id}'"))
-    caller = Caller(url, runner_key(context, job_owners=[ada])[1])
-    assert caller.lease()["job_id"] == own.id
+    execute(context, "UPDATE jobs SET faults = 1 WHERE id = :id", {"id": theirs.id})
+    of_ada = Caller(url, runner_key(context, job_owners=[ada])[1])
+    assert of_ada.lease()["job_id"] == own.id
+    of_ada.name = "second"
+    assert not offered(of_ada)
+    found = {caller.lease()["job_id"]}
     caller.name = "second"
-    assert caller.ask("POST", "/leases", json=caller.about()).status_code == 204
-    anybodys = Caller(url, runner_key(context)[1])
-    found = {anybodys.lease()["job_id"]}
-    anybodys.name = "second"
-    found.add(anybodys.lease()["job_id"])
-    assert found == {theirs.id, nobodys.id}
+    assert found | {caller.lease()["job_id"]} == {theirs.id, nobodys.id}
 
 
-def test_another_keys_lease_can_neither_be_read_nor_written(context, url) -> None:
+def test_another_keys_lease_can_neither_be_read_nor_written(context, callers) -> None:
     job = waiting(context)
-    holder, thief = (Caller(url, runner_key(context)[1]) for _ in range(2))
+    holder, thief, _ = callers
     lease = holder.lease()
     data = write_trajectory(true_trajectory(context, job))
     sent = holder.upload(lease, data)
     before = everything(context.store.database)
     outcome = {"trajectory": sent, "versions": {}, "wall_s": 1}
-    fault = {"reason": "simulator_fault", "detail": "b", "permanent": True}
     upload = f"/uploads/{sent['sha256']}"
     for method, path, options in (
         ("GET", "", {}),
         ("GET", upload, {"params": {"size": len(data)}}),
         ("PUT", upload, {"params": {"size": len(data), "offset": 0}, "content": data}),
         ("POST", "/outcome", {"json": outcome}),
-        ("POST", "/fault", {"json": fault}),
+        ("POST", "/fault", {"json": NEVER}),
         ("POST", "/hand-back", {}),
     ):
         answer = thief.ask(method, thief.at(lease, path), **options)
         assert answer.status_code == 409, (method, path, answer.text)
         assert "mujoco" not in answer.text
-    named = {"job_id": lease["job_id"], "token": lease["token"]}
+    named = thief.named(lease)
     beat = thief.ask("POST", "/heartbeat", json=thief.about(leases=[named]))
     assert beat.json() == {"live": [], "lost": [named]}
     assert everything(context.store.database) == before
     assert holder.outcome(lease, data).json() == {"status": "done"}
 
 
-def test_a_job_that_a_worker_beside_the_database_has_is_not_a_runners(context, url) -> None:
+def test_a_job_that_a_worker_beside_the_database_has_is_not_a_runners(context, caller) -> None:
     job = waiting(context)
     lease = context.store.leases.claim("simulate.mujoco", owner="simulate@here:1")
-    caller = Caller(url, runner_key(context)[1])
     named = {"job_id": job.id, "token": lease.token}
     assert caller.ask("GET", caller.at(named)).status_code == 409
     assert caller.ask("POST", caller.at(named, "/hand-back")).status_code == 409
 
 
-def test_one_name_has_one_lease(context, url) -> None:
+def test_one_name_has_one_lease(context, callers) -> None:
     for seed in range(3):
         waiting(context, seed=seed)
-    caller = Caller(url, runner_key(context)[1])
+    caller, other, _ = callers  # another key's runner has the same name
     first = caller.lease()
     assert caller.lease() == first
     caller.name = "by-hand.1"  # begins like the first
-    second = caller.lease()
-    assert second["job_id"] != first["job_id"]
-    other = Caller(url, runner_key(context)[1])  # another key's runner of the same name
-    assert other.lease()["job_id"] not in {first["job_id"], second["job_id"]}
+    assert len({each["job_id"] for each in (first, caller.lease(), other.lease())}) == 3
 
 
-def test_a_keys_leases_and_names_are_bounded(context, url, monkeypatch) -> None:
-    monkeypatch.setattr(lease_queue, "MAX_LEASES", 2)
-    for seed in range(3):
+def test_a_keys_leases_are_bounded_as_they_are_given(context, url, callers, monkeypatch) -> None:
+    monkeypatch.setattr(lease_queue, "MAX_LEASES", 5)
+    for seed in range(9):
         waiting(context, seed=seed)
-    caller = Caller(url, runner_key(context)[1])
-    for number in range(2):
-        caller.name = f"n{number}"
-        caller.lease()
-    caller.name = "n2"
-    refused = caller.ask("POST", "/leases", json=caller.about())
-    assert (refused.status_code, refused.headers["retry-after"]) == (429, "5")
-    Caller(url, runner_key(context)[1]).lease()  # another key has its own
+
+    def lease(number: int) -> int:
+        one = Caller(url, callers[0].secret, name=f"r{number}")
+        return one.ask("POST", "/leases", json=one.about(wait_s=5)).status_code
+
+    with ThreadPoolExecutor(8) as at_once:
+        assert sorted(at_once.map(lease, range(8))) == [200] * 5 + [429] * 3
+    callers[1].lease()  # another key has its own
 
 
-def test_no_lease_is_renewed_forever(context, url) -> None:
+def test_no_lease_is_renewed_forever(context, caller) -> None:
     waiting(context)
-    caller = Caller(url, runner_key(context)[1])
-    lease = caller.lease()
-    named = {"job_id": lease["job_id"], "token": lease["token"]}
+    named = caller.named(caller.lease())
     beat = caller.about(leases=[named])
     assert caller.ask("POST", "/heartbeat", json=beat).json()["live"] == [named]
-    with context.store.database.transaction() as connection:
-        connection.execute(text("UPDATE attempts SET started_at = now() - interval '61 minutes'"))
+    execute(context, "UPDATE attempts SET started_at = now() - interval '61 minutes'")
     assert caller.ask("POST", "/heartbeat", json=beat).json()["lost"] == [named]
 
 
-def test_runners_are_workers_like_others(context, url) -> None:
-    caller = Caller(url, runner_key(context)[1])
-    versions = {"engine": "mujoco", "simulation": SIMULATION_VERSION}
-    caller.ask("POST", "/heartbeat", json=caller.about(versions=versions, pid=7))
-    (listed,) = as_admin(url).ask("GET", "/../workers").json()["workers"]
+def test_runners_are_workers_like_others(url, caller) -> None:
+    caller.ask("POST", "/heartbeat", json=caller.about(versions={"engine": "mujoco"}, pid=7))
+    admin = as_admin(url)
+    (listed,) = admin.ask("GET", "/../workers").json()["workers"]
     assert (listed["queues"], listed["pid"], listed["alive"]) == (["simulate.mujoco"], 7, True)
     assert listed["id"].startswith("runner@key_")
 
     def is_served() -> bool:
-        checks = as_admin(url).ask("GET", "/../health").json()["checks"]
+        checks = admin.ask("GET", "/../health").json()["checks"]
         return {c["name"]: c["ok"] for c in checks}["workers of simulate.mujoco"]
 
     wait_until(is_served, 20, "health was told")
     caller.ask("POST", "/goodbye", json=caller.about())
-    assert as_admin(url).ask("GET", "/../workers").json()["workers"] == []
+    assert admin.ask("GET", "/../workers").json()["workers"] == []
+
+
+def misses(context, caller: Caller, how: str) -> None:
+    lease = caller.lease()
+    if how == "lost":
+        expire_leases(context)
+        context.store.leases.recover()
+        return
+    body = {"fault": FAULT, "never": NEVER}.get(how)
+    path = "/hand-back" if body is None else "/fault"
+    assert caller.ask("POST", caller.at(lease, path), json=body).status_code == 200
+
+
+def test_a_key_that_misses_a_trial_again_and_again_counts_once(context, callers) -> None:
+    job = waiting(context)
+    for how in ("fault", "hand back", "lost", "fault"):
+        misses(context, callers[0], how)
+        assert not offered(callers[0], name="another-name"), f"it waits after: {how}"
+        pause_ends(context)
+    now = context.store.jobs.get(job.id)
+    assert (now.state, now.faults) == ("queued", 1)
+    misses(context, callers[0], "fault")
+    assert offered(callers[1]), "who did not miss it need not wait"
+
+
+@pytest.mark.ci
+def test_the_pause_grows(context, caller) -> None:
+    waiting(context)
+    ended = "UPDATE attempts SET ended_at = now() - make_interval(secs => :s)"
+    for pause_s in (2, 4, 8, 16, 32):
+        misses(context, caller, "fault")
+        execute(context, ended, {"s": pause_s * 3 // 4})
+        assert not offered(caller), pause_s
+        execute(context, ended, {"s": pause_s + 1})
+
+
+def test_what_can_not_be_done_needs_two_keys_or_a_worker_of_the_house(context, callers) -> None:
+    job = waiting(context)
+    misses(context, callers[0], "never")
+    pause_ends(context)
+    assert not offered(callers[0])
+    now = context.store.jobs.get(job.id)
+    assert (now.state, "another key" in now.detail) == ("queued", True)
+    misses(context, callers[1], "fault")
+    assert context.store.jobs.get(job.id).state == "queued"
+    misses(context, callers[2], "never")
+    now = context.store.jobs.get(job.id)
+    assert (now.state, now.outcome, now.reason) == ("done", "errored", "simulator_fault")
+    other = waiting(context, seed=1)
+    misses(context, callers[0], "never")
+    lease = context.store.leases.claim("simulate.mujoco", owner="simulate@here:1")
+    assert lease.job.id == other.id
+    context.store.leases.give_up(lease, "so it is", reason="game_version")
+    assert context.store.jobs.get(other.id).outcome == "errored"
+
+
+def test_evidence_of_faults_is_bounded_and_only_the_latest_stays(context, callers) -> None:
+    job = waiting(context)
+    lease = callers[0].lease()
+    sha256 = hashlib.sha256(b"x").hexdigest()
+    large = {"files": [{"name": "log-0-1.txt", "sha256": sha256, "size": 17 << 20}]}
+    for wrong, says in ((large, f"{16 << 20:,}"), ({"reason": "because"}, "simulator_fault")):
+        at = callers[0].at(lease, "/fault")
+        refused = callers[0].ask("POST", at, json={**FAULT, **wrong})
+        assert (refused.status_code, says in refused.text) == (422, True)
+    for number, caller in enumerate(callers):
+        lease = caller.lease()
+        sent = {**caller.upload(lease, b"log"), "name": f"log-0-{number}.txt"}
+        body = {**FAULT, "files": [sent]}
+        assert caller.ask("POST", caller.at(lease, "/fault"), json=body).status_code == 200
+    logs = [name for name in context.store.jobs.artifacts(job.id) if "log" in name]
+    assert logs == ["log-0-2.txt"]
+
+
+@pytest.mark.ci
+def test_every_answer_to_odd_requests_is_a_documented_one(context) -> None:
+    own = context.settings.model_copy(update={**WITH_KEYS, "require_keys": False, "lease_s": 60.0})
+    with live_api(replace(context, settings=own)) as url:
+        for number, way in enumerate(ways(SCHEMA.include(path_regex="^/v1/runner"))):
+            waiting(context, seed=number)
+            lease = Caller(url, name=f"slot-{number}").lease()
+
+            def prepare(case: Any, way: Any = way, lease: Any = lease) -> None:
+                # Half of what is worth asking needs a lease that lives.
+                for name in ("job_id", "token"):
+                    if way[1] is GenerationMode.POSITIVE and name in (case.path_parameters or {}):
+                        case.path_parameters[name] = lease[name]
+                if isinstance(case.body, dict) and "wait_s" in case.body:
+                    case.body["wait_s"] = 0
+
+            ask(url, way, 2, prepare)

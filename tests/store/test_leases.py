@@ -1,13 +1,47 @@
+"""Jobs, their leases and their journal: one worker at a time, and late writers write nothing."""
+
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import timedelta
+from decimal import Decimal
 
 import pytest
-from sqlalchemy import Connection, TextClause, event, text
-from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry
+from sqlalchemy import Connection, event, text
+from sqlalchemy.exc import IntegrityError
+from support.jobs import (
+    cancel,
+    claim,
+    execute,
+    expire_leases,
+    finish,
+    journal_entry,
+    set_budget,
+)
 
 from buildarena_pipeline.runtime.context import Context
-from buildarena_store import Lease, Leases, StaleLeaseError, TurnResult
+from buildarena_store import (
+    Lease,
+    Leases,
+    NewJob,
+    StaleLeaseError,
+    TurnResult,
+    UnknownIdError,
+    Usage,
+)
+from buildarena_store.account_tables import MAX_USD
+from buildarena_store.tables import jobs
+
+USAGE = Usage(
+    requests=1, input_tokens=100, output_tokens=10, cached_tokens=40, cost_usd=Decimal("0.25")
+)
+ENTRY = journal_entry(0, reply={"text": "ü"}, usage=USAGE, tries=2)
+
+
+def scalar(context: Context, query: str, **values: object) -> object:
+    with context.store.database.statement() as connection:
+        return connection.execute(text(query), values).scalar_one()
 
 
 def test_a_job_is_leased_to_one_worker_at_a_time(context, add) -> None:
@@ -34,13 +68,9 @@ def test_the_hinted_job_is_taken_first_and_a_recovered_one_before_it(context, ad
     expire_leases(context)
     assert set(context.store.leases.recover()) == {second, third}
     assert claim(context, hint=first).job.id in {lost.job.id, third}
-
-
-def test_a_hint_that_is_gone_still_brings_another_job(context, add) -> None:
-    (only,) = add(1)
-    assert claim(context, hint="job_gone").job.id == only
+    assert claim(context, hint="job_gone").job.id in {second, third}
+    assert claim(context).job.id == first
     assert context.store.leases.claim("construct", owner="w") is None
-    assert context.store.leases.claim("simulate.mujoco", owner="w") is None
 
 
 def stale_and_fresh(context: Context) -> tuple[Lease, Lease]:
@@ -63,109 +93,80 @@ def test_a_stale_lease_can_write_nothing(context, add) -> None:
         with pytest.raises(StaleLeaseError):
             write()
     assert context.store.journal.read(job_id) == []
-    finish(context, fresh, indicator=7.5)
-    job = context.store.jobs.get(job_id)
-    assert (job.outcome, job.indicator) == ("success", 7.5)
-
-
-def test_a_scored_job_cannot_be_scored_again(context, add) -> None:
-    add(1)
-    lease = claim(context)
-    finish(context, lease)
-    for change in (
-        lambda: finish(context, lease),
-        lambda: context.store.leases.hand_back(lease),
-    ):
-        with pytest.raises(StaleLeaseError):
-            change()
-    assert context.store.jobs.get(lease.job.id).outcome == "success"
-    assert context.store.leases.claim("construct", owner="w") is None
-
-
-def test_turns_of_a_lost_lease_are_not_kept(context, add) -> None:
-    (job_id,) = add(1)
-    for lease in stale_and_fresh(context):
+    for lease in (stale, fresh):
         turn = TurnResult(index=0, sequence=0, sub_structure=None, results=[])
         context.store.turns.append(lease, turn)
     told = "SELECT count(*) FROM events WHERE job_id = :id AND kind = 'turn'"
-    with context.store.database.statement() as connection:
-        assert connection.execute(text(told), {"id": job_id}).scalar_one() == 1
+    assert scalar(context, told, id=job_id) == 1
+    finish(context, fresh, indicator=7.5)
+    for again in (lambda: finish(context, fresh), lambda: context.store.leases.hand_back(fresh)):
+        with pytest.raises(StaleLeaseError):
+            again()
+    job = context.store.jobs.get(job_id)
+    assert (job.outcome, job.indicator) == ("success", 7.5)
+    assert context.store.leases.claim("construct", owner="w") is None
 
 
 def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context, add) -> None:
     add(1, 2)
     kept, lost = claim(context), claim(context)
     cancel(context, lost.job.id)
+    expires = "SELECT expires_at FROM leases WHERE job_id = :id"
+    before = scalar(context, expires, id=kept.job.id)
+    assert context.store.leases.held([kept, lost]) == {kept.job.id: False}
+    assert scalar(context, expires, id=kept.job.id) == before, "looking renews nothing"
     assert context.store.leases.heartbeat([kept, lost]) == {kept.job.id: False}
+    assert scalar(context, expires, id=kept.job.id) > before
+    with pytest.raises(StaleLeaseError):
+        finish(context, lost)
+    assert context.store.jobs.get(lost.job.id).outcome == "cancelled"
     context.store.leases.duration = timedelta(seconds=0.05)
     context.store.leases.heartbeat([kept])
     time.sleep(0.1)
     assert context.store.leases.recover() == [kept.job.id]
 
 
-def test_a_job_that_keeps_losing_its_workers_is_given_up(context, add) -> None:
-    (job_id,) = add(1)
+def test_a_job_that_keeps_losing_its_workers_is_given_up_unless_it_gets_on(context, add) -> None:
+    losing, going = add(1, 2)
     leases = Leases(context.store.database, duration_s=1, max_faults=2)
-    for _ in range(2):
-        assert leases.claim("construct", owner="w") is not None
+    for sequence in range(4):
+        if sequence < 2:
+            assert leases.claim("construct", owner="w", hint=losing).job.id == losing
+        lease = leases.claim("construct", owner="w", hint=going)
+        assert lease.job.id == going
+        context.store.journal.append(lease, journal_entry(sequence))
         expire_leases(context)
         leases.recover()
-    job = context.store.jobs.get(job_id)
+    job = context.store.jobs.get(losing)
     assert (job.outcome, job.reason, job.success) == ("errored", "lost_worker", None)
-    assert [attempt.result for attempt in context.store.jobs.attempts(job_id)] == ["lost", "lost"]
+    assert [attempt.result for attempt in context.store.jobs.attempts(losing)] == ["lost", "lost"]
+    assert context.store.jobs.get(going).state == "queued"
 
 
-def test_a_fault_waits_before_the_next_attempt(context, add) -> None:
-    add(1)
-    lease = claim(context)
-    assert context.store.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
-    assert context.store.leases.claim("construct", owner="w") is None
-    assert context.store.waiting.to_notify("construct", 10) == []
-
-
-def test_handing_back_is_no_fault(context, add) -> None:
+def test_a_fault_waits_before_the_next_attempt_and_handing_back_is_none(context, add) -> None:
     (job_id,) = add(1)
     context.store.leases.hand_back(claim(context))
     job = context.store.jobs.get(job_id)
     assert (job.state, job.faults) == ("queued", 0)
-
-
-def test_workers_are_notified_of_waiting_jobs_once(context, add) -> None:
-    ids = add(1, 2, 3)
-    assert set(context.store.waiting.to_notify("construct", 10)) == set(ids)
+    lease = claim(context)
+    assert context.store.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
+    assert context.store.leases.claim("construct", owner="w") is None
     assert context.store.waiting.to_notify("construct", 10) == []
+    kinds = [event.kind for event in context.store.events.after(0, job_id=job_id)]
+    assert kinds[:4] == ["queued", "running", "queued", "running"]
 
 
-def test_no_more_jobs_are_notified_than_asked_for_however_it_is_planned(context, add) -> None:
-    add(*range(20))
+def test_workers_are_notified_of_waiting_jobs_once_and_of_no_more_than_asked(context, add) -> None:
+    ids = add(*range(20))
 
     def take_nested_loops(connection: Connection) -> None:
         for way in ("hashagg", "hashjoin", "mergejoin", "sort", "material"):
             connection.exec_driver_sql(f"SET LOCAL enable_{way} = off")
 
     event.listen(context.store.database.engine, "begin", take_nested_loops)
-    assert len(context.store.waiting.to_notify("construct", 3)) == 3
-
-
-def test_a_cancelled_job_frees_its_worker(context, add) -> None:
-    (job_id,) = add(1)
-    lease = claim(context)
-    cancel(context, job_id)
-    with pytest.raises(StaleLeaseError):
-        finish(context, lease)
-    assert context.store.jobs.get(job_id).outcome == "cancelled"
-
-
-def test_a_job_that_gets_on_is_not_given_up(context, add) -> None:
-    (job_id,) = add(1)
-    leases = Leases(context.store.database, duration_s=1, max_faults=2)
-    for sequence in range(4):
-        lease = leases.claim("construct", owner="w")
-        assert lease is not None
-        context.store.journal.append(lease, journal_entry(sequence))
-        expire_leases(context)
-        leases.recover()
-    assert context.store.jobs.get(job_id).state == "queued"
+    first, others = (context.store.waiting.to_notify("construct", most) for most in (3, 99))
+    assert (len(first), len(others)) == (3, 17)
+    assert {*first, *others} == set(ids)
 
 
 def owned(context: Context, add, owners: list[str | None]) -> list[str]:
@@ -180,11 +181,9 @@ def test_owners_take_turns(context, add) -> None:
     taken, last = [], None
     for _ in range(8):
         lease = context.store.leases.claim("construct", owner="w", last=last)
-        assert lease is not None
         last = lease.job.owner or ""
         taken.append(last)
     assert taken == ["", "a", "b", "c", "a", "b", "a", "a"]
-    assert context.store.leases.claim("construct", owner="w", last="a") is None
 
 
 def test_a_hint_does_not_jump_the_turn_of_another_owner(context, add) -> None:
@@ -205,62 +204,15 @@ def test_jobs_of_full_owners_wait_whatever_names_them(context, add, faults) -> N
     assert claim("construct", owner="w", full=["a"]).job.id == operators
 
 
-def test_looking_at_leases_says_what_a_heartbeat_says_and_renews_nothing(context, add) -> None:
+def test_heartbeats_change_a_narrow_row_and_no_index(context, add) -> None:
     add(1, 2)
-    first, second = claim(context), claim(context)
-    cancel(context, second.job.id)
-    expires = text("SELECT expires_at FROM leases WHERE job_id = :id")
-    with context.store.database.transaction() as connection:
-        before = connection.execute(expires, {"id": first.job.id}).scalar_one()
-    assert context.store.leases.held([first, second]) == {first.job.id: False}
-    with context.store.database.transaction() as connection:
-        assert connection.execute(expires, {"id": first.job.id}).scalar_one() == before
-    assert context.store.leases.heartbeat([first, second]) == {first.job.id: False}
-    assert context.store.leases.held([]) == {}
-
-
-WRITTEN = text("SELECT pg_current_wal_insert_lsn() - '0/0'::pg_lsn")
-CHANGED = text(
-    """
-    SELECT pg_stat_get_tuples_updated(oid), pg_stat_get_tuples_hot_updated(oid)
-    FROM pg_class WHERE relname = :table
-    """
-)
-
-
-@pytest.mark.parametrize("cost", [0, 7])
-def test_heartbeats_change_a_narrow_row_and_no_index(context, add, cost) -> None:
-    add(*range(40))
-    held = [claim(context) for _ in range(40)]
-    execute(context, "UPDATE jobs SET cost_usd = :cost", {"cost": cost})
-    heartbeats, before, written = 0, changed(context), []
-    while heartbeats < 1000 or changed(context)["leases"][0] - before["leases"][0] < heartbeats:
-        begun = ask(context, WRITTEN)[0]
-        assert len(context.store.leases.heartbeat(held)) == len(held)
-        written.append((ask(context, WRITTEN)[0] - begun) / len(held))
-        heartbeats += len(held)
-        assert heartbeats < 10_000, "they are never counted"
-    after = changed(context)
-    # The claims, and the costs.
-    assert after["jobs"][0] - before["jobs"][0] <= 2 * len(held)
-    (all_before, hot_before), (all_after, hot_after) = before["leases"], after["leases"]
-    assert all_after - all_before >= 1000
-    # A snapshot of somebody else, such as autovacuum's, keeps old versions of rows for a moment:
-    # two rounds of forty, for example. With an index on what changes no update would be one.
-    assert hot_after - hot_before >= 0.8 * (all_after - all_before)
-    # The log is the server's: tests beside this one write to it, too, but not all the time.
-    assert min(written) < 900
-
-
-def ask(context: Context, query: TextClause, **values: str) -> tuple[int, ...]:
-    with context.store.database.transaction() as connection:
-        connection.execute(text("SELECT pg_stat_force_next_flush()"))
-        return tuple(map(int, connection.execute(query, values).one()))
-
-
-def changed(context: Context) -> dict[str, tuple[int, ...]]:
-    """Rows changed so far, and how many of them without a change of an index, by table."""
-    return {table: ask(context, CHANGED, table=table) for table in ("jobs", "leases")}
+    held = [claim(context), claim(context)]
+    written = "SELECT string_agg(xmin::text, ' ' ORDER BY id) FROM jobs"
+    before = scalar(context, written)
+    assert len(context.store.leases.heartbeat(held)) == 2
+    assert scalar(context, written) == before, "rows of jobs are wide"
+    indexes = "SELECT string_agg(indexdef, ' ') FROM pg_indexes WHERE tablename = 'leases'"
+    assert "expires_at" not in scalar(context, indexes)
 
 
 def test_what_is_known_of_leases_goes_an_hour_after_their_end(context, add) -> None:
@@ -277,20 +229,94 @@ def test_what_is_known_of_leases_goes_an_hour_after_their_end(context, add) -> N
     assert context.store.leases.recover() == [running.job.id]
 
 
-def test_leases_of_the_release_before_end_by_their_own_column(context, add) -> None:
+def test_leases_of_the_release_before_and_of_this_one_end_by_their_own_column(context, add) -> None:
     add(1, 2)
     claim(context), claim(context)
+    distant = "SELECT min(lease_expires_at) - now() > interval '1 hour' FROM jobs"
+    assert scalar(context, distant), "the release before leaves leases of this one alone"
     execute(context, "DELETE FROM leases")
     assert context.store.leases.recover() == []
     execute(context, "UPDATE jobs SET lease_expires_at = now() - interval '1 s' WHERE seed = 1")
     assert len(context.store.leases.recover()) == 1
 
 
-def test_the_release_before_leaves_leases_of_this_one_alone(context, add) -> None:
-    add(1)
-    lease = claim(context)
+def test_a_job_with_the_same_key_is_the_same_job_also_when_it_is_added_at_once(
+    context, new_job
+) -> None:
+    given = [new_job(seed) for seed in range(200)]
+
+    def add(new: list[NewJob]) -> int:
+        with context.store.database.transaction() as connection:
+            return context.store.jobs.add(new, connection=connection)
+
+    with ThreadPoolExecutor(4) as threads:
+        added = list(threads.map(add, [given, given[::-1], given[::-1], given]))
+    assert sorted(added) == [0, 0, 0, 200]
+    assert add([new_job(1), new_job(200)]) == 1
+
+
+def test_jobs_are_claimed_in_the_order_in_which_they_were_given(context, new_job) -> None:
+    given = [new_job(seed, model) for model in ("m", "n") for seed in (3, 1, 4, 15, 9, 2, 6, 5)]
     with context.store.database.transaction() as connection:
-        query = text("SELECT lease_expires_at - now() > interval '1 hour' FROM jobs")
-        assert connection.execute(query).scalar_one()
-    expire_leases(context)
-    assert context.store.leases.recover() == [lease.job.id]
+        assert context.store.jobs.add([*given, given[0]], connection=connection) == len(given)
+    claimed = [claim(context).job for _ in given]
+    assert [(job.model, job.seed) for job in claimed] == [(j.model, j.key.seed) for j in given]
+    assert len({job.draw for job in claimed}) == len(given)
+
+
+def test_a_cancelled_job_is_opened_when_wanted_again_and_an_errored_one_retried(
+    context, new_job, add
+) -> None:
+    (job_id,) = add(1)
+    with pytest.raises(UnknownIdError, match="there is no job 'job_x'"):
+        context.store.jobs.get("job_x")
+    with context.store.database.transaction() as connection:
+        assert not context.store.jobs.retry(jobs.c.id == job_id, connection=connection)
+        assert context.store.jobs.cancel([job_id], connection=connection) == [job_id]
+        assert context.store.jobs.add([new_job(1)], connection=connection) == 1
+    job = context.store.jobs.get(job_id)
+    assert (job.state, job.outcome) == ("queued", None)
+    context.store.leases.give_up(claim(context), "no key", reason="missing_key")
+    assert context.store.jobs.get(job_id).outcome == "errored"
+    with context.store.database.transaction() as connection:
+        assert context.store.jobs.retry(jobs.c.id == job_id, connection=connection)
+    assert context.store.jobs.get(job_id).state == "queued"
+
+
+def test_a_reply_and_its_cost_are_written_together_and_once(context, add) -> None:
+    (job_id,) = add(1)
+    lease = claim(context)
+    context.store.journal.append(lease, ENTRY)
+    context.store.journal.append(lease, replace(ENTRY, sequence=1))
+    with pytest.raises(IntegrityError):
+        context.store.journal.append(lease, replace(ENTRY, sequence=1))
+    job = context.store.jobs.get(job_id)
+    assert (job.requests, job.input_tokens, job.cost_usd) == (2, 200, Decimal("0.500000"))
+    read = context.store.journal.read(job_id)
+    assert [each.sequence for each in read] == [0, 1]
+    assert (read[0].reply, read[0].usage) == ({"text": "ü"}, USAGE)
+
+
+def test_what_is_no_answer_is_paid_for_and_no_progress(context, add) -> None:
+    (job_id,) = add(1)
+    lease = claim(context)
+    execute(context, "UPDATE jobs SET faults = 3")
+    for sequence, finish_, faults in ((0, "garbage", 3), (1, "out_of_time", 3), (2, "stop", 0)):
+        reply = {"text": "", "finish": finish_}
+        context.store.journal.append(lease, replace(ENTRY, sequence=sequence, reply=reply))
+        job = context.store.jobs.get(job_id)
+        assert (job.faults, job.requests) == (faults, sequence + 1), finish_
+
+
+def test_sums_that_a_provider_claims_never_overflow(context, add) -> None:
+    (job_id,) = add(1)
+    execute(context, "UPDATE jobs SET payer = 'sweep_x'")
+    set_budget(context, "sweep_x", max_requests=99)
+    lease = claim(context)
+    most = Usage(requests=1, input_tokens=10**7, cost_usd=Decimal(60_000_000))
+    for sequence in range(3):
+        context.store.journal.append(lease, replace(ENTRY, sequence=sequence, usage=most))
+    context.store.budgets.charge_lost(lease, most)
+    assert context.store.jobs.get(job_id).cost_usd == MAX_USD
+    budget = context.store.budgets.get("sweep_x")
+    assert (budget.spent_cost_usd, budget.spent_requests) == (MAX_USD, 4)

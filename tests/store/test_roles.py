@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from itertools import product
 
 import pytest
 from sqlalchemy import make_url, text
@@ -28,6 +27,7 @@ from buildarena_store.states import CONSTRUCT_QUEUE, Verdict, simulate_queue
 from buildarena_worker.wiring import verifier
 
 PROCESSES = ("api", "construct", "simulate")
+SWEEP = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}
 PERMANENT = ("api_keys", "budgets", "names", "jobs", "sweeps", "tasks", "journal", "events")
 """What nobody removes rows from, but the owner."""
 
@@ -83,14 +83,7 @@ def allowed(context: Context, statement: str) -> bool:
 def test_a_job_goes_through_processes_with_roles_of_their_own(contexts) -> None:
     api = contexts["api"]
     with TestClient(create_app(api, load_registry()), base_url="http://127.0.0.1") as client:
-        sweep = {
-            "tasks": ["lift-1"],
-            "models": ["builtin/expert"],
-            "simulator": "mujoco",
-            "samples": 1,
-            "worlds": 1,
-        }
-        limited = {**sweep, "budget": {"max_requests": 1000}}
+        limited = {**SWEEP, "samples": 1, "worlds": 1, "budget": {"max_requests": 1000}}
         made = client.post("/v1/sweeps", json=limited)
         assert made.status_code == 202, made.text
         (job,) = api.store.jobs.page(limit=10)
@@ -101,9 +94,8 @@ def test_a_job_goes_through_processes_with_roles_of_their_own(contexts) -> None:
         assert done.outcome == "success", done
         for name in PROCESSES:
             Reaper(contexts[name]).reap()
-        assert client.get("/v1/leaderboard").status_code == 200
-        assert client.get(f"/v1/sweeps/{made.json()['id']}").status_code == 200
-        assert client.get("/v1/metrics").status_code == 200
+        for path in ("leaderboard", f"sweeps/{made.json()['id']}", "metrics"):
+            assert client.get(f"/v1/{path}").status_code == 200, path
         key = client.post("/v1/keys", json={"name": "ada", "scopes": ["submit"]})
         assert key.status_code == 201, key.text
         assert client.post(f"/v1/jobs/{job.id}/verify").status_code in {200, 202}
@@ -113,98 +105,66 @@ def test_a_job_goes_through_processes_with_roles_of_their_own(contexts) -> None:
             connection.execute(text(f"SELECT count(*) FROM {table}"))
 
 
-@pytest.mark.parametrize("role", list(ROLES))
-def test_no_process_changes_the_schema_or_the_server(contexts, role) -> None:
-    for statement in (
-        "CREATE TABLE mine (a int)",
-        "CREATE TEMPORARY TABLE mine (a int)",
-        "DROP TABLE jobs",
-        "TRUNCATE jobs",
-        "ALTER TABLE jobs ADD COLUMN mine int",
-        "CREATE ROLE mine",
-        "GRANT pg_read_server_files TO CURRENT_USER",
-        "ALTER TABLE jobs DISABLE TRIGGER ALL",
-        "CREATE FUNCTION mine() RETURNS int LANGUAGE sql AS 'SELECT 1'",
-        "UPDATE alembic_version SET version_num = 'x'",
-        "COPY jobs TO PROGRAM 'cat'",
-        "SELECT pg_read_file('/etc/passwd')",
-        "SELECT rolpassword FROM pg_authid",
-        "SET ROLE buildarena",
-    ):
-        assert not allowed(contexts[role], statement), statement
+OWNERS_ALONE = (
+    *("CREATE TABLE mine (a int)", "CREATE TEMPORARY TABLE mine (a int)", "DROP TABLE jobs"),
+    *("TRUNCATE jobs", "ALTER TABLE jobs ADD COLUMN mine int", "CREATE ROLE mine"),
+    "GRANT pg_read_server_files TO CURRENT_USER",
+    "ALTER TABLE jobs DISABLE TRIGGER ALL",
+    "CREATE FUNCTION mine() RETURNS int LANGUAGE sql AS 'SELECT 1'",
+    "UPDATE alembic_version SET version_num = 'x'",
+    *("COPY jobs TO PROGRAM 'cat'", "SELECT pg_read_file('/etc/passwd')"),
+    *("SELECT rolpassword FROM pg_authid", "SET ROLE buildarena"),
+    *(f"DELETE FROM {table}" for table in PERMANENT),
+)
+"""What no process may do, of the schema, the server and what results rest on."""
+NEVER_REWRITTEN = tuple(f"UPDATE {table} SET job_id = job_id" for table in ("journal", "events"))
+NOT_WORKERS = (
+    *(f"SELECT {column} FROM api_keys" for column in ("secret_hash", "previous_hash", "scopes")),
+    *("UPDATE api_keys SET revoked_at = NULL", "UPDATE api_keys SET secret_hash = 'x'"),
+    *("SELECT 1 FROM names", "INSERT INTO api_keys (id) VALUES ('key_x')"),
+    *("UPDATE budgets SET max_cost_usd = 1e6", "INSERT INTO budgets (id) VALUES ('key_x')"),
+    *("INSERT INTO sweeps (id) VALUES ('sweep_x')", "INSERT INTO jobs (id) VALUES ('job_x')"),
+    *("INSERT INTO tasks (name) VALUES ('x')", "UPDATE journal SET reply = '{}'"),
+    *("UPDATE sweeps SET owner = 'key_x'", "UPDATE sweep_jobs SET wanted = false"),
+    *("UPDATE events SET kind = 'x'", "SELECT 1 FROM board_cells"),
+)
+"""Workers read no keys and raise no limit."""
+NOT_SIMULATORS = (
+    *("SELECT reply FROM journal", "INSERT INTO journal (job_id) VALUES ('job_x')"),
+    "UPDATE budgets SET spent_cost_usd = 0",
+    "INSERT INTO reservations (job_id) VALUES ('job_x')",
+    "UPDATE sweeps SET state = 'active'",
+)
+"""A simulation worker sees no replies and spends nothing."""
+REFUSED = {
+    "api": NEVER_REWRITTEN,
+    "construct": NEVER_REWRITTEN + NOT_WORKERS,
+    "simulate": NEVER_REWRITTEN + NOT_WORKERS + NOT_SIMULATORS,
+    "reader": tuple(f"INSERT INTO {table} DEFAULT VALUES" for table in tables.metadata.tables),
+}
 
 
-@pytest.mark.parametrize(("role", "table"), list(product(ROLES, PERMANENT)))
-def test_no_process_removes_what_results_rest_on(contexts, role, table) -> None:
-    assert not allowed(contexts[role], f"DELETE FROM {table}")
-
-
-@pytest.mark.parametrize("role", ["construct", "simulate"])
-def test_workers_read_no_keys_and_raise_no_limit(contexts, role) -> None:
-    for statement in (
-        "SELECT secret_hash FROM api_keys",
-        "SELECT previous_hash FROM api_keys",
-        "SELECT scopes FROM api_keys",
-        "UPDATE api_keys SET revoked_at = NULL",
-        "UPDATE api_keys SET secret_hash = 'x'",
-        "SELECT 1 FROM names",
-        "INSERT INTO api_keys (id) VALUES ('key_x')",
-        "UPDATE budgets SET max_cost_usd = 1e6",
-        "INSERT INTO budgets (id) VALUES ('key_x')",
-        "INSERT INTO sweeps (id) VALUES ('sweep_x')",
-        "INSERT INTO jobs (id) VALUES ('job_x')",
-        "INSERT INTO tasks (name) VALUES ('x')",
-        "UPDATE journal SET reply = '{}'",
-        "UPDATE sweeps SET owner = 'key_x'",
-        "UPDATE sweep_jobs SET wanted = false",
-        "UPDATE events SET kind = 'x'",
-        "SELECT 1 FROM board_cells",
-    ):
-        assert not allowed(contexts[role], statement), statement
+def test_no_process_does_what_is_not_its_work(contexts) -> None:
+    assert set(REFUSED) == set(ROLES)
+    done = [
+        (role, statement)
+        for role, own in REFUSED.items()
+        for statement in (*OWNERS_ALONE, *own)
+        if allowed(contexts[role], statement)
+    ]
+    assert done == []
+    with contexts["api"].store.database.engine.connect() as connection:
+        there = text("SELECT tablename FROM pg_tables WHERE schemaname = 'public'")
+        found = set(connection.execute(there).scalars())
+    assert set(ROLES["reader"].reads) == found, "rights name every table there is"
 
 
 def test_a_worker_stops_a_sweep_whose_budget_is_used_up(contexts) -> None:
     api = contexts["api"]
-    spec = SweepSpec(
-        tasks=["lift-1"],
-        models=["builtin/expert"],
-        simulator="mujoco",
-        samples=1,
-        budget={"max_requests": 1},
-    )
+    spec = SweepSpec(**SWEEP, samples=1, budget={"max_requests": 1})
     sweep = Submissions(api, load_registry()).submit_sweep(spec).sweep.id
     work(contexts["construct"], queues=(CONSTRUCT_QUEUE,))
     assert api.store.sweeps.get(sweep).state == "budget_exhausted"
-
-
-def test_a_simulation_worker_sees_no_replies_and_spends_nothing(contexts) -> None:
-    for statement in (
-        "SELECT reply FROM journal",
-        "INSERT INTO journal (job_id) VALUES ('job_x')",
-        "UPDATE budgets SET spent_cost_usd = 0",
-        "INSERT INTO reservations (job_id) VALUES ('job_x')",
-        "UPDATE sweeps SET state = 'active'",
-    ):
-        assert not allowed(contexts["simulate"], statement), statement
-
-
-@pytest.mark.parametrize("role", PROCESSES)
-@pytest.mark.parametrize("table", ["journal", "events"])
-def test_what_scores_rest_on_is_never_rewritten(contexts, role, table) -> None:
-    assert not allowed(contexts[role], f"UPDATE {table} SET job_id = job_id")
-
-
-def test_a_reader_only_reads(contexts) -> None:
-    for table in tables.metadata.tables:
-        assert allowed(contexts["reader"], f"SELECT 1 FROM {table}")
-        assert not allowed(contexts["reader"], f"INSERT INTO {table} DEFAULT VALUES")
-
-
-def test_rights_name_every_table_there_is(context) -> None:
-    with context.store.database.engine.connect() as connection:
-        there = text("SELECT tablename FROM pg_tables WHERE schemaname = 'public'")
-        found = set(connection.execute(there).scalars())
-    assert set(ROLES["reader"].reads) == found
 
 
 def test_a_login_has_one_role_only_and_new_rights_replace_old_ones(
@@ -226,37 +186,27 @@ def test_an_owner_who_is_no_superuser_takes_an_older_installation_over(database_
     """Its tables were made by a superuser, who signed every process in."""
     name = f"{make_url(database_url).database}_older"
     older = make_url(database_url).set(database=name).render_as_string(hide_password=False)
-    superuser = Database(database_url)
-    with superuser.statement() as connection:
-        connection.execute(text(f"CREATE DATABASE {name}"))
-    database = Database(older)
-    database.migrate()
     url = url_of(older, OWNER)
-    make_roles(database, {OWNER: url})
-    make_roles(database, {OWNER: url})
-    owner = Database(url)
+    foreign = text(
+        "SELECT count(*) FILTER (WHERE relowner <> current_user::regrole), count(*) > 20 "
+        "FROM pg_class WHERE relkind IN ('r', 'S') AND relnamespace = 'public'::regnamespace"
+    )
+    may = text("SELECT rolsuper OR rolcreaterole FROM pg_roles WHERE rolname = current_user")
+    execute(database_url, f"CREATE DATABASE {name}")
+    database, owner = Database(older), Database(url)
+    database.migrate()
+    for _ in range(2):
+        make_roles(database, {OWNER: url})
     owner.migrate()
     with owner.transaction() as connection:
-        mine = connection.execute(
-            text(
-                "SELECT count(*) FILTER (WHERE relowner <> current_user::regrole), count(*) "
-                "FROM pg_class WHERE relkind IN ('r', 'S') "
-                "AND relnamespace = 'public'::regnamespace"
-            )
-        ).one()
-        assert mine[0] == 0
-        assert mine[1] > 20
+        assert connection.execute(foreign).one() == (0, True)
         connection.execute(text("ALTER TABLE jobs ADD COLUMN further int"))
         connection.execute(text("DROP FUNCTION recount_jobs()"))
-        assert not connection.execute(
-            text("SELECT rolsuper OR rolcreaterole FROM pg_roles WHERE rolname = current_user")
-        ).scalar()
+        assert not connection.execute(may).scalar()
     owner.close()
     database.close()
-    with superuser.statement() as connection:
-        connection.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
-        connection.execute(text(f'DROP ROLE "{make_url(url).username}"'))
-    superuser.close()
+    execute(database_url, f"DROP DATABASE {name} WITH (FORCE)")
+    execute(database_url, f'DROP ROLE "{make_url(url).username}"')
 
 
 @pytest.fixture
@@ -300,34 +250,26 @@ def test_an_older_installation_is_taken_over_table_by_table(context, owned) -> N
     assert others is None
 
 
-@pytest.mark.parametrize(
-    ("role", "url", "message"),
-    [
+def test_logins_that_are_none_or_may_too_much_are_refused(context, logins, postgres_url) -> None:
+    superuser = context.store.database
+    for role, url, message in [
         ("admin", "postgresql://a:b@h/d", "no role 'admin'; there are api"),
         ("api", "postgresql://a@h/d", "no user and password"),
-        ("api", None, "superuser"),
-    ],
-)
-def test_logins_that_are_none_are_refused(context, postgres_url, role, url, message) -> None:
-    with pytest.raises(RoleError, match=message):
-        make_roles(context.store.database, {role: url or postgres_url})
-
-
-@pytest.mark.parametrize("right", ["CREATEROLE", "CREATEDB", "BYPASSRLS", "REPLICATION"])
-def test_logins_that_may_more_than_a_process_are_refused(context, postgres_url, right) -> None:
-    name = f"{make_url(context.settings.database_url).database}_{right.lower()}"
-    execute(postgres_url, f"CREATE ROLE {name} LOGIN PASSWORD 'x' {right}")
-    url = make_url(postgres_url).set(username=name, password="x")
-    try:
-        with pytest.raises(RoleError, match="may do more than a process should"):
-            make_roles(context.store.database, {"api": url.render_as_string(hide_password=False)})
-    finally:
-        execute(postgres_url, f"DROP ROLE {name}")
-
-
-def test_two_roles_need_two_logins(context, logins) -> None:
+        ("api", postgres_url, "superuser"),
+    ]:
+        with pytest.raises(RoleError, match=message):
+            make_roles(superuser, {role: url})
     with pytest.raises(RoleError, match="login of its own"):
-        make_roles(context.store.database, {"api": logins["api"], OWNER: logins["api"]})
+        make_roles(superuser, {"api": logins["api"], OWNER: logins["api"]})
+    name = f"{make_url(context.settings.database_url).database}_more"
+    url = make_url(postgres_url).set(username=name, password="x")
+    for right in ("CREATEROLE", "CREATEDB", "BYPASSRLS", "REPLICATION"):
+        execute(postgres_url, f"CREATE ROLE {name} LOGIN PASSWORD 'x' {right}")
+        try:
+            with pytest.raises(RoleError, match="may do more than a process should"):
+                make_roles(superuser, {"api": url.render_as_string(hide_password=False)})
+        finally:
+            execute(postgres_url, f"DROP ROLE {name}")
 
 
 def test_the_api_s_login_sees_the_server_s_figures_and_which_it_does_not(contexts) -> None:

@@ -88,16 +88,9 @@ def _borne(name: str, change: Callable[[Any], Any]) -> Lie:
     return lie
 
 
-def _loads(change: Callable[[Any], object]) -> Lie:
-    return lambda t: replace(t, joint_loads=_changed(t.joint_loads, change))
-
-
-def _peaks(factor: float) -> Lie:
-    def lie(t: Trajectory) -> Trajectory:
-        peaks = [replace(p, force=p.force * factor, ratio=p.ratio * factor) for p in t.joint_peaks]
-        return replace(t, joint_peaks=tuple(peaks))
-
-    return lie
+def _small_peaks(t: Trajectory) -> Trajectory:
+    peaks = [replace(peak, force=peak.force / 2, ratio=peak.ratio / 2) for peak in t.joint_peaks]
+    return replace(t, joint_peaks=tuple(peaks))
 
 
 def _broken(time_s: float) -> Lie:
@@ -112,35 +105,12 @@ def _broken(time_s: float) -> Lie:
     return lie
 
 
-def _pieces(since: int, value: int) -> Lie:
-    """Blocks that belong to other pieces."""
-    return lambda t: replace(
-        t, pieces=_changed(t.pieces, lambda a: a.__setitem__((slice(since, None), -1), value))
-    )
-
-
-def _event(what: str, held: str) -> Lie:
-    return lambda t: replace(
-        t, events=(Event(time_s=0.1, what=what, joint=t.joint_peaks[0].joint, held=held),)
-    )
-
-
-def _turned(quaternion: tuple[float, float, float, float], of: str) -> Lie:
+def _turned(of: str) -> Lie:
+    upside_down = (0.0, 1.0, 0.0, 0.0)
     return lambda t: replace(
         t,
-        **{of: _changed(getattr(t, of), lambda a: a.__setitem__(slice(1, None), quaternion))},
+        **{of: _changed(getattr(t, of), lambda a: a.__setitem__(slice(1, None), upside_down))},
     )
-
-
-def _swapped(t: Trajectory) -> Trajectory:
-    """Blocks in each other's places, from the second instant on."""
-    return replace(
-        t, positions=_changed(t.positions, lambda a: a.__setitem__(slice(1, None), a[1:, ::-1]))
-    )
-
-
-def _rounded(digits: int) -> Lie:
-    return lambda t: replace(t, positions=np.round(t.positions, digits).astype(np.float32))
 
 
 def _last_bit(t: Trajectory) -> Trajectory:
@@ -153,51 +123,31 @@ def _last_bit(t: Trajectory) -> Trajectory:
     )
 
 
-def _setting(name: str, value: Any) -> Lie:
-    return lambda t: replace(t, settings={**t.settings, name: value})
-
-
 LIES: dict[str, Lie] = {
-    **{f"poses held from instant {since}": _held(since) for since in (0, 1, 2, 5, 10)},
+    **{f"poses held from instant {since}": _held(since) for since in (0, 5)},
     "time at half its pace": _at(lambda n: np.arange(n) // 2),
-    "time at a tenth": _at(lambda n: np.arange(n) // 10),
-    "time at twice its pace": _at(lambda n: np.arange(n) * 2),
-    "time that stops half way": _at(lambda n: np.minimum(np.arange(n), n // 2)),
     "time backwards": _at(lambda n: np.where(np.arange(n) == 0, 0, n - np.arange(n))),
     "an instant left out": _at(lambda n: np.arange(n) + (np.arange(n) > n // 2)),
-    **{
-        f"blocks {by:+g} along {'xyz'[axis]}": _moved(axis, by, of="positions")
-        for axis in range(3)
-        for by in (-1.0, 0.01, 50.0)
-    },
-    **{
-        f"cargo {by:+g} along {'xyz'[axis]}": _moved(axis, by, of="cargo_position")
-        for axis in range(3)
-        for by in (-1.0, 0.01, 50.0)
-    },
+    "blocks +0.01 along x": _moved(0, 0.01, of="positions"),
+    "blocks +50 along z": _moved(2, 50.0, of="positions"),
+    "cargo +0.01 along x": _moved(0, 0.01, of="cargo_position"),
+    "cargo -1 along z": _moved(2, -1.0, of="cargo_position"),
     "a late jump": _moved(1, 10.0, of="positions", since=15),
-    "blocks swapped": _swapped,
-    "blocks turned": _turned((0.0, 1.0, 0.0, 0.0), "quaternions"),
-    "a cargo turned": _turned((0.0, 1.0, 0.0, 0.0), "cargo_quaternion"),
-    "a cargo's weight that the ground bears": _borne("ground", lambda a: a + 50),
+    "blocks turned": _turned("quaternions"),
+    "a cargo turned": _turned("cargo_quaternion"),
     "no ground": _borne("ground", lambda a: a * 0),
-    "a lighter load": _borne("cargo", lambda a: a / 2),
     "a heavier load": _borne("cargo", lambda a: a * 2 + 10),
-    "weight split evenly": _borne("cargo", lambda a: a * 0 + a.mean()),
-    "joints without loads": _loads(lambda a: a.fill(0)),
-    "joints near breaking": _loads(lambda a: a.fill(0.99)),
-    "small peaks": _peaks(0.5),
-    "large peaks": _peaks(1.5),
-    **{f"a break at {time_s} s": _broken(time_s) for time_s in (0.0, 0.3, 0.76)},
-    "a block on its own from the start": _pieces(0, 1),
-    "a block on its own at the end": _pieces(-1, 1),
-    "a cargo that was grabbed": _event("grabbed", "cargo"),
-    "a decoupler": _event("decoupled", ""),
-    "poses rounded to 3 digits": _rounded(3),
-    "poses rounded to 5 digits": _rounded(5),
+    "joints without loads": lambda t: replace(t, joint_loads=t.joint_loads * np.float32(0)),
+    "small peaks": _small_peaks,
+    "a break at 0.3 s": _broken(0.3),
+    "a block on its own at the end": lambda t: replace(
+        t, pieces=_changed(t.pieces, lambda a: a.__setitem__((-1, -1), 1))
+    ),
+    "a cargo that was grabbed": lambda t: replace(
+        t, events=(Event(time_s=0.1, what="grabbed", joint=t.joint_peaks[0].joint, held="cargo"),)
+    ),
     "the last bit of one pose": _last_bit,
-    "another step": _setting("substeps", 1),
-    "a setting that nothing has": _setting("friction", 9.0),
+    "another step": lambda t: replace(t, settings={**t.settings, "substeps": 1}),
     "a version of the engine that it has not": lambda t: replace(t, engine_version="0.0.1"),
 }
-"""At least fifty ways to lie in a trajectory, by name; of a trial with cargo and joints."""
+"""Ways to lie in a trajectory, by name; of a trial with cargo and joints."""

@@ -5,11 +5,9 @@ from hashlib import sha256
 import pytest
 from alembic import command
 from sqlalchemy.dialects.postgresql import dialect
-from sqlalchemy.exc import OperationalError
 from sqlalchemy.schema import CreateIndex, CreateTable
 
 from buildarena_store import Database, SchemaVersionError
-from buildarena_store import database as database_module
 from buildarena_store.database import SCHEMA
 from buildarena_store.migrating import TRIGGERS, alembic_config, known_schemas
 from buildarena_store.tables import metadata
@@ -71,23 +69,3 @@ def test_a_release_candidates_schema_is_refused_and_left_as_it_is(database) -> N
 def test_a_later_schema_that_only_adds_serves_the_programs_before(database) -> None:
     with of_schema(database, "2099_01_01_flight"):
         database.require_schema()
-
-
-@pytest.mark.parametrize("idle_s", [0.0, 1000.0])
-def test_a_connection_that_the_server_dropped_is_noticed(context, monkeypatch, idle_s) -> None:
-    monkeypatch.setattr(database_module, "IDLE_S", idle_s)
-    other = Database(context.store.database.url)
-
-    def backend() -> int:
-        with context.store.database.statement() as connection:
-            return int(connection.exec_driver_sql("SELECT pg_backend_pid()").scalar_one())
-
-    before = backend()
-    with other.transaction() as connection:
-        connection.exec_driver_sql(f"SELECT pg_terminate_backend({before}, 5000)")
-    other.close()
-    if idle_s:
-        # A busy connection's break reaches its user, once.
-        with pytest.raises(OperationalError):
-            backend()
-    assert backend() != before
