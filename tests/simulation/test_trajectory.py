@@ -181,7 +181,8 @@ def _hash_in_new_process(engine: str, name: str, task: str, hash_seed: str) -> s
 
 @pytest.mark.ci
 @pytest.mark.parametrize(
-    ("name", "task"), [nightly("carrier", "transport-2"), nightly("beam", "support-1"), ("car", "program")]
+    ("name", "task"),
+    [nightly("carrier", "transport-2"), nightly("beam", "support-1"), ("car", "program")],
 )
 def test_two_processes_give_the_same_bytes(engine, name, task) -> None:
     first, second = (_hash_in_new_process(engine, name, task, seed) for seed in ("1", "2"))
