@@ -292,6 +292,13 @@ def test_a_line_is_followed_in_its_way_and_once() -> None:
     assert (backwards.success, backwards.indicator) == (False, 0.0)
     to_and_fro = score(task, machine, played(trial, np.abs((samples + 75) % 150 - 75)))
     assert 0 < to_and_fro.metrics["stretches"] < 4
+    first = np.r_[0:60, 150:240]  # what comes back after a shortcut counts no more
+    both = np.r_[first, 60:150]
+    ahead, back = (
+        score(task, machine, played(trial, np.r_[way, np.full(len(samples) - len(way), way[-1])]))
+        for way in (first, both)
+    )
+    assert 2 < ahead.metrics["stretches"] == back.metrics["stretches"]
     stops = score(task, machine, played(trial, np.minimum(samples, 100)))
     assert 0 < stops.metrics["stretches"] < 6
     assert stops.metrics["all_followed_s"] is None

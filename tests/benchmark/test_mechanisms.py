@@ -12,6 +12,7 @@ from tests.benchmark.conftest import (
     make_trajectory,
     rolled,
     shifted,
+    strict,
     wheels_of,
     with_bearing,
     with_pieces,
@@ -333,13 +334,17 @@ def test_the_keys_that_were_played_decide(tasks, train) -> None:
 # Pick and place
 
 
+def _held(t: np.ndarray) -> np.ndarray:
+    return np.where((t > 2) & (t < 12), 2.0, 0.0)
+
+
 def carry(
     machine: Machine,
     *,
     top: float = 4.0,
     end: tuple[float, float] = (4.0, 3.0),
     around: float = 0.0,
-    borne: Path = lambda t: np.where((t > 2) & (t < 12), 2.0, 0.0),
+    borne: Path = _held,
     base: Path | None = None,
     shiver: float = 0.0,
 ) -> Trajectory:
@@ -369,6 +374,12 @@ def test_what_is_carried(tasks, car, subtests) -> None:
         ("too far from the mark", {"end": (4.0, 4.1)}, (), 1 / 1.1),
         ("kicked", {"borne": np.zeros_like}, ("not_carried",), 0.0),
         ("thrown", {"borne": throws}, ("not_carried",), 0.0),
+        (
+            "let go on the way",
+            {"borne": lambda t: _held(t) * (abs(t - 8.3) > 0.7)},
+            ("not_carried",),
+            0,
+        ),
         ("through the wall's end", {"top": 1.5}, ("not_carried",), 0.0),
         ("pushed round it", {"top": 0.0, "around": 9.0}, ("not_carried",), 0.0),
         ("never put down", {"borne": lambda t: np.where(t > 2, 2.0, 0.0)}, (), 10.0),
@@ -382,6 +393,9 @@ def test_what_is_carried(tasks, car, subtests) -> None:
             assert (result.success, result.flags) == (flags is None, flags or ())
             if indicator is not None:
                 assert result.indicator == pytest.approx(indicator, rel=1e-3)
+    rests = strict(tasks["mechanisms-4"], must_rest=True)
+    held = carry(car, borne=lambda t: np.where(t > 2, 2.0, 0.0))
+    assert score(rests, car, held).indicator == 0, "never put down"
     apart = with_pieces(carry(car), list(car.blocks)[-2:], since_s=8.0)
     result = score(tasks["mechanisms-4"], car, apart)
     assert (result.success, result.indicator, result.flags) == (False, 0.0, ("came_apart",))

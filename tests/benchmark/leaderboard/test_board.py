@@ -149,6 +149,14 @@ def test_models_alike_share_a_rank_and_better_ones_do_not() -> None:
     assert [(row.rank_low, row.rank_high) for row in rows] == [(1, 1), (2, 3), (2, 3)]
 
 
+def test_claims_of_all_tasks_of_a_board_are_one_family() -> None:
+    found = trials("lift-1", "a", 39, 64) + trials("lift-1", "b", 25, 64)
+    alike = [trials(f"own-{n}", model, 30, 64) for n in range(3) for model in "ab"]
+    for groups, ranks in (([], [1, 2]), (alike, [1, 1])):
+        (lift,) = (t for t in board_of(found, *groups).board(ALL).tasks if t.task == "lift-1")
+        assert [row.rank for row in lift.rows] == ranks
+
+
 def test_a_model_with_a_missing_task_is_shown_but_not_ranked() -> None:
     both = trials("lift-1", "a", 3, 9) + trials("support-1", "a", 3, 9)
     ranked, unranked = board_of(both, trials("lift-1", "b", 9, 9)).board(ALL).overall
