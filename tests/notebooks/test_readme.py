@@ -42,7 +42,7 @@ def test_it_can_fail(tmp_path, monkeypatch, capsys, subtests):
 
 
 def test_its_commands_exist():
-    # `tests/e2e/test_distributions.py` installs the wheels, and has them run the demo.
+    # `tests/e2e/test_release.py` installs the wheels, and has them run the demo.
     named = re.findall(r"^buildarena (\w+)", README.read_text(encoding="utf-8"), re.MULTILINE)
     assert named == ["demo", "up"]
     for name in named:

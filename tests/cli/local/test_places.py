@@ -169,7 +169,7 @@ def _refusal(case: Case) -> str:
 @pytest.mark.ci
 def test_the_suite_itself_runs_in_a_private_clone() -> None:
     case = Case(noexec=("/tmp",), folder="Übungen für später", unset=("HOME",))
-    few = f"{case.clone}/tests/store/test_schema.py"
+    few = f"{case.clone}/tests/store/test_keys.py"
     options = [f"--rootdir={case.clone}", f"-c{case.clone}/pyproject.toml", "-pno:cacheprovider"]
     printed = run_elsewhere(case, ["-m", "pytest", *options, few])
     assert "passed" in printed
