@@ -5,7 +5,6 @@ from __future__ import annotations
 import httpx
 import pytest
 from opentelemetry.sdk.trace import ReadableSpan
-from opentelemetry.sdk.trace.sampling import ALWAYS_OFF
 from opentelemetry.semconv._incubating.attributes import gen_ai_attributes as gen_ai
 from opentelemetry.semconv.attributes import error_attributes, http_attributes
 from opentelemetry.trace import SpanKind, StatusCode
@@ -56,21 +55,26 @@ def assert_children(of: ReadableSpan, children: list[ReadableSpan]) -> None:
         assert child.context.trace_id == of.context.trace_id
 
 
-@pytest.mark.ci
-def test_a_job_is_one_trace_from_its_submission_on(context) -> None:
+def test_what_is_submitted_is_one_trace_and_goes_on_a_callers(context) -> None:
+    sweep = {"tasks": ["support-1", "lift-1"], "models": ["builtin/idle"], "seeds": [0]}
     with recorded() as spans:
         job = submitted(context)
+        lease = claim(context)
+        expire_leases(context)
+        context.store.leases.recover()  # a job that loses its worker stays in its trace
+        submitted(context, "/v1/sweeps", headers=sampled(), **sweep)
         work(context)
-    root = request_of(spans, "/v1/jobs")
+    root, other = request_of(spans, "/v1/jobs"), request_of(spans, "/v1/sweeps")
     assert root.parent is None
     assert root.kind == SpanKind.SERVER
     assert root.attributes[http_attributes.HTTP_RESPONSE_STATUS_CODE] == 202
-    stages = spans.named(*STAGES)
+    stages = [one for one in spans.named(*STAGES) if one.attributes["buildarena.job"] == job["id"]]
     assert [one.name for one in stages] == list(STAGES)
+    assert stages[0].attributes["buildarena.token"] == lease.token + 1
     assert_children(root, stages)
-    assert {one.attributes["buildarena.job"] for one in stages} == {job["id"]}
-    assert {trace_of(one) for one in spans.all()} == {trace_of(root)}
-    assert context.store.jobs.get(job["id"]).outcome == "success"
+    assert (trace_of(other), f"{other.parent.span_id:016x}") == (TRACE, CALLER)
+    assert_children(other, [one for one in spans.named(*STAGES) if one not in stages])
+    assert {trace_of(one) for one in spans.all()} == {trace_of(root), TRACE}
 
 
 def test_model_requests_follow_the_genai_conventions(context) -> None:
@@ -99,16 +103,6 @@ def test_model_requests_follow_the_genai_conventions(context) -> None:
             assert entry.reply["text"][:20] not in said
 
 
-def test_a_caller_s_trace_goes_on(context) -> None:
-    with recorded() as spans:
-        submitted(context, headers=sampled())
-        work(context)
-    root = request_of(spans, "/v1/jobs")
-    assert f"{root.parent.span_id:016x}" == CALLER
-    assert {trace_of(one) for one in spans.all()} == {TRACE}
-    assert_children(root, spans.named(*STAGES))
-
-
 def test_a_caller_that_is_not_sampled_is_followed(context) -> None:
     with recorded() as spans:
         job = submitted(context, headers=sampled("00"))
@@ -118,24 +112,6 @@ def test_a_caller_that_is_not_sampled_is_followed(context) -> None:
     kept = context.store.jobs.get(job["id"]).traceparent
     assert kept.startswith(f"00-{TRACE}-")
     assert kept.endswith("-00")
-
-
-def test_what_the_api_does_not_sample_no_worker_records(context) -> None:
-    with recorded(ALWAYS_OFF):
-        submitted(context)
-    with recorded() as spans:
-        work(context)
-    assert spans.all() == []
-
-
-def test_jobs_of_a_sweep_are_children_of_its_submission(context) -> None:
-    sweep = {"tasks": ["support-1", "lift-1"], "models": ["builtin/idle"], "seeds": [0, 1]}
-    with recorded() as spans:
-        submitted(context, "/v1/sweeps", **sweep)
-        work(context)
-    root, stages = request_of(spans, "/v1/sweeps"), spans.named(*STAGES)
-    assert len({one.attributes["buildarena.job"] for one in stages}) == 4
-    assert_children(root, stages)
 
 
 def test_a_retried_job_stays_in_its_trace(context, monkeypatch) -> None:
@@ -153,23 +129,6 @@ def test_a_retried_job_stays_in_its_trace(context, monkeypatch) -> None:
         assert one.status.status_code == StatusCode.ERROR
         assert one.attributes[error_attributes.ERROR_TYPE] == "missing_key"
     assert trace_of(request_of(spans, "/v1/jobs/{job_id}/retry")) != trace_of(stages[0])
-
-
-@pytest.mark.parametrize("end", ["handed back", "lost"])
-def test_a_job_that_changes_its_worker_stays_in_its_trace(context, end) -> None:
-    with recorded() as spans:
-        submitted(context)
-        lease = claim(context)
-        if end == "lost":
-            expire_leases(context)
-            context.store.leases.recover()
-        else:
-            context.store.leases.hand_back(lease)
-        work(context)
-    stages = spans.named(*STAGES)
-    assert [one.name for one in stages] == list(STAGES)
-    assert stages[0].attributes["buildarena.token"] == 2
-    assert_children(request_of(spans, "/v1/jobs"), stages)
 
 
 def test_a_job_that_is_wanted_again_moves_to_the_trace_of_who_wants_it(context) -> None:
@@ -208,14 +167,13 @@ def test_a_request_that_fails_says_how(context, tmp_path) -> None:
     assert "stand-in says no" not in " ".join(one.to_json() for one in spans.all())
 
 
-@pytest.mark.parametrize("path", ["/v1/health", "/v1/metrics"])
-def test_what_machines_poll_is_not_traced(context, path) -> None:
+def test_what_machines_poll_is_not_traced(context) -> None:
     with recorded() as spans, api_client(context) as api:
-        api.get(path, headers=sampled())
+        for path in ("/v1/health", "/v1/metrics"):
+            api.get(path, headers=sampled())
         api.get("/v1/models", headers={"traceparent": "nonsense"})
     (one,) = spans.all()
-    assert one.name == "GET /v1/models"
-    assert one.parent is None
+    assert (one.name, one.parent) == ("GET /v1/models", None)
 
 
 @pytest.mark.ci

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shlex
 import subprocess
 import time
 from contextlib import closing
@@ -21,7 +20,6 @@ ROOT = Path(__file__).parents[2]
 pytestmark = pytest.mark.ci
 ADAPTER = ROOT / "integrations/inspect"
 PYTHON = ROOT / ".venv-integrations/inspect/bin/python"
-README_LINE = re.compile(r"^python -m buildarena_inspect import .*$", re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +84,7 @@ def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, c
         assert jobs_of(client) == jobs
 
 
+@pytest.mark.nightly
 def test_an_import_that_was_broken_off_goes_on_where_it_stopped(logs, context) -> None:
     with live_api(context) as url, httpx.Client(base_url=url) as client:
         command = [PYTHON, "-m", "buildarena_inspect", "import", logs / "honest.eval"]
@@ -103,15 +102,6 @@ def test_an_import_that_was_broken_off_goes_on_where_it_stopped(logs, context) -
         assert len(turns) == whole["actions"] == 61
 
 
-def test_what_the_service_refuses_is_told(logs, context) -> None:
-    with live_api(context) as url:
-        code, told = bring(url, logs / "honest.eval", "--agent", "no name", "--wait", 0)
-        assert code == 2
-        assert "1 to 80 letters" in told[-1]
-    code, told = bring(url, logs / "honest.eval")
-    assert (code, told[1][:24]) == (2, "no BuildArena answers at")
-
-
 def test_jobs_belong_to_the_key_and_its_name_is_nobody_elses(logs, context) -> None:
     own = open_context(context.settings.model_copy(update=WITH_KEYS))
     with closing(own), live_api(own) as url, httpx.Client(base_url=url) as client:
@@ -124,23 +114,3 @@ def test_jobs_belong_to_the_key_and_its_name_is_nobody_elses(logs, context) -> N
         code, told = bring(url, logs / "honest.eval", "--limit", 1, key=theirs.secret)
         assert code == 2
         assert "inspect-mockllm-model" in told[-1]
-
-
-def test_the_readmes_own_line_does_it(logs, context, tmp_path) -> None:
-    (line,) = README_LINE.findall((ADAPTER / "README.md").read_text(encoding="utf-8"))
-    (tmp_path / "logs").mkdir()
-    (tmp_path / "logs/run.eval").write_bytes((logs / "honest.eval").read_bytes())
-    words = shlex.split(line)
-    assert words[:2] == ["python", "-m"]
-    with live_api(context) as url:
-        work(context)
-        done = subprocess.run(
-            [PYTHON, *words[1:], "--wait", "0"],
-            env={**os.environ, "BUILDARENA_URL": url},
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=200,
-        )
-    assert "by agent/inspect-mockllm-model" in done.stdout, done.stderr

@@ -1,119 +1,115 @@
+"""Handlers of jobs: leases that live as long, what they hear, faults, and whose turn it is."""
+
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
+from support.servers.stacks import wait_until
 
 from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_pipeline.errors import PermanentError, TransientError
 from buildarena_pipeline.runtime import job_runner
 from buildarena_pipeline.runtime.active_lease import ActiveLease, LeaseKeeper
 from buildarena_pipeline.runtime.job_runner import SLICE_S, JobRunner
+from buildarena_pipeline.runtime.owner_slots import OwnerSlots
 from buildarena_store import BudgetLimits, JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)
+SPEC = JobSpec(task="support-1", model="builtin/idle")
+SWEEP = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
 
 
 @pytest.fixture
-def run(context, submissions):
+def keeper(context) -> Iterator[LeaseKeeper]:
+    found = LeaseKeeper(context.store.leases, lambda: None)
+    found.start()
+    yield found
+    found.stop()
+
+
+@pytest.fixture
+def runner(context, keeper) -> Callable[[Callable[..., None]], JobRunner]:
+    return lambda handler: JobRunner(context.store.leases, handler, keeper, "worker")
+
+
+@pytest.fixture
+def run(context, submissions, runner):
     """Submits a job and lets a handler work on it; returns the job afterwards."""
 
     def work(handler: Callable[..., None]):
-        job, _ = submissions.submit_job(JobSpec(task="support-1", model="builtin/idle"))
-        keeper = LeaseKeeper(context.store.leases, lambda: None)
-        keeper.start()
-        JobRunner(context.store.leases, handler, keeper, "worker").process_next("construct", job.id)
-        keeper.stop()
+        job, _ = submissions.submit_job(SPEC)
+        runner(handler).process_next("construct", job.id)
         return context.store.jobs.get(job.id)
 
     return work
 
 
-def finisher(context) -> Callable[..., None]:
-    def finish(active: ActiveLease) -> None:
+@pytest.fixture
+def finish(context) -> Callable[[ActiveLease], None]:
+    def end(active: ActiveLease) -> None:
         with context.store.database.transaction() as connection:
             context.store.results.finish(active.lease, SCORE, connection=connection)
 
-    return finish
-
-
-def test_a_handler_ends_the_job(context, run) -> None:
-    assert run(finisher(context)).outcome == "unsuccessful"
+    return end
 
 
 @pytest.mark.ci
-def test_a_lease_lives_as_long_as_its_handler(context, run) -> None:
+def test_a_lease_lives_as_long_as_its_handler(context, run, finish) -> None:
     def slow(active: ActiveLease) -> None:
         time.sleep(context.settings.lease_s * 1.5)
         context.store.leases.recover()
         assert not active.lost
-        finisher(context)(active)
+        finish(active)
 
     assert run(slow).outcome == "unsuccessful"
 
 
 def test_a_handler_hears_that_its_job_was_cancelled(context, run) -> None:
-    heard: list[bool] = []
-
     def cancelled(active: ActiveLease) -> None:
         with context.store.database.transaction() as connection:
             context.store.jobs.cancel([active.lease.job.id], connection=connection)
-        deadline = time.monotonic() + 5
-        while not active.lost and time.monotonic() < deadline:
-            time.sleep(0.05)
-        heard.append(active.lost)
+        wait_until(lambda: active.lost, 5, "it is heard")
 
     assert run(cancelled).outcome == "cancelled"
-    assert heard == [True]
 
 
-def test_a_handler_hears_of_a_budget_that_was_given_meanwhile(context, submissions) -> None:
-    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], seeds=[0])
-    sweep_id = submissions.submit_sweep(spec).sweep.id
-    heard: list[bool] = []
+def test_a_handler_hears_of_a_budget_that_was_given_meanwhile(
+    context, submissions, runner, finish
+) -> None:
+    sweep_id = submissions.submit_sweep(SWEEP.model_copy(update={"samples": 1})).sweep.id
 
     def paid_for_later(active: ActiveLease) -> None:
-        heard.append(active.budgeted)
+        assert not active.budgeted
         with context.store.database.transaction() as connection:
             context.store.budgets.set(sweep_id, BudgetLimits(max_requests=5), connection=connection)
-        deadline = time.monotonic() + 20
-        while not active.budgeted and time.monotonic() < deadline:
-            time.sleep(0.05)
-        heard.append(active.budgeted)
-        finisher(context)(active)
+        wait_until(lambda: active.budgeted, 20, "it is heard")
+        finish(active)
 
-    keeper = LeaseKeeper(context.store.leases, lambda: None)
-    keeper.start()
-    JobRunner(context.store.leases, paid_for_later, keeper, "worker").process_next(
-        "construct", "any"
-    )
-    keeper.stop()
-    assert heard == [False, True]
+    runner(paid_for_later).process_next("construct", "any")
+    assert context.store.sweeps.progress(sweep_id).outcomes == {"unsuccessful": 1}
 
 
 @pytest.mark.parametrize(
-    ("error", "state", "outcome", "reason"),
+    ("error", "ending"),
     [
-        (TransientError("outage", reason="provider_outage", delay_s=9), "queued", None, None),
-        (PermanentError("no key", reason="missing_key"), "done", "errored", "missing_key"),
-        (ZeroDivisionError("a bug"), "queued", None, None),
+        (TransientError("outage", reason="x", delay_s=9), ("queued", None, None)),
+        (PermanentError("no key", reason="missing_key"), ("done", "errored", "missing_key")),
+        (ZeroDivisionError("a bug"), ("queued", None, None)),
     ],
 )
-def test_faults_are_never_scored(run, error, state, outcome, reason) -> None:
+def test_faults_are_never_scored(run, error, ending) -> None:
     def fail(*_: object) -> None:
         raise error
 
     job = run(fail)
-    assert (job.state, job.outcome, job.reason) == (state, outcome, reason)
-    assert job.success is None
-    assert job.faults == 1
+    assert (job.state, job.outcome, job.reason) == ending
+    assert (job.success, job.faults) == (None, 1)
 
 
-def test_what_is_held_at_shutdown_is_handed_back(context, submissions) -> None:
-    job, _ = submissions.submit_job(JobSpec(task="support-1", model="builtin/idle"))
-    keeper = LeaseKeeper(context.store.leases, lambda: None)
-    keeper.start()
+def test_what_is_held_at_shutdown_is_handed_back(context, submissions, keeper) -> None:
+    job, _ = submissions.submit_job(SPEC)
     lease = context.store.leases.claim("construct", owner="w")
     with keeper.keeping(lease) as active:
         keeper.stop()
@@ -122,26 +118,43 @@ def test_what_is_held_at_shutdown_is_handed_back(context, submissions) -> None:
     assert [a.result for a in context.store.jobs.attempts(job.id)] == ["handed_back"]
 
 
-def runner_of(context, handler: Callable[..., None]) -> JobRunner:
-    keeper = LeaseKeeper(context.store.leases, lambda: None)
-    return JobRunner(context.store.leases, handler, keeper, "worker")
-
-
-def test_one_message_has_several_short_jobs_done(context, submissions, monkeypatch) -> None:
-    monkeypatch.setattr(job_runner, "SLICE_S", 60.0)  # jobs are short, however busy the machine
-    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
-    sweep = submissions.submit_sweep(spec).sweep
-    runner_of(context, finisher(context)).process_some("construct", "")
-    assert context.store.sweeps.progress(sweep.id).done == 3
-
-
-def test_a_message_has_no_further_job_done_after_a_long_one(context, submissions) -> None:
-    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
-    sweep = submissions.submit_sweep(spec).sweep
-
+def test_one_message_has_several_short_jobs_done_and_none_after_a_long_one(
+    context, submissions, runner, finish, monkeypatch
+) -> None:
     def slow(active: ActiveLease) -> None:
         time.sleep(SLICE_S)
-        finisher(context)(active)
+        finish(active)
 
-    runner_of(context, slow).process_some("construct", "")
-    assert context.store.sweeps.progress(sweep.id).done == 1
+    sweep = submissions.submit_sweep(SWEEP).sweep.id
+    runner(slow).process_some("construct", "")
+    assert context.store.sweeps.progress(sweep).done == 1
+    monkeypatch.setattr(job_runner, "SLICE_S", 60.0)  # jobs are short, however busy the machine
+    runner(finish).process_some("construct", "")
+    assert context.store.sweeps.progress(sweep).done == 3
+
+
+def greedy(slots: OwnerSlots, owner: str) -> int:
+    """How many further slots an owner gets that takes all it can."""
+    taken = 0
+    while slots.free and owner not in slots.full():
+        slots.take(owner)
+        taken += 1
+    return taken
+
+
+def test_one_owner_alone_gets_what_is_configured_and_others_find_room() -> None:
+    for configured in (1, 2, 3, 5, 8, 32, 40, 200):
+        slots = OwnerSlots(configured)
+        assert greedy(slots, "a") == configured
+        assert greedy(slots, "b") >= 1, configured
+    slots = OwnerSlots(40)
+    assert [greedy(slots, owner) for owner in "abcd"] == [40, 8, 1, 1]
+    assert slots.free == 0
+    for _ in range(20):
+        slots.give_back("a")
+    assert greedy(slots, "d") > 10
+    slots = OwnerSlots(1)
+    slots.take("a")
+    assert slots.full() == ["a"]
+    slots.give_back("a")
+    assert slots.full() == []

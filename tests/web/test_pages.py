@@ -1,11 +1,23 @@
-"""The dashboard in a real browser, against the whole service."""
+"""The dashboard and a published site in a real browser, against a whole service."""
+
+import json
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 import httpx
+import psutil
 import pytest
 from pydantic import SecretStr
-from support.documents.pages import LOOKS, in_browser, needs_pages
+from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
+from support.providers.stand_in import ProviderStandIn
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from support.servers.stacks import finished, running_stack
+from tests.web.random_machines import built_session
 
 SWEEP = {
     "name": "pages",
@@ -15,19 +27,23 @@ SWEEP = {
     "simulator": "mujoco",
 }
 ADMIN = "operator-secret-that-is-long-enough"
+PLACE = "some/where"
 
 pytestmark = needs_pages
 
 
+def submit(client: httpx.Client, **changes: object) -> str:
+    made = client.post("/v1/sweeps", json={**SWEEP, **changes}).raise_for_status()
+    return str(made.json()["id"])
+
+
 @pytest.mark.ci
-@pytest.mark.parametrize("files", ["e2e/pages", "e2e/boards"])
 @pytest.mark.parametrize("looks", LOOKS)
-def test_pages_work_in_a_browser(tmp_path, files, looks) -> None:
-    with running_stack(tmp_path) as stack:
-        with httpx.Client(base_url=stack.url) as client:
-            sweep_id = client.post("/v1/sweeps", json=SWEEP).raise_for_status().json()["id"]
-            finished(client, sweep_id)
-        in_browser(stack.url, [files], **looks)
+def test_pages_work_in_a_browser(tmp_path, looks) -> None:
+    with running_stack(tmp_path) as stack, httpx.Client(base_url=stack.url) as client:
+        finished(client, submit(client))
+        for files in ("e2e/pages", "e2e/boards"):
+            in_browser(stack.url, [files], **looks)
 
 
 @pytest.mark.nightly
@@ -53,5 +69,96 @@ def test_pages_work_below_a_path(tmp_path) -> None:
         httpx.Client(base_url=stack.url) as client,
         reverse_proxy(stack.url, ProxyRules(prefix="/tools/arena")) as outer,
     ):
-        client.post("/v1/sweeps", json=SWEEP).raise_for_status()
+        submit(client)
         in_browser(outer, ["e2e/below"], BUILDARENA_WEB_ROOT_URL=stack.url)
+
+
+@pytest.mark.nightly
+def test_the_room_of_a_job_shows_what_is(tmp_path) -> None:
+    """Of machines built by random calls."""
+    with running_stack(tmp_path) as stack:
+        with httpx.Client(base_url=stack.url, timeout=30) as client:
+            sweep = submit(client, models=["builtin/expert"], seeds=[0, 1])
+            groups = [range(first, first + 10) for first in range(0, 50, 10)]
+            sessions = [built_session(client, f"random-{g[0]}", g) for g in groups]
+            finished(client, sweep)
+        assert any(step["ghosts"] for session in sessions for step in session["steps"])
+        file = tmp_path / "machines.json"
+        file.write_text(json.dumps(sessions))
+        in_browser(stack.url, ["e2e/room"], BUILDARENA_WEB_MACHINES=str(file))
+
+
+def processes(*names: str) -> str:
+    """Ids of the service's processes with one of these words among theirs."""
+    found = []
+    for process in psutil.Process().children(recursive=True):
+        words = process.cmdline()
+        if any(any(name in word for word in words) for name in names):
+            found.append(str(process.pid))
+    assert found
+    return ",".join(found)
+
+
+@pytest.mark.nightly
+def test_a_session_is_watched_while_processes_die(tmp_path) -> None:
+    with ProviderStandIn("expert", latency_s=0.3) as standin:
+        models = tmp_path / "models.yaml"
+        models.write_text(
+            f"providers:\n  standin: {{protocol: openai, base_url: '{standin.url}/v1'}}\n"
+            "models:\n  - {name: standin/expert, provider: standin, model: expert}\n"
+        )
+        with running_stack(tmp_path, models_file=models) as stack:
+            payload = {"task": "support-1", "model": "standin/expert", "simulator": "mujoco"}
+            job = httpx.post(f"{stack.url}/v1/jobs", json=payload).raise_for_status().json()["id"]
+            in_browser(
+                stack.url,
+                ["e2e/live"],
+                BUILDARENA_WEB_PLAYED=job,
+                BUILDARENA_WEB_WORKERS=processes("buildarena_worker"),
+                BUILDARENA_WEB_APIS=processes("buildarena_api"),
+            )
+
+
+@contextmanager
+def file_server(folder: Path) -> Iterator[str]:
+    """Serves a folder as any static host does; yields its address."""
+
+    class Quiet(SimpleHTTPRequestHandler):
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its name
+            pass
+
+    class Server(ThreadingHTTPServer):
+        def handle_error(self, request: object, client_address: object) -> None:
+            """Browsers hang up when a page is closed."""
+
+    server = Server(("127.0.0.1", 0), partial(Quiet, directory=str(folder)))
+    thread = threading.Thread(target=server.serve_forever, args=(0.01,))
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/"
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("looks", LOOKS)
+def test_a_site_works_from_a_file_server(tmp_path, looks) -> None:
+    """Under a sub-path, with a name that is no markup."""
+    host, name = tmp_path / "host", "</script><img src=x onerror=alert(1)>another"
+    with running_stack(tmp_path) as stack, file_server(host) as address:
+        with httpx.Client(base_url=stack.url) as client:
+            models = ["builtin/expert", "builtin/random", "builtin/idle"]
+            published = {"name": "published", "tasks": ["support-1", "lift-1"], "seeds": [0, 1]}
+            sweeps = [
+                submit(client, **{"models": models, **spec})
+                for spec in (published, {"name": name, "seeds": [1]})
+            ]
+            for sweep in sweeps:
+                finished(client, sweep)
+        for name in ("all", "best"):
+            words = ["--out", str(host / PLACE / name), "--jobs", name, "--url", stack.url]
+            subprocess.run([BUILDARENA, "site", *sweeps, *words], check=True, timeout=120)
+        sites = ",".join(f"{address}{PLACE}/{name}/" for name in ("all", "best"))
+        in_browser(stack.url, ["e2e/site"], BUILDARENA_WEB_SITES=sites, **looks)

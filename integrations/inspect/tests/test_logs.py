@@ -90,24 +90,6 @@ def test_models_of_several_logs_are_ranked_over_their_tasks(run, tmp_path, capsy
     assert second.split()[1:] == ["2.00", "0%", "6", "mockllm-lazy"]
 
 
-def test_a_log_that_is_partial_is_named_and_ends_with_one(run, tmp_path, capsys) -> None:
-    log = run("buildarena/all", sample_id=["support-1", "lift-1"])
-    whole = read_eval_log(log.location, resolve_attachments="full")
-    assert whole.samples is not None
-    half = whole.model_copy(update={"samples": whole.samples[:1]})
-    for name, changed, words in (
-        ("half.json", half, "1 of 2 samples: it is partial"),
-        (
-            "stopped.json",
-            half.model_copy(update={"status": "cancelled"}),
-            "1 of 2 samples: it is unfinished (cancelled)",
-        ),
-    ):
-        write_eval_log(changed, str(tmp_path / name))
-        assert main(["rank", str(tmp_path / name)]) == 1
-        assert capsys.readouterr().out.splitlines()[0] == f"{name}: {words}"
-
-
 def test_what_is_no_log_of_ours_is_refused_in_plain_words(run, tmp_path, capsys) -> None:
     nothing, garbage = tmp_path / "nothing.eval", tmp_path / "garbage.eval"
     garbage.write_bytes(b"PK no")

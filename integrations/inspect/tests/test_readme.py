@@ -55,31 +55,3 @@ def test_commands_and_program_in_the_order_of_the_page(folder) -> None:
         assert "errors and were not scored" not in shown
     assert "mockllm-model-five_roles" in told[3]
     assert told[4].startswith("there is no machine to simulate")
-
-
-BARE = f"""
-import sys
-sys.path.insert(0, {str(HERE)!r})
-from inspect_ai import eval
-from buildarena_inspect import TASKS
-from scripted_models import expert, scripted
-(log,) = eval(TASKS["support_1"](), model=scripted(expert), display="none", log_dir="bare")
-print(log.status)
-"""
-
-
-@pytest.mark.nightly
-def test_a_program_without_its_guard_is_told_so(folder) -> None:
-    (folder / "bare.py").write_text(BARE)
-    done = subprocess.run(
-        [sys.executable, "bare.py"],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(HERE / "offline")},
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
-    )
-    assert done.stdout.splitlines()[-1] == "error"
-    assert 'put what evaluates under `if __name__ == "__main__":`' in done.stderr
-    assert len(list((folder / "bare").iterdir())) == 1

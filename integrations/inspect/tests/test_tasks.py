@@ -12,9 +12,7 @@ import anyio
 import psutil
 import pytest
 from inspect_ai import eval_retry, score
-from inspect_ai.approval import ApprovalPolicy, auto_approver
 from inspect_ai.model import ModelOutput, get_model
-from inspect_ai.solver import solver
 from scripted_models import (
     EXPERTS,
     USAGE,
@@ -41,6 +39,7 @@ from buildarena_simulation import read_trajectory
 WOOD = {"base_block": 1, "face": "A", "new_block": "Small Wooden Block"}
 
 
+@pytest.mark.nightly
 @pytest.mark.timeout(1200)
 def test_all_tasks_end_to_end_score_as_the_library_does(run) -> None:
     log = run("buildarena/all", task_args={"simulator": "mujoco"})
@@ -142,24 +141,7 @@ def test_what_was_never_submitted_is_tried_in_the_end(run) -> None:
     assert sample.scores["success"].metadata["metrics"]["parts"] > 2
 
 
-def test_several_rounds_end_with_the_first_success(run) -> None:
-    calls = EXPERTS["support-1"]["calls"]
-
-    def answer(messages):
-        done = calls_in(messages)
-        if done == 5:
-            return call("submit", {})
-        number = done - (done > 5)
-        if number >= len(calls):
-            return call("submit", {})
-        return call(calls[number]["tool"], calls[number]["arguments"])
-
-    sample = only(run("buildarena/support_1", answer, task_args={"rounds": 3}))
-    assert sample.scores["success"].value == "C"
-    assert sample.scores["success"].metadata["trials"] == 2
-    assert "You may submit 3 times" in sample.messages[0].text
-
-
+@pytest.mark.nightly
 def test_rewards_and_seeds_are_task_arguments(run) -> None:
     weights = {"success": 1.0, "indicator": 0.5}
     args = {"rewards": json.dumps(weights), "seed": 3, "simulator": "mujoco"}
@@ -169,21 +151,7 @@ def test_rewards_and_seeds_are_task_arguments(run) -> None:
     assert sample.scores["indicator"].value != tried("support-1", "mujoco").score.indicator
 
 
-@pytest.mark.parametrize(
-    ("given", "error", "message"),
-    [
-        ({"solver": "rect"}, ChoiceError, "choose from react, roles"),
-        ({"simulator": "bullet"}, UnknownChoiceError, "choose from pybullet, mujoco"),
-        ({"rewards": "[1]"}, ChoiceError, "an object of weights"),
-        ({"rewards": {"style": 1}}, UnknownChoiceError, "choose from success"),
-        ({"rounds": 0}, ValueError, "rounds is 0"),
-    ],
-)
-def test_arguments_that_do_not_exist_are_refused_with_the_choices(given, error, message) -> None:
-    with pytest.raises(error, match=message):
-        TASKS["support_1"](**given)
-
-
+@pytest.mark.nightly
 def test_epochs_and_samples_side_by_side_share_nothing(run) -> None:
     """Half of the epochs build something else; each is judged by its own machine."""
     kinds: dict[str, bool] = {}
@@ -206,6 +174,7 @@ def test_epochs_and_samples_side_by_side_share_nothing(run) -> None:
     assert sum(sample.scores["success"].value == "C" for sample in log.samples) == 4
 
 
+@pytest.mark.nightly
 def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> None:
     usual = TrialPool.try_machine
     trying, asked = threading.Event(), threading.Event()
@@ -230,31 +199,7 @@ def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> 
     assert [sample.scores["success"].value for sample in log.samples] == ["C", "C"]
 
 
-def test_another_solver_finds_the_tools_in_the_state(run) -> None:
-    @solver
-    def loop():
-        async def solve(state, generate):
-            while not any(m.role == "tool" and m.function == "submit" for m in state.messages):
-                state = await generate(state, tool_calls="single")
-            return state
-
-        return solve
-
-    sample = only(run("buildarena/support_1", solver=loop()))
-    assert sample.scores["success"].value == "C"
-
-
-def test_calls_that_nobody_approves_do_not_reach_the_machine(run) -> None:
-    approval = [
-        ApprovalPolicy(auto_approver("reject"), "connect_blocks"),
-        ApprovalPolicy(auto_approver("approve"), "*"),
-    ]
-    sample = only(run("buildarena/support_1", approval=approval))
-    told = [message.error for message in sample.messages if message.role == "tool"]
-    assert sum(error is not None for error in told) == 6
-    assert sample.scores["success"].metadata["metrics"]["parts"] == 7
-
-
+@pytest.mark.nightly
 def test_a_machine_that_ends_its_process_costs_one_sample_and_only_that_is_run_again(
     run, monkeypatch
 ) -> None:
@@ -320,3 +265,15 @@ def test_a_log_is_scored_again_from_what_it_keeps(run) -> None:
         assert only(again).scores[name].value == only(log).scores[name].value
     told = only(again).scores["success"].metadata
     assert told["machine_hash"] == only(log).scores["success"].metadata["machine_hash"]
+
+
+def test_arguments_that_do_not_exist_are_refused_with_the_choices() -> None:
+    for given, error, message in [
+        ({"solver": "rect"}, ChoiceError, "choose from react, roles"),
+        ({"simulator": "bullet"}, UnknownChoiceError, "choose from pybullet, mujoco"),
+        ({"rewards": "[1]"}, ChoiceError, "an object of weights"),
+        ({"rewards": {"style": 1}}, UnknownChoiceError, "choose from success"),
+        ({"rounds": 0}, ValueError, "rounds is 0"),
+    ]:
+        with pytest.raises(error, match=message):
+            TASKS["support_1"](**given)

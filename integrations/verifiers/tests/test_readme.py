@@ -36,11 +36,3 @@ def ran(scripts, tmp_path, monkeypatch):
 
 def test_the_readme_runs_word_for_word(ran) -> None:
     assert ran(README) == 3
-
-
-@pytest.mark.nightly
-def test_a_wrong_readme_fails(ran, tmp_path) -> None:
-    wrong = tmp_path / "README.md"
-    wrong.write_text(README.read_text().replace("--run.name", "--run.nmae"))
-    with pytest.raises(AssertionError, match="nmae"):
-        ran(wrong)
