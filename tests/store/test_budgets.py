@@ -105,11 +105,12 @@ def test_a_key_pays_beside_its_sweep(context, sweep, reserve) -> None:
 
 
 def test_a_budget_that_comes_later_counts_what_was_spent(context, sweep) -> None:
-    name = sweep(0)
+    name = sweep(0, owner="key_k")
     context.store.journal.append(claim(context), reply())
-    set_budget(context, name, max_requests=5)
-    budget = context.store.budgets.get(name)
-    assert (budget.spent_requests, budget.spent_tokens) == (1, 250)
+    for payer in (name, "key_k"):
+        set_budget(context, payer, max_requests=5)
+        budget = context.store.budgets.get(payer)
+        assert (budget.spent_requests, budget.spent_tokens) == (1, 250), payer
 
 
 def test_the_end_of_a_hold_gives_its_reservation_back(context, sweep, reserve) -> None:

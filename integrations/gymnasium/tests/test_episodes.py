@@ -119,6 +119,7 @@ def test_states_are_reached_again_and_lead_to_the_same(actions) -> None:
         gymnasium.make(IDS[0]).reset(options={"state": state})
 
 
+@pytest.mark.nightly
 def test_starts_vary_when_asked_for_and_only_then(actions) -> None:
     def indicator(environment, **options) -> float:
         environment.reset(**options)

@@ -40,6 +40,7 @@ def folder(tmp_path_factory) -> Path:
     return tmp_path_factory.mktemp("readme")
 
 
+@pytest.mark.nightly
 def test_commands_and_program_in_the_order_of_the_page(folder) -> None:
     assert [kind for kind, _ in BLOCKS] == ["bash", "bash", "bash", "bash", "python"]
     told = []

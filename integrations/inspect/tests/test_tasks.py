@@ -83,8 +83,9 @@ def test_tools_are_those_of_everybody(run) -> None:
             assert shown["properties"][argument] == known
 
 
-def test_what_the_log_keeps_of_a_sample(run) -> None:
-    sample = only(run("buildarena/support_1"))
+def test_what_the_log_keeps_of_a_sample_and_is_scored_again_from(run) -> None:
+    log = run("buildarena/support_1")
+    sample = only(log)
     machine = Machine.from_document(sample.store[MACHINE])
     assert machine_hash(machine) == sample.scores["success"].metadata["machine_hash"]
     trajectory = read_trajectory(base64.b64decode(sample.store[TRAJECTORY]))
@@ -93,6 +94,10 @@ def test_what_the_log_keeps_of_a_sample(run) -> None:
     assert pictured.content[1].image.startswith("data:image/png;base64,")
     assert all("image" not in str(event.input) for event in sample.events if event.event == "model")
     assert [len(answers(sample)), sample.model_usage["mockllm/model"].total_tokens] == [14, 140]
+    again = only(score(log, [success(), indicator()], action="overwrite", display="none"))
+    for name in ("success", "indicator"):
+        assert again.scores[name].value == sample.scores[name].value
+    assert again.scores["success"].metadata["machine_hash"] == machine_hash(machine)
 
 
 def test_refused_and_nonsensical_calls_are_answers_and_the_building_goes_on(run) -> None:
@@ -125,6 +130,7 @@ def test_refused_and_nonsensical_calls_are_answers_and_the_building_goes_on(run)
     assert only(log).scores["success"].metadata["metrics"]["parts"] == 2
 
 
+@pytest.mark.nightly
 def test_one_who_only_talks_or_only_fails_comes_to_an_end(run) -> None:
     for answer in (ModelOutput.from_content("mockllm", "Well…"), call("fly", {})):
         sample = only(run("buildarena/support_1", listed(answer)))
@@ -134,6 +140,7 @@ def test_one_who_only_talks_or_only_fails_comes_to_an_end(run) -> None:
         assert (sample.scores["success"].value, told["reason"]) == ("I", "nothing_submitted")
 
 
+@pytest.mark.nightly
 def test_what_was_never_submitted_is_tried_in_the_end(run) -> None:
     sample = only(run("buildarena/support_1", message_limit=20))
     assert sample.limit.type == "message"
@@ -256,15 +263,6 @@ def killing_children() -> Iterator[None]:
     finally:
         over.set()
         thread.join()
-
-
-def test_a_log_is_scored_again_from_what_it_keeps(run) -> None:
-    log = run("buildarena/support_1")
-    again = score(log, [success(), indicator()], action="overwrite", display="none")
-    for name in ("success", "indicator"):
-        assert only(again).scores[name].value == only(log).scores[name].value
-    told = only(again).scores["success"].metadata
-    assert told["machine_hash"] == only(log).scores["success"].metadata["machine_hash"]
 
 
 def test_arguments_that_do_not_exist_are_refused_with_the_choices() -> None:

@@ -34,5 +34,6 @@ def ran(scripts, tmp_path, monkeypatch):
     return run
 
 
+@pytest.mark.nightly
 def test_the_readme_runs_word_for_word(ran) -> None:
     assert ran(README) == 3
