@@ -129,8 +129,10 @@ def test_cargo_marks_and_gates_are_told_from_where_it_is() -> None:
         gates=(Gate(name="first", center=(0, 9), half_width=2),),
     )
     for sense, value in (
-        ("cargo.relative.x", 6.0), ("marks.goal.position.y", 4.0), ("gates.first.relative.y", 9.0),
-    ):  # fmt: skip
+        ("cargo.relative.x", 6.0),
+        ("marks.goal.position.y", 4.0),
+        ("gates.first.relative.y", 9.0),
+    ):
         assert float(told(f"sense.{sense}", scenario=scenario)) == pytest.approx(value, abs=0.1)
 
 

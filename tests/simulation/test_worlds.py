@@ -226,10 +226,13 @@ def test_worlds_are_bounded() -> None:
 
 def test_a_scenario_that_uses_none_of_it_reads_and_hashes_as_before() -> None:
     plain = {
-        "duration_s": 1.0, "terrain": [], "cargo": None,
-        "placement": {"kind": "ground"}, "control": {"mode": "none", "from_s": 0.0},
+        "duration_s": 1.0,
+        "terrain": [],
+        "cargo": None,
+        "placement": {"kind": "ground"},
+        "control": {"mode": "none", "from_s": 0.0},
         "tracked_blocks": "all",
-    }  # fmt: skip
+    }
     assert Scenario(duration_s=1).model_dump(mode="json") == plain
     usual = Scenario(duration_s=1, gravity=GRAVITY, drive_strength=1, senses=Senses())
     assert usual.model_dump(mode="json").keys() - plain.keys() == {"senses"}
