@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import signal
-import threading
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,14 +54,16 @@ def up(
         return
     from buildarena_cli.local.stack import Stack
 
-    stopping = threading.Event()
+    # A list takes no lock: a second signal in the middle of an event's would wait for itself.
+    asked: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stopping.set())
+        signal.signal(number, lambda number, _: asked.append(number))
     _tell_simulators()
     with Stack(settings, tell=_tell) as stack:
         say(f"dashboard and API {stack.url}  ·  docs {stack.url}/docs  ·  logs {stack.logs}")
         say("Ctrl-C stops it.")
-        while not stopping.wait(0.5):
+        while not asked:
+            time.sleep(0.5)
             stack.require_running()
         _tell(
             "stopping: open model requests and trials may finish, for at most "
