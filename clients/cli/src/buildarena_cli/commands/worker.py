@@ -84,8 +84,13 @@ def migrate() -> None:
     The database is the one that BUILDARENA_DATABASE_URL names. Roles that `admin roles` made get
     their rights on it.
     """
+    from buildarena_store import SchemaVersionError
+
     with _database() as database:
-        say(f"schema {database.migrate()}")
+        try:
+            say(f"schema {database.migrate()}")
+        except SchemaVersionError as error:
+            raise CommandError(str(error)) from error
 
 
 def roles(

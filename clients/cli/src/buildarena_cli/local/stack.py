@@ -37,7 +37,7 @@ from buildarena_pipeline.errors import StartupError
 from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
 from buildarena_pipeline.runtime.simulators.installed import installed_engines
 from buildarena_pipeline.secret_files import SUFFIX
-from buildarena_store import Database, Workers
+from buildarena_store import Database, SchemaVersionError, Workers
 from buildarena_store.accounts.keys import new_secret
 from buildarena_store.states import CONSTRUCT_QUEUE
 
@@ -91,7 +91,7 @@ class Stack:
     def __enter__(self) -> Self:
         try:
             self._start()
-        except (StartupError, OSError, subprocess.SubprocessError) as error:
+        except (StartupError, SchemaVersionError, OSError, subprocess.SubprocessError) as error:
             self.stop()
             raise CommandError(str(error)) from error
         except BaseException:
