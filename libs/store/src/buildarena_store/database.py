@@ -42,7 +42,7 @@ MIGRATION_LOCK = 0x6275696C64  # "build": two processes that migrate at once tak
 LOCK_PAUSE_S = 0.2
 
 
-def _unknown(schema: str) -> str:
+def _unknown_schema(schema: str) -> str:
     return (
         f"the database has schema {schema}, which this program ({SCHEMA}) does not know: it is of "
         "a release candidate or of a later version, and was left as it is"
@@ -194,7 +194,7 @@ class Database:
                 time.sleep(LOCK_PAUSE_S)
             try:
                 if (found := self.schema()) is not None and found not in known_schemas():
-                    raise SchemaVersionError(_unknown(found))
+                    raise SchemaVersionError(_unknown_schema(found))
                 migrate_to_newest(self.url)
                 with self.engine.begin() as owner:
                     grant_rights(owner)
@@ -226,7 +226,7 @@ class Database:
         if found is not None and found not in known:
             if self._compatible_since() in known:
                 return
-            raise SchemaVersionError(_unknown(found))
+            raise SchemaVersionError(_unknown_schema(found))
         raise SchemaVersionError(
             f"the database has schema {found or 'none'}, this program needs {SCHEMA}: "
             "run `buildarena admin migrate`"

@@ -84,13 +84,8 @@ def migrate() -> None:
     The database is the one that BUILDARENA_DATABASE_URL names. Roles that `admin roles` made get
     their rights on it.
     """
-    from buildarena_store import SchemaVersionError
-
     with _database() as database:
-        try:
-            say(f"schema {database.migrate()}")
-        except SchemaVersionError as error:
-            raise CommandError(str(error)) from error
+        say(f"schema {database.migrate()}")
 
 
 def roles(
@@ -132,7 +127,7 @@ def _database() -> Iterator[Database]:
     """The database that the settings name."""
     from buildarena_pipeline.errors import StartupError
     from buildarena_pipeline.runtime.settings import load_settings
-    from buildarena_store import Database
+    from buildarena_store import Database, SchemaVersionError
 
     try:
         url = load_settings().direct_database_url()
@@ -141,6 +136,8 @@ def _database() -> Iterator[Database]:
     database = Database(url, name="buildarena-command")
     try:
         yield database
+    except SchemaVersionError as error:
+        raise CommandError(str(error)) from error
     finally:
         database.close()
 
