@@ -143,7 +143,7 @@ def test_a_log_of_nobody_is_refused() -> None:
 
 FOLDER = Path(__file__).parents[1] / "data" / "besiege" / "game_logs"
 ROWS = (FOLDER / "support-1_seven_blocks.csv").read_text(encoding="ascii").splitlines()
-SUPPORT_OF_REAL_LOGS = builtin_tasks()["support-1"]
+REAL_TASK = builtin_tasks()["support-1"]
 BEAM = beam(7)
 LETTERS = str.maketrans(".", ",")
 
@@ -159,7 +159,7 @@ def longer(row: str) -> str:
     """A row as a runner that prints three decimals would write it."""
     time, name, *values = row.split(",")
     if len(values) == 1:
-        values = [f"{SUPPORT_OF_REAL_LOGS.scenario.cargo.mass_at(float(time)):.3f}"]
+        values = [f"{REAL_TASK.scenario.cargo.mass_at(float(time)):.3f}"]
         return ",".join([f"{time}0", name, *values])
     return ",".join([f"{time}0", name, *(f"{value}0" for value in values)])
 
@@ -169,7 +169,7 @@ def thinned(rows: list[str]) -> list[str]:
     return [row for row in rows if draw.random() > 0.15]
 
 
-FORMS_OF_REAL_LOGS = {
+REAL_FORMS = {
     "as it was written": "\n".join(ROWS),
     "decimal commas": "\n".join(row.translate(LETTERS) for row in ROWS),
     "decimal commas between semicolons": "\n".join(
@@ -188,16 +188,16 @@ FORMS_OF_REAL_LOGS = {
 }
 
 
-def read_of_real_logs(text: str):
-    return published_trajectory(text, BEAM, SUPPORT_OF_REAL_LOGS.scenario)
+def read_real(text: str):
+    return published_trajectory(text, BEAM, REAL_TASK.scenario)
 
 
 def test_the_log_of_seven_blocks_is_a_failure_in_any_form(subtests) -> None:
-    for form in FORMS_OF_REAL_LOGS:
+    for form in REAL_FORMS:
         with subtests.test(form=form):
-            assert looks_published(FORMS_OF_REAL_LOGS[form])
-            trajectory = read_of_real_logs(FORMS_OF_REAL_LOGS[form])
-            result = score(SUPPORT_OF_REAL_LOGS, BEAM, trajectory)
+            assert looks_published(REAL_FORMS[form])
+            trajectory = read_real(REAL_FORMS[form])
+            result = score(REAL_TASK, BEAM, trajectory)
             assert (result.success, result.indicator) == (False, 0.0)
             # Too far aside from 1.28 s on; the first sample below 4 is that of 1.48 s, at 103.
             assert result.metrics["fall_time_s"] == pytest.approx(1.28, abs=0.06)
@@ -212,7 +212,7 @@ def test_the_log_of_seven_blocks_is_a_failure_in_any_form(subtests) -> None:
 
 
 def test_what_was_before_the_first_rows_is_the_fall_that_they_continue() -> None:
-    trajectory = read_of_real_logs(FORMS_OF_REAL_LOGS["as it was written"])
+    trajectory = read_real(REAL_FORMS["as it was written"])
     height = trajectory.cargo_position[:, 2]
     assert trajectory.settings["begins_at_s"] == 0.32
     assert height[:2] == pytest.approx([9.03, 9.03], abs=0.03)
@@ -241,7 +241,7 @@ def test_what_a_log_does_not_show_is_not_made_up(subtests) -> None:
         ([row for row in ROWS if row.count(",") != 2], "cargo's mass"),
     ]:
         with subtests.test(rows=rows), pytest.raises(LogIncompleteError, match=says):
-            read_of_real_logs("\n".join(rows))
+            read_real("\n".join(rows))
 
 
 def test_a_beginning_without_a_fall_is_refused() -> None:
@@ -253,7 +253,7 @@ def test_a_beginning_without_a_fall_is_refused() -> None:
         for parts in (row.split(",") for row in ROWS)
     ]
     with pytest.raises(LogIncompleteError, match=r"Between 0.00 s and 0.32 s"):
-        read_of_real_logs("\n".join(standing))
+        read_real("\n".join(standing))
 
 
 SAGGING = np.loadtxt(FOLDER / "support-2_sagging_bridge_y.csv", delimiter=",", skiprows=1)

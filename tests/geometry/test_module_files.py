@@ -252,7 +252,7 @@ def test_a_slider_counts_in_units(tmp_path):
 
 
 SPEED = {"kind": "speed", "rate": 600, "force": 20}
-SENSELESS_OF_MOVING_JOINTS = [
+SENSELESS_JOINTS = [
     ("attachment", {"joint": {}}, "joint: expected no joint: only one of the joint types axle"),
     ("mount", {"joint": {}}, "moves, found 'mount'"),
     ("hinge", {"gear": {"pitch_radius": 1}}, "no gear: a cog's joint type is axle, not hinge"),
@@ -292,7 +292,7 @@ SENSELESS_OF_MOVING_JOINTS = [
 
 
 def test_senseless_joints_are_refused_with_what_belongs_there(tmp_path, subtests):
-    for seat, fields, message in SENSELESS_OF_MOVING_JOINTS:
+    for seat, fields, message in SENSELESS_JOINTS:
         with subtests.test(seat=seat), pytest.raises(CatalogueError, match=message):
             _loaded(tmp_path, seat, **fields)
 
@@ -310,7 +310,7 @@ def test_driven_joints_can_be_flipped_and_passive_ones_cannot(subtests):
 FURTHER = entries("extended.yaml")
 
 
-def other_of_forces(name, field, **changes):
+def with_force(name, field, **changes):
     entry = copy.deepcopy(FURTHER[name])
     entry["name"] = "Other"
     entry[field] = {**entry[field], **changes}
@@ -322,13 +322,11 @@ def read(tmp_path, entry):
 
 
 def test_a_wings_flow_is_its_normal_turned_by_the_pitch(tmp_path):
-    flat = read(tmp_path, other_of_forces("Propeller", "wing", pitch_deg=0)).wing
+    flat = read(tmp_path, with_force("Propeller", "wing", pitch_deg=0)).wing
     assert flat.flow == flat.normal == (0.0, 1.0, 0.0)
-    quarter = read(tmp_path, other_of_forces("Propeller", "wing", pitch_deg=90)).wing
+    quarter = read(tmp_path, with_force("Propeller", "wing", pitch_deg=90)).wing
     assert quarter.flow == pytest.approx((1.0, 0.0, 0.0))
-    x_first = read(
-        tmp_path, other_of_forces("Propeller", "wing", normal=[1, 0, 0], pitch_deg=90)
-    ).wing
+    x_first = read(tmp_path, with_force("Propeller", "wing", normal=[1, 0, 0], pitch_deg=90)).wing
     assert x_first.flow == pytest.approx((0.0, -1.0, 0.0))
 
 
@@ -350,19 +348,19 @@ def test_a_force_that_makes_no_sense_is_refused_by_its_name(tmp_path, subtests):
         ("Grabber", "grip", {"reach": 0}, r"grip\.reach: expected a number above 0"),
     ]:
         with subtests.test(name=name), pytest.raises(CatalogueError, match=said):
-            read(tmp_path, other_of_forces(name, field, **changes))
+            read(tmp_path, with_force(name, field, **changes))
 
 
 def test_only_connectors_with_the_link_spring_have_one(tmp_path):
     for link in ("rigid", "rope"):
         with pytest.raises(CatalogueError, match=r"spring: expected a spring with the link"):
-            read(tmp_path, {**other_of_forces("Spring", "spring"), "link": link})
+            read(tmp_path, {**with_force("Spring", "spring"), "link": link})
     without = {
-        key: value for key, value in other_of_forces("Spring", "spring").items() if key != "spring"
+        key: value for key, value in with_force("Spring", "spring").items() if key != "spring"
     }
     with pytest.raises(CatalogueError, match=r"spring: expected a spring with the link"):
         read(tmp_path, without)
-    fan = {**other_of_forces("Spring", "spring"), "lift": {"force": 1}}
+    fan = {**with_force("Spring", "spring"), "lift": {"force": 1}}
     with pytest.raises(CatalogueError, match=r"lift: expected no lift"):
         read(tmp_path, fan)
 

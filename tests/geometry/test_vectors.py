@@ -145,7 +145,7 @@ def sequences():
     return json.loads(gzip.decompress(FILE.read_bytes()))
 
 
-def test_every_step_has_the_vectors_verdict_and_state_of_extended_vectors(sequences):
+def test_every_step_with_further_types_has_the_vectors_verdict_and_state(sequences):
     steps = reached = 0
     for sequence in sequences:
         steps += len(sequence["steps"])
@@ -155,7 +155,7 @@ def test_every_step_has_the_vectors_verdict_and_state_of_extended_vectors(sequen
                 break  # the verdict hangs on estimated colliders
             where = f"seed {sequence['seed']}, step {number}: {step['op']} {step['params']}"
             assert (ours["ok"], ours["kind"]) == (step["ok"], step["kind"]), where
-            assert_same_state_of_extended_vectors(ours["state"], step["state"], where)
+            assert_same_extended_state(ours["state"], step["state"], where)
             reached += 1
     assert reached / steps > 0.7, "most steps are compared"
 
@@ -174,18 +174,16 @@ def compared(sequence):
     return sequence["steps"]
 
 
-def assert_same_state_of_extended_vectors(ours, theirs, where):
+def assert_same_extended_state(ours, theirs, where):
     for field in ("n", "cost", "next_id"):
         assert ours[field] == theirs[field], (where, field)
     assert ours["mass"] == pytest.approx(theirs["mass"], abs=TOLERANCE), where
     assert [block["id"] for block in ours["blocks"]] == [b["id"] for b in theirs["blocks"]], where
     for our, their in zip(ours["blocks"], theirs["blocks"], strict=True):
-        assert_same_block_of_extended_vectors(
-            our, their, f"{where}, block {their['id']} ({their['name']})"
-        )
+        assert_same_extended_block(our, their, f"{where}, block {their['id']} ({their['name']})")
 
 
-def assert_same_block_of_extended_vectors(ours, theirs, where):
+def assert_same_extended_block(ours, theirs, where):
     for field in ("name", "flipped", "root_face"):
         assert ours.get(field) == theirs.get(field), (where, field)
     for field in ("pos", "center_follow", "virtual", "pointing", "spin"):

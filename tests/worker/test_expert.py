@@ -99,7 +99,7 @@ def test_the_kept_sessions_end_in_every_way() -> None:
     assert kinds == {"Finished", "Suspended", "Failed", "LimitReached"}
 
 
-TASKS_OF_DESIGNS_FROM_PROMPTS = ["mechanisms-3", "mechanisms-4"]
+TASKS_FROM_PROMPTS = ["mechanisms-3", "mechanisms-4"]
 OTHER_WINCHES = [(14, 7)]
 """Masses and distances of other cargoes."""
 
@@ -133,7 +133,7 @@ def another_winch(weight: float, north: float) -> Task:
 
 @pytest.mark.ci
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("name", TASKS_OF_DESIGNS_FROM_PROMPTS)
+@pytest.mark.parametrize("name", TASKS_FROM_PROMPTS)
 def test_numbers_in_the_prompt_are_enough_for_a_first_success(name, engine) -> None:
     assert first_try(builtin_tasks()[name], engine)
 
@@ -146,7 +146,7 @@ def test_other_numbers_make_other_machines_that_succeed_too(weight, north, engin
 
 
 def test_without_data_sheets_nobody_can_compute_it(subtests) -> None:
-    for name in TASKS_OF_DESIGNS_FROM_PROMPTS:
+    for name in TASKS_FROM_PROMPTS:
         with subtests.test(name=name):
             played = built(builtin_tasks()[name], data_sheets=False)
             assert isinstance(played.result, LookupError)

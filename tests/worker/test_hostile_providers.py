@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
-import os
 import re
 import signal
-import subprocess
 import sys
 import time
 from dataclasses import replace
@@ -17,13 +15,11 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 from support.providers.stand_in import ProviderStandIn
-from support.servers.construct_threads import crew, models_file
+from support.servers.construct_threads import crew, worker_process
 from support.servers.stacks import wait_until
 from support.stages import work
 
-from buildarena_pipeline.catalog.models import load_registry
 from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.submission.submission import Submissions
 from buildarena_store import BudgetLimits
 from buildarena_worker import builtin
 from buildarena_worker.builtin import expert
@@ -125,30 +121,14 @@ def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
 
 
 @pytest.mark.ci
-def test_shutdown_ends_open_requests(context, settings, tmp_path) -> None:
+def test_shutdown_ends_open_requests(context, tmp_path) -> None:
     with stuck("hang") as bad:
-        file = models_file(tmp_path, {"bad": bad})
-        job, _ = Submissions(context, load_registry(file)).submit_job(
-            JobSpec(task="lift-1", model="bad/expert", simulator="mujoco")
-        )
-        environment = {
-            **os.environ,
-            "BUILDARENA_DATABASE_URL": settings.required_database_url(),
-            "BUILDARENA_BROKER_URL": settings.required_broker_url(),
-            "BUILDARENA_DATA": str(settings.data),
-            "BUILDARENA_MODELS_FILE": str(file),
-            "BUILDARENA_STOP_GRACE_S": "3",
-        }
-        process = subprocess.Popen([sys.executable, "-m", "buildarena_worker"], env=environment)
-        try:
-            wait_until(lambda: bad.counts.requests, 20, "the request is sent")
+        grace = {"BUILDARENA_STOP_GRACE_S": "3"}
+        with worker_process(context, tmp_path, bad, **grace) as (job_id, process):
             process.send_signal(signal.SIGTERM)
             process.wait(timeout=8)
-        finally:
-            process.kill()
-            process.wait()
         wait_until(lambda: bad.left, 1, "the connection is closed")
-    job = context.store.jobs.get(job.id)
+    job = context.store.jobs.get(job_id)
     assert (job.state, job.faults) == ("queued", 0)
     assert [a.result for a in context.store.jobs.attempts(job.id)] == ["handed_back"]
 

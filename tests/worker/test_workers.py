@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -15,12 +12,10 @@ from contextlib import contextmanager
 import pytest
 from sqlalchemy import event
 from support.providers.stand_in import ProviderStandIn
-from support.servers.construct_threads import Crew, crew, models_file
+from support.servers.construct_threads import Crew, crew, worker_process
 from support.servers.stacks import wait_until
 
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
-from buildarena_pipeline.submission.submission import Submissions
+from buildarena_pipeline.catalog.specs import SweepSpec
 from buildarena_store import BudgetLimits
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.verification_report import Report
@@ -123,30 +118,16 @@ def test_nothing_is_sent_again_after_the_stop(context, tmp_path) -> None:
 
 
 @pytest.mark.ci
-def test_a_worker_that_is_asked_to_stop_waits_for_its_reply(context, settings, tmp_path) -> None:
-    with ProviderStandIn(latency_s=1.5) as model:
-        file = models_file(tmp_path, {"good": model})
-        job, _ = Submissions(context, load_registry(file)).submit_job(
-            JobSpec(task="lift-1", model="good/expert", simulator="mujoco")
-        )
-        environment = {
-            **os.environ,
-            "BUILDARENA_DATABASE_URL": settings.required_database_url(),
-            "BUILDARENA_BROKER_URL": settings.required_broker_url(),
-            "BUILDARENA_DATA": str(settings.data),
-            "BUILDARENA_MODELS_FILE": str(file),
-        }
-        process = subprocess.Popen([sys.executable, "-m", "buildarena_worker"], env=environment)
-        try:
-            wait_until(lambda: model.counts.requests, 30, "the request is sent")
-            process.send_signal(signal.SIGTERM)
-            assert process.wait(timeout=20) == 0
-        finally:
-            process.kill()
-            process.wait()
-    assert answered(context, [job.id]) == model.counts.requests
-    assert attempts(context, [job.id]) == ["handed_back"]
-    assert context.store.jobs.get(job.id).state == "queued"
+def test_a_worker_that_is_asked_to_stop_waits_for_its_reply(context, tmp_path) -> None:
+    with (
+        ProviderStandIn(latency_s=1.5) as model,
+        worker_process(context, tmp_path, model) as (job_id, process),
+    ):
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=20) == 0
+    assert answered(context, [job_id]) == model.counts.requests
+    assert attempts(context, [job_id]) == ["handed_back"]
+    assert context.store.jobs.get(job_id).state == "queued"
 
 
 class Crowd:

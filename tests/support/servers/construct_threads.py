@@ -1,5 +1,8 @@
-"""A construct worker's threads in the test's process, against stand-ins for providers."""
+"""A construct worker against stand-ins for providers: its threads here, or a process of its own."""
 
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -103,3 +106,35 @@ def crew(
         for client in handler._clients._clients.values():
             if isinstance(client, ProviderClient):
                 client.close()
+
+
+@contextmanager
+def worker_process(
+    context: Context, folder: Path, model: ProviderStandIn, **more: str
+) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """The id of a job for a stand-in's model, and a worker that has sent its first request.
+
+    Args:
+        context: Its settings name the database and the broker.
+        folder: Where the registry of models is written.
+        model: The stand-in.
+        more: Further variables of the worker.
+    """
+    file, settings = models_file(folder, {"only": model}), context.settings
+    spec = JobSpec(task="lift-1", model="only/expert", simulator="mujoco")
+    job, _ = Submissions(context, load_registry(file)).submit_job(spec)
+    environment = {
+        **os.environ,
+        "BUILDARENA_DATABASE_URL": settings.required_database_url(),
+        "BUILDARENA_BROKER_URL": settings.required_broker_url(),
+        "BUILDARENA_DATA": str(settings.data),
+        "BUILDARENA_MODELS_FILE": str(file),
+        **more,
+    }
+    process = subprocess.Popen([sys.executable, "-m", "buildarena_worker"], env=environment)
+    try:
+        wait_until(lambda: model.counts.requests, 20, "the request is sent")
+        yield job.id, process
+    finally:
+        process.kill()
+        process.wait()

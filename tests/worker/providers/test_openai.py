@@ -125,11 +125,9 @@ def test_schemas_are_written_as_kept_ones_were() -> None:
         assert found == {"sent": case["sent"], "strict": case["strict"]}, case["given"]
 
 
-KEPT_OF_ANSWERS = json.loads((Path(__file__).parents[2] / "data/openai.json").read_text())[
-    "answers"
-]
+KEPT_ANSWERS = json.loads((Path(__file__).parents[2] / "data/openai.json").read_text())["answers"]
 URL = "http://127.0.0.1:1/v1"
-READERS = {url: AnswerReader(url) for url in {case.get("url", URL) for case in KEPT_OF_ANSWERS}}
+READERS = {url: AnswerReader(url) for url in {case.get("url", URL) for case in KEPT_ANSWERS}}
 
 
 def meaning(case: dict[str, Any]) -> dict[str, Any]:
@@ -154,9 +152,9 @@ def meaning(case: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_answers_mean_what_kept_ones_meant(subtests) -> None:
-    for status in sorted({case["status"] for case in KEPT_OF_ANSWERS}):
+    for status in sorted({case["status"] for case in KEPT_ANSWERS}):
         with subtests.test(status=status):
-            cases = [case for case in KEPT_OF_ANSWERS if case["status"] == status]
+            cases = [case for case in KEPT_ANSWERS if case["status"] == status]
             found = {case["name"]: meaning(case) for case in cases}
             assert found == {case["name"]: case["means"] for case in cases}
 
