@@ -10,9 +10,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 # For programs beside the tests: they use the tests' support package.
 TEST_PYTHON := PYTHONPATH=$(CURDIR):$(CURDIR)/tests $(BIN)/python
-PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/environment libs/store libs/pipeline services/api services/worker services/simworker services/simworker-besiege clients/python clients/cli clients/buildarena
+PACKAGES := libs/geometry libs/simulation libs/besiege libs/benchmark libs/backend services/api services/worker services/simworker clients/python clients/cli
 SOURCES := $(addsuffix /src,$(PACKAGES))
-CODE := $(SOURCES) clients/python/hatch_build.py conftest.py tests services/simworker-besiege/tests scenarios benchmarks
+CODE := $(SOURCES) clients/python/hatch_build.py conftest.py tests scenarios benchmarks
 STAMP := $(VENV)/.installed
 # The dashboard as it is served; mk/web.mk builds it.
 WEB_OUT := services/api/src/buildarena_api/pages
@@ -64,9 +64,7 @@ ifeq ($(filter $(PACKAGE),$(PACKAGES)),)
 $(error there is no package $(PACKAGE); the packages are: $(PACKAGES))
 endif
 # Where a package's tests are, if not in the folder of its name.
-TESTS_OF_services/simworker := tests/runner
 TESTS_OF_clients/python := tests/client
-TESTS_OF_clients/buildarena := tests/notebooks
 PACKAGE_TESTS := $(or $(TESTS_OF_$(PACKAGE)),tests/$(notdir $(PACKAGE)))
 
 test: $(STAMP) $(if $(filter clients/%,$(PACKAGE)),$(SCHEMAS))
@@ -127,7 +125,7 @@ clean: ## Removes the environment, caches and local data
 # Who asks for what stands in the lock: mk/locked.py takes from it what one of them needs.
 LOCK := bash mk/uv.sh pip compile --quiet --universal --generate-hashes --annotation-style line \
 	--custom-compile-command "make lock"
-OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-buildarena,buildarena,$(patsubst buildarena-python,buildarena-client,buildarena-$(notdir $(p)))))
+OURS := $(foreach p,$(PACKAGES),--no-emit-package $(patsubst buildarena-cli,buildarena,$(patsubst buildarena-python,buildarena-client,buildarena-$(notdir $(p)))))
 
 lock: $(STAMP) ## Compiles requirements.lock again, and the locks of the adapters
 	$(LOCK) --all-extras $(OURS) -o requirements.lock \

@@ -21,9 +21,9 @@ from support.servers.run_servers import TEMPLATE, RunServers, execute, server_ur
 if TYPE_CHECKING:
     from support.player import Player
 
-    from buildarena_pipeline.runtime.context import Context
-    from buildarena_pipeline.runtime.settings import Settings
-    from buildarena_pipeline.submission.submission import Submissions
+    from buildarena_backend.process.context import Context
+    from buildarena_backend.settings import Settings
+    from buildarena_backend.submission.submission import Submissions
 
 SERVERS: Final = pytest.StashKey[RunServers]()
 VALKEY_DATABASES: Final = 16
@@ -147,7 +147,7 @@ def broker_url(worker_id: str) -> str:
 @pytest.fixture
 def settings(database_url: str, broker_url: str, tmp_path: Path) -> Settings:
     """Settings that name the test servers and a folder of this test's own."""
-    from buildarena_pipeline.runtime.settings import Settings
+    from buildarena_backend.settings import Settings
 
     return Settings(
         database_url=database_url, broker_url=broker_url, data=tmp_path / "data", lease_s=2.0
@@ -160,7 +160,7 @@ def context(settings: Settings) -> Iterator[Context]:
     from redis import Redis
     from support.servers.databases import empty
 
-    from buildarena_pipeline.runtime.context import open_context
+    from buildarena_backend.process.context import open_context
 
     context = open_context(settings)
     empty(context.store.database)
@@ -181,7 +181,7 @@ def play() -> Player:
 @pytest.fixture
 def submissions(context: Context) -> Submissions:
     """Submits with the built-in registry."""
-    from buildarena_pipeline.catalog.models import load_registry
-    from buildarena_pipeline.submission.submission import Submissions
+    from buildarena_backend.catalog.models import load_registry
+    from buildarena_backend.submission.submission import Submissions
 
     return Submissions(context, load_registry())

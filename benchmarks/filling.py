@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, text
 
+from buildarena_backend.database.database import Database
 from buildarena_benchmark import builtin_tasks
-from buildarena_store import Database
 
 MODELS = 50
 TRACKS = ("five-role/pybullet-1/default-00000000-1", "single/mujoco-1/default-00000000-1")

@@ -23,9 +23,9 @@ from benchmarks.figures import keep
 from benchmarks.filling import TRACKS, Amount, fill
 from sqlalchemy import text
 
+from buildarena_backend.database.database import Database
+from buildarena_backend.store import open_store
 from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
-from buildarena_store import Database
-from buildarena_store.store import open_store
 
 BARS = {
     "board_at_rest_ms": 20.0,

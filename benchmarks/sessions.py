@@ -20,12 +20,12 @@ from pathlib import Path
 import psutil
 from benchmarks.figures import tell
 
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import SweepSpec
+from buildarena_backend.process.context import Context, open_context
+from buildarena_backend.settings import Settings
+from buildarena_backend.submission.submission import Submissions
 from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import SweepSpec
-from buildarena_pipeline.runtime.context import Context, open_context
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.submission.submission import Submissions
 
 MEBIBYTE = 1024 * 1024
 POLL_S = 0.05

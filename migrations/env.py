@@ -3,7 +3,7 @@
 from alembic import context
 from sqlalchemy import Connection, NullPool, create_engine, text
 
-from buildarena_store.tables import metadata
+from buildarena_backend.database.tables import metadata
 
 
 def note_compatibility(connection: Connection) -> None:

@@ -8,7 +8,7 @@ export PYTHONPATH=$PWD:$PWD/tests
 for name in "$@"; do
     case $name in
     sessions) "$python" -m support.documents.kept_sessions ;;
-    games) PYTHONPATH=$PWD/tests:$PWD/services/simworker-besiege/tests/support "$python" -m record_games ;;
+    games) "$python" -m support.game.record_games ;;
     inspect) "$python" mk/inspect_tasks.py ;;
     sweeps) "$python" -c 'import json; from buildarena_cli.sweep_files import sweep_schema; print(json.dumps(sweep_schema(), indent=2, ensure_ascii=False))' >docs/sweep.schema.json ;;
     pictures) "$python" tests/web/screenshots.py ;;

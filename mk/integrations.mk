@@ -2,9 +2,9 @@
 
 # Adapters to frameworks, each with an environment of its own: the frameworks exclude each other.
 INTEGRATIONS := inspect verifiers gymnasium
-LIBRARIES := libs/geometry libs/simulation libs/benchmark libs/environment
+LIBRARIES := libs/geometry libs/simulation libs/benchmark
 # What one of them needs besides: our workflows, which Inspect's models can play, and the client.
-LIBRARIES_inspect := clients/python libs/besiege libs/store libs/pipeline services/worker
+LIBRARIES_inspect := clients/python libs/besiege libs/backend services/worker
 INTEGRATION_STAMPS := $(foreach name,$(INTEGRATIONS),.venv-integrations/$(name)/.installed)
 
 check-integrations: $(INTEGRATION_STAMPS)

@@ -4,7 +4,7 @@ set -euo pipefail
 name=${1:-}
 shift || true
 python=.venv/bin/python
-game=services/simworker-besiege/tests
+game=tests/simworker/besiege
 export PYTHONPATH=$PWD:$PWD/tests
 
 run() {

@@ -9,8 +9,8 @@ from support.documents.what_a_model_sees import BEGINNING, LISTED
 from support.documents.what_a_model_sees import page as what_a_model_sees
 from support.machines import drive_machines
 
+from buildarena_backend.agents.briefing import briefing
 from buildarena_benchmark import CANARY, builtin_tasks
-from buildarena_pipeline.agents.briefing import briefing
 from buildarena_worker.builtin.designs import DESIGNS
 
 ROOT = Path(__file__).parents[1]

@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from buildarena_backend.settings import Settings
 from buildarena_cli.command_table import ADMIN, COMMANDS
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_simworker_besiege.settings import BesiegeSettings
+from buildarena_simworker.besiege.settings import BesiegeSettings
 
 ROOT = Path(__file__).parents[1]
 SOURCES = [

@@ -117,7 +117,7 @@ def endpoint() -> Iterator[str]:
 ASKING = """
 import sys
 from pathlib import Path
-from buildarena_pipeline.catalog.models import load_registry
+from buildarena_backend.catalog.models import load_registry
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.providers.registry import require_known_protocols
 from buildarena_worker.session.messages import Message, Request

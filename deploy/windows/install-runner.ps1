@@ -72,16 +72,13 @@ function Install-Packages {
         if ($LASTEXITCODE -ne 0) { throw "no environment could be made in $Venv" }
     }
     $from = @()
-    $wanted = @('buildarena-cli', 'buildarena-simworker-besiege[window]')
+    $wanted = @('buildarena[besiege]')
     if ($Wheels) {
         $folder = (Resolve-Path -LiteralPath $Wheels).Path
         Save-Constraints -Folder $folder
         $from = @('--constraint', $Constraints)
         # What is asked for by its name and an extra is not taken from a constraint's path.
-        $wanted = @(
-            (Get-Wheel -Folder $folder -Name 'buildarena_cli'),
-            "$(Get-Wheel -Folder $folder -Name 'buildarena_simworker_besiege')[window]"
-        )
+        $wanted = @("$(Get-Wheel -Folder $folder -Name 'buildarena')[besiege]")
     }
     & (Join-Path $Venv 'Scripts\python.exe') -m pip install --quiet --disable-pip-version-check --upgrade @from @wanted
     if ($LASTEXITCODE -ne 0) { throw 'the packages could not be installed; pip says why above' }

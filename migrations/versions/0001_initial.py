@@ -1,4 +1,4 @@
-"""All tables as `buildarena_store.tables` has them, and the triggers of sql/triggers.sql.
+"""All tables of `buildarena_backend.database.tables`, and the triggers of sql/triggers.sql.
 
 Until 1.0.0 there is this revision alone. Its name has the fingerprint of what it makes, which a
 test compares: a database of another release candidate is refused. From 1.0.0 on the chain grows.
@@ -6,8 +6,8 @@ test compares: a database of another release candidate is refused. From 1.0.0 on
 
 from alembic import op
 
-from buildarena_store.migrating import TRIGGERS
-from buildarena_store.tables import metadata
+from buildarena_backend.database.migrating import TRIGGERS
+from buildarena_backend.database.tables import metadata
 
 revision = "0001_fe7855c0"
 down_revision = None

@@ -18,9 +18,9 @@ from support.clients.tenants import WITH_KEYS, Tenant, new_tenant, operator
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import running_stack
 
+from buildarena_backend.database.database import Database
+from buildarena_benchmark.environment.trials.processes import memory_bytes
 from buildarena_cli.local.stack import Stack
-from buildarena_environment.processes import memory_bytes
-from buildarena_store import Database
 
 HOSTILE = "hostile/model"
 MEBI = 1 << 20

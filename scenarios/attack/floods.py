@@ -20,7 +20,7 @@ from sqlalchemy import text
 from support.clients.tenants import ADMIN
 from support.servers.api_process import Service, api_service
 
-from buildarena_store import Database
+from buildarena_backend.database.database import Database
 
 JOBS = 1000
 FLOODS = {"streams": 800, "verifications": 1500, "exports": 200, "boards": 400}

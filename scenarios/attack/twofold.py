@@ -18,8 +18,8 @@ from sqlalchemy import create_engine, text
 from support.clients.tenants import everything, new_tenant
 from support.servers.stacks import wait_until
 
+from buildarena_backend.database.database import Database
 from buildarena_cli.local import free_port
-from buildarena_store import Database
 
 REVOKED_S = 1.0
 """Within so long every process refuses a key that another revoked."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from scenarios.chaos.faults import WORKERS, Strike
 from sqlalchemy import text
 
-from buildarena_store import Database
-from buildarena_store.jobs.verifications import ABANDONED_AFTER
+from buildarena_backend.database.database import Database
+from buildarena_backend.results.verifications import ABANDONED_AFTER
 
 WRONG = {
     "jobs that have not ended": "SELECT id FROM jobs WHERE state <> 'done'",

@@ -21,11 +21,11 @@ from scenarios.chaos.faults import VICTIMS, Fire, skewed_worker
 from sqlalchemy.exc import OperationalError
 from support.servers.stacks import running_stack, wait_until
 
+from buildarena_backend.database.database import Database
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_cli.local import ManagedProcess
 from buildarena_cli.local.stack import Stack
 from buildarena_simulation import simulate
-from buildarena_store import Database
 
 pytestmark = pytest.mark.nightly
 

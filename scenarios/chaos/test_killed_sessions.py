@@ -14,11 +14,11 @@ import pytest
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import wait_until
 
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.process.reaper import Reaper
+from buildarena_backend.submission.submission import Submissions
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.reaper import Reaper
-from buildarena_pipeline.submission.submission import Submissions
 
 KILLS = int(os.environ.get("CHAOS_KILLS", "2"))
 LATENCY_S = 0.02

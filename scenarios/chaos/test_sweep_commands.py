@@ -16,25 +16,21 @@ from sqlalchemy import text
 from support.clients.tenants import WITH_KEYS
 from support.servers.live_api import live_api
 
-from buildarena_pipeline.catalog.specs import Budget, SweepSpec
-from buildarena_pipeline.errors import TransientError
-from buildarena_pipeline.runtime.active_lease import ActiveLease, LeaseKeeper
-from buildarena_pipeline.runtime.job_runner import JobRunner
-from buildarena_store import (
-    JobScore,
-    JobState,
-    JournalEntry,
-    Need,
-    Outcome,
-    SweepState,
-    TransitionError,
-    Usage,
-)
-from buildarena_store.states import (
+from buildarena_backend.accounts.budgets import Need
+from buildarena_backend.catalog.specs import Budget, SweepSpec
+from buildarena_backend.errors import TransientError, TransitionError
+from buildarena_backend.journal.journal import JournalEntry, Usage
+from buildarena_backend.process.active_lease import ActiveLease, LeaseKeeper
+from buildarena_backend.process.job_runner import JobRunner
+from buildarena_backend.results.results import JobScore
+from buildarena_backend.states import (
     CONSTRUCT_QUEUE,
     JOB_TRANSITIONS,
     SWEEP_TRANSITIONS,
     AttemptResult,
+    JobState,
+    Outcome,
+    SweepState,
 )
 
 SECONDS = float(os.environ.get("CHAOS_COMMANDS_S", "6"))

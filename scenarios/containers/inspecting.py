@@ -36,7 +36,7 @@ def check_code(engine: Engine) -> dict[str, int]:
         there = json.loads(engine.run(*words, "-c", OURS_THERE))
         other = sorted(name for name, digest in there.items() if ours.get(name) != digest)
         assert not other, f"{target} has other sources than the tree: {', '.join(other)}"
-        assert {name.partition("/")[0] for name in there} >= {"buildarena_store"}, target
+        assert {name.partition("/")[0] for name in there} >= {"buildarena_backend"}, target
         found[target] = len(there)
     return found
 

@@ -24,8 +24,8 @@ from scenarios.gameday.faults import ENGINE, FAULTS, Fault
 from support.servers.prometheus import Receiver, alertmanager, prometheus, target_says
 from support.servers.stacks import finished, running_stack, wait_until
 
+from buildarena_backend.database.database import Database
 from buildarena_cli.local.stack import Stack
-from buildarena_store import Database
 
 HOUR_MIN: Final = 60.0
 DISK: Final = "4g"

@@ -17,7 +17,7 @@ from support.clients.tenants import Tenant
 from support.servers.lies import LIES, Lie
 from support.servers.runner_rig import Caller
 
-from buildarena_store import Database
+from buildarena_backend.database.database import Database
 
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 TASK = "lift-1"

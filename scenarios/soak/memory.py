@@ -10,7 +10,7 @@ from typing import Self
 
 import psutil
 
-from buildarena_environment.processes import memory_bytes
+from buildarena_benchmark.environment.trials.processes import memory_bytes
 
 MEBI = 1 << 20
 NOISES = 3.0

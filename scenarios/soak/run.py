@@ -28,9 +28,9 @@ from scenarios.soak.memory import MEBI, Watch, growth
 from support.clients.tenants import ADMIN, WITH_KEYS, Tenant, new_tenant, operator
 from support.servers.stacks import running_stack, wait_until
 
+from buildarena_backend.database.database import Database
 from buildarena_cli.local import free_port
 from buildarena_cli.local.stack import Stack
-from buildarena_store import Database
 
 BATCH = 100
 MIX = (("builtin/random", 0.6), ("builtin/idle", 0.3), ("builtin/expert", 0.1))

@@ -6,7 +6,7 @@ from starlette.testclient import TestClient
 from support.clients.tenants import WITH_KEYS
 from support.servers.live_api import api_client, changed
 
-from buildarena_pipeline.runtime.context import Context
+from buildarena_backend.process.context import Context
 
 
 @pytest.fixture

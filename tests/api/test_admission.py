@@ -29,8 +29,8 @@ from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.limits import BodyLimitMiddleware
 from buildarena_api.http.overload import MAX_IN_FLIGHT, OverloadMiddleware
 from buildarena_api.http.weights import Weights
-from buildarena_pipeline.runtime.context import open_context
-from buildarena_store.accounts.keys import secret_hash
+from buildarena_backend.accounts.keys import secret_hash
+from buildarena_backend.process.context import open_context
 
 MIB = 1024 * 1024
 STRANGERS = 200

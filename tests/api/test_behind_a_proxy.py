@@ -18,11 +18,11 @@ from support.servers.stacks import wait_until
 from typer.testing import CliRunner
 
 from buildarena_api.dashboard.files import BASE_NAME, INDEX, read_pages
+from buildarena_backend.errors import StartupError
+from buildarena_backend.process.context import Context
+from buildarena_backend.settings import OWN_PATHS, Settings, load_settings
 from buildarena_cli.local import free_port
 from buildarena_cli.main import app
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.settings import OWN_PATHS, Settings, load_settings
 
 BASE = "/tools/arena"
 PROXIES = "127.0.0.0/8"

@@ -13,16 +13,16 @@ from support.servers.live_api import api_client
 from support.statements import statements_of
 
 from buildarena_api.leaderboard.views import board_view
+from buildarena_backend.boards.kept import FORMAT, keep_summary
+from buildarena_backend.boards.trials import TrialFilter
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.database.derived_tables import board_cells, board_state
+from buildarena_backend.database.tables import board_changes, jobs, sweep_jobs, sweeps
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import (
     BoardQuery,
     summaries_made_by,
 )
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_store import TrialFilter
-from buildarena_store.boards.kept import FORMAT, keep_summary
-from buildarena_store.derived_tables import board_cells, board_state
-from buildarena_store.tables import board_changes, jobs, sweep_jobs, sweeps
 
 TRACKS = ("first/track-1", "second/track-1")
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -237,8 +237,8 @@ def test_a_process_that_starts_reads_what_another_made(context, process, monkeyp
     assert len(statements) == 1
     assert "board_changes" in statements[0]
     # Nothing is left to make: a process that read jobs would fail here.
-    monkeypatch.setattr("buildarena_store.boards.cells.tally_jobs", None)
-    monkeypatch.setattr("buildarena_store.boards.tallying.summarise_tallies", None)
+    monkeypatch.setattr("buildarena_backend.boards.cells.tally_jobs", None)
+    monkeypatch.setattr("buildarena_backend.boards.tallying.summarise_tallies", None)
     assert asked(process(), BOARD) == kept
     monkeypatch.undo()
     change(context, 77.0)

@@ -13,7 +13,7 @@ from support.contract import contract
 from support.servers.contract import SCHEMA, ask, ways
 from support.servers.live_api import changed, live_api
 
-from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_backend.catalog.specs import SweepSpec
 
 pytestmark = pytest.mark.ci
 

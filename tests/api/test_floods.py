@@ -13,11 +13,11 @@ from support.jobs import execute
 from support.servers.live_api import live_api
 from support.servers.stacks import wait_until
 
-from buildarena_pipeline.agents import sessions as agent_sessions
-from buildarena_pipeline.catalog.specs import SweepSpec
-from buildarena_pipeline.runtime.context import open_context
-from buildarena_store.jobs import verifications
-from buildarena_store.states import Verdict
+from buildarena_backend.agents import sessions as agent_sessions
+from buildarena_backend.catalog.specs import SweepSpec
+from buildarena_backend.process.context import open_context
+from buildarena_backend.results import verifications
+from buildarena_backend.states import Verdict
 
 START = {"tool": "start", "arguments": {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}}
 

@@ -19,7 +19,7 @@ from buildarena_api.http.concurrency import MAX_WAITING, ConcurrencyLimit, usual
 from buildarena_api.http.fair_cache import FairCache
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.weights import HEAVIEST, MAX_QUERY_BYTES, Weight, Weights
-from buildarena_pipeline.catalog.specs import SweepSpec
+from buildarena_backend.catalog.specs import SweepSpec
 
 LIGHT_PATHS = (
     *("/v1/jobs", "/v1/jobs?limit=100&task=lift-1", "/v1/jobs/job_1", "/v1/sweeps", "/v1/caller"),

@@ -8,7 +8,7 @@ from collections import Counter
 import pytest
 from support.jobs import attach, claim, finish, journal_entry
 
-from buildarena_store import Usage
+from buildarena_backend.journal.journal import Usage
 
 SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"]
 

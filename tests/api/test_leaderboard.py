@@ -14,11 +14,12 @@ from support.servers.live_api import api_client, changed
 
 from buildarena_api.leaderboard.filters import _ranked_over
 from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_backend.boards.trials import TrialFilter
+from buildarena_backend.database.tables import jobs
+from buildarena_backend.journal.journal import Usage
 from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import cost_bins, failure_rows
-from buildarena_store import TrialFilter, Usage
-from buildarena_store.tables import jobs
 
 MODELS = ["builtin/expert", "builtin/random"]
 YAML = {"Content-Type": "application/yaml"}

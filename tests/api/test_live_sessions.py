@@ -12,9 +12,11 @@ from support.jobs import claim, execute, finish, journal_entry
 from support.servers.live_api import live_api
 from support.stages import work
 
-from buildarena_pipeline.turns import Transcripts
-from buildarena_store import Lease, TurnResult, Usage
-from buildarena_store.jobs import transcript_search
+from buildarena_backend.agents.turn_views import Transcripts
+from buildarena_backend.journal import transcript_search
+from buildarena_backend.journal.journal import Usage
+from buildarena_backend.journal.turns import TurnResult
+from buildarena_backend.leases.leases import Lease
 from buildarena_worker.session.turn_keeper import TurnKeeper
 
 START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}

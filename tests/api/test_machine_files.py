@@ -20,9 +20,9 @@ from support.warm_work import make
 from buildarena_api import machine_uploads
 from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_api.machine_uploads import MAX_BYTES, shared_checker
+from buildarena_backend.jobs import files
 from buildarena_geometry import Machine
 from buildarena_simulation.constants import MAX_PARTS
-from buildarena_store.jobs import files
 
 TRIAL = {"task": "support-1", "simulator": "mujoco"}
 SPARE = 200 << 20

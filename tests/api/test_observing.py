@@ -24,9 +24,9 @@ from support.servers.stacks import wait_until
 from buildarena_api.http import log as request_log
 from buildarena_api.http.probes import ARTIFACTS_FRESH_S, PATIENCE_S, PartFailedError, Probe
 from buildarena_api.routes.health import FEW_LOST
-from buildarena_pipeline import __version__
-from buildarena_pipeline.runtime.logs import set_up_logs
-from buildarena_store import Usage
+from buildarena_backend import __version__
+from buildarena_backend.journal.journal import Usage
+from buildarena_backend.telemetry.logs import set_up_logs
 
 METRICS = "a-secret-for-metrics-alone-of-some-length"
 PARTS = {"database": "database_up", "broker": "broker_up", "artifacts": "artifact_store_up"}

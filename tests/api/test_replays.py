@@ -14,8 +14,8 @@ from support.stages import work
 from buildarena_api.http.negotiation import prefers
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import pictures, trials
+from buildarena_backend.replays import chapters
 from buildarena_geometry import load_catalogue
-from buildarena_pipeline.replays import chapters
 from buildarena_simulation import read_trajectory
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 

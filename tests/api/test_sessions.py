@@ -8,10 +8,10 @@ from dataclasses import replace
 import pytest
 from support.clients.tenants import new_tenant, operator
 
+from buildarena_backend.agents.briefing import briefing
+from buildarena_backend.agents.sessions import ExternalSessions
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine, modules_named
-from buildarena_pipeline.agents.briefing import briefing
-from buildarena_pipeline.agents.sessions import ExternalSessions
 
 OPEN = {"task": "support-1", "agent": "me", "seed": 1, "simulator": "mujoco"}
 START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}

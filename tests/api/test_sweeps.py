@@ -10,7 +10,7 @@ import pytest
 from support.jobs import claim, execute, finish
 from support.servers.live_api import live_api
 
-from buildarena_store.states import AttemptResult, JobState
+from buildarena_backend.states import AttemptResult, JobState
 
 JOB = {"task": "support-1", "model": "builtin/idle", "seed": 3}
 TWO = {

@@ -10,13 +10,13 @@ from support.contract import contract
 from support.jobs import report_worker
 
 from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_backend import __version__
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.states import simulate_queue
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 from buildarena_geometry import FEEDBACK_VERSION
-from buildarena_pipeline import __version__
-from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_simulation import SIMULATION_VERSION
-from buildarena_store.states import simulate_queue
 
 YAML = {"Content-Type": "application/yaml"}
 OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")

@@ -9,7 +9,7 @@ from support.clients.tenants import Tenant, everything, new_tenant, operator
 from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_pipeline.runtime.context import Context
+from buildarena_backend.process.context import Context
 
 JOB = {"task": "support-1", "model": "builtin/idle"}
 SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}

@@ -12,8 +12,8 @@ from support.clients.tenants import operator
 from support.contract import contract
 from support.servers.live_api import api_client, live_api
 
-from buildarena_pipeline.runtime.context import open_context
-from buildarena_pipeline.runtime.settings import Settings
+from buildarena_backend.process.context import open_context
+from buildarena_backend.settings import Settings
 
 CONTRACT = contract()
 METHODS = {"GET", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "TRACE", "PROPFIND"}

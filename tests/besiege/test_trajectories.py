@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from game_rig import experts_machine
 from scipy.spatial.transform import Rotation
+from support.game.game_rig import experts_machine
 from support.machines.building import attach
 from tests.besiege.playing import RUN, log_of, played, press, vehicle
 

@@ -3,7 +3,7 @@ from collections.abc import Iterator
 import pytest
 from support.servers.live_api import live_api
 
-from buildarena_pipeline.runtime.context import Context
+from buildarena_backend.process.context import Context
 
 
 @pytest.fixture

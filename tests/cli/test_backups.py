@@ -12,9 +12,9 @@ from support.clients.commands import Done, run
 from support.servers.databases import MADE_OF_OTHERS
 from support.stages import work
 
-from buildarena_pipeline.catalog.specs import SweepSpec
-from buildarena_pipeline.runtime.context import Context, open_context
-from buildarena_store.tables import metadata
+from buildarena_backend.catalog.specs import SweepSpec
+from buildarena_backend.database.tables import metadata
+from buildarena_backend.process.context import Context, open_context
 
 SWEEP = {"tasks": ["support-1"], "models": ["builtin/expert", "builtin/idle"], "seeds": [0]}
 

@@ -11,12 +11,12 @@ from support.clients.commands import printed, run_cli
 from support.clients.terminals import on_terminal, piped
 from support.stages import work
 
+from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.catalog.specs import SweepSpec
+from buildarena_backend.database.tables import jobs, rollouts
+from buildarena_backend.states import Verdict
 from buildarena_cli.commands.job_lists import COLUMNS
 from buildarena_cli.terminal.output import columns, print_table
-from buildarena_pipeline.agents.sessions import ExternalSessions
-from buildarena_pipeline.catalog.specs import SweepSpec
-from buildarena_store.states import Verdict
-from buildarena_store.tables import jobs, rollouts
 
 SCORES = {
     "openai/gpt-5": (1500.0, ["never_fell"]),

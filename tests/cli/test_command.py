@@ -16,13 +16,12 @@ from support.machines.experts import experts_machine
 from typer.core import TyperArgument
 from typer.main import get_command
 
+from buildarena_backend.database.database import SCHEMA, Database
 from buildarena_cli import main
 from buildarena_cli.command_table import COMMANDS
-from buildarena_store import Database
-from buildarena_store.database import SCHEMA
 
 HEAVY = {
-    *("buildarena_pipeline", "buildarena_store", "buildarena_simulation", "buildarena_geometry"),
+    *("buildarena_backend", "buildarena_backend", "buildarena_simulation", "buildarena_geometry"),
     *("buildarena_benchmark", "buildarena_api", "httpx", "mcp", "matplotlib", "numpy", "rich"),
     *("pydantic", "pydantic_settings", "sqlalchemy", "structlog", "redis", "yaml", "jinja2"),
 }

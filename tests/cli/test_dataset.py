@@ -17,6 +17,7 @@ from support.servers.live_api import changed, live_api
 from support.stages import work
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
 from buildarena_cli.dataset import reading, writing
 from buildarena_cli.dataset.card import card
 from buildarena_cli.dataset.columns import ACTIONS, JOBS
@@ -25,7 +26,6 @@ from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import parts_hash
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.errors import CommandError
-from buildarena_environment import ASSEMBLY, MAIN, Workbench
 from buildarena_geometry import Machine
 from buildarena_geometry import replay as done_again
 from buildarena_geometry.machine_files import machine_bytes

@@ -19,12 +19,12 @@ from mcp.types import CallToolRequestParams
 from support.clients.commands import printed, run_cli
 from support.jobs import attach, claim, finish
 
+from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_cli.client import Client, at
 from buildarena_cli.commands.job_files import file_name
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id, whole_id
 from buildarena_cli.mcp_server import _act, _manage, make_server
-from buildarena_pipeline.catalog.specs import SweepSpec
 
 JSON = "application/json"
 JOB = "job_0a1b2c3d4e5f60718293"

@@ -14,9 +14,9 @@ from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import changed, live_api
 from typer.testing import CliRunner, Result
 
+from buildarena_backend.database.database import Database
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
-from buildarena_store import Database
 
 Call = Callable[..., Result]
 

@@ -10,10 +10,10 @@ from support.machines.experts import experts_machine
 from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_backend.catalog.specs import JobSpec
 from buildarena_besiege import MachineNotPlayableError, read_any_machine, with_own_keys
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.catalog.specs import JobSpec
 
 SUSPENSION_BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 

@@ -9,9 +9,9 @@ from jsonschema import Draft202012Validator
 from support.clients.commands import printed, run, run_cli
 from support.jobs import execute
 
+from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_benchmark import parse_custom_task
 from buildarena_cli.sweep_files import sweep_schema
-from buildarena_pipeline.catalog.specs import SweepSpec
 
 ROOT = Path(__file__).parents[2]
 NOWHERE = ("--url", "http://127.0.0.1:1")

@@ -14,13 +14,13 @@ from support.servers.live_api import live_api
 from support.servers.stacks import meanwhile
 from support.stages import work
 
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import SweepSpec
+from buildarena_backend.process.context import Context, open_context
+from buildarena_backend.settings import Settings
+from buildarena_backend.submission.submission import Submissions
 from buildarena_client.transports.asynchronous import AsyncTransport
 from buildarena_client.transports.blocking import BlockingTransport
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import SweepSpec
-from buildarena_pipeline.runtime.context import Context, open_context
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.submission.submission import Submissions
 
 KINDS = ("sync", "async")
 SPEC = {

@@ -21,6 +21,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 from support.servers.wrong_server import answer, wrong_server
 
+from buildarena_backend.secret_files import MAX_BYTES, SecretFileError, read_secret
 from buildarena_client import (
     BadArgumentError,
     Client,
@@ -38,7 +39,6 @@ from buildarena_client import (
 from buildarena_client.config import stored_key
 from buildarena_client.event_streams import MAX_EVENT_BYTES
 from buildarena_client.retries import BREAK_PAUSE_S, LONGEST_PAUSE_S
-from buildarena_pipeline.secret_files import MAX_BYTES, SecretFileError, read_secret
 
 SECRET = "ba_secret-that-nobody-sees"
 JOB = "job_0a1b2c3d4e5f60718293"

@@ -18,14 +18,14 @@ from support.documents.locks import image_lock_names
 from support.documents.manifests import KUBERNETES, OVERLAYS
 from support.servers.stacks import wait_until
 
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.database.rights import ROLES
+from buildarena_backend.database.roles import OWNER
+from buildarena_backend.settings import Settings
+from buildarena_backend.trials.installed_simulators import installed_engines
+from buildarena_benchmark.environment.trials.processes import ALLOCATOR
 from buildarena_cli.command_table import ADMIN
-from buildarena_environment.processes import ALLOCATOR
 from buildarena_geometry import kernels
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.runtime.simulators.installed import installed_engines
-from buildarena_store.rights import ROLES
-from buildarena_store.roles import OWNER
 
 ROOT = Path(__file__).parents[2]
 COMPOSE_TEXT = (ROOT / "docker-compose.yml").read_text()

@@ -23,13 +23,13 @@ from support.documents.manifests import (
 )
 from support.documents.promtool import needs_promtool, promtool
 
+from buildarena_backend import __version__
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.database.roles import OWNER
+from buildarena_backend.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
+from buildarena_backend.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_backend.trials.installed_simulators import installed_engines
 from buildarena_cli.command_table import ADMIN
-from buildarena_pipeline import __version__
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
-from buildarena_pipeline.runtime.simulators.installed import installed_engines
-from buildarena_store.roles import OWNER
-from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
 
 SCHEMAS = json.loads((Path(__file__).parents[1] / "data/kubernetes-schemas.json").read_text())
 """Schemas of kinds that are not Kubernetes' own."""

@@ -12,7 +12,7 @@ import typer
 from tree_sitter import Language, Node, Parser
 
 from buildarena_cli.main import app
-from buildarena_simworker_besiege.settings import BesiegeSettings
+from buildarena_simworker.besiege.settings import BesiegeSettings
 
 WINDOWS = Path(__file__).resolve().parents[2] / "deploy" / "windows"
 SCRIPTS = sorted(WINDOWS.glob("*.ps1"))

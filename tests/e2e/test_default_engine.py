@@ -7,10 +7,10 @@ import pytest
 import buildarena as ba
 from buildarena_api.routes.machines import TrialQuery
 from buildarena_api.routes.sessions import OpenSession
+from buildarena_backend.catalog.specs import JobSpec, SweepSpec
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import Environment, Evaluator, TrialPool, try_machine
+from buildarena_benchmark.environment import Environment, Evaluator, TrialPool, try_machine
 from buildarena_geometry import Machine
-from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
 from buildarena_simulation import DEFAULT_ENGINE, UnknownEngineError, rollout, simulate
 
 

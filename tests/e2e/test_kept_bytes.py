@@ -9,10 +9,10 @@ from support.stages import work
 
 from buildarena_api.app import create_app
 from buildarena_api.http import probes
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime import trial_repository
-from buildarena_pipeline.runtime.context import Context
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.process.context import Context
+from buildarena_backend.trials import trial_repository
 from buildarena_simulation import Trajectory, schema_of, write_trajectory
 from buildarena_worker.wiring import verifier
 

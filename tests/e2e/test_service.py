@@ -20,7 +20,7 @@ from support.servers.live_api import live_api
 from support.servers.stacks import finished, results, running_stack, wait_until
 from support.stages import work
 
-from buildarena_pipeline.runtime.context import open_context
+from buildarena_backend.process.context import open_context
 
 ROOT = Path(__file__).parents[2]
 NEW_ADMIN = "another-operator-secret-as-long"

@@ -18,7 +18,7 @@ from support.servers.stacks import finished, running_stack
 from support.spans import Spans, recorded
 from support.stages import work
 
-from buildarena_pipeline.runtime.tracing import current_traceparent, span
+from buildarena_backend.telemetry.tracing import current_traceparent, span
 
 JOB = {"task": "support-1", "model": "builtin/expert", "simulator": "mujoco"}
 TRACE, CALLER = "4bf92f3577b34da6a3ce929d0e0e4736", "00f067aa0ba902b7"

@@ -13,7 +13,7 @@ from support.clients.tenants import WITH_KEYS, new_tenant
 from support.servers.live_api import live_api
 from support.stages import work
 
-from buildarena_pipeline.runtime.context import open_context
+from buildarena_backend.process.context import open_context
 from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[2]

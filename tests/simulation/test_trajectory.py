@@ -13,7 +13,7 @@ from support.machines.references import load_machine
 from support.marks import nightly
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment.other_kernels import simulate_with
+from buildarena_benchmark.environment.other_kernels import simulate_with
 from buildarena_geometry import kernels
 from buildarena_simulation import (
     SIMULATION_VERSION,

@@ -5,8 +5,11 @@ from typing import Any
 from sqlalchemy import text
 from sqlalchemy.sql import Executable
 
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store import BudgetLimits, JobScore, JournalEntry, Lease, Usage
+from buildarena_backend.accounts.budgets import BudgetLimits
+from buildarena_backend.journal.journal import JournalEntry, Usage
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.process.context import Context
+from buildarena_backend.results.results import JobScore
 
 
 def execute(context: Context, statement: str | Executable, values: Any = None) -> None:

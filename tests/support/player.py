@@ -6,13 +6,14 @@ from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
 
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.prompt_packs import PromptPack, PromptPacks
+from buildarena_backend.catalog.specs import Decoding
+from buildarena_backend.journal.journal import JournalEntry
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.process.active_lease import ActiveLease
+from buildarena_backend.submission.submission import model_config
 from buildarena_benchmark import Task, builtin_tasks
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.catalog.specs import Decoding
-from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_pipeline.submission.submission import model_config
-from buildarena_store import JournalEntry, RolloutRecord
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate

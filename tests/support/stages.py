@@ -8,14 +8,14 @@ from typing import Any
 
 from sqlalchemy import text
 
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.active_lease import LeaseKeeper
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.job_runner import JobRunner
-from buildarena_pipeline.runtime.simulators.installed import installed_simulators
-from buildarena_pipeline.runtime.simulators.simulator import Simulator, TrialRequest, TrialResult
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.process.active_lease import LeaseKeeper
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.job_runner import JobRunner
+from buildarena_backend.states import simulate_queue
+from buildarena_backend.trials.installed_simulators import installed_simulators
+from buildarena_backend.trials.simulator import Simulator, TrialRequest, TrialResult
 from buildarena_simworker.simulate import simulate_handler
-from buildarena_store.states import simulate_queue
 from buildarena_worker.wiring import construct_handler
 
 _TRIALS: dict[str, TrialResult] = {}

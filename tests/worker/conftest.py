@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 
 import pytest
 
-from buildarena_store import RolloutRecord
+from buildarena_backend.journal.rollouts import RolloutRecord
 
 
 @pytest.fixture

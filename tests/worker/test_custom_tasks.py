@@ -15,14 +15,14 @@ from support.providers.scripted import Scripted, call
 from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.prompt_packs import PromptPacks
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.submission.submission import Submissions
+from buildarena_backend.trials.installed_simulators import announced, installed_simulators
 from buildarena_benchmark import builtin_tasks, parse_custom_task
-from buildarena_pipeline.agents.sessions import ExternalSessions
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.simulators.installed import announced, installed_simulators
-from buildarena_pipeline.submission.submission import Submissions
-from buildarena_store import Job
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.session.host import ReplayHost
 from buildarena_worker.session.messages import Completion

@@ -22,9 +22,9 @@ from support.player import Played, Player
 from support.providers.engineer import Engineer
 from support.providers.flying_engineer import FlyingEngineer
 
+from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_benchmark import Task, builtin_tasks, score
 from buildarena_simulation import ENGINES, simulate
-from buildarena_store import JournalEntry, Usage
 from buildarena_worker.session.results import Failed
 
 TASKS = sorted(builtin_tasks())

@@ -8,12 +8,12 @@ import pytest
 from support.jobs import execute
 from support.stages import tampered, work
 
-from buildarena_pipeline.agents import submission
-from buildarena_pipeline.agents.sessions import ExternalSessions
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import Budget, JobSpec, SweepSpec
-from buildarena_pipeline.submission.submission import Submissions
-from buildarena_store import Job
+from buildarena_backend.agents import submission
+from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import Budget, JobSpec, SweepSpec
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.submission.submission import Submissions
 from buildarena_worker.wiring import verifier
 
 

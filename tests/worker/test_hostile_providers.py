@@ -19,8 +19,8 @@ from support.servers.construct_threads import crew, worker_process
 from support.servers.stacks import wait_until
 from support.stages import work
 
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_store import BudgetLimits
+from buildarena_backend.accounts.budgets import BudgetLimits
+from buildarena_backend.catalog.specs import JobSpec
 from buildarena_worker import builtin
 from buildarena_worker.builtin import expert
 from buildarena_worker.session.messages import Completion, Request, ToolCall

@@ -10,16 +10,16 @@ import pytest
 from support.machines.expert_calls import measured_for, played
 from support.stages import work
 
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.context import Context
+from buildarena_backend.submission.submission import Submissions
+from buildarena_backend.trials.scoring import best_rollout, task_of
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.environment import Environment
+from buildarena_benchmark.environment.briefing import briefing
 from buildarena_benchmark.families.unknowns import drawn_numbers
-from buildarena_environment import Environment
-from buildarena_environment.briefing import briefing
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.scoring import best_rollout, task_of
-from buildarena_pipeline.submission.submission import Submissions
 from buildarena_simulation import read_trajectory
-from buildarena_store import Job
 from buildarena_worker.builtin import expert
 from buildarena_worker.builtin.designs import risers
 from buildarena_worker.builtin.designs.calls import calls_with

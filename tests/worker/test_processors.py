@@ -7,13 +7,13 @@ import json
 import pytest
 from support.stages import work
 
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.database import tables
+from buildarena_backend.states import Verdict
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment.other_kernels import simulate_with
+from buildarena_benchmark.environment.other_kernels import simulate_with
 from buildarena_geometry import Machine, kernels
-from buildarena_pipeline.catalog.specs import JobSpec
 from buildarena_simulation import processor, write_trajectory
-from buildarena_store import tables
-from buildarena_store.states import Verdict
 from buildarena_worker import processors
 from buildarena_worker.wiring import verifier
 

@@ -10,12 +10,12 @@ from support.player import Player
 from support.servers.live_api import changed
 from support.stages import work
 
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import JobSpec, SweepSpec
+from buildarena_backend.errors import SubmissionError
+from buildarena_backend.submission.submission import Submissions
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_geometry import Machine
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import JobSpec, SweepSpec
-from buildarena_pipeline.errors import SubmissionError
-from buildarena_pipeline.submission.submission import Submissions
 from buildarena_simulation import simulate
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import Completion, Request

@@ -9,7 +9,8 @@ import random
 import pytest
 from support.providers.scripted import Recording, Scripted, call
 
-from buildarena_store import StaleLeaseError, Usage
+from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.journal.journal import Usage
 from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import (
     Diverged,

@@ -10,12 +10,12 @@ import pytest
 from support.machines.repairs import faulty
 from support.providers.scripted import Recording, Scripted, call
 
+from buildarena_backend.catalog.prompt_packs import PromptPack, PromptPacks
+from buildarena_backend.errors import PermanentError, StartupError
+from buildarena_backend.replays.from_turns import replay_of_turns
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.families.given import edits_between
 from buildarena_geometry import LOOKUP, Machine, module_set, tool_definitions
-from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.errors import PermanentError, StartupError
-from buildarena_pipeline.replays.from_turns import replay_of_turns
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.builtin.reading import read_situation

@@ -15,8 +15,8 @@ from support.providers.stand_in import ProviderStandIn
 from support.servers.construct_threads import Crew, crew, worker_process
 from support.servers.stacks import wait_until
 
-from buildarena_pipeline.catalog.specs import SweepSpec
-from buildarena_store import BudgetLimits
+from buildarena_backend.accounts.budgets import BudgetLimits
+from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.verification_report import Report
 from buildarena_worker.verification_runner import AT_ONCE, VerificationRunner
@@ -258,7 +258,7 @@ def test_it_can_be_woken_again(context, asked) -> None:
 
 
 def test_what_is_open_is_counted_by_owner(context, submissions, monkeypatch) -> None:
-    from buildarena_store.jobs import verifications
+    from buildarena_backend.results import verifications
 
     monkeypatch.setattr(verifications, "MAX_OPEN", 4)
     sweep = submissions.submit_sweep(

@@ -12,17 +12,19 @@ from support.providers.scripted import Recording
 from support.servers.live_api import changed
 from support.stages import tampered, work
 
+from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.boards.trials import TrialFilter
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
+from buildarena_backend.errors import SubmissionError
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.process.context import Context
+from buildarena_backend.settings import Settings
+from buildarena_backend.submission.submission import Submissions
 from buildarena_benchmark.leaderboard import summarise
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.sessions import ExternalSessions
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.catalog.specs import ClosedLoop, JobSpec, SweepSpec
-from buildarena_pipeline.errors import SubmissionError
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.submission.submission import Submissions
 from buildarena_simulation import constants, read_trajectory, simulate, write_trajectory
-from buildarena_store import Job, RolloutRecord, TrialFilter
 from buildarena_worker.wiring import verification_runner
 
 WORLDS = 3

@@ -4,7 +4,7 @@ import type { Browser, Frame, Page } from "playwright-core";
 import { afterAll, beforeAll, expect, test } from "vitest";
 import { launched } from "./browser";
 
-// Pages that notebooks made: tests/notebooks writes them into this folder.
+// Pages that notebooks made: tests/cli/notebooks writes them into this folder.
 const FOLDER = process.env.BUILDARENA_VIEWER_PAGES ?? "";
 
 interface Drawn {

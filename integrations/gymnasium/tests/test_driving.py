@@ -13,7 +13,7 @@ from gymnasium.vector import AsyncVectorEnv
 
 import buildarena_gymnasium
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_environment import UnknownChoiceError
+from buildarena_benchmark.environment import UnknownChoiceError
 from buildarena_gymnasium import DriveEnv
 from buildarena_gymnasium.machines import fixed_machine, fixed_machines
 from buildarena_simulation import Drive, SimulationError, simulate, write_trajectory

@@ -12,7 +12,7 @@ from gymnasium.utils.env_checker import check_env
 
 import buildarena_gymnasium
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import SnapshotError, UnknownChoiceError
+from buildarena_benchmark.environment import SnapshotError, UnknownChoiceError
 from buildarena_gymnasium.spaces import MAX_OBSERVATION, UNKNOWN, observed
 
 SUBMIT = '{"tool": "submit"}'

@@ -11,8 +11,8 @@ from inspect_ai.log import EvalLog, EvalSample, read_eval_log
 from inspect_ai.model import ChatMessage, Model, ModelOutput, ModelUsage, get_model
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import Trial, try_machine
-from buildarena_environment.workbench import Workbench
+from buildarena_benchmark.environment import Trial, try_machine
+from buildarena_benchmark.environment.workbench import Workbench
 from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[3]

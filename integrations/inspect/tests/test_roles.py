@@ -10,7 +10,7 @@ import pytest
 from inspect_ai.model import ChatMessage, ModelOutput
 from scripted_models import EXPERTS, only
 
-from buildarena_environment import Workbench
+from buildarena_benchmark.environment import Workbench
 from buildarena_geometry import Machine
 from buildarena_inspect.scorers import machine_hash
 
@@ -99,7 +99,7 @@ import sys
 sys.modules["buildarena_worker"] = None
 from buildarena_inspect import TASKS
 TASKS["support_1"]()
-assert not [name for name in sys.modules if name.startswith(("buildarena_pipeline", "sqlalchemy"))]
+assert not [name for name in sys.modules if name.startswith(("buildarena_backend", "sqlalchemy"))]
 try:
     TASKS["support_1"](solver="roles")
 except ValueError as error:

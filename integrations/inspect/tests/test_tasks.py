@@ -27,7 +27,7 @@ from scripted_models import (
 )
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import TrialPool, UnknownChoiceError, tools_of_models
+from buildarena_benchmark.environment import TrialPool, UnknownChoiceError, tools_of_models
 from buildarena_geometry import Machine
 from buildarena_inspect.errors import ChoiceError
 from buildarena_inspect.log_artifacts import MACHINE, TRAJECTORY

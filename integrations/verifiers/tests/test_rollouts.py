@@ -17,7 +17,7 @@ from conftest import SUBMIT, without
 from stand_in import serving
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import Environment, NothingToSubmitError, call, try_machine
+from buildarena_benchmark.environment import Environment, NothingToSubmitError, call, try_machine
 from buildarena_geometry import Machine
 from buildarena_verifiers import load_environment
 from buildarena_verifiers.harness import MAX_REMINDERS

@@ -94,7 +94,7 @@ def test_where_no_program_can_be_run_each_place_is_named() -> None:
 
 def _refusal(case: Case) -> str:
     program = SERVERS + (
-        "from buildarena_pipeline.errors import StartupError\n"
+        "from buildarena_backend.errors import StartupError\n"
         "try:\n    once('SELECT 1')\n"
         "except StartupError as error:\n    print(error)"
     )

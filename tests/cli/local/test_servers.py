@@ -17,11 +17,11 @@ import pytest
 from redis import Redis
 from support.servers.stacks import wait_until
 
+from buildarena_backend.errors import StartupError
 from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, ManagedProcess, Supervisor
 from buildarena_cli.local.postgres import installed_postgres
 from buildarena_cli.local.program_copy import PREFIX, ProgramCopy
 from buildarena_cli.local.supervisor import LOOK_EVERY_S
-from buildarena_pipeline.errors import StartupError
 
 
 def python(*words: str, **more: object) -> subprocess.Popen[bytes]:

@@ -8,8 +8,8 @@ from pydantic import SecretStr
 from sqlalchemy import text
 from support.servers.databases import MADE_OF_OTHERS
 
-from buildarena_store import Database
-from buildarena_store.tables import metadata
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import metadata
 
 ADMIN = "operator-secret-that-is-long-enough"
 WITH_KEYS = {

@@ -14,8 +14,9 @@ from typing import Any
 from support.player import Played, Player
 from support.providers.scripted import Scripted
 
+from buildarena_backend.journal.journal import JournalEntry
+from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_store import JournalEntry, RolloutRecord
 from buildarena_worker.session.messages import Completion, ToolCall
 from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
 from buildarena_worker.workflow.rounds import Loop

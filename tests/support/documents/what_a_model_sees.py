@@ -14,10 +14,10 @@ from itertools import groupby
 from support.player import Player
 from support.providers.scripted import Recording
 
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.journal.transcript import Turn
+from buildarena_backend.settings import Settings
 from buildarena_benchmark import CANARY
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.transcript import Turn
-from buildarena_store import RolloutRecord
 from buildarena_worker.session.messages import Message
 from buildarena_worker.workflow.rounds import Loop
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_environment import Environment, references
-from buildarena_environment.trials import score_text
+from buildarena_benchmark.environment import Environment, references
+from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import simulate
 from buildarena_worker.builtin.designs import DESIGNS

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from buildarena_store import Usage
+from buildarena_backend.journal.journal import Usage
 from buildarena_worker.builtin.designs.drafting import (
     DOWN,
     EAST,

@@ -11,7 +11,7 @@ from string import Template
 
 from support.providers.engineer import Told
 
-from buildarena_store import Usage
+from buildarena_backend.journal.journal import Usage
 from buildarena_worker.builtin.designs.design import Design, PartDesign
 from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
 from buildarena_worker.builtin.expert import answered

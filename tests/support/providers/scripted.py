@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from buildarena_store import Usage
+from buildarena_backend.journal.journal import Usage
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import Completion, Request, ToolCall
 

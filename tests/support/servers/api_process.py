@@ -12,8 +12,8 @@ from pathlib import Path
 import httpx
 from support.servers.stacks import wait_until
 
+from buildarena_backend.database.database import Database
 from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
-from buildarena_store import Database
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,15 +12,15 @@ from pathlib import Path
 from support.providers.stand_in import ProviderStandIn
 from support.servers.stacks import wait_until
 
-from buildarena_pipeline.catalog.models import ModelRegistry, load_registry
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.active_lease import LeaseKeeper
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.job_runner import JobRunner
-from buildarena_pipeline.runtime.owner_slots import OwnerSlots
-from buildarena_pipeline.submission.submission import Submissions
-from buildarena_store import Job
-from buildarena_store.states import CONSTRUCT_QUEUE
+from buildarena_backend.catalog.models import ModelRegistry, load_registry
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.active_lease import LeaseKeeper
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.job_runner import JobRunner
+from buildarena_backend.process.owner_slots import OwnerSlots
+from buildarena_backend.states import CONSTRUCT_QUEUE
+from buildarena_backend.submission.submission import Submissions
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.wiring import construct_handler
 

@@ -4,9 +4,9 @@ from typing import Final
 
 from sqlalchemy import text
 
-from buildarena_store import Database
-from buildarena_store.derived_tables import board_cells
-from buildarena_store.tables import metadata, schema_compatibility
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.derived_tables import board_cells
+from buildarena_backend.database.tables import metadata, schema_compatibility
 
 KEPT: Final = {schema_compatibility}
 MADE_OF_OTHERS: Final = {"board_cells", "board_state", "figures", "figure_changes"}

@@ -20,9 +20,9 @@ from fastapi.routing import _IncludedRouter
 from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.process.context import Context, open_context
 from buildarena_cli.local import free_port
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import Context, open_context
 
 LOOPBACK = "http://127.0.0.1"
 """What a client in the test's process calls the API: a service without keys has no other name."""

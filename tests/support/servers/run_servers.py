@@ -58,8 +58,8 @@ class RunServers:
                 connection.send(urls)
 
     def _start(self) -> tuple[str, str]:
+        from buildarena_backend.database.database import Database
         from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
-        from buildarena_store import Database
 
         postgres = EmbeddedPostgres(self._folder / "pg", self._folder / "pg.log", durable=False)
         self._run(postgres)

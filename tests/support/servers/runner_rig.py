@@ -12,13 +12,14 @@ from sqlalchemy import text
 from support.clients.tenants import ADMIN
 from support.machines.building import built
 
+from buildarena_backend.agents.machine_trials import request_trial
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.context import Context
+from buildarena_backend.submission.submission import Submissions
+from buildarena_backend.trials.simulator import Simulator
 from buildarena_benchmark.tasks.loading import parse_custom_task
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.machine_trials import request_trial
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.simulator import Simulator
-from buildarena_pipeline.submission.submission import Submissions
 from buildarena_simulation import (
     SIMULATION_VERSION,
     Trajectory,
@@ -29,7 +30,6 @@ from buildarena_simulation import (
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote.api import RunnerApi, tls_context
 from buildarena_simworker.remote.slots import Heartbeats, Slot
-from buildarena_store import Job
 
 MUJOCO = {"mujoco": SIMULATION_VERSION}
 VERSIONS = {

@@ -11,9 +11,9 @@ from typing import Any
 import httpx
 import psutil
 
+from buildarena_backend.settings import Settings
 from buildarena_cli.local import free_port
 from buildarena_cli.local.stack import Stack
-from buildarena_pipeline.runtime.settings import Settings
 
 
 def wait_until(condition: Callable[[], Any], within_s: float, what: str) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from support.providers.stand_in import ProviderStandIn
 
-from buildarena_pipeline.catalog.models import ModelEntry, Price, ProviderEntry
+from buildarena_backend.catalog.models import ModelEntry, Price, ProviderEntry
 from buildarena_worker.providers.provider import ProviderClient
 from buildarena_worker.providers.retries import RetryPolicy
 

@@ -12,8 +12,8 @@ import pytest
 from support.providers.scripted import Scripted
 from support.providers.stand_in import ProviderStandIn
 
-from buildarena_pipeline.errors import PermanentError, TransientError
-from buildarena_store import clean
+from buildarena_backend.database.text import clean
+from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_worker.providers import bounds
 from buildarena_worker.providers.failures import ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader

@@ -15,10 +15,10 @@ from typing import Any
 import pytest
 from support.providers.stand_in import ProviderStandIn
 
+from buildarena_backend.catalog.models import ModelEntry, ProviderEntry, load_registry
+from buildarena_backend.errors import PermanentError, TransientError
+from buildarena_backend.journal.journal import Usage
 from buildarena_geometry import ToolDefinition
-from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry, load_registry
-from buildarena_pipeline.errors import PermanentError, TransientError
-from buildarena_store import Usage
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.providers.keys import key_report
 from buildarena_worker.providers.provider import ProviderClient

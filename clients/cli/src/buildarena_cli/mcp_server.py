@@ -17,11 +17,11 @@ from mcp import types
 from mcp.server import Server, ServerRequestContext
 from mcp.server.stdio import stdio_server
 
+from buildarena_benchmark.environment import MAIN
+from buildarena_benchmark.environment.tools import MACHINE, building_tools
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
-from buildarena_environment import MAIN
-from buildarena_environment.tools import MACHINE, building_tools
 from buildarena_geometry.modules.names import CaselessNames
 
 INSTRUCTIONS = """Build a machine for a BuildArena task. Call list_tasks, then open_session for one
@@ -71,7 +71,7 @@ def make_server(client: Client) -> Server[Any]:
 
     return Server(
         "buildarena",
-        version=version("buildarena-cli"),
+        version=version("buildarena"),
         instructions=INSTRUCTIONS,
         on_list_tools=list_tools,
         on_call_tool=call_tool,

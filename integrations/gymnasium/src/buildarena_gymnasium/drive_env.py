@@ -12,9 +12,14 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from numpy.typing import NDArray
 
 from buildarena_benchmark import Task, broken_constraint, score
-from buildarena_environment import Progress, Trial, UnknownChoiceError
-from buildarena_environment.choices import checked_simulator, chosen_task, reference_of
-from buildarena_environment.rewards import DEFAULT_WEIGHTS, TERMINAL, checked_weights, weighed
+from buildarena_benchmark.environment import Progress, Trial, UnknownChoiceError
+from buildarena_benchmark.environment.choices import checked_simulator, chosen_task, reference_of
+from buildarena_benchmark.environment.rewards import (
+    DEFAULT_WEIGHTS,
+    TERMINAL,
+    checked_weights,
+    weighed,
+)
 from buildarena_geometry import Machine
 from buildarena_gymnasium.machines import fixed_machine, fixed_machines
 from buildarena_gymnasium.pictures import Picture, checked_mode, picture_at

@@ -9,7 +9,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from buildarena_environment import UnknownChoiceError
+from buildarena_benchmark.environment import UnknownChoiceError
 from buildarena_geometry import Machine
 
 

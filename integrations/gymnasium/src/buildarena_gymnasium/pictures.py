@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from buildarena_environment import Environment, NothingToSubmitError
+from buildarena_benchmark.environment import Environment, NothingToSubmitError
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Scenario, Trajectory
 from buildarena_simulation.render.still import SIZE, still_png

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from buildarena_environment import Trial
+from buildarena_benchmark.environment import Trial
 
 
 def score_told(trial: Trial) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import read_from_shared_memory, write_to_shared_memory
 
-from buildarena_environment import LONGEST_CALL
+from buildarena_benchmark.environment import LONGEST_CALL
 
 MAX_OBSERVATION: Final = 32_768
 """Characters of an answer; a briefing has about 6,500."""

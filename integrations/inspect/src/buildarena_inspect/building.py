@@ -9,7 +9,7 @@ from typing import Any, Final, Self
 import anyio
 from inspect_ai.solver import TaskState
 
-from buildarena_environment import (
+from buildarena_benchmark.environment import (
     ASSEMBLY,
     DEFAULT_STEPS,
     MAIN,

@@ -11,9 +11,9 @@ from hashlib import sha256
 from itertools import islice
 from typing import Any, Final
 
+from buildarena_benchmark.environment import ASSEMBLY, MAIN
+from buildarena_benchmark.environment.workbench import NAME
 from buildarena_client import Client, RefusedError, TimedOutError
-from buildarena_environment import ASSEMBLY, MAIN
-from buildarena_environment.workbench import NAME
 from buildarena_geometry.json_values import levels
 from buildarena_inspect.logs import LoggedSample, Unusable
 

@@ -11,8 +11,8 @@ import anyio
 from inspect_ai.model import ChatMessageUser, ContentImage, ContentText
 from inspect_ai.solver import TaskState
 
-from buildarena_environment import Trial
-from buildarena_environment.trials import score_text
+from buildarena_benchmark.environment import Trial
+from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_inspect.building import CALLS, STATE, Building, building_of, end
 from buildarena_inspect.errors import LogError

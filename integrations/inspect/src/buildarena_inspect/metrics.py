@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from inspect_ai.scorer import Metric, SampleScore, Value, metric, value_to_float
 
+from buildarena_benchmark.environment import references
 from buildarena_benchmark.statistics import mean_interval, mean_ranks, wilson_interval
-from buildarena_environment import references
 
 DIGITS: Final = 4
 """References have so many; more would make equal figures differ."""

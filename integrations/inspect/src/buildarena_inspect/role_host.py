@@ -25,16 +25,17 @@ from inspect_ai.model import (
 from inspect_ai.tool import ToolCall as InspectCall
 from inspect_ai.tool import ToolInfo
 
+from buildarena_backend.journal.journal import Usage
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.trials.trial_repository import tracked_at_1_hz
 from buildarena_inspect.building import Building
 from buildarena_inspect.scorers import machine_hash
 from buildarena_inspect.tools import parameters_of
 from buildarena_inspect.trial_processes import try_machine
-from buildarena_pipeline.runtime.trial_repository import tracked_at_1_hz
-from buildarena_store import RolloutRecord, Usage
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
 if TYPE_CHECKING:
-    from buildarena_environment import Trial
+    from buildarena_benchmark.environment import Trial
     from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation import Trajectory
 

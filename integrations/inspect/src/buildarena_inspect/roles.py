@@ -9,12 +9,12 @@ from inspect_ai.model import ChatMessageAssistant
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from buildarena_benchmark import failed_score
-from buildarena_environment import Trial
+from buildarena_benchmark.environment import Trial
 from buildarena_inspect.building import Building, building_of
 from buildarena_inspect.errors import ChoiceError
 
 if TYPE_CHECKING:
-    from buildarena_pipeline.transcript import ModelTurn
+    from buildarena_backend.journal.transcript import ModelTurn
     from buildarena_worker.session.session import Session
 
 PACK = "default"
@@ -52,8 +52,8 @@ def _require_extra() -> None:
 
 def _play(state: TaskState, building: Building) -> None:
     """Plays a session from beginning to end, in a thread of its own."""
+    from buildarena_backend.catalog.prompt_packs import PromptPacks
     from buildarena_inspect.role_host import RoleHost
-    from buildarena_pipeline.catalog.prompt_packs import PromptPacks
     from buildarena_worker.session.results import Failed
     from buildarena_worker.session.session import Session
     from buildarena_worker.workflow.five_role import FiveRole

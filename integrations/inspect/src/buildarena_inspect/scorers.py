@@ -8,9 +8,9 @@ from typing import Any, Final
 from inspect_ai.scorer import CORRECT, INCORRECT, Score, Scorer, Target, accuracy, mean, scorer
 from inspect_ai.solver import TaskState
 
+from buildarena_benchmark.environment import Trial
+from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_benchmark.flags import is_disqualified
-from buildarena_environment import Trial
-from buildarena_environment.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_inspect.building import Building, building_of

@@ -13,7 +13,7 @@ from inspect_ai.scorer import Scorer
 from inspect_ai.solver import Solver
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import DEFAULT_STEPS
+from buildarena_benchmark.environment import DEFAULT_STEPS
 from buildarena_inspect.building import Conditions
 from buildarena_inspect.errors import ChoiceError, UnguardedProgramError
 from buildarena_inspect.log_artifacts import keep

@@ -8,8 +8,8 @@ from typing import Any
 from inspect_ai.tool import ToolCall, ToolDef, ToolError, ToolParams
 from inspect_ai.util import JSONSchema
 
-from buildarena_environment import EpisodeOverError, NothingToSubmitError
-from buildarena_environment.tools import SUBMIT
+from buildarena_benchmark.environment import EpisodeOverError, NothingToSubmitError
+from buildarena_benchmark.environment.tools import SUBMIT
 from buildarena_geometry import ToolDefinition
 from buildarena_inspect.building import Building
 

@@ -7,7 +7,7 @@ from functools import cache
 from typing import Final
 
 from buildarena_benchmark import Task
-from buildarena_environment import Trial, TrialPool
+from buildarena_benchmark.environment import Trial, TrialPool
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE, SimulationError
 
@@ -18,7 +18,7 @@ TRIES: Final = 2
 def try_machine(
     task: Task, machine: Machine, simulator: str = DEFAULT_ENGINE, *, seed: int | None = None
 ) -> Trial:
-    """As `buildarena_environment.try_machine`, in a warm process; waits where all are busy.
+    """As `buildarena_benchmark.environment.try_machine`, in a warm process; waits where all are busy.
 
     Raises:
         SimulationError: The engine failed or ended its process, which says nothing of the machine.

@@ -9,7 +9,7 @@ from typing import Any
 import verifiers.v1 as vf
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import REWARDS, UnknownChoiceError
+from buildarena_benchmark.environment import REWARDS, UnknownChoiceError
 from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_verifiers.taskset import BuildTaskConfig, BuildTasksetConfig
 from buildarena_verifiers.trial_runners import RUNNERS
@@ -59,7 +59,7 @@ def load_environment(
     Args:
         tasks: Names of tasks, or one; all by default.
         simulator: Name of the engine that tries machines.
-        rewards: Weights by the names of `buildarena_environment.rewards`; success alone by default.
+        rewards: Weights by the names of `buildarena_benchmark.environment.rewards`; success alone by default.
         processes: Processes that try machines; by default one for each core.
         trial_timeout_s: Seconds after which a trial is broken off.
         until_decided: Ends trials when they are decided, as in `BuildTaskConfig`.

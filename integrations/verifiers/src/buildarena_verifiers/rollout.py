@@ -6,8 +6,14 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_environment import Answer, Environment, NothingToSubmitError, call, counted_trial
-from buildarena_environment.tools import SUBMIT
+from buildarena_benchmark.environment import (
+    Answer,
+    Environment,
+    NothingToSubmitError,
+    call,
+    counted_trial,
+)
+from buildarena_benchmark.environment.tools import SUBMIT
 from buildarena_geometry.json_texts import read_json
 from buildarena_verifiers.trial_runners import TrialRunner
 

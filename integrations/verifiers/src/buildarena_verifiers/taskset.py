@@ -9,7 +9,7 @@ import verifiers.v1 as vf
 from pydantic import Field, PrivateAttr
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_environment import DEFAULT_STEPS, Environment, Limits
+from buildarena_benchmark.environment import DEFAULT_STEPS, Environment, Limits
 from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_verifiers.harness_config import BuildHarnessConfig
 from buildarena_verifiers.rollout import Seat
@@ -82,7 +82,7 @@ class BuildTasksetConfig(vf.TasksetConfig):
 class BuildTask(vf.Task[BuildData, BuildState, BuildTaskConfig]):
     """One episode: set up for each rollout anew, finalized by a submission, scored by name.
 
-    The rewards are those of `buildarena_environment.rewards`, success alone unless weights say
+    The rewards are those of `buildarena_benchmark.environment.rewards`, success alone unless weights say
     otherwise. They are read from the trace's record, so that replays of traces need no physics.
     """
 

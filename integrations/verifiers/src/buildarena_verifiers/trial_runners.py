@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-from buildarena_environment import TrialPool
+from buildarena_benchmark.environment import TrialPool
 
 T = TypeVar("T")
 Asked = tuple[int | None, float, bool]
@@ -23,7 +23,7 @@ class TrialRunner:
     Args:
         processes: How many; None for one for each core that this process may use.
         timeout_s: Seconds after which a trial is broken off.
-        whole: False ends each trial when it is decided, see `buildarena_environment.try_machine`.
+        whole: False ends each trial when it is decided, see `buildarena_benchmark.environment.try_machine`.
     """
 
     def __init__(self, processes: int | None, timeout_s: float, whole: bool) -> None:

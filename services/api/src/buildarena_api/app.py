@@ -63,14 +63,14 @@ from buildarena_api.routes import (
     workers,
 )
 from buildarena_api.runners.service import RunnerService
-from buildarena_pipeline import __version__
-from buildarena_pipeline.agents.sessions import ExternalSessions
-from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.reaper import Reaper
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.runtime.simulators.known import configured_simulators
-from buildarena_pipeline.submission.submission import Submissions
+from buildarena_backend import __version__
+from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.reaper import Reaper
+from buildarena_backend.settings import Settings
+from buildarena_backend.submission.submission import Submissions
+from buildarena_backend.trials.known_simulators import configured_simulators
 
 POOL_SIZE = 10
 """Connections for ordinary requests."""

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import structlog
 
-from buildarena_environment.warm_process import ProcessEndedError, WarmProcess
+from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError, WarmProcess
 
 TRIES: Final = 2
 """How often a file is read whose process was killed: by its own fault, or by nobody's."""

@@ -7,9 +7,9 @@ import sys
 from typing import Any
 
 from buildarena_api.app import create_app
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.runtime.context import open_context
-from buildarena_pipeline.runtime.settings import Settings
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.process.context import open_context
+from buildarena_backend.settings import Settings
 
 
 def contract() -> dict[str, Any]:

@@ -8,10 +8,10 @@ from fastapi import Depends, Query, Request
 from pydantic import AfterValidator
 
 from buildarena_api.http.own_pool import OwnPool
-from buildarena_pipeline.agents.sessions import ExternalSessions
-from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.submission.submission import Submissions
+from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.process.context import Context
+from buildarena_backend.submission.submission import Submissions
 
 
 async def _context(request: Request) -> Context:

@@ -11,11 +11,11 @@ from buildarena_api.dependencies import ContextDep, IdPrefix, Track
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.leaderboard.filters import unknown
 from buildarena_api.schemas import AnyJobState, AnyOutcome
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.jobs.filters import JobFilter
+from buildarena_backend.process.context import Context
 from buildarena_benchmark import ValidationIssue
 from buildarena_benchmark.scorers.registry import known_flags
-from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store.jobs.filters import JobFilter
 
 SEARCHED: Final[Mapping[str, int]] = {
     "text": 10,

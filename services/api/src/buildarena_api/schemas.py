@@ -7,9 +7,11 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_backend.accounts.budgets import Budget
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.states import AttemptResult, Audit, JobState, Outcome, Stage, SweepState
+from buildarena_backend.sweeps.sweeps import SweepProgress
 from buildarena_benchmark.flags import is_censored
-from buildarena_store import Budget, Job, JobState, Outcome, Stage, SweepProgress, SweepState
-from buildarena_store.states import AttemptResult, Audit
 
 # Spelled out, because the contract lists the values in place.
 AnyOutcome = Literal[

@@ -13,14 +13,13 @@ from buildarena_api.app import POOL_SIZE, create_app
 from buildarena_api.http.access import check_binding
 from buildarena_api.http.own_pool import POOL_TIMEOUT_S
 from buildarena_api.http.serving import serve
-from buildarena_environment.processes import end_with_parent
-from buildarena_pipeline.catalog.models import load_registry
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.context import open_context
-from buildarena_pipeline.runtime.logs import set_up_logs
-from buildarena_pipeline.runtime.settings import load_settings
-from buildarena_pipeline.runtime.tracing import Tracing
-from buildarena_store import SchemaVersionError
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.errors import SchemaVersionError, StartupError
+from buildarena_backend.process.context import open_context
+from buildarena_backend.settings import load_settings
+from buildarena_backend.telemetry.logs import set_up_logs
+from buildarena_backend.telemetry.tracing import Tracing
+from buildarena_benchmark.environment.trials.processes import end_with_parent
 
 SWITCH_S = 0.0001
 """How long a thread may keep the interpreter: a light question asks for it some twenty times, and

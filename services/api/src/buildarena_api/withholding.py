@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from buildarena_api.http.problems import ProblemError
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store import Job
-from buildarena_store.states import JobState
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import JobState
 
 
 def require_told(context: Context, job: Job) -> None:

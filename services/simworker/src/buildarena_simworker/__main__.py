@@ -8,13 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from buildarena_backend.errors import StartupError
+from buildarena_backend.settings import Settings, load_settings
+from buildarena_backend.trials.installed_simulators import announced, installed_simulators
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.settings import Settings, load_settings
-from buildarena_pipeline.runtime.simulators.installed import announced, installed_simulators
 
 if TYPE_CHECKING:
-    from buildarena_pipeline.runtime.context import Context
+    from buildarena_backend.process.context import Context
 
 
 def main() -> None:
@@ -46,9 +46,9 @@ def main() -> None:
 
 def _serve_database(simulator: str, settings: Settings) -> None:
     # A runner has no such connections, and is not to load what makes them.
-    from buildarena_pipeline.runtime.worker_process import WorkerSpec, run_worker
+    from buildarena_backend.process.worker_process import WorkerSpec, run_worker
+    from buildarena_backend.states import simulate_queue
     from buildarena_simworker.simulate import SimulateHandler, simulate_handler
-    from buildarena_store.states import simulate_queue
 
     described = installed_simulators()[simulator]
     first = described.make(settings)

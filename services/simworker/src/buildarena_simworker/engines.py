@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_environment import TrialPool
-from buildarena_environment.warm_process import ProcessEndedError
-from buildarena_pipeline.runtime.simulators.simulator import (
+from buildarena_backend.trials.simulator import (
     MachineRefusedError,
     SimulatorFaultError,
     TrialRequest,
     TrialResult,
 )
+from buildarena_benchmark.environment import TrialPool
+from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError
 from buildarena_simulation import (
     SIMULATION_VERSION,
     MachineNotSimulable,

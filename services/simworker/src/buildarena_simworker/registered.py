@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from buildarena_environment import TrialPool
-from buildarena_pipeline.runtime.simulators.installed import InstalledSimulator
-from buildarena_pipeline.runtime.simulators.simulator import Simulator
+from buildarena_backend.trials.installed_simulators import InstalledSimulator
+from buildarena_backend.trials.simulator import Simulator
+from buildarena_benchmark.environment import TrialPool
 from buildarena_simulation import ENGINES, SIMULATION_VERSION, engine_version
 from buildarena_simworker.engines import EngineSimulator
 

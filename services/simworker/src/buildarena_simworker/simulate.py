@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.simulator import Simulator, TrialRequest
-from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
-from buildarena_pipeline.runtime.trials import File, TrialResult
+from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.process.active_lease import ActiveLease
+from buildarena_backend.process.context import Context
+from buildarena_backend.trials.simulator import Simulator, TrialRequest
+from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
+from buildarena_backend.trials.trials import File, TrialResult
 from buildarena_simworker.trials import do_trial
-from buildarena_store import StaleLeaseError
 
 
 class SimulateHandler:

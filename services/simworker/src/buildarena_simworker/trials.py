@@ -6,14 +6,14 @@ import time
 from dataclasses import replace
 from typing import Protocol
 
-from buildarena_pipeline.errors import TransientError
-from buildarena_pipeline.runtime.simulators.simulator import (
+from buildarena_backend.errors import TransientError
+from buildarena_backend.trials.simulator import (
     MachineRefusedError,
     Simulator,
     SimulatorFaultError,
     TrialRequest,
 )
-from buildarena_pipeline.runtime.trials import File, TrialResult, refused
+from buildarena_backend.trials.trials import File, TrialResult, refused
 
 
 class TrialSource(Protocol):

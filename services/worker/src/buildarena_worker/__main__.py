@@ -7,15 +7,15 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 
+from buildarena_backend.catalog.models import ModelRegistry, load_registry
+from buildarena_backend.errors import StartupError
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.job_runner import StageHandler
+from buildarena_backend.process.worker_process import SideWork, WorkerSpec, run_worker
+from buildarena_backend.settings import load_settings
+from buildarena_backend.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
 from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.catalog.models import ModelRegistry, load_registry
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.job_runner import StageHandler
-from buildarena_pipeline.runtime.settings import load_settings
-from buildarena_pipeline.runtime.worker_process import SideWork, WorkerSpec, run_worker
-from buildarena_store.states import CONSTRUCT_QUEUE, VERIFY_QUEUE
 from buildarena_worker.providers.keys import key_report
 from buildarena_worker.providers.registry import require_known_protocols
 from buildarena_worker.wiring import construct_handler, verification_runner

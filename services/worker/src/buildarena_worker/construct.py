@@ -5,32 +5,26 @@ from __future__ import annotations
 from decimal import Decimal
 from typing import assert_never
 
+from buildarena_backend.accounts.budgets import Shortage
+from buildarena_backend.artifacts.storing import ArtifactInfo, ArtifactStore
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.catalog.prices import free_models, price_usd
+from buildarena_backend.catalog.prompt_packs import PromptPacks
+from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.catalog.tracks import has_data_sheets, worlds_of
+from buildarena_backend.errors import PermanentError, StaleLeaseError
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.rollouts import RolloutRequest
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.process.active_lease import ActiveLease
+from buildarena_backend.process.notify import Notifier
+from buildarena_backend.results.results import JobScore
+from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage, simulate_queue
+from buildarena_backend.store import Store
+from buildarena_backend.trials.scoring import failure_score, task_of
+from buildarena_backend.trials.worlds import finish_or_vary
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.catalog.prices import free_models, price_usd
-from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_pipeline.catalog.tracks import has_data_sheets, worlds_of
-from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_pipeline.runtime.notify import Notifier
-from buildarena_pipeline.runtime.scoring import failure_score, task_of
-from buildarena_pipeline.runtime.worlds import finish_or_vary
 from buildarena_simulation import read_trajectory
-from buildarena_store import (
-    ArtifactInfo,
-    ArtifactStore,
-    Job,
-    JobScore,
-    Lease,
-    Outcome,
-    RolloutRequest,
-    Shortage,
-    Stage,
-    StaleLeaseError,
-    Store,
-)
-from buildarena_store.states import AttemptResult, JobState, simulate_queue
 from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard, Price

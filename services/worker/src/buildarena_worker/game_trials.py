@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.trials.annotations import annotate
 from buildarena_benchmark import Task
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.runtime.annotations import annotate
-from buildarena_store import RolloutRecord
 
 VERSIONS = ("simulation", "engine_version")
 

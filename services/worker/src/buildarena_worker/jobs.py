@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from buildarena_pipeline.catalog.prompt_packs import PromptPack, PromptPacks
-from buildarena_pipeline.errors import PermanentError, StartupError
-from buildarena_store import Job
+from buildarena_backend.catalog.prompt_packs import PromptPack, PromptPacks
+from buildarena_backend.errors import PermanentError, StartupError
+from buildarena_backend.jobs.job import Job
 from buildarena_worker.workflow.rounds import Loop
 
 

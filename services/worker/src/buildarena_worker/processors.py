@@ -12,12 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_benchmark import Task
-from buildarena_environment.other_kernels import simulate_with
+from buildarena_benchmark.environment.other_kernels import simulate_with
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.kernels import runnable
 from buildarena_simulation import Trajectory, processor, simulate
-from buildarena_store import RolloutRecord
 
 PROCESSOR: Final = "processor"
 """The key of a rollout's versions that says what simulated it, see `buildarena_simulation`."""

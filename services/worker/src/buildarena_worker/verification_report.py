@@ -7,13 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.journal import Usage
+from buildarena_backend.results.results import JobScore
+from buildarena_backend.states import Verdict
+from buildarena_backend.trials.trials import REFUSED, refused
 from buildarena_benchmark import Score
 from buildarena_benchmark.scorers.scorer import REFUTED
-from buildarena_pipeline.runtime.trials import REFUSED, refused
 from buildarena_simulation import ControllerFailed
 from buildarena_simulation.controllers.program import blames_clock
-from buildarena_store import Job, JobScore, Usage
-from buildarena_store.states import Verdict
 
 SCORED: Final = ("success", "indicator", "metrics", "flags")
 """Figures of a score that are compared."""

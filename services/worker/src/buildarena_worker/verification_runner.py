@@ -9,8 +9,9 @@ from threading import Lock
 import structlog
 from sqlalchemy.exc import OperationalError
 
-from buildarena_store import ArtifactStoreError, Verifications
-from buildarena_store.states import Verdict
+from buildarena_backend.errors import ArtifactStoreError
+from buildarena_backend.results.verifications import Verifications
+from buildarena_backend.states import Verdict
 from buildarena_worker.verification_report import Report, broken_off
 from buildarena_worker.verify import Verifier
 

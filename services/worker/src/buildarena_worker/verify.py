@@ -17,6 +17,36 @@ from contextlib import suppress
 from hashlib import sha256
 from typing import Any, cast
 
+from buildarena_backend.agents.workbench import bench_of, repeated
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.catalog.prompt_packs import PromptPacks
+from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.catalog.tracks import (
+    EXTERNAL_WORKFLOW,
+    FILE_WORKFLOW,
+    has_data_sheets,
+    worlds_of,
+)
+from buildarena_backend.errors import (
+    ArtifactDamagedError,
+    ArtifactMissingError,
+    ArtifactStoreError,
+    PermanentError,
+)
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.external_calls import ExternalCall
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.results.results import JobScore
+from buildarena_backend.states import JobState, Outcome
+from buildarena_backend.store import Store
+from buildarena_backend.trials.scoring import (
+    best_rollout,
+    has_counted,
+    rollout_score,
+    task_of,
+    varied_rollouts,
+)
+from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_besiege import (
     LogIncompleteError,
@@ -26,24 +56,6 @@ from buildarena_besiege import (
 )
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.machine_files import machine_bytes
-from buildarena_pipeline.agents.workbench import bench_of, repeated
-from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_pipeline.catalog.tracks import (
-    EXTERNAL_WORKFLOW,
-    FILE_WORKFLOW,
-    has_data_sheets,
-    worlds_of,
-)
-from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.scoring import (
-    best_rollout,
-    has_counted,
-    rollout_score,
-    task_of,
-    varied_rollouts,
-)
-from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
 from buildarena_simulation import (
     SIMULATION_VERSION,
     ControllerFailed,
@@ -55,19 +67,6 @@ from buildarena_simulation import (
     read_trajectory,
     schema_of,
     write_trajectory,
-)
-from buildarena_store import (
-    ArtifactDamagedError,
-    ArtifactMissingError,
-    ArtifactStore,
-    ArtifactStoreError,
-    ExternalCall,
-    Job,
-    JobScore,
-    JobState,
-    Outcome,
-    RolloutRecord,
-    Store,
 )
 from buildarena_worker.game_trials import annotations_again
 from buildarena_worker.jobs import loop_of, pack_of

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.catalog.prompt_packs import PromptPacks
-from buildarena_pipeline.runtime.context import Context
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.catalog.prompt_packs import PromptPacks
+from buildarena_backend.process.context import Context
 from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate

@@ -6,10 +6,10 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
 from buildarena_cli.backups.copying import AT_ONCE
 from buildarena_cli.backups.place import DUMP, BackupPlace
 from buildarena_cli.backups.restoring import read_list
-from buildarena_store import ArtifactDamagedError, ArtifactMissingError
 
 
 def check_backup(place: BackupPlace, name: str) -> dict[str, str]:

@@ -7,7 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
 
-from buildarena_store import ArtifactDamagedError, ArtifactMissingError, ArtifactStore
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
 
 AT_ONCE: Final = 8
 

@@ -21,9 +21,8 @@ from typing import Any, Final
 import obstore
 from obstore.exceptions import BaseError
 
+from buildarena_backend.artifacts.storing import ArtifactStore, open_objects
 from buildarena_cli.errors import CommandError
-from buildarena_store import ArtifactStore
-from buildarena_store.artifacts.storing import open_objects
 
 NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,79}")
 MANIFEST: Final = "manifest.json"

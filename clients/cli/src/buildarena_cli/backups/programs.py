@@ -10,9 +10,9 @@ from pathlib import Path
 
 from sqlalchemy import make_url
 
+from buildarena_backend.errors import StartupError
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import installed_postgres
-from buildarena_pipeline.errors import StartupError
 
 PASSED_ON = ("PATH", "HOME", "LANG", "SSL_CERT_FILE", "PGSSLMODE", "PGSSLROOTCERT", "TMPDIR")
 

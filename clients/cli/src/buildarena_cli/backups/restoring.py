@@ -11,13 +11,14 @@ from pathlib import Path
 from obstore.exceptions import BaseError
 from sqlalchemy import inspect, select
 
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.migrating import known_schemas
+from buildarena_backend.database.tables import job_artifacts
 from buildarena_cli.backups.copying import copy_artifacts
 from buildarena_cli.backups.place import DUMP, LIST, BackupPlace, Manifest
 from buildarena_cli.backups.programs import run_program
 from buildarena_cli.errors import CommandError
-from buildarena_store import ArtifactStore, Database
-from buildarena_store.migrating import known_schemas
-from buildarena_store.tables import job_artifacts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,14 +12,15 @@ from typing import Final
 
 from sqlalchemy import Connection, select, text
 
+from buildarena_backend import __version__
+from buildarena_backend.artifacts.collecting import LOCK, referenced
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import artifacts as artifacts_table
 from buildarena_cli.backups.copying import copy_artifacts
 from buildarena_cli.backups.place import DUMP, FORMAT, LIST, NAME, BackupPlace, Manifest
 from buildarena_cli.backups.programs import run_program
 from buildarena_cli.errors import CommandError
-from buildarena_pipeline import __version__
-from buildarena_store import ArtifactStore, Database
-from buildarena_store.artifacts.collecting import LOCK, referenced
-from buildarena_store.tables import artifacts as artifacts_table
 
 CHUNK_BYTES: Final = 1024 * 1024
 

@@ -33,8 +33,8 @@ def collect(
     """
     from datetime import timedelta
 
+    from buildarena_backend.artifacts.collecting import GarbageCollector
     from buildarena_cli.local.stores import opened_stores
-    from buildarena_store.artifacts import GarbageCollector
 
     with opened_stores(data) as stores:
         stores.database.require_schema()

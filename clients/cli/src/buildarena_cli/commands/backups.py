@@ -155,9 +155,9 @@ def _tell(quiet: bool) -> Callable[[str], None]:
 
 
 def _place(location: str) -> BackupPlace:
+    from buildarena_backend.errors import StartupError
+    from buildarena_backend.settings import load_settings
     from buildarena_cli.backups.place import BackupPlace
-    from buildarena_pipeline.errors import StartupError
-    from buildarena_pipeline.runtime.settings import load_settings
 
     try:
         return BackupPlace(location, load_settings().artifact_options)

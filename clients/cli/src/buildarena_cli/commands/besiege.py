@@ -123,5 +123,5 @@ def doctor(*, as_json: JsonOption = False) -> None:
     exec_module([*RUNNER, "doctor", *(["--json"] if as_json else [])])
 
 
-RUNNER = ("buildarena_simworker_besiege",)
+RUNNER = ("buildarena_simworker.besiege",)
 """The program that knows this machine's game."""

@@ -16,7 +16,7 @@ from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
-    from buildarena_pipeline.runtime.settings import Settings
+    from buildarena_backend.settings import Settings
 
 DEMO_SWEEP: dict[str, Any] = {
     "name": "demo",
@@ -147,8 +147,8 @@ def _detach(settings: Settings, *, keys: bool) -> None:
 
 
 def _settings(data: Path | None, port: int | None, *, require_keys: bool | None = None) -> Settings:
-    from buildarena_pipeline.errors import StartupError
-    from buildarena_pipeline.runtime.settings import load_settings
+    from buildarena_backend.errors import StartupError
+    from buildarena_backend.settings import load_settings
 
     options: dict[str, Any] = {"data": data, "port": port, "require_keys": require_keys}
     try:

@@ -18,7 +18,7 @@ from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:
-    from buildarena_store import Database
+    from buildarena_backend.database.database import Database
 
 SIMULATE: Final = "simulate."
 ApiOption = Annotated[
@@ -103,7 +103,7 @@ def roles(
     Each has only the rights of its role. BUILDARENA_DATABASE_URL names an account that may make
     roles; the owner gets the tables, and then migrates. It is safe to repeat: new passwords count.
     """
-    from buildarena_store.roles import RoleError, make_roles
+    from buildarena_backend.database.roles import RoleError, make_roles
 
     urls = {}
     for login in logins:
@@ -125,9 +125,9 @@ def roles(
 @contextmanager
 def _database() -> Iterator[Database]:
     """The database that the settings name."""
-    from buildarena_pipeline.errors import StartupError
-    from buildarena_pipeline.runtime.settings import load_settings
-    from buildarena_store import Database, SchemaVersionError
+    from buildarena_backend.database.database import Database
+    from buildarena_backend.errors import SchemaVersionError, StartupError
+    from buildarena_backend.settings import load_settings
 
     try:
         url = load_settings().direct_database_url()
@@ -144,9 +144,9 @@ def _database() -> Iterator[Database]:
 
 def _known(queue: str) -> list[str]:
     """The words of the program that serves a queue."""
+    from buildarena_backend.errors import StartupError
+    from buildarena_backend.trials.installed_simulators import installed_simulators
     from buildarena_cli.local.programs import programs
-    from buildarena_pipeline.errors import StartupError
-    from buildarena_pipeline.runtime.simulators.installed import installed_simulators
 
     try:
         known = programs(installed_simulators())

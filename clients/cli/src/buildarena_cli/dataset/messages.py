@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from buildarena_environment.tools import OBJECTION
+from buildarena_benchmark.environment.tools import OBJECTION
 from buildarena_geometry import tool_definitions
 
 

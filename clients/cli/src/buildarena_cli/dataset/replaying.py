@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from hashlib import sha256
 from typing import Any, Final
 
+from buildarena_backend.replays.from_document import CONTROL, PROGRAMMED
+from buildarena_backend.replays.from_turns import replay_of_turns
 from buildarena_cli.dataset.messages import compact
 from buildarena_geometry import DocumentError
-from buildarena_pipeline.replays.from_document import CONTROL, PROGRAMMED
-from buildarena_pipeline.replays.from_turns import replay_of_turns
 
 SESSION: Final = "session"
 """The role whose turn carries out a controller's program."""

@@ -10,15 +10,15 @@ from functools import lru_cache
 from hashlib import sha256
 from typing import Any, Final
 
+from buildarena_backend.agents.briefing import briefing, briefing_digest
+from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW, has_data_sheets, worlds_of
+from buildarena_backend.database.text import clean
 from buildarena_benchmark import CANARY, TaskError, parse_task
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_cli.dataset.messages import chat, compact
 from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import action_rows, parts_hash, replayed_hash
 from buildarena_cli.errors import CommandError
-from buildarena_pipeline.agents.briefing import briefing, briefing_digest
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW, has_data_sheets, worlds_of
-from buildarena_store import clean
 
 BASELINE: Final = "builtin/"
 OURS: Final = "apache-2.0"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict
 
-from buildarena_pipeline.errors import StartupError
+from buildarena_backend.errors import StartupError
 
 UNPRIVILEGED = "nobody"
 LONGEST_PATH = 900

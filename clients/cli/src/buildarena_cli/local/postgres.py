@@ -13,6 +13,8 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
+from buildarena_backend.errors import StartupError
+from buildarena_benchmark.environment.trials.processes import dying_with_me
 from buildarena_cli.local.accounts import (
     READ_BY_SHELLS,
     run_as,
@@ -29,8 +31,6 @@ from buildarena_cli.local.server import (
     stop_process,
     wait_until_ready,
 )
-from buildarena_environment.processes import dying_with_me
-from buildarena_pipeline.errors import StartupError
 
 ADVICE = (
     "choose another folder with --data or BUILDARENA_DATA, "

@@ -12,8 +12,8 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from buildarena_backend.errors import StartupError
 from buildarena_cli.local.accounts import Account, run_as, usable_by_path
-from buildarena_pipeline.errors import StartupError
 
 PREFIX = "buildarena-program-"
 PLACES = ("/var/tmp", "/tmp", "/var/cache", "/var/lib", "/run", "/dev/shm")  # noqa: S108 - a fresh folder of our own is made there

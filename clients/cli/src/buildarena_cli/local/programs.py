@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_backend.states import CONSTRUCT_QUEUE, simulate_queue
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

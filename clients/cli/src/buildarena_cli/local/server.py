@@ -13,7 +13,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Protocol
 
-from buildarena_pipeline.errors import StartupError
+from buildarena_backend.errors import StartupError
 
 LOOPBACK = "127.0.0.1"
 READY_WITHIN_S = 30.0

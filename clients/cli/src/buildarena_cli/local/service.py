@@ -21,8 +21,8 @@ from typing import Any, Final
 
 import psutil
 
+from buildarena_benchmark.environment.trials.processes import memory_bytes
 from buildarena_cli.errors import CommandError
-from buildarena_environment.processes import memory_bytes
 
 LOCK: Final = "lock"
 RUN: Final = "run.json"

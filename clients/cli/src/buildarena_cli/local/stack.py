@@ -17,6 +17,15 @@ from typing import IO, Any, Self
 
 import psutil
 
+from buildarena_backend.accounts.keys import new_secret
+from buildarena_backend.database.database import Database
+from buildarena_backend.errors import SchemaVersionError, StartupError
+from buildarena_backend.secret_files import SUFFIX
+from buildarena_backend.settings import PREFIX, SECRETS, Settings
+from buildarena_backend.states import CONSTRUCT_QUEUE
+from buildarena_backend.trials.installed_simulators import installed_engines
+from buildarena_backend.workers import Workers
+from buildarena_benchmark.environment.trials.processes import ALLOCATOR, PARENT, tree_memory_bytes
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local import (
     EmbeddedPostgres,
@@ -32,14 +41,6 @@ from buildarena_client.paths import HEALTH
 from buildarena_client.requests import Request
 from buildarena_client.transport_errors import TransportError
 from buildarena_client.transports.blocking import BlockingTransport
-from buildarena_environment.processes import ALLOCATOR, PARENT, tree_memory_bytes
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.settings import PREFIX, SECRETS, Settings
-from buildarena_pipeline.runtime.simulators.installed import installed_engines
-from buildarena_pipeline.secret_files import SUFFIX
-from buildarena_store import Database, SchemaVersionError, Workers
-from buildarena_store.accounts.keys import new_secret
-from buildarena_store.states import CONSTRUCT_QUEUE
 
 KEYS = ("admin_key", "previous_admin_key", "metrics_key")
 """Settings that are keys: no process gets them where none are asked for."""

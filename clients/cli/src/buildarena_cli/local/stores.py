@@ -10,12 +10,13 @@ from pathlib import Path
 
 from sqlalchemy.exc import OperationalError
 
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.database.database import Database
+from buildarena_backend.errors import StartupError, StoreError
+from buildarena_backend.settings import load_settings
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import EmbeddedPostgres, url_of_running
 from buildarena_cli.local.service import LOCK, is_running, unwritable
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.settings import load_settings
-from buildarena_store import ArtifactStore, Database, StoreError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,8 +13,8 @@ from typing import Self
 
 import structlog
 
+from buildarena_backend.errors import StartupError
 from buildarena_cli.local.server import stop_process
-from buildarena_pipeline.errors import StartupError
 
 log = structlog.get_logger(__name__)
 

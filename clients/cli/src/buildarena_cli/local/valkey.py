@@ -11,6 +11,8 @@ from pathlib import Path
 from redis import Redis
 from redis.exceptions import RedisError
 
+from buildarena_backend.errors import StartupError
+from buildarena_benchmark.environment.trials.processes import dying_with_me
 from buildarena_cli.local.server import (
     LOOPBACK,
     free_port,
@@ -19,8 +21,6 @@ from buildarena_cli.local.server import (
     stop_process,
     wait_until_ready,
 )
-from buildarena_environment.processes import dying_with_me
-from buildarena_pipeline.errors import StartupError
 
 
 class EmbeddedValkey:

@@ -12,7 +12,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from buildarena_api.dashboard.files import INDEX, PageFile
-from buildarena_pipeline.runtime.settings import PAGES
+from buildarena_backend.settings import PAGES
 
 PAGE: Final = re.compile(rf"/(?:(?:{'|'.join(PAGES)})(?:/[^\x00-\x1f\x7f]*)?)?")
 """Addresses of pages: the page itself reads which, so all of them get the same file."""

@@ -17,10 +17,9 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.events.texts import event_texts
 from buildarena_api.http.own_pool import OwnPool
-from buildarena_pipeline.turns import Transcripts
-from buildarena_store import Event
-from buildarena_store.events import SETTLED_AFTER
-from buildarena_store.states import TURN
+from buildarena_backend.agents.turn_views import Transcripts
+from buildarena_backend.events import SETTLED_AFTER, Event
+from buildarena_backend.states import TURN
 
 log = structlog.get_logger(__name__)
 

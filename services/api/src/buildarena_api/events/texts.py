@@ -9,9 +9,9 @@ from typing import Any, Final
 
 from sse_starlette import ServerSentEvent
 
-from buildarena_pipeline.turns import Transcripts
-from buildarena_store import Event
-from buildarena_store.states import TURN
+from buildarena_backend.agents.turn_views import Transcripts
+from buildarena_backend.events import Event
+from buildarena_backend.states import TURN
 
 MAX_TURN_BYTES: Final = 64 << 10
 """A longer turn is sent without its actions and most of its text: the transcript has them."""

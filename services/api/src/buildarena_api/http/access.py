@@ -26,7 +26,7 @@ from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import ProblemError, database_problem
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.weights import weight_of
-from buildarena_pipeline.runtime.settings import Settings
+from buildarena_backend.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
 """From the least to the most; each includes those before it."""

@@ -10,8 +10,8 @@ from decimal import Decimal
 from typing import Any, Final
 
 from buildarena_api.http.problems import ProblemError
+from buildarena_backend.jobs.pages import NULLABLE, Order, SortValue
 from buildarena_benchmark import ValidationIssue
-from buildarena_store.jobs.pages import NULLABLE, Order, SortValue
 
 MAX_INTEGER: Final = 2**63 - 1
 

@@ -15,10 +15,10 @@ from sqlalchemy import Engine
 from sqlalchemy.pool import QueuePool
 
 from buildarena_api.http.probes import Probes
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.known import configured_simulators
-from buildarena_store import WorkerCounts
-from buildarena_store.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import CONSTRUCT_QUEUE, simulate_queue
+from buildarena_backend.trials.known_simulators import configured_simulators
+from buildarena_backend.workers import WorkerCounts
 
 PREFIX: Final = "buildarena_"
 
@@ -102,7 +102,7 @@ class InfrastructureMetrics(Collector):
             pool = engine.pool
             if isinstance(pool, QueuePool):
                 used[name] = pool.checkedout()
-                # Pools may grow to twice their size (`buildarena_store.Database`).
+                # Pools may grow to twice their size (`buildarena_backend.Database`).
                 most[name] = 2 * pool.size()
         yield self._each(
             "database_connections_used", "Connections of this process in use.", "pool", used

@@ -8,8 +8,7 @@ from collections.abc import Awaitable, Callable
 from typing import Final, TypeVar
 
 from buildarena_api.http.own_pool import OwnPool
-from buildarena_store import KeyCheck
-from buildarena_store.accounts.keys import is_secret, secret_hash
+from buildarena_backend.accounts.keys import KeyCheck, is_secret, secret_hash
 
 CACHED_S: Final = 0.5
 """How long an answer is used again: so long a key that was revoked elsewhere may still work."""

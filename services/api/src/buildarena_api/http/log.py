@@ -13,7 +13,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.metrics import ServiceMetrics
-from buildarena_pipeline.runtime.tracing import TRACEPARENT, mark_failed, span
+from buildarena_backend.telemetry.tracing import TRACEPARENT, mark_failed, span
 
 REQUEST_ID = "X-Request-ID"
 GOOD_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")

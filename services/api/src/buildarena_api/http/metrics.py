@@ -18,10 +18,22 @@ from prometheus_client.registry import Collector
 
 from buildarena_api.http.probes import PartFailedError, Probes
 from buildarena_api.http.server_metrics import server_metrics
-from buildarena_pipeline import __version__
-from buildarena_store import STAGE_SECONDS, MetricValues, Outcome, Stage
-from buildarena_store.metrics import ModelUse, QueueDepth, StageTimes
-from buildarena_store.states import CONSTRUCT_QUEUE, AttemptResult, JobState, simulate_queue
+from buildarena_backend import __version__
+from buildarena_backend.states import (
+    CONSTRUCT_QUEUE,
+    AttemptResult,
+    JobState,
+    Outcome,
+    Stage,
+    simulate_queue,
+)
+from buildarena_backend.telemetry.metrics import (
+    STAGE_SECONDS,
+    MetricValues,
+    ModelUse,
+    QueueDepth,
+    StageTimes,
+)
 
 # Rates need a counter's zero, and alerts a gauge's: one that begins at its first event hides it.
 PLACES: Final = tuple(

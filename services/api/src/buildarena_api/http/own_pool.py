@@ -10,9 +10,10 @@ from dataclasses import replace
 from functools import partial
 from typing import ParamSpec, TypeVar
 
-from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store import Database, open_store
+from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.database.database import Database
+from buildarena_backend.process.context import Context
+from buildarena_backend.store import open_store
 
 POOL_TIMEOUT_S = 2.0
 """How long a request waits for a database connection before it is answered with 503."""

@@ -14,9 +14,10 @@ from concurrent.futures import Future
 from typing import Any, Final, Generic, TypeVar
 
 from buildarena_api.http.own_pool import OwnPool
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store import ArtifactStore, WorkerCounts
-from buildarena_store.states import CONSTRUCT_QUEUE
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import CONSTRUCT_QUEUE
+from buildarena_backend.workers import WorkerCounts
 
 PATIENCE_S: Final = 3.0
 """How long a part may take before it counts as not answering."""

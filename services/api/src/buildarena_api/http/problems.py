@@ -19,9 +19,7 @@ from starlette.requests import ClientDisconnect
 from starlette.types import Send
 
 from buildarena_api.http.admission import SlowBodyError
-from buildarena_benchmark import ValidationIssue
-from buildarena_pipeline.errors import SubmissionError
-from buildarena_store import (
+from buildarena_backend.errors import (
     ArtifactDamagedError,
     ArtifactMissingError,
     ArtifactStoreError,
@@ -29,10 +27,12 @@ from buildarena_store import (
     NameTakenError,
     NotOwnedError,
     StoreError,
+    SubmissionError,
     TooManyFilesError,
     TransitionError,
     UnknownIdError,
 )
+from buildarena_benchmark import ValidationIssue
 
 PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")

@@ -18,7 +18,7 @@ from redis.asyncio.retry import Retry
 from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 
-from buildarena_pipeline.breakers import AsyncCircuitBreaker
+from buildarena_backend.queue.breakers import AsyncCircuitBreaker
 
 TIMEOUT_S = 0.3
 """How long a request waits for its count; the store is not asked again until it answers."""

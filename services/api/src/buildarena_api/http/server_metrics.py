@@ -7,7 +7,7 @@ from typing import Final
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 
-from buildarena_store.server_figures import ServerFigures
+from buildarena_backend.telemetry.server_figures import ServerFigures
 
 PREFIX: Final = "buildarena_postgres_"
 

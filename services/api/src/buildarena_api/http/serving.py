@@ -11,7 +11,7 @@ from typing import Any
 
 import uvicorn
 
-from buildarena_pipeline.keepalive import socket_options
+from buildarena_backend.keepalive import socket_options
 
 UNANSWERED_S = 60
 """A client may leave what it is sent unread for so long: whoever only reads slowly is not dead."""

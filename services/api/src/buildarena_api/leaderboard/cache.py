@@ -10,10 +10,11 @@ from typing import Final
 from buildarena_api.http.etags import Answer
 from buildarena_api.http.fair_cache import FairCache
 from buildarena_api.leaderboard.cells import Cells, Shown
+from buildarena_backend.boards.reading import Boards
+from buildarena_backend.boards.trials import CellId, TrialFilter
+from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_benchmark import Task
 from buildarena_benchmark.leaderboard import Board, BoardQuery, EndedJob, Tally
-from buildarena_pipeline.catalog.tasks import TaskCatalog
-from buildarena_store import Boards, CellId, TrialFilter
 
 MAX_CACHED_ANSWERS: Final = 256
 """Answers in memory at most; one of a full board is about 200 kB."""

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_backend.boards.trials import CellId
 from buildarena_benchmark import Task
 from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board, OverallRow, Tally, cost_bins_of, failure_row
-from buildarena_store import CellId
 
 
 class _View(BaseModel):

@@ -10,6 +10,8 @@ from urllib.parse import quote_plus
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
@@ -18,8 +20,6 @@ from buildarena_benchmark.leaderboard import (
 )
 from buildarena_benchmark.scorers.registry import known_flags
 from buildarena_benchmark.statistics import MIN_SUCCESSES
-from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.catalog.tasks import TaskCatalog
 
 
 class _View(BaseModel):

@@ -11,16 +11,16 @@ from buildarena_api.http.etags import Answer
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.replays.views import replay_view
+from buildarena_backend.agents.turn_views import Transcripts
+from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.context import Context
+from buildarena_backend.replays.chapters import Replay
+from buildarena_backend.replays.from_document import replay_of_document
+from buildarena_backend.replays.from_turns import NO_BUILDING, replay_of_turns
+from buildarena_backend.trials.scoring import drawn_for
 from buildarena_benchmark import Task
 from buildarena_geometry import DocumentError, Machine
-from buildarena_pipeline.catalog.tracks import EXTERNAL_WORKFLOW
-from buildarena_pipeline.replays.chapters import Replay
-from buildarena_pipeline.replays.from_document import replay_of_document
-from buildarena_pipeline.replays.from_turns import NO_BUILDING, replay_of_turns
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.scoring import drawn_for
-from buildarena_pipeline.turns import Transcripts
-from buildarena_store import Job
 
 MAX_CACHED_BYTES: Final = 64 << 20
 """Replays in memory; one of a usual session has 50 kB. They are not kept as artifacts: another

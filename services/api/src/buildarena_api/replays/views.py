@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, Field
 
+from buildarena_backend.replays.chapters import Chapter, Replay, ReplayStep
 from buildarena_geometry import AttemptedBlock, Block, Connector
-from buildarena_pipeline.replays.chapters import Chapter, Replay, ReplayStep
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

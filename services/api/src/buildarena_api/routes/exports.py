@@ -18,6 +18,7 @@ from buildarena_api.http.problems import problem_responses
 from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
 from buildarena_api.leaderboard.views import Board, Row, board_view
+from buildarena_backend.store import Store
 from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
@@ -26,7 +27,6 @@ from buildarena_benchmark.leaderboard import (
     plain_table,
     published_rows,
 )
-from buildarena_store import Store
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited()])
 

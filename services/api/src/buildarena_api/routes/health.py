@@ -13,10 +13,12 @@ from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.probes import PartFailedError, Probes
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.known import configured_simulators
-from buildarena_store import MetricValues, SchemaVersionError, WorkerCounts
-from buildarena_store.states import CONSTRUCT_QUEUE, Audit, SweepState, simulate_queue
+from buildarena_backend.errors import SchemaVersionError
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import CONSTRUCT_QUEUE, Audit, SweepState, simulate_queue
+from buildarena_backend.telemetry.metrics import MetricValues
+from buildarena_backend.trials.known_simulators import configured_simulators
+from buildarena_backend.workers import WorkerCounts
 
 # No turn is waited for: an answer takes neither a thread nor a connection.
 router = APIRouter(prefix="/v1", tags=["health"])

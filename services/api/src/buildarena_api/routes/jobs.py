@@ -26,13 +26,13 @@ from buildarena_api.schemas import (
     PromptView,
 )
 from buildarena_api.withholding import require_told
-from buildarena_pipeline.catalog.specs import JobSpec
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.notify import notify_waiting
-from buildarena_pipeline.turns import Transcripts
-from buildarena_store import Job
-from buildarena_store.artifacts.kinds import MEDIA_TYPES
-from buildarena_store.jobs.pages import Order, Sort, sort_value
+from buildarena_backend.agents.turn_views import Transcripts
+from buildarena_backend.artifacts.kinds import MEDIA_TYPES
+from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.jobs.pages import Order, Sort, sort_value
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.notify import notify_waiting
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 

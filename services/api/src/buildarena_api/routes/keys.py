@@ -13,14 +13,14 @@ from buildarena_api.http.access import admin_only
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.schemas import BudgetView
-from buildarena_pipeline.catalog.specs import Budget, Title
-from buildarena_pipeline.errors import SubmissionError
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.notify import notify_waiting
-from buildarena_pipeline.runtime.settings import SimulatorName
-from buildarena_pipeline.runtime.simulators.known import simulator_issues
-from buildarena_store import ApiKey
-from buildarena_store.states import CONSTRUCT_QUEUE
+from buildarena_backend.accounts.keys import ApiKey
+from buildarena_backend.catalog.specs import Budget, Title
+from buildarena_backend.errors import SubmissionError
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.notify import notify_waiting
+from buildarena_backend.settings import SimulatorName
+from buildarena_backend.states import CONSTRUCT_QUEUE
+from buildarena_backend.trials.known_simulators import simulator_issues
 
 router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[Depends(admin_only)])
 

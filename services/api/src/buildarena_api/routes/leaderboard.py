@@ -20,8 +20,8 @@ from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown,
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
+from buildarena_backend.boards.trials import CellId
 from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
-from buildarena_store import CellId
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
 MAX_DISTINCT = 20

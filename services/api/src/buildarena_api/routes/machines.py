@@ -21,11 +21,11 @@ from buildarena_api.machine_uploads import (
 from buildarena_api.replays.views import PressView
 from buildarena_api.scenes import MachineScene, Vector, machine_scene
 from buildarena_api.schemas import JobView
+from buildarena_backend.agents.machine_trials import request_trial
+from buildarena_backend.catalog.specs import MAX_SEED, Name
+from buildarena_backend.process.context import Context
 from buildarena_benchmark import ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
-from buildarena_pipeline.agents.machine_trials import request_trial
-from buildarena_pipeline.catalog.specs import MAX_SEED, Name
-from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import DEFAULT_ENGINE
 
 router = APIRouter(prefix="/v1/machines", tags=["machines"])

@@ -14,12 +14,13 @@ from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import weighs
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import JobState
 from buildarena_geometry import DocumentError, Machine, module_set
 from buildarena_geometry.export import machine_glb, module_glb
-from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import MachineNotSimulable
 from buildarena_simulation.render.still import still_png
-from buildarena_store import Job, JobState
 
 router = APIRouter(prefix="/v1", tags=["pictures"])
 

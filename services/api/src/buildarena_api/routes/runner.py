@@ -31,15 +31,19 @@ from buildarena_api.runners.views import (
     RunnerAbout,
     RunnerFacts,
 )
+from buildarena_backend.artifacts.uploads import (
+    MAX_FILE_BYTES,
+    MAX_LEASE_BYTES,
+    PIECE_BYTES,
+    UploadedFile,
+)
+from buildarena_backend.errors import PermanentError, StaleLeaseError, UploadError
+from buildarena_backend.leases.runner_leases import JobToken, runner_prefix
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import simulate_queue
+from buildarena_backend.trials.known_simulators import known_simulators
+from buildarena_backend.trials.trial_repository import TrialRepository
 from buildarena_benchmark import ValidationIssue
-from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.known import known_simulators
-from buildarena_pipeline.runtime.trial_repository import TrialRepository
-from buildarena_store import StaleLeaseError, UploadedFile, UploadError
-from buildarena_store.jobs.runner_leases import JobToken, runner_prefix
-from buildarena_store.states import simulate_queue
-from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_BYTES, PIECE_BYTES
 
 PREFIX: Final = "/v1/runner"
 OCTETS: Final = "application/octet-stream"

@@ -13,15 +13,15 @@ from buildarena_api.dependencies import ContextDep, ExternalDep
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
-from buildarena_environment import ASSEMBLY, MAIN, NothingToSubmitError, Workbench
-from buildarena_environment.tools import building_tools
-from buildarena_pipeline.agents.briefing import LIMITS
-from buildarena_pipeline.agents.sessions import SessionClosedError
-from buildarena_pipeline.agents.trying import NoTestError
-from buildarena_pipeline.catalog.specs import Name, Seed, Worlds
-from buildarena_pipeline.runtime.context import Context
+from buildarena_backend.agents.briefing import LIMITS
+from buildarena_backend.agents.sessions import SessionClosedError
+from buildarena_backend.agents.trying import NoTestError
+from buildarena_backend.catalog.specs import Name, Seed, Worlds
+from buildarena_backend.errors import UnknownIdError
+from buildarena_backend.process.context import Context
+from buildarena_benchmark.environment import ASSEMBLY, MAIN, NothingToSubmitError, Workbench
+from buildarena_benchmark.environment.tools import building_tools
 from buildarena_simulation import DEFAULT_ENGINE
-from buildarena_store import UnknownIdError
 
 router = APIRouter(prefix="/v1/sessions", tags=["sessions"])
 

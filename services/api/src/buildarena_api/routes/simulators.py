@@ -9,10 +9,10 @@ from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import problem_responses
-from buildarena_pipeline.runtime.simulators.known import known_simulators
-from buildarena_pipeline.runtime.simulators.simulator import SimulatorKind
+from buildarena_backend.states import simulate_queue
+from buildarena_backend.trials.known_simulators import known_simulators
+from buildarena_backend.trials.simulator import SimulatorKind
 from buildarena_simulation import DEFAULT_ENGINE
-from buildarena_store.states import simulate_queue
 
 router = APIRouter(prefix="/v1/simulators", tags=["simulators"])
 

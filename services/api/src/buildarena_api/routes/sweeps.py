@@ -26,12 +26,12 @@ from buildarena_api.schemas import (
     SweepView,
     TroubleView,
 )
-from buildarena_pipeline.catalog.specs import Budget, SweepSpec
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.notify import notify_waiting
-from buildarena_pipeline.submission.submission import spec_hash
-from buildarena_store import Sweep, SweepProgress, SweepState
-from buildarena_store.states import CONSTRUCT_QUEUE
+from buildarena_backend.catalog.specs import Budget, SweepSpec
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.notify import notify_waiting
+from buildarena_backend.states import CONSTRUCT_QUEUE, SweepState
+from buildarena_backend.submission.submission import spec_hash
+from buildarena_backend.sweeps.sweeps import Sweep, SweepProgress
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 MAX_TROUBLES: Final = 50

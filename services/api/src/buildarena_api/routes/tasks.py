@@ -12,9 +12,9 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_backend.catalog.tasks import CatalogueEntry, TaskChangedError
 from buildarena_benchmark import TaskError, ValidationIssue, parse_custom_task
 from buildarena_benchmark.tasks.sources import MAX_BYTES
-from buildarena_pipeline.catalog.tasks import CatalogueEntry, TaskChangedError
 
 PATH = "/v1/tasks"
 router = APIRouter(prefix=PATH, tags=["tasks"])

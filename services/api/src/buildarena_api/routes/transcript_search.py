@@ -12,9 +12,9 @@ from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.job_filters import require_known
 from buildarena_api.schemas import AnyOutcome
+from buildarena_backend.jobs.filters import JobFilter
+from buildarena_backend.journal.transcript_search import TranscriptFilter
 from buildarena_benchmark import ValidationIssue
-from buildarena_store.jobs.filters import JobFilter
-from buildarena_store.jobs.transcript_search import TranscriptFilter
 
 SHARED: Final = ("task", "model", "seed", "outcome", "turn", "where")
 router = APIRouter(prefix="/v1/transcripts", tags=["jobs"])

@@ -17,12 +17,12 @@ from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.http.weights import weighs
 from buildarena_api.scenes import SceneView, scene_view
 from buildarena_api.withholding import require_told
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.process.context import Context
 from buildarena_geometry import DocumentError, Machine
-from buildarena_pipeline.runtime.context import Context
 from buildarena_simulation import TrajectoryFormatError
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 from buildarena_simulation.arrow import arrow_stream, unpacked_bytes
-from buildarena_store import Job
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store.jobs.verifications import MAX_OPEN, Requested
-from buildarena_store.states import VERIFY_QUEUE, Verdict, VerificationState
+from buildarena_backend.process.context import Context
+from buildarena_backend.results.verifications import MAX_OPEN, Requested
+from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
 
 router = APIRouter(prefix="/v1", tags=["verification"])
 

@@ -7,11 +7,11 @@ from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import problem_responses
+from buildarena_backend import __version__
+from buildarena_backend.trials.known_simulators import known_simulators
 from buildarena_benchmark.statistics import ERROR, MIN_SUCCESSES
 from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_geometry import FEEDBACK_VERSION
-from buildarena_pipeline import __version__
-from buildarena_pipeline.runtime.simulators.known import known_simulators
 
 router = APIRouter(prefix="/v1/versions", tags=["catalogue"])
 

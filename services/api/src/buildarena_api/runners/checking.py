@@ -7,9 +7,9 @@ from functools import cache
 from typing import Any, Final
 
 from buildarena_api.checking import Checker, CheckFailedError
+from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
+from buildarena_backend.trials.trial_checks import checked_trajectory, require_refusable
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
-from buildarena_pipeline.runtime.trial_checks import checked_trajectory, require_refusable
 from buildarena_simulation import Scenario, Trajectory
 
 SPARE_BYTES: Final = 1 << 30

@@ -10,13 +10,13 @@ from typing import Final
 from fastapi.concurrency import run_in_threadpool
 
 from buildarena_api.http.problems import ProblemError
-from buildarena_pipeline.errors import PermanentError
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.known import find_simulator
-from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
-from buildarena_store import Lease, StaleLeaseError, TooManyLeasesError
-from buildarena_store.jobs.runner_leases import prefix_of
-from buildarena_store.states import simulate_queue
+from buildarena_backend.errors import PermanentError, StaleLeaseError, TooManyLeasesError
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.leases.runner_leases import prefix_of
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import simulate_queue
+from buildarena_backend.trials.known_simulators import find_simulator
+from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
 
 LOOK_EVERY_S: Final = 0.3
 """How often the queues are looked at for all runners of one process that ask for the same."""

@@ -10,18 +10,21 @@ import structlog
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.runners.checking import shared_checker
 from buildarena_api.runners.views import Fault, NamedFile, Outcome
-from buildarena_pipeline.runtime.context import Context
-from buildarena_pipeline.runtime.simulators.simulator import BESIEGE
-from buildarena_pipeline.runtime.tracing import Attribute, span
-from buildarena_pipeline.runtime.trajectory_files import OutcomeRefusedError
-from buildarena_pipeline.runtime.trial_checks import checked_versions
-from buildarena_pipeline.runtime.trial_repository import DueTrial, TrialRepository
-from buildarena_pipeline.runtime.trials import File, TrialResult
+from buildarena_backend.artifacts.kinds import EVIDENCE
+from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
+from buildarena_backend.artifacts.uploads import UploadedFile, Uploads
+from buildarena_backend.database.text import clean
+from buildarena_backend.errors import StaleLeaseError, UploadError
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.leases.runner_leases import JobToken
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import AttemptResult
+from buildarena_backend.telemetry.tracing import Attribute, span
+from buildarena_backend.trials.simulator import BESIEGE
+from buildarena_backend.trials.trial_checks import checked_versions
+from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
+from buildarena_backend.trials.trials import File, TrialResult
 from buildarena_simulation import Trajectory
-from buildarena_store import Lease, StaleLeaseError, UploadedFile, UploadError, Uploads, clean
-from buildarena_store.artifacts.kinds import EVIDENCE
-from buildarena_store.jobs.runner_leases import JobToken
-from buildarena_store.states import AttemptResult
 
 LONGEST_DETAIL: Final = 2000
 MAX_EVIDENCE_BYTES: Final = 16 << 20

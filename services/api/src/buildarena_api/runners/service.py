@@ -10,10 +10,10 @@ from sqlalchemy.exc import SQLAlchemyError
 from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.runners.lease_queue import LeaseQueue
 from buildarena_api.runners.outcomes import Outcomes, drop_dead_uploads
-from buildarena_pipeline.periodic import Periodic
-from buildarena_pipeline.runtime.context import Context
-from buildarena_store import Uploads
-from buildarena_store.errors import ArtifactStoreError
+from buildarena_backend.artifacts.uploads import Uploads
+from buildarena_backend.errors import ArtifactStoreError
+from buildarena_backend.periodic import Periodic
+from buildarena_backend.process.context import Context
 
 SCORERS: Final = 3
 """Threads and connections for outcomes: their trajectories are unpacked and scored in them."""

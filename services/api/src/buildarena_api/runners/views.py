@@ -8,11 +8,11 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from buildarena_pipeline.runtime.settings import SimulatorName
-from buildarena_pipeline.runtime.trials import FaultReason
+from buildarena_backend.artifacts.kinds import EVIDENCE_NAME
+from buildarena_backend.artifacts.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
+from buildarena_backend.settings import SimulatorName
+from buildarena_backend.trials.trials import FaultReason
 from buildarena_simulation import ALL_ENGINES
-from buildarena_store.artifacts.kinds import EVIDENCE_NAME
-from buildarena_store.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
 
 LONGEST_WAIT_S: Final = 25.0
 MAX_VERSIONS: Final = 32

@@ -26,7 +26,7 @@ from tenacity import (
 from tenacity.nap import sleep_using_event
 from tenacity.stop import stop_base
 
-from buildarena_pipeline.keepalive import socket_options
+from buildarena_backend.keepalive import socket_options
 from buildarena_simworker.remote.errors import LeaseLostError, RefusedError, UnreachableError
 
 TIMEOUT_S: Final = 15.0

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.settings import Settings
-from buildarena_pipeline.runtime.simulators.installed import installed_simulators
+from buildarena_backend.errors import StartupError
+from buildarena_backend.settings import Settings
+from buildarena_backend.trials.installed_simulators import installed_simulators
 from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
 from buildarena_simworker.remote.errors import RefusedError, RemoteError
 from buildarena_simworker.remote.process import KEY_VARIABLE, read_key

@@ -18,11 +18,11 @@ from typing import Any, Final
 
 import structlog
 
-from buildarena_environment.processes import end_with_parent, tree_memory_bytes
+from buildarena_backend.errors import StartupError
+from buildarena_backend.telemetry.logs import set_up_logs
+from buildarena_backend.trials.simulator import Simulator
+from buildarena_benchmark.environment.trials.processes import end_with_parent, tree_memory_bytes
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_pipeline.errors import StartupError
-from buildarena_pipeline.runtime.logs import set_up_logs
-from buildarena_pipeline.runtime.simulators.simulator import Simulator
 from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
 from buildarena_simworker.remote.errors import RemoteError, UnreachableError
 from buildarena_simworker.remote.slots import Heartbeats, Slot, hand_back

@@ -11,13 +11,13 @@ from typing import Any, Final, get_args
 
 import structlog
 
+from buildarena_backend.errors import PermanentError, TransientError
+from buildarena_backend.periodic import Periodic
+from buildarena_backend.trials.simulator import Simulator, TrialRequest
+from buildarena_backend.trials.trials import FaultReason, File, TrialResult
 from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.task import task_of
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.errors import PermanentError, TransientError
-from buildarena_pipeline.periodic import Periodic
-from buildarena_pipeline.runtime.simulators.simulator import Simulator, TrialRequest
-from buildarena_pipeline.runtime.trials import FaultReason, File, TrialResult
 from buildarena_simulation import write_trajectory
 from buildarena_simworker.remote.api import HeldLease, RunnerApi
 from buildarena_simworker.remote.errors import (

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 from decimal import Decimal
 
-from buildarena_pipeline.errors import PermanentError
-from buildarena_store import Usage
+from buildarena_backend.errors import PermanentError
+from buildarena_backend.journal.journal import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions

@@ -9,7 +9,7 @@ import json
 import random
 from typing import Any
 
-from buildarena_environment.tools import OBJECTION
+from buildarena_benchmark.environment.tools import OBJECTION
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.builtin.reading import Situation, read_situation
 from buildarena_worker.session.messages import Completion, Request, ToolCall

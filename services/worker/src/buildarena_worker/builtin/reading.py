@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from buildarena_environment.tools import LOOKUPS
+from buildarena_benchmark.environment.tools import LOOKUPS
 from buildarena_worker.builtin.designs.design import Seen
 from buildarena_worker.session.messages import Message, Request
 

@@ -14,7 +14,7 @@ from redis.asyncio.retry import Retry
 from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 
-from buildarena_pipeline.breakers import AsyncCircuitBreaker
+from buildarena_backend.queue.breakers import AsyncCircuitBreaker
 
 log = structlog.get_logger(__name__)
 

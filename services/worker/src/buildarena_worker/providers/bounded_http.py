@@ -10,8 +10,8 @@ from typing import Any
 
 import httpx2
 
+from buildarena_backend.journal.journal import Usage
 from buildarena_geometry.json_texts import is_too_deep, read_json
-from buildarena_store import Usage
 from buildarena_worker.providers.bounds import MAX_BODY, usage_of
 from buildarena_worker.providers.failures import Failure, ProviderError, redirected
 from buildarena_worker.session.messages import ONE_REQUEST

@@ -7,9 +7,9 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from buildarena_backend.journal.journal import Usage
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.json_values import levels
-from buildarena_store import Usage
 from buildarena_worker.session.messages import Completion, ToolCall
 
 MAX_BODY = 8 * 1024 * 1024

@@ -6,8 +6,8 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_pipeline.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
-from buildarena_pipeline.errors import PermanentError
+from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
+from buildarena_backend.errors import PermanentError
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import ModelClient
 

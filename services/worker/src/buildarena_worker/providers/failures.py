@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 
-from buildarena_store import Usage
+from buildarena_backend.journal.journal import Usage
 from buildarena_worker.session.messages import ONE_REQUEST
 
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from buildarena_pipeline.catalog.models import ModelRegistry
-from buildarena_pipeline.secret_files import SUFFIX, SecretFileError, read_secret
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.secret_files import SUFFIX, SecretFileError, read_secret
 
 LOOKS_LIKE_A_KEY: Final = re.compile(rf"^\w+_API_KEY(?:{SUFFIX})?$")
 

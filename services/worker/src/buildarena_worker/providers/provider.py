@@ -15,13 +15,12 @@ from dataclasses import replace
 
 import structlog
 
-from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
-from buildarena_pipeline.catalog.prices import price_usd
-from buildarena_pipeline.errors import PermanentError, TransientError
-from buildarena_pipeline.runtime.tracing import ERROR_TYPE, note
-from buildarena_pipeline.secret_files import SUFFIX, SecretFileError, read_secret
-from buildarena_store import Usage
-from buildarena_store.jobs.journal import GARBAGE, OUT_OF_TIME
+from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
+from buildarena_backend.catalog.prices import price_usd
+from buildarena_backend.errors import PermanentError, TransientError
+from buildarena_backend.journal.journal import GARBAGE, OUT_OF_TIME, Usage
+from buildarena_backend.secret_files import SUFFIX, SecretFileError, read_secret
+from buildarena_backend.telemetry.tracing import ERROR_TYPE, note
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.request_loop import RequestLoop

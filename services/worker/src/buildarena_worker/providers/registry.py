@@ -14,13 +14,13 @@ from importlib import import_module, metadata
 from types import MappingProxyType
 from typing import Final, Protocol, cast
 
-from buildarena_pipeline.catalog.models import (
+from buildarena_backend.catalog.models import (
     BUILTIN_PROTOCOL,
     ModelEntry,
     ModelRegistry,
     ProviderEntry,
 )
-from buildarena_pipeline.errors import PermanentError, StartupError
+from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_worker import providers
 from buildarena_worker.session.messages import Completion, Request
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from decimal import Decimal
 
-from buildarena_pipeline.runtime.active_lease import ActiveLease
-from buildarena_store import Budgets, Need, Shortage, StaleLeaseError, Usage
+from buildarena_backend.accounts.budgets import Budgets, Need, Shortage
+from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.journal.journal import Usage
+from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_worker.session.messages import Request
 from buildarena_worker.session.results import BudgetExhausted, Drained, SessionEnded, Superseded
 

@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from buildarena_environment.tools import LOOKUPS, OBJECTION
+from buildarena_backend.journal.transcript import ActionResult
+from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
 from buildarena_geometry import Outcome, Refused, ToolDefinition
-from buildarena_pipeline.transcript import ActionResult
 from buildarena_worker.session.messages import Completion, Message, ToolCall
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session

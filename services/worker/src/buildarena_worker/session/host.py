@@ -12,12 +12,13 @@ from concurrent.futures import CancelledError
 from dataclasses import replace
 from typing import Any, Protocol
 
+from buildarena_backend.database.text import clean
+from buildarena_backend.errors import StaleLeaseError, TransientError
+from buildarena_backend.journal.journal import OUT_OF_TIME, Journal, JournalEntry, Usage
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_geometry import KeyPress, Machine
-from buildarena_pipeline.errors import TransientError
-from buildarena_pipeline.runtime.active_lease import ActiveLease
 from buildarena_simulation import Trajectory
-from buildarena_store import Journal, JournalEntry, RolloutRecord, StaleLeaseError, Usage, clean
-from buildarena_store.jobs.journal import OUT_OF_TIME
 from buildarena_worker.session.budget_guard import BudgetGuard, require_open
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.session.messages import Completion, ModelClient, Request

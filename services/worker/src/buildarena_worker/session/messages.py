@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from buildarena_backend.ids import content_hash
+from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_geometry import ToolDefinition
-from buildarena_store import JournalEntry, Usage
-from buildarena_store.ids import content_hash
 from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 ONE_REQUEST = Usage(requests=1)

@@ -6,7 +6,7 @@ import math
 import threading
 from dataclasses import dataclass, field
 
-from buildarena_pipeline.runtime.active_lease import ActiveLease
+from buildarena_backend.process.active_lease import ActiveLease
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

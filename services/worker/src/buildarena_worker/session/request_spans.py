@@ -14,7 +14,7 @@ from typing import Final
 
 from opentelemetry.trace import SpanKind
 
-from buildarena_pipeline.runtime.tracing import Attribute, mark_failed, span
+from buildarena_backend.telemetry.tracing import Attribute, mark_failed, span
 from buildarena_worker.session.messages import Completion, Request
 
 PROVIDERS: Final[Mapping[str, str]] = {

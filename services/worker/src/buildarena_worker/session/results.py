@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from buildarena_backend.accounts.budgets import Shortage
+from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_geometry import KeyPress, Machine
-from buildarena_store import RolloutRecord, Shortage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

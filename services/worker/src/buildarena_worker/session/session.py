@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from buildarena_backend.catalog.prompt_packs import PromptPack
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_benchmark import Score, Task, broken_constraint
-from buildarena_environment.briefing import catalogue_told, worlds_told
-from buildarena_environment.given import acting
-from buildarena_environment.trials import score_text
+from buildarena_benchmark.environment.briefing import catalogue_told, worlds_told
+from buildarena_benchmark.environment.given import acting
+from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Catalogue, Machine, Outcome, ToolDefinition
-from buildarena_pipeline.catalog.prompt_packs import PromptPack
-from buildarena_pipeline.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_simulation import Trajectory
-from buildarena_store import RolloutRecord
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.messages import Completion, Message, Request
 from buildarena_worker.session.results import ConstructionFailedError

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any
 
-from buildarena_store import JournalEntry, Usage
+from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_worker.session.results import LimitReached, SessionEnded
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from buildarena_pipeline.transcript import ModelTurn
-from buildarena_store import Lease, TurnResult, Turns
+from buildarena_backend.journal.transcript import ModelTurn
+from buildarena_backend.journal.turns import TurnResult, Turns
+from buildarena_backend.leases.leases import Lease
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 
 

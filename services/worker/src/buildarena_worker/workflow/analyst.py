@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.journal.transcript import Turn
 from buildarena_geometry import (
     Accepted,
     Cause,
@@ -20,9 +22,7 @@ from buildarena_geometry import (
     ToolDefinition,
     object_schema,
 )
-from buildarena_pipeline.transcript import Turn
 from buildarena_simulation import Trajectory
-from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Act, Dialogue, Role
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.machine_tools import QUERIES, tools_named

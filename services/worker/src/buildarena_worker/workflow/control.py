@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.trials.scoring import best_rollout
+from buildarena_benchmark.environment.briefing import programs_told
+from buildarena_benchmark.environment.trials.world import units_text
 from buildarena_benchmark.flags import is_disqualified
-from buildarena_environment.briefing import programs_told
-from buildarena_environment.world import units_text
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.feedback.modules import module_text
 from buildarena_geometry.feedback.words import point
 from buildarena_geometry.json_texts import read_json
-from buildarena_pipeline.runtime.scoring import best_rollout
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.errors import ControllerFailed
-from buildarena_store import RolloutRecord
 from buildarena_worker.session.dialogue import Dialogue, Role
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_benchmark import Task, builtin_tasks
-from buildarena_pipeline.catalog.prompt_packs import PromptPack
 from buildarena_worker.builtin.designs import DESIGNS
 
 EXAMPLE_SEED = 0

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any, Final
 
 from buildarena_benchmark import Task
-from buildarena_environment.briefing import modules_told
-from buildarena_environment.tools import LOOKUPS
-from buildarena_environment.world import units_text
+from buildarena_benchmark.environment.briefing import modules_told
+from buildarena_benchmark.environment.tools import LOOKUPS
+from buildarena_benchmark.environment.trials.world import units_text
 from buildarena_geometry import (
     GROUPS,
     LOOKUP,

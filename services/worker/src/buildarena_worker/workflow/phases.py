@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from buildarena_environment.tools import LOOKUPS, OBJECTION
+from buildarena_benchmark.environment.tools import LOOKUPS, OBJECTION
 from buildarena_geometry import Machine
 from buildarena_worker.session.dialogue import Dialogue, Role, is_lookup_only, terminates
 from buildarena_worker.session.messages import Completion

@@ -8,8 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 
-from buildarena_pipeline.catalog.workflows import WorkflowSource, workflow_sources
-from buildarena_pipeline.errors import PermanentError, StartupError
+from buildarena_backend.catalog.workflows import WorkflowSource, workflow_sources
+from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_worker.workflow.base import Workflow
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.trials.scoring import best_rollout
 from buildarena_geometry import Machine
-from buildarena_pipeline.runtime.scoring import best_rollout
-from buildarena_store import RolloutRecord
 from buildarena_worker.session.results import Failed, Finished, SessionEnded, SessionResult
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.analyst import analyse

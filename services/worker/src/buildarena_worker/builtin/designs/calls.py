@@ -8,13 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_environment import ASSEMBLY, MAIN
+from buildarena_benchmark.environment import ASSEMBLY, MAIN
 from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.builtin.designs.design import Design
 from buildarena_worker.builtin.designs.drafting import Action
 
 Call = dict[str, Any]
-"""`machine`, `tool` and `arguments`, as `buildarena_environment.Environment.step` takes them."""
+"""`machine`, `tool` and `arguments`, as an `Environment` takes them."""
 
 
 def calls_of(task: str, seed: int) -> list[Call] | None:

@@ -6,7 +6,7 @@ from anthropic import AsyncAnthropic
 from pydantic_ai.models.anthropic import AnthropicModel
 from pydantic_ai.providers.anthropic import AnthropicProvider
 
-from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
 from buildarena_worker.providers.bounded_http import BoundedClient
 from buildarena_worker.providers.library import Connected, LibrarySender
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pydantic_ai.models.google import GoogleModel
 from pydantic_ai.providers.google import GoogleProvider
 
-from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
 from buildarena_worker.providers.bounded_http import BoundedClient
 from buildarena_worker.providers.library import Connected, LibrarySender
 

@@ -15,8 +15,8 @@ from typing import Any
 
 from genai_prices.data_snapshot import get_snapshot
 
+from buildarena_backend.journal.journal import Usage
 from buildarena_geometry.json_texts import read_json
-from buildarena_store import Usage
 from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded, usage_of
 from buildarena_worker.providers.failures import (
     Failure,

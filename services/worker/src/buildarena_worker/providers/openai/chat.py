@@ -13,7 +13,7 @@ from urllib.request import getproxies, proxy_bypass
 
 import aiohttp
 
-from buildarena_pipeline import __version__
+from buildarena_backend import __version__
 from buildarena_worker.providers.bounds import MAX_BODY
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader

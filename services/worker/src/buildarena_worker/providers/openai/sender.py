@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from buildarena_pipeline.catalog.models import ModelEntry, ProviderEntry
+from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
 from buildarena_worker.providers.openai.chat import OpenAIChat
 
 

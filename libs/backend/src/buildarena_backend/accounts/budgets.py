@@ -1,0 +1,262 @@
+"""Budgets of sweeps and keys: what their jobs may spend, reserved before each model request.
+
+A job is paid for by the sweep that wants it and by the key that submitted that sweep. Before a
+request its worker reserves what it may cost; when the reply is journaled, the reservation gives
+way to what it did cost. So a budget is overspent by no more than the open requests cost above
+what was reserved for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any
+
+from sqlalchemy import Connection, and_, func, literal, or_, select, update
+from sqlalchemy.dialects.postgresql import insert
+
+from buildarena_backend.database.account_tables import MAX_USD, budgets, reservations
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import jobs, journal, sweep_jobs
+from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.journal.journal import Usage
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.states import JobState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BudgetLimits:
+    """The most that may be spent; None where there is no limit.
+
+    Attributes:
+        max_cost_usd: US dollars.
+        max_tokens: Input and output tokens together.
+        max_requests: Model requests.
+    """
+
+    max_cost_usd: Decimal | None = None
+    max_tokens: int | None = None
+    max_requests: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Budget:
+    """A budget and what was spent of it.
+
+    Attributes:
+        id: Id of the sweep or key whose budget it is.
+        limits: The most that may be spent.
+        spent_cost_usd: US dollars spent.
+        spent_tokens: Input and output tokens used.
+        spent_requests: Model requests answered.
+        lost_cost_usd: What the lost requests cost at most; only what is known to have been paid is
+            part of what was spent.
+        lost_requests: Requests whose replies no journal has: sent by a process that was killed, or
+            answered after their lease had ended. Each may have been paid for.
+    """
+
+    id: str
+    limits: BudgetLimits
+    spent_cost_usd: Decimal
+    spent_tokens: int
+    spent_requests: int
+    lost_cost_usd: Decimal
+    lost_requests: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Need:
+    """What one model request may use."""
+
+    cost_usd: Decimal
+    tokens: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shortage:
+    """Why a request may not be sent.
+
+    Attributes:
+        budget_id: The budget that lacks the means.
+        limit: The limit that is reached, by its name in `BudgetLimits`.
+        detail: What is lacking, for people.
+        temporary: Whether open requests may give back enough, so that waiting helps.
+    """
+
+    budget_id: str
+    limit: str
+    detail: str
+    temporary: bool
+
+
+class Budgets:
+    """Sets, reads and reserves budgets."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def set(self, budget_id: str, limits: BudgetLimits, *, connection: Connection) -> None:
+        """Gives a sweep or key a budget; what its jobs spent before counts.
+
+        Args:
+            budget_id: The sweep's or key's id.
+            limits: What may be spent in all, earlier spending included.
+            connection: The transaction it is part of.
+        """
+        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == budget_id)
+        of_sweep = and_(journal.c.payer == budget_id, journal.c.job_id.in_(members))
+        cost, tokens, requests = connection.execute(
+            select(
+                func.coalesce(func.sum(journal.c.cost_usd), 0),
+                func.coalesce(func.sum(journal.c.input_tokens + journal.c.output_tokens), 0),
+                func.count(),
+            ).where(or_(of_sweep, journal.c.owner == budget_id))
+        ).one()
+        given: dict[str, Any] = {
+            name: getattr(limits, name) for name in BudgetLimits.__dataclass_fields__
+        }
+        statement = insert(budgets).values(
+            id=budget_id,
+            spent_cost_usd=cost,
+            spent_tokens=tokens,
+            spent_requests=requests,
+            **given,
+        )
+        connection.execute(statement.on_conflict_do_update(index_elements=["id"], set_=given))
+
+    def get(self, budget_id: str) -> Budget | None:
+        """The budget of a sweep or key; None when it has none."""
+        with self._database.statement() as connection:
+            row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
+        return None if row is None else _budget(row)
+
+    def reserve(self, lease: Lease, need: Need) -> Shortage | None:
+        """Reserves what the job's next request may cost, in all its budgets or in none.
+
+        Returns:
+            None when it is reserved, otherwise what is lacking.
+
+        Raises:
+            StaleLeaseError: The lease is over: nobody would give back what it reserved.
+        """
+        job_id = lease.job.id
+        # Before the budgets, as in every write under a lease; who ends the lease waits for it.
+        held = (
+            select(jobs.c.id)
+            .where(
+                jobs.c.id == job_id,
+                jobs.c.lease_token == lease.token,
+                jobs.c.state == JobState.RUNNING,
+            )
+            .with_for_update(read=True)
+        )
+        # Locked in the order of their ids, so that two jobs never wait for each other.
+        locked = (
+            select(budgets)
+            .join(jobs, _PAYS)
+            .where(jobs.c.id == job_id)
+            .order_by(budgets.c.id)
+            .with_for_update(of=budgets)
+        )
+        with self._database.transaction() as connection:
+            if connection.execute(held).first() is None:
+                raise StaleLeaseError(job_id, lease.token)
+            found = [_budget(row) for row in connection.execute(locked)]
+            for budget in found:
+                shortage = _shortage(budget, _reserved(budget.id, job_id, connection), need)
+                if shortage is not None:
+                    return shortage
+            if found:
+                self._write_reservations(found, lease, need, connection)
+        return None
+
+    def _write_reservations(
+        self, found: Sequence[Budget], lease: Lease, need: Need, connection: Connection
+    ) -> None:
+        rows = [
+            {
+                "job_id": lease.job.id,
+                "budget_id": budget.id,
+                "token": lease.token,
+                "cost_usd": need.cost_usd,
+                "tokens": need.tokens,
+            }
+            for budget in found
+        ]
+        statement = insert(reservations).values(rows)
+        new = {name: statement.excluded[name] for name in ("token", "cost_usd", "tokens")}
+        connection.execute(
+            statement.on_conflict_do_update(index_elements=["job_id", "budget_id"], set_=new)
+        )
+
+    def charge_lost(self, lease: Lease, usage: Usage) -> None:
+        """Counts a reply that was paid for but came after the lease had ended."""
+        paying = select(budgets.c.id).join(jobs, _PAYS).where(jobs.c.id == lease.job.id)
+        with self._database.transaction() as connection:
+            connection.execute(
+                update(budgets)
+                .where(budgets.c.id.in_(paying))
+                .values(
+                    spent_cost_usd=func.least(budgets.c.spent_cost_usd + usage.cost_usd, MAX_USD),
+                    spent_tokens=budgets.c.spent_tokens + usage.input_tokens + usage.output_tokens,
+                    spent_requests=budgets.c.spent_requests + usage.requests,
+                    lost_cost_usd=func.least(budgets.c.lost_cost_usd + usage.cost_usd, MAX_USD),
+                    lost_requests=budgets.c.lost_requests + usage.requests,
+                )
+            )
+            connection.execute(
+                update(jobs)
+                .where(jobs.c.id == lease.job.id)
+                .values(lost_requests=jobs.c.lost_requests + usage.requests)
+            )
+
+
+_PAYS = or_(budgets.c.id == jobs.c.payer, budgets.c.id == jobs.c.owner)
+
+
+def _budget(row: Any) -> Budget:
+    limits = BudgetLimits(
+        max_cost_usd=row.max_cost_usd, max_tokens=row.max_tokens, max_requests=row.max_requests
+    )
+    return Budget(
+        id=row.id,
+        limits=limits,
+        spent_cost_usd=row.spent_cost_usd,
+        spent_tokens=row.spent_tokens,
+        spent_requests=row.spent_requests,
+        lost_cost_usd=row.lost_cost_usd,
+        lost_requests=row.lost_requests,
+    )
+
+
+def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
+    """Dollars, tokens and requests reserved for the budget's other jobs."""
+    row = connection.execute(
+        select(
+            func.coalesce(func.sum(reservations.c.cost_usd), literal(0)),
+            func.coalesce(func.sum(reservations.c.tokens), literal(0)),
+            func.count(),
+        ).where(reservations.c.budget_id == budget_id, reservations.c.job_id != job_id)
+    ).one()
+    return Decimal(row[0]), int(row[1]), int(row[2])
+
+
+def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) -> Shortage | None:
+    limits = budget.limits
+    rows: tuple[tuple[str, Any, Any, Any, Any], ...] = (
+        ("max_cost_usd", limits.max_cost_usd, budget.spent_cost_usd, reserved[0], need.cost_usd),
+        ("max_tokens", limits.max_tokens, budget.spent_tokens, reserved[1], need.tokens),
+        ("max_requests", limits.max_requests, budget.spent_requests, reserved[2], 1),
+    )
+    for name, limit, spent, reserved_now, wanted in rows:
+        # What needs nothing lacks nothing, even of a budget that was overspent a little.
+        if limit is None or not wanted or spent + reserved_now + wanted <= limit:
+            continue
+        temporary = spent + wanted <= limit
+        detail = (
+            f"budget of {budget.id}: {name} is {limit:,}, {spent:,} is spent, and the next "
+            f"request may use {wanted:,}"
+        )
+        return Shortage(budget_id=budget.id, limit=name, detail=detail, temporary=temporary)
+    return None

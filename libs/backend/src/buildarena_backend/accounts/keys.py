@@ -1,0 +1,275 @@
+"""API keys: who may do what. Only the hash of a key's secret is kept."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import any_, func, insert, or_, select, update
+
+from buildarena_backend import events
+from buildarena_backend.database.account_tables import api_keys
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import bound_texts, columns_of, value_of
+from buildarena_backend.errors import EndedKeyError, UnknownIdError
+from buildarena_backend.ids import new_id
+
+SECRET_PREFIX = "ba_"  # noqa: S105 - what secrets begin with, for scanners that look for leaks
+NOTED_EVERY = timedelta(minutes=1)
+"""How exact the time of a key's last use is."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ApiKey:
+    """A key without its secret.
+
+    Attributes:
+        id: Its identifier, which also names its holder's sweeps and budget.
+        name: Who holds it, for people.
+        scopes: What it may do: ``read``, ``submit``, ``admin``, or only ``runner``.
+        simulators: Of a runner key, the simulators whose jobs may be leased with it.
+        job_owners: Of a runner key, the keys whose jobs may be leased; None for everybody's.
+        created_at: When it was made.
+        expires_at: When it ends, if ever.
+        revoked_at: When it was revoked, if it was.
+        used_at: When it was last used, to the minute.
+        suspended_at: Of a runner key, since when its runners may do nothing: a trial of theirs was
+            refuted.
+        suspended_for: The verification that refuted it.
+        previous_until: Until when the secret before the present one is good; None when there was
+            none.
+    """
+
+    id: str
+    name: str
+    scopes: Sequence[str]
+    simulators: Sequence[str] | None
+    job_owners: Sequence[str] | None
+    created_at: datetime
+    expires_at: datetime | None
+    revoked_at: datetime | None
+    used_at: datetime | None
+    suspended_at: datetime | None
+    suspended_for: str | None
+    previous_until: datetime | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyCheck:
+    """What a presented secret is.
+
+    Attributes:
+        key: The key that has it.
+        refusal: ``revoked``, ``suspended`` or ``expired``, or ``replaced`` of a secret that a newer
+            one has followed; None when the key is good.
+    """
+
+    key: ApiKey
+    refusal: str | None
+
+
+class ApiKeys:
+    """Makes, finds and revokes keys."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def create(
+        self,
+        *,
+        name: str,
+        scopes: Sequence[str],
+        ttl: timedelta | None = None,
+        simulators: Sequence[str] | None = None,
+        job_owners: Sequence[str] | None = None,
+    ) -> tuple[ApiKey, str]:
+        """Makes a key.
+
+        Args:
+            name: Who holds it.
+            scopes: What it may do.
+            ttl: How long it is valid; None for no limit.
+            simulators: Of a runner key, the simulators whose jobs may be leased.
+            job_owners: Of a runner key, the keys whose jobs may be leased; None for everybody's.
+
+        Returns:
+            The key, and its secret, which can't be read again.
+        """
+        secret = new_secret()
+        statement = (
+            insert(api_keys)
+            .values(
+                id=new_id("key"),
+                name=name,
+                secret_hash=secret_hash(secret),
+                scopes=list(scopes),
+                simulators=None if simulators is None else list(simulators),
+                job_owners=None if job_owners is None else list(job_owners),
+                expires_at=None if ttl is None else events.now + ttl,
+            )
+            .returning(*_COLUMNS)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(statement).one()
+        return value_of(ApiKey, row), secret
+
+    def check(self, secret: str) -> KeyCheck | None:
+        """The key that has this secret, and whether it is still valid; None when nobody has it."""
+        digest = secret_hash(secret)
+        return self.check_hashes([digest]).get(digest)
+
+    def check_hashes(self, digests: Sequence[str]) -> dict[str, KeyCheck]:
+        """The keys that have the secrets of these hashes, by hash; what nobody has is left out."""
+        expired = (api_keys.c.expires_at <= events.now).label("expired")
+        replaced = (api_keys.c.previous_until <= events.now).label("replaced")
+        stale = func.coalesce(api_keys.c.used_at < events.now - NOTED_EVERY, True).label("stale")
+        wanted = any_(bound_texts(digests))
+        query = select(
+            *_COLUMNS, api_keys.c.secret_hash, api_keys.c.previous_hash, expired, replaced, stale
+        ).where(or_(api_keys.c.secret_hash == wanted, api_keys.c.previous_hash == wanted))
+        asked, checks, used = set(digests), {}, []
+        with self._database.transaction() as connection:
+            for row in connection.execute(query):
+                key = value_of(ApiKey, row)
+                for digest in asked & {row.secret_hash, row.previous_hash}:
+                    replaced_one = digest != row.secret_hash and row.replaced
+                    refusal = _refusal(key, expired=row.expired, replaced=replaced_one)
+                    checks[digest] = KeyCheck(key=key, refusal=refusal)
+                    if refusal is None and row.stale:
+                        used.append(key.id)
+            if used:
+                noted = api_keys.c.id == any_(bound_texts(used))
+                connection.execute(update(api_keys).where(noted).values(used_at=events.now))
+        return checks
+
+    def ended(self, key_ids: Sequence[str]) -> set[str]:
+        """Those of the keys that were revoked or suspended, or have expired."""
+        query = select(api_keys.c.id).where(
+            api_keys.c.id == any_(bound_texts(key_ids)),
+            or_(
+                api_keys.c.revoked_at.is_not(None),
+                api_keys.c.suspended_at.is_not(None),
+                api_keys.c.expires_at <= events.now,
+            ),
+        )
+        with self._database.transaction() as connection:
+            return set(connection.execute(query).scalars())
+
+    def all(self) -> list[ApiKey]:
+        """Every key, oldest first, including revoked and expired ones."""
+        query = select(*_COLUMNS).order_by(api_keys.c.created_at, api_keys.c.id)
+        with self._database.transaction() as connection:
+            return [value_of(ApiKey, row) for row in connection.execute(query)]
+
+    def get(self, key_id: str) -> ApiKey:
+        """The key with this id.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        query = select(*_COLUMNS).where(api_keys.c.id == key_id)
+        with self._database.transaction() as connection:
+            row = connection.execute(query).first()
+        if row is None:
+            raise UnknownIdError("key", key_id)
+        return value_of(ApiKey, row)
+
+    def rotate(self, key_id: str, *, overlap: timedelta) -> tuple[ApiKey, str]:
+        """Gives a key another secret; it keeps its id, and so all that it owns.
+
+        Args:
+            key_id: The key.
+            overlap: How long its present secret stays good. A secret before that one ends at once.
+
+        Returns:
+            The key, and its secret, which can't be read again.
+
+        Raises:
+            UnknownIdError: There is no such key.
+            EndedKeyError: It was revoked or has expired.
+        """
+        secret = new_secret()
+        statement = (
+            update(api_keys)
+            .where(
+                api_keys.c.id == key_id,
+                api_keys.c.revoked_at.is_(None),
+                or_(api_keys.c.expires_at.is_(None), api_keys.c.expires_at > events.now),
+            )
+            .values(
+                previous_hash=api_keys.c.secret_hash,
+                previous_until=events.now + overlap,
+                secret_hash=secret_hash(secret),
+            )
+            .returning(*_COLUMNS)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(statement).first()
+        if row is None:
+            key = self.get(key_id)
+            raise EndedKeyError(key_id, "revoked" if key.revoked_at else "expired")
+        return value_of(ApiKey, row), secret
+
+    def revoke(self, key_id: str) -> ApiKey:
+        """Revokes a key at once; revoking it again changes nothing.
+
+        Raises:
+            UnknownIdError: There is no such key.
+        """
+        return self._change(key_id, revoked_at=func.coalesce(api_keys.c.revoked_at, events.now))
+
+    def reinstate(self, key_id: str) -> ApiKey:
+        """Lets a suspended key work again; what its runners bring is verified as before.
+
+        Raises:
+            UnknownIdError: There is no such key.
+        """
+        return self._change(key_id, suspended_at=None, suspended_for=None)
+
+    def _change(self, key_id: str, **values: Any) -> ApiKey:
+        statement = (
+            update(api_keys).where(api_keys.c.id == key_id).values(**values).returning(*_COLUMNS)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(statement).first()
+        if row is None:
+            raise UnknownIdError("key", key_id)
+        return value_of(ApiKey, row)
+
+
+def _refusal(key: ApiKey, *, expired: bool | None, replaced: bool | None) -> str | None:
+    if key.revoked_at is not None:
+        return "revoked"
+    if key.suspended_at is not None:
+        return "suspended"
+    if expired:
+        return "expired"
+    return "replaced" if replaced else None
+
+
+def is_secret(text: str) -> bool:
+    """Whether a text has the form of a secret; one that has not is nobody's."""
+    return _SECRET.fullmatch(text) is not None
+
+
+def new_secret() -> str:
+    """256 random bits in letters."""
+    return SECRET_PREFIX + secrets.token_urlsafe(32)
+
+
+def secret_hash(secret: str) -> str:
+    """What is kept of a secret.
+
+    A plain SHA-256 is enough: secrets are 256 random bits, which nobody can guess from a hash,
+    unlike a password.
+    """
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+_SECRET = re.compile(SECRET_PREFIX + "[A-Za-z0-9_-]{43}")
+_COLUMNS = columns_of(ApiKey, api_keys)

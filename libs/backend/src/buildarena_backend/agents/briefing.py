@@ -1,0 +1,86 @@
+"""What an external agent reads when its session opens: the task as one who plays alone has it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from typing import Final
+
+from buildarena_backend.agents.trying import tests_told
+from buildarena_backend.agents.workbench import MAX_BYTES
+from buildarena_backend.journal.external_calls import IDLE_FOR
+from buildarena_benchmark import Task
+from buildarena_benchmark.environment import briefing as words_around
+
+MAX_CALLS: Final = 2000
+"""Calls a session may make."""
+MAX_SESSION_BYTES: Final = 8 << 20
+"""What a session's arguments and feedback may have together: 4 kB for each of its calls."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionLimits:
+    """How much a session may do.
+
+    Attributes:
+        calls: Calls it may make.
+        session_bytes: Bytes of all arguments and answers.
+        call_bytes: Bytes of one call's arguments.
+        idle_s: Seconds without a call after which it is cancelled.
+    """
+
+    calls: int
+    session_bytes: int
+    call_bytes: int
+    idle_s: int
+
+
+LIMITS: Final = SessionLimits(
+    calls=MAX_CALLS,
+    session_bytes=MAX_SESSION_BYTES,
+    call_bytes=MAX_BYTES,
+    idle_s=int(IDLE_FOR.total_seconds()),
+)
+
+
+def briefing(task: Task, *, data_sheets: bool = True, worlds: int = 0) -> str:
+    """All that an agent must know to play a task, but for its tools.
+
+    Args:
+        task: The task.
+        data_sheets: Whether it is told the numbers of modules and world.
+        worlds: In how many varied worlds its machine is scored.
+
+    Returns:
+        Markdown: how it plays, the statement, the frame, the rules, the limits, the modules.
+    """
+    return words_around.briefing(
+        task,
+        trials=tests_told(task.tests),
+        guidelines=f"{_guidelines()}\n{words_around.worlds_told(worlds)}",
+        values={
+            "calls": f"{LIMITS.calls:,}",
+            "bytes": f"{LIMITS.session_bytes:,}",
+            "call_bytes": f"{LIMITS.call_bytes:,}",
+            "idle_hours": str(LIMITS.idle_s // 3600),
+        },
+        data_sheets=data_sheets,
+    )
+
+
+def briefing_digest(*, on_demand: bool = False, data_sheets: bool = True) -> str:
+    """Hash of the words around a statement: results of different ones don't compare.
+
+    Args:
+        on_demand: Whether the task's modules are looked up instead of told.
+        data_sheets: Whether it is told the numbers of modules and world.
+    """
+    return words_around.briefing_digest(
+        tests_told(0), _guidelines(), on_demand=on_demand, data_sheets=data_sheets
+    )
+
+
+@cache
+def _guidelines() -> str:
+    return resources.files(__package__).joinpath("guidelines.md").read_text(encoding="utf-8")

@@ -1,0 +1,337 @@
+"""Sessions of external agents: opened, played through tool calls, submitted, and then simulated."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from threading import Lock
+from typing import Any, Literal
+
+from cachetools import LRUCache
+
+from buildarena_backend.accounts.names import claim_name
+from buildarena_backend.agents.briefing import (
+    MAX_CALLS,
+    MAX_SESSION_BYTES,
+    briefing,
+    briefing_digest,
+)
+from buildarena_backend.agents.submission import chosen_task, submit_machine
+from buildarena_backend.agents.trying import TriedOnce, request_test, trials_of
+from buildarena_backend.agents.turn_views import turn_of_call
+from buildarena_backend.agents.workbench import TEST, Workbench, check_arguments, rebuild
+from buildarena_backend.catalog.tracks import (
+    EXTERNAL_WORKFLOW,
+    external_track,
+    has_data_sheets,
+    worlds_of,
+)
+from buildarena_backend.errors import PipelineError, SubmissionError, UnknownIdError
+from buildarena_backend.jobs.job import Job, JobKey, NewJob, configuration_hash
+from buildarena_backend.journal.external_calls import ExternalCall
+from buildarena_backend.journal.transcript import Transcript
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import EXTERNAL_PROVIDER, EXTERNAL_QUEUE, JobState
+from buildarena_backend.telemetry.tracing import current_traceparent
+from buildarena_backend.trials.known_simulators import (
+    drawn_issues,
+    simulation_version,
+    worlds_here,
+    worlds_issues,
+)
+from buildarena_backend.trials.scoring import drawn_for, task_of
+from buildarena_benchmark import Task, ValidationIssue
+from buildarena_benchmark.environment import MAIN
+from buildarena_geometry import Machine
+
+AGENT_NAME = re.compile(r"[A-Za-z0-9_.-]{1,80}")
+CACHED_BENCHES = 256
+PlayerKind = Literal["agent", "human"]
+"""Who plays: a program, or a person. Leaderboards show `agent/NAME` and `human/NAME`."""
+
+
+class SessionClosedError(PipelineError):
+    """The session is not open: it was submitted, cancelled, or never there."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenedSession:
+    """An open session.
+
+    Attributes:
+        job: Its job.
+        task: What is to be built.
+        briefing: What its agent must know to play.
+        reopened: Whether it was open already.
+    """
+
+    job: Job
+    task: Task
+    briefing: str
+    reopened: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SessionState:
+    """A session as it stands.
+
+    Attributes:
+        job: Its job.
+        machines: What was built so far, by name.
+        calls: Calls made.
+        size: Bytes of all arguments and feedback.
+        open: Whether it takes calls.
+        tests: Its test trials, those under way included.
+        most_tests: Test trials that it may have.
+        programs: Whether it may set a controller.
+    """
+
+    job: Job
+    machines: Mapping[str, Machine]
+    calls: int
+    size: int
+    open: bool
+    tests: Sequence[TriedOnce]
+    most_tests: int
+    programs: bool
+
+
+class ExternalSessions:
+    """Lets external agents build through tool calls.
+
+    Args:
+        context: The process' connections.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._benches: LRUCache[tuple[str, int], Workbench] = LRUCache(CACHED_BENCHES)
+        self._lock = Lock()
+
+    def open(
+        self,
+        *,
+        task: str,
+        agent: str,
+        seed: int,
+        simulator: str,
+        kind: PlayerKind = "agent",
+        owner: str | None = None,
+        force: bool = False,
+        data_sheets: bool = True,
+        worlds: int | None = None,
+    ) -> OpenedSession:
+        """Opens a session for one task, which belongs to the key that opened it.
+
+        A session that is open already is given again to its owner: the first answer may be lost.
+
+        Args:
+            task: The task's name.
+            agent: The agent's name, which is the key's from now on.
+            seed: The seed.
+            simulator: The simulator's name.
+            kind: Who plays; no name is of both kinds.
+            owner: Id of the API key; None for the operator.
+            force: Play under another key's name, as an admin may.
+            data_sheets: Whether it is told the numbers of modules and world.
+            worlds: In how many varied worlds its machine is scored; None for the service's default.
+
+        Raises:
+            SubmissionError: Something is unknown, or the agent's session of this seed is over or
+                another key's.
+            NameTakenError: The name is another key's, or of the other kind.
+        """
+        further = worlds_issues(self._context, simulator, worlds)
+        if not AGENT_NAME.fullmatch(agent):
+            message = "1 to 80 letters, digits, dots, dashes and underscores"
+            further.append(ValidationIssue(path="agent", message=message))
+        chosen = chosen_task(self._context, task, simulator, further=further)
+        undrawn = drawn_issues(self._context, simulator, worlds, {"task": chosen})
+        if undrawn:
+            raise SubmissionError(undrawn)
+        version = simulation_version(self._context, simulator)
+        on_demand = chosen.constraints.on_demand
+        track = external_track(
+            simulator,
+            version,
+            briefing_digest(on_demand=on_demand, data_sheets=data_sheets),
+            on_demand=on_demand,
+            data_sheets=data_sheets,
+            worlds=worlds_here(self._context, simulator, worlds),
+        )
+        model = f"{kind}/{agent}"
+        config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}
+        key = JobKey(
+            task=task,
+            task_version=chosen.version,
+            model_hash=configuration_hash(config, {}),
+            track=track.id,
+            seed=seed,
+        )
+        new = NewJob(
+            key=key,
+            model=model,
+            model_config=config,
+            track_config=track.as_config(),
+            owner=owner,
+            traceparent=current_traceparent(),
+        )
+        # Refused inside the transaction, so that nothing of it stays.
+        with self._context.store.database.transaction() as connection:
+            claim_name(kind, agent, owner=owner, connection=connection, force=force)
+            self._context.store.jobs.add([new], connection=connection)
+            calls = self._context.store.external_calls
+            reopened = not calls.open(key.job_id, connection=connection)
+            if reopened:
+                lease = calls.lease(key.job_id, connection=connection)
+                if lease is None or lease.job.owner != owner:
+                    message = (
+                        f"{kind} {agent!r} has played seed {seed} of {task}: take another seed"
+                    )
+                    raise SubmissionError([ValidationIssue(path="seed", message=message)])
+        return OpenedSession(
+            job=self._context.store.jobs.get(key.job_id),
+            task=chosen,
+            briefing=briefing(chosen, data_sheets=data_sheets, worlds=worlds_of(track.as_config())),
+            reopened=reopened,
+        )
+
+    def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
+        """Carries out one tool call and keeps it.
+
+        Raises:
+            SessionClosedError: The session is not open, or its calls are too many or too large.
+            SubmissionError: The arguments are too large or too deep.
+        """
+        check_arguments(arguments)
+        with self._context.store.database.transaction() as connection:
+            lease = self._open_lease(job_id, connection)
+            count = lease.job.actions
+            if tool.lower() == TEST:
+                raise SessionClosedError(f"{TEST} is no tool: test trials are asked for apart")
+            if count >= MAX_CALLS:
+                raise SessionClosedError(
+                    f"session {job_id} has made {MAX_CALLS} calls, the most it may make: submit it"
+                )
+            bench = self._bench(lease.job, count, connection)
+            if bench.size >= MAX_SESSION_BYTES:
+                self._keep_bench(job_id, count, bench)
+                raise SessionClosedError(
+                    f"session {job_id} has {bench.size:,} bytes of arguments and feedback, of "
+                    f"{MAX_SESSION_BYTES:,} that it may have: submit it"
+                )
+            done = bench.call(machine, tool, arguments)
+            self._context.store.external_calls.append(lease, count, done, connection=connection)
+        self._keep_bench(job_id, count + 1, bench)
+        return done
+
+    def view(self, job_id: str) -> SessionState:
+        """What stands on the workbench of a session that is, or was, under way.
+
+        Raises:
+            UnknownIdError: There is no such session.
+        """
+        try:
+            job = self._context.store.jobs.get(job_id)
+        except UnknownIdError as error:
+            raise UnknownIdError("session", job_id) from error
+        if job.track_config.get("workflow") != EXTERNAL_WORKFLOW:
+            raise UnknownIdError("session", job_id)
+        with self._context.store.database.transaction() as connection:
+            calls = self._context.store.external_calls.read(job_id, connection=connection)
+        with self._lock:
+            bench = self._benches.pop((job_id, len(calls)), None)
+        if bench is None:
+            bench = self._rebuilt(calls, job)
+        task = self._task(job)
+        # A call in between works on a workbench of its own, so this one stays as it is.
+        machines = {name: machine.copy() for name, machine in bench.machines.items()}
+        state = SessionState(
+            job=job,
+            machines=machines,
+            calls=len(calls),
+            size=bench.size,
+            open=job.state == JobState.RUNNING and job.queue == EXTERNAL_QUEUE,
+            tests=trials_of(self._context, job_id, task) if task and task.tests else (),
+            most_tests=task.tests if task else 0,
+            programs=task is not None and task.takes_programs,
+        )
+        self._keep_bench(job_id, len(calls), bench)
+        return state
+
+    def test(self, job_id: str) -> Job:
+        """Has the machine tried as it stands; the session goes on once it was.
+
+        Raises:
+            SessionClosedError: The session is not open.
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
+            NoTestError: There is no test trial, none is left, or the machine breaks a rule.
+        """
+        context = self._context
+        with context.store.database.transaction() as connection:
+            lease = self._open_lease(job_id, connection)
+            count = lease.job.actions
+            calls = context.store.external_calls.read(job_id, connection=connection)
+            bench = self._rebuilt(calls, lease.job)
+            name, machine = bench.result() or (MAIN, bench.submitted())
+            task = task_of(lease.job, context.tasks)
+            done = bench.call(name, TEST, {})
+            context.store.external_calls.append(lease, count, done, connection=connection)
+            _, queue = request_test(context, lease, task, machine, connection=connection)
+        context.queues.announce(queue, [job_id])
+        return context.store.jobs.get(job_id)
+
+    def submit(self, job_id: str) -> Job:
+        """Ends the session: the machine is checked and goes to the simulator.
+
+        Raises:
+            SessionClosedError: The session is not open.
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
+        """
+        context = self._context
+        with context.store.database.transaction() as connection:
+            lease = self._open_lease(job_id, connection)
+            calls = context.store.external_calls.read(job_id, connection=connection)
+            bench = self._rebuilt(calls, lease.job)
+            machine = bench.submitted()
+            transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
+            queue = submit_machine(context, lease, machine, transcript, connection=connection)
+        if queue is not None:
+            context.queues.announce(queue, [job_id])
+        return context.store.jobs.get(job_id)
+
+    def _open_lease(self, job_id: str, connection: Any) -> Lease:
+        lease = self._context.store.external_calls.lease(job_id, connection=connection)
+        if lease is None:
+            try:
+                job = self._context.store.jobs.get(job_id)
+            except UnknownIdError as error:
+                raise UnknownIdError("session", job_id) from error
+            state = job.outcome or f"{job.stage} {job.state}"
+            if job.outcome is None and job.queue.startswith("simulate."):
+                state += ": its machine is being tried"
+            raise SessionClosedError(f"session {job_id} is not open: it is {state}")
+        return lease
+
+    def _bench(self, job: Job, count: int, connection: Any) -> Workbench:
+        """The workbench after so many calls: kept from the last call, or built again."""
+        with self._lock:
+            bench = self._benches.pop((job.id, count), None)
+        if bench is not None:
+            return bench
+        calls = self._context.store.external_calls.read(job.id, connection=connection)
+        return self._rebuilt(calls, job)
+
+    def _rebuilt(self, calls: Sequence[ExternalCall], job: Job) -> Workbench:
+        data_sheets = has_data_sheets(job.track_config)
+        return rebuild(calls, self._task(job), data_sheets=data_sheets)
+
+    def _task(self, job: Job) -> Task | None:
+        task = self._context.tasks.exact(job.task, job.task_version)
+        return None if task is None else drawn_for(job, task)
+
+    def _keep_bench(self, job_id: str, count: int, bench: Workbench) -> None:
+        with self._lock:
+            self._benches[job_id, count] = bench

@@ -1,0 +1,95 @@
+"""What people and agents bring: the task they choose, and the way of a machine to its trial."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from sqlalchemy import Connection
+
+from buildarena_backend.errors import SubmissionError
+from buildarena_backend.journal.rollouts import RolloutRequest
+from buildarena_backend.journal.transcript import Transcript
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import Outcome, Stage, simulate_queue
+from buildarena_backend.trials.known_simulators import simulator_issues
+from buildarena_backend.trials.scoring import failure_score, task_of
+from buildarena_benchmark import Task, ValidationIssue, broken_constraint
+from buildarena_geometry import Machine
+from buildarena_geometry.machine_files import machine_bytes
+
+JSON: Final = "application/json"
+
+
+def chosen_task(
+    context: Context, task: str, simulator: str, *, further: Sequence[ValidationIssue] = ()
+) -> Task:
+    """The newest version of a task, if everything that was named exists.
+
+    Args:
+        context: The process' connections.
+        task: The task's name.
+        simulator: The simulator's name.
+        further: What else is wrong with what was asked for.
+
+    Raises:
+        SubmissionError: Something is wrong; it names all of it.
+    """
+    chosen = context.tasks.named([task]).get(task)
+    issues = []
+    if chosen is None:
+        choices = tuple(sorted(context.tasks.newest()))
+        message = f"there is no task {task!r}"
+        issues.append(ValidationIssue(path="task", message=message, choices=choices))
+    issues += [*simulator_issues(context, simulator), *further]
+    if issues or chosen is None:
+        raise SubmissionError(issues)
+    return chosen
+
+
+def submit_machine(
+    context: Context,
+    lease: Lease,
+    machine: Machine,
+    transcript: Transcript | None,
+    *,
+    connection: Connection,
+) -> str | None:
+    """Checks a machine, and sends it to the simulator or scores it as a failure.
+
+    Args:
+        context: The process' connections.
+        lease: The lease on its job, which ends here.
+        machine: The machine.
+        transcript: How it was built, if that is known.
+        connection: The transaction that holds the lease.
+
+    Returns:
+        The queue to announce it in once the transaction is done; None when the job has ended.
+    """
+    job = lease.job
+    stored = context.artifacts.put(machine_bytes(machine), JSON)
+    made = {"machine": stored}
+    if transcript is not None:
+        made["transcript"] = context.artifacts.put(transcript.to_json(spaced=True), JSON)
+    context.store.results.attach(job.id, made, connection=connection)
+    refusals = {} if transcript is None else transcript.refusals
+    task = task_of(job, context.tasks)
+    broken = broken_constraint(task, machine)
+    if broken is not None:
+        reason, detail = broken
+        score = failure_score(
+            job, task, machine, outcome=Outcome.CONSTRUCTION_FAILED, reason=reason, detail=detail
+        )
+        context.store.results.finish(lease, score, connection=connection, refusals=refusals)
+        return None
+    engine = str(job.track_config["simulator"])
+    number = len(context.store.rollouts.read(job.id))
+    request = RolloutRequest(number=number, final=True, engine=engine, machine_hash=stored.hash)
+    context.store.rollouts.request(job.id, request, connection=connection)
+    queue = simulate_queue(engine)
+    context.store.leases.queue_again(
+        lease, stage=Stage.SIMULATE, queue=queue, connection=connection, refusals=refusals
+    )
+    return queue

@@ -1,0 +1,119 @@
+"""Test trials of external agents: a machine is tried as it stands, and its session goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from sqlalchemy import Connection
+
+from buildarena_backend.errors import PipelineError
+from buildarena_backend.journal.rollouts import RolloutRecord, RolloutRequest
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import Stage, simulate_queue
+from buildarena_benchmark import Score, Task, broken_constraint
+from buildarena_benchmark.environment.trials.trials import score_text
+from buildarena_geometry import Machine
+from buildarena_geometry.machine_files import machine_bytes
+from buildarena_simulation import read_trajectory
+
+JSON: Final = "application/json"
+
+
+class NoTestError(PipelineError):
+    """The session has no test trial, or none is left, or the machine breaks a rule."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TriedOnce:
+    """A test trial of a session.
+
+    Attributes:
+        number: Which one it is, from 1.
+        result: What was measured, in words; None while it is under way.
+        trace: Where what counts was, rows of time, seconds, and x, y, z, units.
+    """
+
+    number: int
+    result: str | None
+    trace: Sequence[Sequence[float]]
+
+
+def tests_told(tests: int) -> str:
+    """What an agent reads of its trials, in a sentence or two.
+
+    Args:
+        tests: Test trials of the task.
+    """
+    if not tests:
+        return "You submit once, and the machine has one trial."
+    return (
+        f"You have {tests} test trials: `test` has the machine tried as it stands, and the session "
+        "tells what was measured, and goes on. You submit once, and the machine has one trial that "
+        "counts, whatever came of the others."
+    )
+
+
+def request_test(
+    context: Context, lease: Lease, task: Task, machine: Machine, *, connection: Connection
+) -> tuple[int, str]:
+    """Has a session's machine tried.
+
+    Args:
+        context: The process' connections.
+        lease: The agent's lease on its session, which ends here and begins again after the trial.
+        task: The job's task, as the job has it.
+        machine: The machine as it stands.
+        connection: The transaction that holds the lease.
+
+    Returns:
+        Which test trial it is, from 1, and the queue to announce it in once the transaction is
+        done.
+
+    Raises:
+        NoTestError: There is none; the message says why. None is used up.
+    """
+    used = len(context.store.rollouts.read(lease.job.id))
+    if not task.tests:
+        raise NoTestError(f"task {task.name} has no test trials: submit")
+    if used >= task.tests:
+        raise NoTestError(f"all {task.tests} test trials are used up: submit")
+    broken = broken_constraint(task, machine)
+    if broken is not None:
+        raise NoTestError(f"this machine would not be tried: {broken[1]}")
+    engine = str(lease.job.track_config["simulator"])
+    stored = context.artifacts.put(machine_bytes(machine), JSON)
+    request = RolloutRequest(number=used, final=False, engine=engine, machine_hash=stored.hash)
+    queue = simulate_queue(engine)
+    context.store.results.attach(lease.job.id, {"machine": stored}, connection=connection)
+    context.store.rollouts.request(lease.job.id, request, connection=connection)
+    context.store.leases.queue_again(
+        lease, stage=Stage.SIMULATE, queue=queue, connection=connection
+    )
+    return used + 1, queue
+
+
+def trials_of(context: Context, job_id: str, task: Task) -> list[TriedOnce]:
+    """The test trials of a session, in order, with what is told of each."""
+    records = context.store.rollouts.read(job_id)
+    return [_told(context, task, record) for record in records if not record.final]
+
+
+def _told(context: Context, task: Task, record: RolloutRecord) -> TriedOnce:
+    if record.finished_at is None:
+        return TriedOnce(number=record.number + 1, result=None, trace=())
+    measured = Score(
+        success=bool(record.success),
+        indicator=record.indicator or 0.0,
+        metrics=record.metrics or {},
+        flags=tuple(record.flags or ()),
+    )
+    digest = record.trajectory_hash
+    trajectory = None if digest is None else read_trajectory(context.artifacts.get(digest))
+    return TriedOnce(
+        number=record.number + 1,
+        result=score_text(task, measured, trajectory),
+        trace=record.trace or (),
+    )

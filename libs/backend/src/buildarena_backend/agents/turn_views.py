@@ -1,0 +1,119 @@
+"""Turns of jobs as far as they are there: of sessions under way, and of those that broke off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any, Final
+
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.events import Event
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.external_calls import ExternalCall
+from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript, Turn
+from buildarena_backend.journal.turns import TurnRecord
+from buildarena_backend.states import EXTERNAL_PROVIDER, JobState, Outcome
+from buildarena_backend.store import Store
+
+UNSCORED: Final = frozenset({Outcome.ERRORED, Outcome.CANCELLED})
+"""Jobs that ended without a transcript of their own, or with one of an earlier suspension."""
+
+
+class Transcripts:
+    """Reads the transcripts of jobs, whatever state these are in.
+
+    Args:
+        store: Where journals and agents' calls are.
+        artifacts: Where the transcripts of ended sessions are.
+    """
+
+    def __init__(self, store: Store, artifacts: ArtifactStore) -> None:
+        self._store = store
+        self._artifacts = artifacts
+
+    def read(self, job: Job) -> bytes | None:
+        """The job's transcript as it stands; None while there is no turn."""
+        digest = self._store.jobs.artifacts(job.id).get("transcript")
+        ended = job.state == JobState.DONE and job.outcome not in UNSCORED
+        if digest is not None and ended:
+            return self._artifacts.get(digest)
+        turns = self._so_far(job)
+        if not turns:
+            return None if digest is None else self._artifacts.get(digest)
+        return Transcript(turns).to_json()
+
+    def taken(self, job_id: str, events: Sequence[Event]) -> dict[int, dict[str, Any]]:
+        """The turns that some events of a job speak of, by the events' ids.
+
+        Args:
+            job_id: The job.
+            events: Events of the kind ``turn``, in order.
+        """
+        if not events:
+            return {}
+        turns: Sequence[Turn]
+        if "sequence" in events[0].data:
+            after, until = events[0].id - 1, events[-1].id
+            records = self._store.turns.read(job_id, after=after, until=until)
+            turns = [turn_of_record(record) for record in records]
+        else:
+            first, last = (int(event.data["index"]) for event in (events[0], events[-1]))
+            with self._store.database.transaction() as connection:
+                calls = self._store.external_calls.read(
+                    job_id, connection=connection, first=first, count=last - first + 1
+                )
+            turns = [turn_of_call(index, call) for index, call in enumerate(calls, start=first)]
+        by_index = {turn.index: asdict(turn) for turn in turns}
+        by_event = {event.id: by_index.get(int(event.data["index"])) for event in events}
+        return {id_: turn for id_, turn in by_event.items() if turn is not None}
+
+    def _so_far(self, job: Job) -> list[Turn]:
+        if job.model_config.get("provider") != EXTERNAL_PROVIDER:
+            return [turn_of_record(record) for record in self._store.turns.read(job.id)]
+        with self._store.database.transaction() as connection:
+            calls = self._store.external_calls.read(job.id, connection=connection)
+        return [turn_of_call(index, call) for index, call in enumerate(calls)]
+
+
+def turn_of_record(record: TurnRecord) -> ModelTurn:
+    """A model's turn from its reply in the journal and what came of it."""
+    calls = record.reply["calls"]
+    return ModelTurn(
+        index=record.index,
+        stage=record.stage,
+        sub_structure=record.sub_structure,
+        role=record.role,
+        text=record.reply["text"],
+        actions=tuple(
+            ActionResult(name=name, arguments=arguments, ok=ok, reason=reason, feedback=feedback)
+            for (_, name, arguments), (ok, reason, feedback) in zip(
+                calls, record.results, strict=True
+            )
+        ),
+        finish=record.reply["finish"],
+        input_tokens=record.input_tokens,
+        output_tokens=record.output_tokens,
+        cost_usd=f"{record.cost_usd:.6f}",
+        latency_s=record.latency_s,
+        tries=record.tries,
+    )
+
+
+def turn_of_call(index: int, call: ExternalCall) -> Turn:
+    """An external agent's turn; what it thought in between is not known."""
+    return Turn(
+        index=index,
+        stage="external",
+        sub_structure=call.machine,
+        role="agent",
+        text="",
+        actions=(
+            ActionResult(
+                name=call.tool,
+                arguments=call.arguments,
+                ok=call.ok,
+                reason=call.reason,
+                feedback=call.feedback,
+            ),
+        ),
+    )

@@ -1,0 +1,132 @@
+"""The workbench of an external agent: as everybody's, and each call is kept."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any, Final
+
+from buildarena_backend.database.text import clean
+from buildarena_backend.errors import SubmissionError
+from buildarena_backend.journal.external_calls import ExternalCall
+from buildarena_benchmark import Task, ValidationIssue
+from buildarena_benchmark.environment import workbench as building
+from buildarena_benchmark.environment.briefing import catalogue_told
+from buildarena_geometry import Accepted, Catalogue, Machine, Refused
+from buildarena_geometry.json_values import levels
+
+TEST: Final = "test_trial"
+"""What stands in a session's calls for a test trial of its machine."""
+TESTED: Final = "The machine is tried as it stands; the session tells what was measured."
+MAX_DEPTH = 20
+MAX_BYTES = 64 << 10
+"""What the arguments of one call may have as JSON; real ones have some hundred bytes."""
+
+
+class Workbench(building.Workbench):
+    """A workbench whose calls are kept: their texts are such that a database takes them.
+
+    Attributes:
+        size: Bytes of all arguments and feedback so far.
+        tests: Test trials so far.
+        most_tests: Test trials that the task has.
+    """
+
+    def __init__(
+        self,
+        catalogue: Catalogue | None = None,
+        *,
+        on_demand: bool = False,
+        task: Task | None = None,
+    ) -> None:
+        super().__init__(catalogue, on_demand=on_demand, task=task)
+        self.size = 0
+        self.tests = 0
+        self.most_tests = 0 if task is None else task.tests
+
+    def call(self, machine: str, tool: str, arguments: Any) -> ExternalCall:
+        """Carries out an action and returns its result; no argument makes it raise.
+
+        `TEST` names no action: it says that the machine was tried as it stood then.
+        """
+        tool, arguments = clean(tool), clean(arguments)
+        tried = tool == TEST and self.tests < self.most_tests
+        self.tests += tried
+        told = Accepted(changed=(), render=lambda: TESTED)
+        outcome = told if tried else self.act(machine, tool, arguments)
+        self.size += _size(tool) + _size(arguments) + len(outcome.text.encode())
+        return ExternalCall(
+            machine=machine,
+            tool=tool,
+            arguments=arguments,
+            ok=outcome.ok,
+            reason=outcome.reason.value if isinstance(outcome, Refused) else None,
+            feedback=outcome.text,
+        )
+
+
+def check_arguments(arguments: Any) -> None:
+    """Checks that a call's arguments are bounded.
+
+    Raises:
+        SubmissionError: They are too deep or too large.
+    """
+    for depth, level in enumerate(levels(arguments)):
+        if depth >= MAX_DEPTH and any(isinstance(value, dict | list) for value in level):
+            raise _refused(f"more than {MAX_DEPTH} lists or objects inside each other")
+    size = _size(arguments)
+    if size > MAX_BYTES:
+        raise _refused(f"{size:,} bytes; a call's arguments have at most {MAX_BYTES:,}")
+
+
+def _size(value: Any) -> int:
+    """Bytes of a JSON value."""
+    return len(json.dumps(value, separators=(",", ":")))
+
+
+def _refused(message: str) -> SubmissionError:
+    return SubmissionError([ValidationIssue(path="arguments", message=message)])
+
+
+def bench_of(task: Task | None, *, data_sheets: bool) -> Workbench:
+    """An empty workbench with what a task offers.
+
+    Args:
+        task: The task; None where that is no longer known.
+        data_sheets: Whether modules that are looked up are told with their numbers.
+    """
+    if task is None:
+        return Workbench()
+    return Workbench(
+        catalogue_told(task.constraints, data_sheets=data_sheets),
+        on_demand=task.constraints.on_demand,
+        task=task,
+    )
+
+
+def repeated(
+    calls: Sequence[ExternalCall], bench: Workbench
+) -> tuple[list[ExternalCall], list[Machine]]:
+    """Makes calls again.
+
+    Args:
+        calls: Those of a session.
+        bench: An empty workbench.
+
+    Returns:
+        The calls as they come out now, and the machines of the test trials as they stood then.
+    """
+    made, tried = list[ExternalCall](), list[Machine]()
+    for call in calls:
+        made.append(bench.call(call.machine, call.tool, call.arguments))
+        if len(tried) < bench.tests:
+            tried.append(bench.submitted().copy())
+    return made, tried
+
+
+def rebuild(calls: Sequence[ExternalCall], task: Task | None, *, data_sheets: bool) -> Workbench:
+    """The workbench after these calls in a session of a task; arguments as for `bench_of`."""
+    bench = bench_of(task, data_sheets=data_sheets)
+    for call in calls:
+        bench.call(call.machine, call.tool, call.arguments)
+    return bench

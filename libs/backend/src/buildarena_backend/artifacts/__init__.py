@@ -1,0 +1,1 @@
+"""Artifacts: the store of large results, which of them anything refers to, and what goes."""

@@ -1,0 +1,157 @@
+"""Garbage collection: artifacts that nothing refers to go to the trash, and later for good.
+
+A writer stores bytes before the row that refers to them is committed, and equal bytes may be stored
+again at any moment. So only what has lain for days is garbage, it is moved before it is deleted,
+and whatever is referred to after all is taken back: at once, and again at every collection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from typing import Final
+
+from sqlalchemy import Connection, select, text, union
+
+from buildarena_backend.artifacts.storing import ArtifactStore, StoredArtifact
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import job_artifacts, rollouts
+
+LOCK: Final = 0x67617262  # "garb"
+"""A collection holds it alone, backups hold it together: what a backup copies stays."""
+BATCH: Final = 1000
+PREFIXES: Final = tuple(f"{number:02x}" for number in range(256))
+"""One part of the store after the other, so that memory is bounded whatever it holds."""
+KEPT: Final = timedelta(days=7)
+"""Longer than any transaction, any upload and any weekend."""
+REFERENCES: Final = (
+    job_artifacts.c.hash,
+    rollouts.c.machine_hash,
+    rollouts.c.trajectory_hash,
+)
+"""The columns that refer to artifacts."""
+
+
+@dataclass(slots=True, kw_only=True)
+class Collected:
+    """What a collection did, or would do.
+
+    Attributes:
+        kept: Artifacts that something refers to.
+        young: Artifacts that nothing refers to, too new to be garbage.
+        trashed: Artifacts that went to the trash.
+        trashed_bytes: Their lengths together.
+        deleted: Artifacts that were deleted from the trash.
+        deleted_bytes: Their lengths together.
+        taken_back: Artifacts that came out of the trash, as something refers to them.
+    """
+
+    kept: int = field(default=0)
+    young: int = field(default=0)
+    trashed: int = field(default=0)
+    trashed_bytes: int = field(default=0)
+    deleted: int = field(default=0)
+    deleted_bytes: int = field(default=0)
+    taken_back: int = field(default=0)
+
+
+def referenced(connection: Connection, prefix: str = "") -> Iterator[str]:
+    """Hashes of all artifacts that something refers to, in their order.
+
+    Args:
+        connection: A transaction.
+        prefix: Only hashes that begin so.
+    """
+    parts = [
+        select(column.label("hash")).where(column.is_not(None), column.startswith(prefix))
+        for column in REFERENCES
+    ]
+    # For this query alone: what the connection is asked later is not worth a cursor.
+    query = union(*parts).order_by("hash").execution_options(yield_per=BATCH)
+    for row in connection.execute(query):
+        yield row.hash
+
+
+class GarbageCollector:
+    """Finds what nothing refers to, and removes it.
+
+    Args:
+        database: Where references are.
+        store: Where artifacts are.
+        keep: How long something that nothing refers to stays, and again how long in the trash.
+    """
+
+    def __init__(self, database: Database, store: ArtifactStore, *, keep: timedelta = KEPT) -> None:
+        self._database = database
+        self._store = store
+        self._keep = keep
+
+    def collect(self, *, dry_run: bool = False) -> Collected | None:
+        """Collects once.
+
+        Args:
+            dry_run: Only say what would be done.
+
+        Returns:
+            What was done; None while another collection or a backup is under way.
+
+        Raises:
+            ArtifactStoreError: The store failed; what was done until then stands, and the next
+                collection goes on from there.
+        """
+        with self._database.engine.connect() as connection:
+            lock = {"key": LOCK}
+            taken = connection.execute(text("SELECT pg_try_advisory_lock(:key)"), lock).scalar_one()
+            connection.rollback()
+            if not taken:
+                return None
+            try:
+                done = Collected()
+                oldest = datetime.now(UTC) - self._keep
+                for prefix in PREFIXES:
+                    self._collect(prefix, oldest, done, dry_run=dry_run)
+            finally:
+                connection.rollback()
+                connection.execute(text("SELECT pg_advisory_unlock(:key)"), lock)
+                connection.rollback()
+        return done
+
+    def _collect(self, prefix: str, oldest: datetime, done: Collected, *, dry_run: bool) -> None:
+        wanted = self._wanted(prefix)
+        for item in self._store.all(prefix, trashed=True):
+            if item.hash in wanted:
+                done.taken_back += 1
+                if not dry_run:
+                    self._store.take_back(item.hash)
+            elif item.stored_at < oldest:
+                done.deleted += 1
+                done.deleted_bytes += item.size
+                if not dry_run:
+                    self._store.delete_trashed(item.hash)
+        garbage = []
+        for item in self._store.all(prefix):
+            if item.hash in wanted:
+                done.kept += 1
+            elif item.stored_at < oldest:
+                garbage.append(item)
+            else:
+                done.young += 1
+        if garbage and not dry_run:
+            garbage = self._trash(prefix, garbage)
+        done.trashed += len(garbage)
+        done.trashed_bytes += sum(item.size for item in garbage)
+
+    def _trash(self, prefix: str, garbage: Sequence[StoredArtifact]) -> list[StoredArtifact]:
+        for item in garbage:
+            self._store.trash(item.hash)
+        # Somebody may have stored equal bytes and referred to them since we looked.
+        wanted = self._wanted(prefix)
+        for item in garbage:
+            if item.hash in wanted:
+                self._store.take_back(item.hash)
+        return [item for item in garbage if item.hash not in wanted]
+
+    def _wanted(self, prefix: str) -> set[str]:
+        with self._database.transaction() as connection:
+            return set(referenced(connection, prefix))

@@ -1,0 +1,194 @@
+"""Files of trajectories that strangers send: bounded before they are unpacked, and sound after."""
+
+from __future__ import annotations
+
+from buildarena_geometry import kernels  # noqa: F401 - before numpy
+
+# isort: split
+
+import io
+import math
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from buildarena_backend.errors import PipelineError
+from buildarena_simulation import Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.control import PRESSES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from buildarena_simulation import Scenario
+
+MAX_UNPACKED_BYTES: Final = 192 << 20
+"""Largest trajectory unpacked; one of the most block-seconds has some 40 MB."""
+SPARE_BYTES: Final = 1 << 20
+MAX_FACTS_BYTES: Final = 4 << 20
+MAX_COLUMNS: Final = 32
+MAX_SENSED_BYTES: Final = 30_000
+"""Of an instant of a program: a hundred sensors, all joints, gates and marks, and what it asks."""
+MAX_TEXT: Final = 120
+MAX_SETTINGS: Final = 64
+
+
+class OutcomeRefusedError(PipelineError):
+    """What was sent is no outcome of this trial; the message says what is wrong with it."""
+
+
+def same(what: str, found: object, wanted: object) -> None:
+    """Checks that something is what it must be; `what` names it."""
+    if found != wanted:
+        raise OutcomeRefusedError(f"{what} is {str(found)[:MAX_TEXT]!r}, not {wanted!r}")
+
+
+def require(condition: object, message: str) -> None:
+    """Checks a condition, whose failure has a message."""
+    if not condition:
+        raise OutcomeRefusedError(message)
+
+
+def require_bounded(data: bytes, scenario: Scenario, blocks: int, *, piloted: bool) -> int:
+    """Looks at a file's own account of itself, before anything is unpacked.
+
+    Returns:
+        The number of instants that it tells of.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        metadata = pq.read_metadata(io.BytesIO(data))
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise OutcomeRefusedError(f"these bytes are not a trajectory: {error}"[:500]) from error
+    rows, whole = int(metadata.num_rows), scenario.sample_count
+    require(rows == whole, f"it has {rows:,} instants, not {whole:,}")
+    require(metadata.num_row_groups == 1, "a trajectory has one row group")
+    require(metadata.num_columns <= MAX_COLUMNS, "a trajectory has fewer columns")
+    facts = sum(len(key) + len(value) for key, value in (metadata.metadata or {}).items())
+    require(facts <= MAX_FACTS_BYTES, f"its facts have {facts:,} bytes")
+    group = metadata.row_group(0)
+    columns = [group.column(index) for index in range(metadata.num_columns)]
+    unpacked = sum(int(column.total_uncompressed_size) for column in columns)
+    # Positions, quaternions, heat and pieces of each block, then what bears it and its joints.
+    most = rows * (blocks * 100 + 1000) + SPARE_BYTES
+    if piloted:
+        most += rows * MAX_SENSED_BYTES
+    require(
+        max(unpacked, int(group.total_byte_size)) <= min(most, MAX_UNPACKED_BYTES),
+        f"unpacked it has {unpacked:,} bytes: a trajectory of this machine has fewer",
+    )
+    for column in columns:
+        require(
+            0 <= column.num_values <= min(most, MAX_UNPACKED_BYTES)
+            and not column.has_dictionary_page,
+            f"its column {column.path_in_schema[:MAX_TEXT]} is larger than a trajectory's",
+        )
+    return rows
+
+
+def require_sound(trajectory: Trajectory, scenario: Scenario, count: int) -> None:
+    """Checks what is so of every trajectory, whichever simulator made it."""
+    instants = np.arange(count) / SAMPLE_RATE_HZ
+    for name, series, kind in (
+        ("time_s", trajectory.time_s, np.float64),
+        ("positions", trajectory.positions, np.float32),
+        ("quaternions", trajectory.quaternions, np.float32),
+        ("heated", trajectory.heated, np.bool_),
+        ("pieces", trajectory.pieces, np.int16),
+        ("joint_loads", trajectory.joint_loads, np.float32),
+        ("cargo_mass", trajectory.cargo_mass, np.float64),
+        ("cargo_position", trajectory.cargo_position, np.float32),
+        ("cargo_quaternion", trajectory.cargo_quaternion, np.float32),
+    ):
+        require(series is None or series.dtype == kind, f"{name} is not of type {np.dtype(kind)}")
+    require(
+        len(trajectory.time_s) == count and np.array_equal(trajectory.time_s, instants),
+        f"its instants are not {count} at {SAMPLE_RATE_HZ} Hz",
+    )
+    require(len(set(trajectory.block_ids)) == len(trajectory.block_ids), "a block comes twice")
+    _require_figures(trajectory)
+    _require_piloting(trajectory)
+    _require_facts(trajectory)
+    cargo = (trajectory.cargo_position, trajectory.cargo_quaternion, trajectory.cargo_mass)
+    require(
+        all((part is not None) == (scenario.cargo is not None) for part in cargo),
+        "it has a cargo, and the scenario none, or the other way round",
+    )
+    size = None if scenario.cargo is None else tuple(scenario.cargo.size)
+    same("cargo_size", trajectory.cargo_size, size)
+
+
+def _require_figures(trajectory: Trajectory) -> None:
+    """Checks that figures are finite.
+
+    Of a trial that blew up engines tell nothing more, to its end; scorers flag it.
+    """
+    poses: list[NDArray[Any]] = [trajectory.positions, trajectory.quaternions]
+    if trajectory.cargo_position is not None and trajectory.cargo_quaternion is not None:
+        poses += [trajectory.cargo_position[:, None], trajectory.cargo_quaternion[:, None]]
+    told = np.ones(len(trajectory.time_s), dtype=bool)
+    for pose in poses:
+        told &= np.isfinite(pose).all(axis=(1, 2))
+    require(told[0], "its start is not finite")
+    require((told[1:] <= told[:-1]).all(), "figures that are not finite stand between others")
+    bearing = trajectory.bearing
+    others: list[NDArray[Any] | None] = [trajectory.joint_loads, trajectory.cargo_mass]
+    if bearing is not None:
+        others += [bearing.ground, bearing.terrain, bearing.cargo, bearing.wheels]
+    for series in others:
+        require(series is None or np.isfinite(series[told]).all(), "a figure is not finite")
+    require(
+        trajectory.cargo_mass is None or np.isfinite(trajectory.cargo_mass).all(),
+        "the cargo's mass is not finite",
+    )
+
+
+def _require_piloting(trajectory: Trajectory) -> None:
+    """Checks what a program is said to have sensed and asked for; a repetition tells if it did."""
+    piloting = trajectory.piloting
+    if piloting is None:
+        return
+    for name, series in (("senses", piloting.senses), ("answers", piloting.answers)):
+        require(series.dtype == np.float32, f"{name} is not of type float32")
+    names = (*piloting.sense_names, *piloting.action_names)
+    require(len(set(names)) == len(names), "a sense or an action comes twice")
+    require(
+        all(isinstance(name, str) and len(name) <= MAX_TEXT for name in names),
+        "a sense or an action has no name, or a long one",
+    )
+    asked = piloting.answers
+    require(bool(((asked >= 0) & (asked <= 1)).all()), "an answer is no share")
+
+
+def _require_facts(trajectory: Trajectory) -> None:
+    """Checks what is no series: texts are short, figures finite."""
+    texts = [trajectory.engine, trajectory.engine_version, trajectory.simulation_version]
+    figures: list[object] = []
+    for peak in trajectory.joint_peaks:
+        texts += [peak.joint, peak.kind]
+        figures += [peak.force, peak.moment, peak.ratio]
+    for event in trajectory.breaks:
+        texts += [event.joint, event.kind]
+        figures += [event.time_s, event.ratio, event.cargo_mass or 0.0]
+    for told in trajectory.events:
+        texts += [told.what, told.joint, told.held]
+        figures.append(told.time_s)
+    settings = trajectory.settings
+    require(
+        isinstance(settings, dict) and len(settings) <= MAX_SETTINGS, "its settings are too many"
+    )
+    for name, value in settings.items():
+        texts.append(name)
+        if name == PRESSES:  # it is compared as a whole
+            continue
+        (texts if isinstance(value, str) else figures).append(value)  # type: ignore[arg-type]
+    require(
+        all(isinstance(text, str) and len(text) <= MAX_TEXT for text in texts),
+        "a text is too long, or is none",
+    )
+    require(
+        all(isinstance(one, (int, float)) and math.isfinite(one) for one in figures),
+        "a figure among its facts is not finite, or is none",
+    )

@@ -1,0 +1,185 @@
+"""Ended jobs in bulk, and the log of what changed on boards, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Row, func, select, text
+
+from buildarena_backend.boards.cells import BoardCells
+from buildarena_backend.boards.trials import RANKED, TrialFilter, read_trials, trial_columns
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import columns_of, value_of
+from buildarena_backend.database.tables import board_changes, jobs, rollouts, sweep_jobs
+from buildarena_backend.states import JobState
+from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.leaderboard import SCORED, EndedJob
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoardChange:
+    """One line of the change log.
+
+    Attributes:
+        kind: ``entered``, ``left``, ``rescored``, ``corrected`` (a figure beside the score), or
+            ``unscored`` (a job ended without a score).
+        before: Outcome, reason, success, indicator and flags, if it had ended before.
+        after: The same now, if it has ended.
+        why: What the writer said, if anything.
+    """
+
+    id: int
+    job_id: str
+    track: str
+    task: str
+    model: str
+    kind: str
+    before: Mapping[str, Any] | None
+    after: Mapping[str, Any] | None
+    why: str | None
+    at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Round:
+    """One simulated machine of a job: all rollouts of one machine together.
+
+    Attributes:
+        machine: Hash of its document: the same machine in another simulator has the same.
+        flags: Remarks on its score.
+    """
+
+    machine: str
+    success: bool
+    indicator: float
+    parts: int | None
+    flags: tuple[str, ...]
+
+
+class Boards:
+    """Reads ended jobs and their changes.
+
+    Attributes:
+        cells: The same by cell, as boards are made of them.
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self.cells = BoardCells(database)
+
+    def trials(self, wanted: TrialFilter) -> list[EndedJob]:
+        """Single ended jobs, in no order; a million of them take a gigabyte."""
+        query = select(*trial_columns()).where(*wanted.conditions())
+        with self._database.transaction() as connection:
+            return list(read_trials(connection, query))
+
+    def scored_ids(self, wanted: TrialFilter) -> list[str]:
+        """Ids of scored jobs, in their order, those that do not count included."""
+        query = (
+            select(jobs.c.id)
+            .where(*wanted.conditions(), jobs.c.outcome.in_(sorted(SCORED)))
+            .order_by(jobs.c.id)
+        )
+        with self._database.statement() as connection:
+            return [row.id for row in connection.execute(query)]
+
+    def any_of(self, wanted: TrialFilter) -> bool:
+        """Whether there is such a job."""
+        query = select(jobs.c.id).where(*wanted.conditions()).limit(1)
+        with self._database.statement() as connection:
+            return connection.execute(query).first() is not None
+
+    def of_sweep(self, sweep_id: str) -> list[tuple[EndedJob, list[Round]]]:
+        """A sweep's ended jobs with their rounds, in a fixed order."""
+        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+        query = (
+            select(*trial_columns())
+            .where(jobs.c.state == JobState.DONE, jobs.c.id.in_(members))
+            .order_by(jobs.c.task, jobs.c.model, jobs.c.seed, jobs.c.id)
+        )
+        simulated = (
+            select(rollouts)
+            .where(
+                rollouts.c.job_id.in_(members),
+                rollouts.c.finished_at.is_not(None),
+                rollouts.c.seed.is_(None),
+            )
+            .order_by(rollouts.c.job_id, rollouts.c.number)
+        )
+        with self._database.transaction() as connection:
+            found = list(read_trials(connection, query))
+            rounds: dict[str, list[Round]] = {}
+            for row in connection.execute(simulated):
+                _add_rollout(rounds.setdefault(row.job_id, []), row)
+        return [(trial, rounds.get(trial.job_id, [])) for trial in found]
+
+    def tracks(self) -> list[str]:
+        """Every track that has jobs, ended or not; files that were tried have no leaderboard."""
+        query = select(jobs.c.track).where(RANKED).distinct().order_by(jobs.c.track)
+        with self._database.transaction() as connection:
+            return [row.track for row in connection.execute(query)]
+
+    def changes(
+        self, track: str, *, before: int | None = None, limit: int = 100, scored_only: bool = True
+    ) -> list[BoardChange]:
+        """The change log of a track, the newest first.
+
+        Args:
+            track: The track.
+            before: Only changes with smaller ids.
+            limit: Rows at most.
+            scored_only: Leave out jobs that ended without a score.
+        """
+        query = select(*columns_of(BoardChange, board_changes)).where(
+            board_changes.c.track == track
+        )
+        if before is not None:
+            query = query.where(board_changes.c.id < before)
+        if scored_only:
+            query = query.where(board_changes.c.kind != "unscored")
+        query = query.order_by(board_changes.c.id.desc()).limit(limit)
+        with self._database.transaction() as connection:
+            return [value_of(BoardChange, row) for row in connection.execute(query)]
+
+    def manifest_values(
+        self, track: str, task: str, task_version: str, model: str
+    ) -> list[tuple[str, Any, int]]:
+        """What a board entry's manifests say: name, value, and how many scored jobs say so."""
+        entries = func.jsonb_each(jobs.c.manifest).table_valued("key", "value")
+        query = (
+            select(entries.c.key, entries.c.value, func.count().label("jobs"))
+            .select_from(jobs.join(entries, text("true")))
+            .where(
+                jobs.c.track == track,
+                jobs.c.task == task,
+                jobs.c.task_version == task_version,
+                jobs.c.model == model,
+                jobs.c.success.is_not(None),
+            )
+            .group_by(entries.c.key, entries.c.value)
+            .order_by(entries.c.key, func.count().desc())
+        )
+        with self._database.transaction() as connection:
+            return [(row.key, row.value, row.jobs) for row in connection.execute(query)]
+
+
+def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:
+    """Adds a rollout to the round of its machine; the best rollout of a round counts."""
+    new = Round(
+        machine=row.machine_hash,
+        success=bool(row.success),
+        indicator=row.indicator or 0.0,
+        parts=(row.metrics or {}).get("parts"),
+        flags=tuple(row.flags or ()),
+    )
+    if rounds and rounds[-1].machine == new.machine:
+        rounds[-1] = max(
+            rounds[-1],
+            new,
+            key=lambda r: (r.success and not is_disqualified(r.flags), r.indicator),
+        )
+    else:
+        rounds.append(new)

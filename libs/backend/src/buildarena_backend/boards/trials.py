@@ -1,0 +1,186 @@
+"""Ended jobs one by one: which are meant, and how they are read."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import cache
+from typing import Any, Final, NamedTuple
+
+from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
+
+from buildarena_backend.database.rows import bound_texts
+from buildarena_backend.database.tables import jobs, sweep_jobs
+from buildarena_backend.states import EXTERNAL_PROVIDER, FILE_PROVIDER, Audit, JobState
+from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS, EndedJob
+from buildarena_benchmark.scorers.registry import published_metrics
+
+CHUNK: Final = 5000
+"""Rows that are in memory twice at a time while all are read."""
+
+
+class CellId(NamedTuple):
+    """Which cell: all jobs of one model configuration on one version of a task, in one track."""
+
+    track: str
+    task: str
+    task_version: str
+    configuration: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialFilter:
+    """Which ended jobs are meant; None means any.
+
+    Attributes:
+        track: Their track.
+        tasks: Their tasks.
+        models: Their models.
+        cells: Their cells.
+        sweeps: Ids of sweeps: jobs of any of these.
+        since: Only jobs that ended then or later.
+        until: Only jobs that ended before.
+    """
+
+    track: str | None = None
+    tasks: Collection[str] | None = None
+    models: Collection[str] | None = None
+    cells: Collection[CellId] | None = None
+    sweeps: Collection[str] | None = None
+    since: datetime | None = None
+    until: datetime | None = None
+
+    def within(self, cells: Collection[CellId]) -> TrialFilter:
+        """The same, of some cells alone."""
+        return replace(self, cells=cells)
+
+    def conditions(self) -> list[ColumnElement[bool]]:
+        """The same for a query of jobs; files that were tried are in no ranking."""
+        found = [jobs.c.state == JobState.DONE, RANKED]
+        if self.track is not None:
+            found.append(jobs.c.track == self.track)
+        for column, values in ((jobs.c.task, self.tasks), (jobs.c.model, self.models)):
+            if values is not None:
+                found.append(column == func.any(bound_texts(sorted(values))))
+        if self.cells is not None:
+            found.append(in_cells(self.cells))
+        if self.sweeps is not None:
+            found.append(
+                exists().where(
+                    sweep_jobs.c.job_id == jobs.c.id,
+                    sweep_jobs.c.sweep_id == func.any(bound_texts(sorted(self.sweeps))),
+                )
+            )
+        if self.since is not None:
+            found.append(jobs.c.finished_at >= self.since)
+        if self.until is not None:
+            found.append(jobs.c.finished_at < self.until)
+        return found
+
+
+def in_cells(cells: Collection[CellId]) -> ColumnElement[bool]:
+    """Whether a job is of one of some cells."""
+    columns = [bound_texts(list(values)) for values in zip(*sorted(cells), strict=True)]
+    given = func.unnest(*columns or [bound_texts([])] * len(CellId._fields))
+    wanted = given.table_valued(*CellId._fields).render_derived(name="wanted")
+    return exists().where(
+        jobs.c.task == wanted.c.task,
+        jobs.c.task_version == wanted.c.task_version,
+        jobs.c.model_hash == wanted.c.configuration,
+        jobs.c.track == wanted.c.track,
+    )
+
+
+COUNTS: Final = func.coalesce(jobs.c.audit, Audit.VERIFIED.value) == Audit.VERIFIED
+"""Whether a scored job counts, as far as its audit goes."""
+RANKED: Final = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
+
+
+@cache
+def published() -> ColumnElement[float]:
+    """As `EndedJob.published`: the metric that was published, where a job's scorer has one."""
+    return func.coalesce(*(jobs.c.metrics[name].as_float() for name in published_metrics()))
+
+
+@cache
+def trial_columns() -> tuple[Any, ...]:
+    """What `read_trials` reads of each job."""
+    return (*_COLUMNS, published().label("published"))
+
+
+_COLUMNS: Final = [
+    jobs.c.track,
+    jobs.c.task,
+    jobs.c.task_version,
+    jobs.c.model,
+    jobs.c.seed,
+    jobs.c.outcome,
+    jobs.c.reason,
+    jobs.c.success,
+    jobs.c.indicator,
+    jobs.c.flags,
+    jobs.c.refusals,
+    jobs.c.requests,
+    jobs.c.input_tokens,
+    jobs.c.output_tokens,
+    jobs.c.cost_usd,
+    jobs.c.actions,
+    jobs.c.refused_actions,
+    jobs.c.finished_at,
+    jobs.c.by_runner,
+    (~COUNTS).label("unverified"),
+    jobs.c.id.label("job_id"),
+    jobs.c.model_hash.label("configuration"),
+    jobs.c.model_config["decoding"].label("decoding"),
+    (jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER).label("external"),
+    jobs.c.limits,
+    cast(jobs.c.metrics["parts"], Integer).label("parts"),
+    jobs.c.metrics[ROBUSTNESS].as_float().label("robustness"),
+    jobs.c.metrics[ROBUST_INDICATOR].as_float().label("robust_indicator"),
+]
+
+
+def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
+    """The trials that a query of `trial_columns` finds."""
+    # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
+    decodings: dict[str, Mapping[str, Any]] = {}
+    result = connection.execution_options(stream_results=True).execute(query)
+    for row in result.yield_per(CHUNK):
+        # What an external agent used is unknown, which is not nothing.
+        known = not row.external
+        yield EndedJob(
+            job_id=row.job_id,
+            track=sys.intern(row.track),
+            task=sys.intern(row.task),
+            task_version=sys.intern(row.task_version),
+            model=sys.intern(row.model),
+            configuration=sys.intern(row.configuration),
+            decoding=decodings.setdefault(row.configuration, decoding_of(row.decoding, row.limits)),
+            seed=row.seed,
+            outcome=sys.intern(row.outcome),
+            reason=None if row.reason is None else sys.intern(row.reason),
+            success=bool(row.success),
+            indicator=row.indicator or 0.0,
+            published=row.published,
+            robustness=row.robustness,
+            robust_indicator=row.robust_indicator,
+            parts=row.parts,
+            flags=tuple(row.flags or ()),
+            refusals=row.refusals or {},
+            requests=row.requests if known else None,
+            input_tokens=row.input_tokens if known else None,
+            output_tokens=row.output_tokens if known else None,
+            cost_usd=float(row.cost_usd) if known else None,
+            actions=row.actions,
+            refused_actions=row.refused_actions,
+            finished_at=row.finished_at,
+            by_runner=row.by_runner,
+            unverified=row.unverified,
+        )
+
+
+def decoding_of(decoding: Mapping[str, Any] | None, limits: Mapping[str, Any]) -> dict[str, Any]:
+    """How a configuration's replies were sampled, and the limits of its sessions, if any."""
+    return {**(decoding or {}), **({"limits": limits} if limits else {})}

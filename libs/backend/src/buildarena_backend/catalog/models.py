@@ -1,0 +1,119 @@
+"""The model registry: which models can be submitted, and how their providers are reached.
+
+An operator adds models and providers with a YAML file of the same layout (see models.yaml);
+a submission can only name them, never say where to send requests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import yaml
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
+
+from buildarena_backend.errors import StartupError
+
+BUILTIN_PROTOCOL: Final = "builtin"
+"""Of models that play inside the worker."""
+
+
+class Price(BaseModel):
+    """US dollars per million tokens."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    input: Annotated[float, Field(ge=0)]
+    output: Annotated[float, Field(ge=0)]
+    cached: Annotated[float | None, Field(ge=0, description="Default: as input")] = None
+    source: Annotated[str, Field(description="Where the figures are from")] = ""
+
+
+class ProviderEntry(BaseModel):
+    """How a provider is reached."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    protocol: Annotated[
+        str,
+        Field(
+            pattern=r"^[a-z0-9-]+$",
+            description="What the provider speaks: openai, anthropic, google, or a worker's own",
+            validation_alias=AliasChoices("protocol", "wire"),  # its former name
+        ),
+    ]
+    base_url: str | None = None
+    key: Annotated[str | None, Field(description="Environment variable of the API key")] = None
+
+
+class ModelEntry(BaseModel):
+    """A model that jobs can name."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_.-]+/[A-Za-z0-9_.:-]+$")]
+    provider: str
+    model: Annotated[str, Field(description="The provider's own name of the snapshot")]
+    baseline: bool = False
+    price: Price | None = None
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    models: list[ModelEntry] = []
+    providers: dict[str, ProviderEntry] = {}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ModelRegistry:
+    """All models and providers by name."""
+
+    models: Mapping[str, ModelEntry]
+    providers: Mapping[str, ProviderEntry]
+
+    def provider_of(self, entry: ModelEntry) -> ProviderEntry:
+        """The provider that serves a model."""
+        return self.providers[entry.provider]
+
+
+def load_registry(extra: Path | None = None) -> ModelRegistry:
+    """The built-in registry, with an operator's file added to it or replacing entries.
+
+    Raises:
+        StartupError: The file can't be used; the message names the offending entry.
+    """
+    builtin = resources.files(__package__).joinpath("models.yaml").read_text()
+    files = [_parse(builtin, "models.yaml")]
+    if extra is not None:
+        try:
+            files.append(_parse(extra.read_text(), str(extra)))
+        except OSError as error:
+            raise StartupError(f"models file {extra}: {error.strerror}") from error
+    models: dict[str, ModelEntry] = {}
+    providers: dict[str, ProviderEntry] = {}
+    for file in files:
+        providers |= file.providers
+        models |= {entry.name: entry for entry in file.models}
+    for entry in models.values():
+        if entry.provider not in providers:
+            raise StartupError(
+                f"model {entry.name!r} names the provider {entry.provider!r}; "
+                f"known are {', '.join(sorted(providers))}"
+            )
+    return ModelRegistry(models=models, providers=providers)
+
+
+def _parse(text: str, name: str) -> _File:
+    try:
+        raw: Any = yaml.safe_load(text)
+        return _File.model_validate(raw if raw is not None else {})
+    except yaml.YAMLError as error:
+        raise StartupError(f"models file {name} is not valid YAML: {error}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise StartupError(f"models file {name}: {where}: {first['msg']}") from error

@@ -1,0 +1,53 @@
+"""Prices of model requests: the registry's own where it gives one, otherwise genai-prices'."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelEntry, ModelRegistry
+
+PER_MILLION = Decimal(1_000_000)
+CENT_FRACTION = Decimal("0.000001")
+
+
+def price_usd(
+    entry: ModelEntry, *, input_tokens: int, output_tokens: int, cached_tokens: int
+) -> Decimal:
+    """What a request costs, in US dollars; zero when no price is known.
+
+    Args:
+        entry: The model.
+        input_tokens: Tokens sent, cached ones included.
+        output_tokens: Tokens received.
+        cached_tokens: The part of the input read from the provider's cache.
+    """
+    own = entry.price
+    if own is not None:
+        cached_price = own.input if own.cached is None else own.cached
+        total = (
+            Decimal(str(own.input)) * (input_tokens - cached_tokens)
+            + Decimal(str(cached_price)) * cached_tokens
+            + Decimal(str(own.output)) * output_tokens
+        )
+        return (total / PER_MILLION).quantize(CENT_FRACTION)
+    from genai_prices import Usage, calc_price
+
+    usage = Usage(
+        input_tokens=input_tokens, output_tokens=output_tokens, cache_read_tokens=cached_tokens
+    )
+    try:
+        price = calc_price(usage, entry.model, provider_id=entry.provider)
+    except LookupError:
+        return Decimal()
+    return Decimal(price.total_price).quantize(CENT_FRACTION)
+
+
+def free_models(registry: ModelRegistry) -> list[str]:
+    """Names of the models that are known to cost nothing: what has no price may cost anything."""
+    return [name for name, entry in registry.models.items() if _is_free(entry, registry)]
+
+
+def _is_free(entry: ModelEntry, registry: ModelRegistry) -> bool:
+    if entry.price is not None:
+        return not (entry.price.input or entry.price.output or entry.price.cached)
+    return registry.provider_of(entry).protocol == BUILTIN_PROTOCOL

@@ -1,0 +1,140 @@
+"""What people submit: one job, or a sweep over tasks x models x seeds."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, field_validator
+
+from buildarena_backend.accounts.budgets import BudgetLimits
+from buildarena_backend.catalog.workflows import DEFAULT_WORKFLOW
+from buildarena_simulation import DEFAULT_ENGINE
+from buildarena_simulation.constants import MAX_WORLDS
+
+MAX_SEED = 2**53 - 1
+"""Largest seed: every JSON reader keeps integers up to here exact."""
+
+Worlds = Annotated[
+    StrictInt | None,
+    Field(
+        ge=0,
+        le=MAX_WORLDS,
+        description="In how many varied worlds each finished machine is scored: other place, yaw, "
+        "cargo and timing, unknown to the model; 0 for the exact trial alone, null for what the "
+        "service does by default",
+    ),
+]
+Seed = Annotated[StrictInt, Field(ge=0, le=MAX_SEED)]
+Name = Annotated[str, Field(min_length=1, max_length=200)]
+Title = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
+"""What people call something of theirs: one line, of characters that can be stored."""
+
+
+class Decoding(BaseModel):
+    """How a model's replies are sampled. The defaults are the paper's."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    temperature: Annotated[float | None, Field(ge=0, le=2)] = 0.5
+    top_p: Annotated[float | None, Field(gt=0, le=1)] = 0.7
+    max_tokens: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+
+
+class Limits(BaseModel):
+    """What one job's session may use; a session that reaches one ends as ``limit``."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    max_requests: Annotated[int | None, Field(ge=1)] = None
+    max_tokens: Annotated[int | None, Field(ge=1, description="Input and output together")] = None
+    max_cost_usd: Annotated[float | None, Field(gt=0)] = None
+    max_seconds: Annotated[float | None, Field(gt=0)] = None
+
+
+class Budget(BaseModel):
+    """What all jobs of a sweep, or of a key, may spend together; then nothing new starts."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    max_cost_usd: Annotated[float | None, Field(gt=0, le=10_000_000)] = None
+    max_tokens: Annotated[
+        int | None, Field(ge=1, le=MAX_SEED, description="Input and output together")
+    ] = None
+    max_requests: Annotated[int | None, Field(ge=1, le=MAX_SEED)] = None
+
+    def as_limits(self) -> BudgetLimits:
+        """The form that the store keeps."""
+        cost = self.max_cost_usd
+        return BudgetLimits(
+            max_cost_usd=None if cost is None else Decimal(str(cost)),
+            max_tokens=self.max_tokens,
+            max_requests=self.max_requests,
+        )
+
+
+class ClosedLoop(BaseModel):
+    """Further rounds for samples that failed, after reading the simulator's results."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    rounds: Annotated[StrictInt, Field(ge=2, le=20, description="The first one included")]
+    analyst: Annotated[
+        bool, Field(description="An analyst looks at each failure and advises the next round")
+    ] = False
+
+
+class Variant(BaseModel):
+    """What makes a track, and the limits of its sessions."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    workflow: Name = DEFAULT_WORKFLOW
+    simulator: Name = DEFAULT_ENGINE
+    prompts: Name = "default"
+    data_sheets: Annotated[
+        bool,
+        Field(
+            description="Tell every number that decides: each module's data, and the world's; "
+            "without, they are found out by trials"
+        ),
+    ] = True
+    worlds: Worlds = None
+    one_shot: Annotated[bool, Field(description="Show an example construction")] = False
+    closed_loop: ClosedLoop | None = None
+    decoding: Decoding = Decoding()
+    limits: Limits = Limits()
+
+
+class JobSpec(Variant):
+    """One job: a task, a model and a seed."""
+
+    task: Name
+    model: Name
+    seed: Seed = 0
+
+
+class SweepSpec(Variant):
+    """A matrix of jobs: every task with every model and every seed."""
+
+    name: Title = "sweep"
+    tasks: Annotated[list[Name], Field(min_length=1, max_length=1000)]
+    models: Annotated[list[Name], Field(min_length=1, max_length=1000)]
+    seeds: Annotated[list[Seed] | None, Field(min_length=1, max_length=100_000)] = None
+    samples: Annotated[
+        StrictInt | None, Field(ge=1, le=100_000, description="Seeds 0 … samples-1")
+    ] = None
+    budget: Budget | None = None
+
+    @field_validator("samples")
+    @classmethod
+    def _seeds_or_samples(cls, samples: int | None, info: ValidationInfo) -> int | None:
+        if info.data.get("seeds") is not None:
+            raise ValueError("give either seeds or samples, not both")
+        return samples
+
+    def all_seeds(self) -> list[int]:
+        """The seeds, each once, in their order; the paper's 64 samples by default."""
+        if self.seeds is not None:
+            return list(dict.fromkeys(self.seeds))
+        return list(range(64 if self.samples is None else self.samples))

@@ -1,0 +1,205 @@
+"""All tasks that can be named: the built-in ones and those that users uploaded.
+
+New submissions get a task's newest version; a job keeps the version it was submitted for, to its
+end and for every verification after it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import structlog
+
+from buildarena_backend.catalog.stored_tasks import StoredTask, TaskKey, Tasks
+from buildarena_backend.errors import PipelineError, UnknownIdError
+from buildarena_benchmark import Task, TaskError, builtin_tasks, parse_task
+
+log = structlog.get_logger(__name__)
+
+MAX_PARSED = 2000
+"""Parsed tasks in memory at most; each is a few kilobytes, at worst a hundred."""
+
+
+class TaskChangedError(PipelineError):
+    """A version is there already, but says something else that is not part of the version."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CatalogueEntry:
+    """A version of a task, and where it is from.
+
+    Attributes:
+        task: The task.
+        custom: Whether somebody uploaded it.
+        current: Whether new submissions get this version.
+        owner: Id of the API key that uploaded it, if any.
+        created_at: When it was uploaded; None for built-in tasks.
+    """
+
+    task: Task
+    custom: bool = False
+    current: bool = True
+    owner: str | None = None
+    created_at: datetime | None = None
+
+
+class TaskCatalog:
+    """Finds tasks. One serves a whole process, from any thread.
+
+    A version's text never changes, so each is read and parsed once a process.
+
+    Args:
+        tasks: Where uploaded tasks are kept.
+    """
+
+    def __init__(self, tasks: Tasks) -> None:
+        self._tasks = tasks
+        self._parsed: dict[TaskKey, Task | None] = {}
+
+    def newest(self) -> Mapping[str, Task]:
+        """Every task by name, the built-in ones first, each in its newest version."""
+        return {entry.task.name: entry.task for entry in self.entries()}
+
+    def entries(self) -> Sequence[CatalogueEntry]:
+        """As `newest`, with where each is from."""
+        builtin = [CatalogueEntry(task=task) for task in builtin_tasks().values()]
+        return [*builtin, *self._entries(self._tasks.newest())]
+
+    def named(self, names: Collection[str]) -> Mapping[str, Task]:
+        """The newest versions of those of the names that there are.
+
+        The database is queried only when a name is not a built-in task's.
+        """
+        builtin = builtin_tasks()
+        tasks = {name: builtin[name] for name in names if name in builtin}
+        others = {name for name in names if name not in builtin}
+        if others:
+            entries = self._entries(self._tasks.newest(others))
+            tasks |= {entry.task.name: entry.task for entry in entries}
+        return tasks
+
+    def exact(self, name: str, version: str) -> Task | None:
+        """This very version, or None when it is not there, or no longer scored as it was."""
+        builtin = builtin_tasks().get(name)
+        if builtin is not None and builtin.version == version:
+            return builtin
+        return self._load([(name, version)])[name, version]
+
+    def find(self, name: str, version: str | None = None) -> CatalogueEntry:
+        """A version of a task, by default the newest.
+
+        Raises:
+            UnknownIdError: There is no such task, or no such version.
+        """
+        builtin = builtin_tasks().get(name)
+        if builtin is not None and version in {None, builtin.version}:
+            return CatalogueEntry(task=builtin)
+        stored = self._tasks.versions(name)
+        current = builtin or next((e.task for e in self._entries(stored[:1])), None)
+        if version is None and current is not None:
+            version = current.version
+        task = None if version is None else self.exact(name, version)
+        if task is None:
+            raise UnknownIdError("task", name if version is None else f"{name} version {version}")
+        row = next((row for row in stored if row.version == version), stored[0])
+        return CatalogueEntry(
+            task=task,
+            custom=True,
+            current=current is not None and current.version == version,
+            owner=row.owner,
+            created_at=row.created_at,
+        )
+
+    def add(self, task: Task, text: str, *, owner: str | None = None, force: bool = False) -> bool:
+        """Stores a task, unless this version of it is there.
+
+        Args:
+            task: What `parse_custom_task` made of the text.
+            text: The YAML text.
+            owner: Id of the API key that uploads it, if any.
+            force: Upload a version of another key's task, as an admin may.
+
+        Returns:
+            Whether it is new.
+
+        Raises:
+            NameTakenError: The name is another key's.
+            TaskChangedError: The version is there with another title, category, level, indicator
+                or difficulty.
+        """
+        added = self._tasks.add(
+            name=task.name, version=task.version, document=text, owner=owner, force=force
+        )
+        stored = self.exact(task.name, task.version)
+        if stored is not None and stored != task:
+            fields = ("title", "category", "level", "indicator", "difficulty")
+            changed = [name for name in fields if getattr(stored, name) != getattr(task, name)]
+            raise TaskChangedError(
+                f"version {task.version} of {task.name} exists with another "
+                f"{' and '.join(changed)}, which cannot be changed alone: they stay as they were "
+                "first uploaded, or choose another name"
+            )
+        return added
+
+    def _entries(self, rows: Sequence[StoredTask]) -> list[CatalogueEntry]:
+        """Stored tasks as they count now; those that can no longer be read are left out."""
+        parsed = self._load([(row.name, row.version) for row in rows])
+        entries = []
+        for row in rows:
+            task = parsed[row.name, row.version] or self._renewed(row)
+            if task is not None and task.name not in builtin_tasks():
+                entries.append(
+                    CatalogueEntry(
+                        task=task, custom=True, owner=row.owner, created_at=row.created_at
+                    )
+                )
+        return entries
+
+    def _renewed(self, row: StoredTask) -> Task | None:
+        """The task's text under the version that it has now.
+
+        Scorers are part of a version: after they changed, a text is another version, which new
+        submissions get, while the old one can no longer be scored as it was.
+        """
+        key = (row.name, row.version)
+        text = self._tasks.documents([key])[key]
+        task = _parsed(text, row.name)
+        if task is None:
+            log.warning("task_unreadable", task=row.name, version=row.version)
+            return None
+        self._tasks.add(
+            name=row.name, version=task.version, document=text, owner=row.owner, force=True
+        )
+        self._keep(task.name, task.version, task)
+        return task
+
+    def _load(self, keys: Sequence[TaskKey]) -> Mapping[TaskKey, Task | None]:
+        """Tasks by key; None for those that are not there under this version."""
+        parsed = self._parsed
+        tasks = {key: parsed[key] for key in keys if key in parsed}
+        missing = [key for key in keys if key not in tasks]
+        if missing:
+            texts = self._tasks.documents(missing)
+            for key in missing:
+                tasks[key] = None
+                if key in texts:
+                    task = _parsed(texts[key], key[0])
+                    tasks[key] = task if task and task.version == key[1] else None
+                    self._keep(*key, tasks[key])
+        return tasks
+
+    def _keep(self, name: str, version: str, task: Task | None) -> None:
+        if len(self._parsed) >= MAX_PARSED:
+            self._parsed = {}  # a new one: other threads read the old one
+        self._parsed[name, version] = task
+
+
+def _parsed(text: str, name: str) -> Task | None:
+    """The task of a stored text, if it has the row's name: rows also come from archives."""
+    try:
+        task = parse_task(text, origin=name)
+    except TaskError:
+        return None
+    return task if task.name == name else None

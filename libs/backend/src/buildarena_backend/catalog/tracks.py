@@ -1,0 +1,198 @@
+"""Tracks: workflow x simulator x prompt version. Only results of one track share a ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from buildarena_backend.catalog.prompt_packs import PromptPack
+from buildarena_backend.catalog.specs import ClosedLoop
+from buildarena_backend.catalog.workflows import WorkflowSource
+from buildarena_geometry import FEEDBACK_VERSION
+
+EXTERNAL_WORKFLOW = "external"
+"""What external agents play: their own."""
+FILE_WORKFLOW = "file"
+"""What machines come by that were built elsewhere."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Track:
+    """What results must share to be compared.
+
+    Attributes:
+        workflow: Workflow name.
+        simulator: Simulator name.
+        simulation_version: Version of our physics, or of the game and its mod.
+        prompts: Prompt pack name.
+        prompts_digest: Hash of the pack.
+        feedback_version: Version of the words in which geometry answers a model.
+        workflow_digest: Hash of an operator's own workflow; "" for built-in ones.
+        one_shot: Whether an example construction is shown.
+        rounds: Rounds of the closed loop; 1 without one.
+        analyst: Whether an analyst advises between rounds.
+        on_demand: Whether roles look modules up instead of being told them.
+        data_sheets: Whether roles are told the numbers of modules and world.
+        worlds: How many varied worlds a finished machine is scored in besides the exact one.
+    """
+
+    workflow: str
+    simulator: str
+    simulation_version: str
+    prompts: str
+    prompts_digest: str
+    feedback_version: str
+    workflow_digest: str = ""
+    one_shot: bool = False
+    rounds: int = 1
+    analyst: bool = False
+    on_demand: bool = False
+    data_sheets: bool = False
+    worlds: int = 0
+
+    @property
+    def id(self) -> str:
+        """A short spelling that holds everything."""
+        workflow = self.workflow
+        if self.workflow_digest:
+            workflow += f"-{self.workflow_digest[:8]}"
+        if self.one_shot:
+            workflow += "+one-shot"
+        if self.on_demand:
+            workflow += "+looked-up"
+        if self.data_sheets:
+            workflow += "+data-sheets"
+        if self.rounds > 1:
+            workflow += f"+{self.rounds}-rounds" + ("-analyst" if self.analyst else "")
+        if self.worlds:
+            workflow += f"+{self.worlds}-worlds"
+        return (
+            f"{workflow}/{self.simulator}-{self.simulation_version}/"
+            f"{self.prompts}-{self.prompts_digest[:8]}-{self.feedback_version}"
+        )
+
+    def as_config(self) -> Mapping[str, Any]:
+        """The parts as a JSON object."""
+        parts = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        # Rows have the older word; tracks from before modules could be looked up say nothing of it,
+        # nor do those from before data sheets, which had none, and from before varied worlds.
+        further = {
+            "data_sheets": parts.pop("data_sheets"),
+            "looked_up": parts.pop("on_demand"),
+            "worlds": parts.pop("worlds"),
+        }
+        return {**parts, **{name: value for name, value in further.items() if value}}
+
+
+def has_data_sheets(config: Mapping[str, Any]) -> bool:
+    """Whether a track tells the numbers of modules and world; older ones say nothing of it.
+
+    Args:
+        config: What `Track.as_config` gave.
+    """
+    return bool(config.get("data_sheets"))
+
+
+def worlds_of(config: Mapping[str, Any]) -> int:
+    """In how many varied worlds a track scores machines; older ones say nothing of it.
+
+    Args:
+        config: What `Track.as_config` gave.
+    """
+    return int(config.get("worlds", 0))
+
+
+def external_track(
+    simulator: str,
+    version: str,
+    briefing_digest: str,
+    *,
+    on_demand: bool = False,
+    data_sheets: bool = True,
+    worlds: int = 0,
+) -> Track:
+    """The track of external agents, which bring their own prompts.
+
+    Args:
+        simulator: Simulator name.
+        version: Its version, see `simulation_version`.
+        briefing_digest: Hash of what they read around a task's statement.
+        on_demand: Whether they look modules up instead of being told them.
+        data_sheets: Whether they are told the numbers of modules and world.
+        worlds: How many varied worlds machines are scored in.
+    """
+    return Track(
+        workflow=EXTERNAL_WORKFLOW,
+        simulator=simulator,
+        simulation_version=version,
+        prompts="own",
+        prompts_digest=briefing_digest,
+        feedback_version=FEEDBACK_VERSION,
+        on_demand=on_demand,
+        data_sheets=data_sheets,
+        worlds=worlds,
+    )
+
+
+def file_track(simulator: str, version: str) -> Track:
+    """The track of machines that were brought as files; it has no leaderboard.
+
+    Args:
+        simulator: Simulator name.
+        version: Its version, see `simulation_version`.
+    """
+    return _promptless(FILE_WORKFLOW, simulator, version)
+
+
+def _promptless(workflow: str, simulator: str, version: str) -> Track:
+    return Track(
+        workflow=workflow,
+        simulator=simulator,
+        simulation_version=version,
+        prompts="none",
+        prompts_digest="00000000",
+        feedback_version=FEEDBACK_VERSION,
+    )
+
+
+def make_track(
+    workflow: WorkflowSource,
+    simulator: str,
+    pack: PromptPack,
+    *,
+    version: str,
+    one_shot: bool = False,
+    closed_loop: ClosedLoop | None = None,
+    on_demand: bool = False,
+    data_sheets: bool = True,
+    worlds: int = 0,
+) -> Track:
+    """The track of a submission, with the prompts and feedback that are installed now.
+
+    Args:
+        workflow: The workflow.
+        simulator: Simulator name.
+        pack: The prompts.
+        version: The simulator's version, see `simulation_version`.
+        one_shot: Whether an example construction is shown.
+        closed_loop: The closed loop, if there is one.
+        on_demand: Whether the task's modules are looked up instead of told.
+        data_sheets: Whether the numbers of modules and world are told.
+        worlds: How many varied worlds machines are scored in.
+    """
+    return Track(
+        workflow=workflow.name,
+        simulator=simulator,
+        simulation_version=version,
+        prompts=pack.name,
+        prompts_digest=pack.digest,
+        feedback_version=FEEDBACK_VERSION,
+        workflow_digest=workflow.digest,
+        one_shot=one_shot,
+        rounds=1 if closed_loop is None else closed_loop.rounds,
+        analyst=closed_loop is not None and closed_loop.analyst,
+        on_demand=on_demand,
+        data_sheets=data_sheets,
+        worlds=worlds,
+    )

@@ -1,0 +1,79 @@
+"""The workflows by name: the built-in ones, and what an operator adds from files or modules.
+
+The API knows them without the worker's package; the worker loads each from its `place`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from buildarena_backend.errors import StartupError
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkflowSource:
+    """Where a workflow's class is.
+
+    Attributes:
+        name: What submissions call it.
+        place: ``module`` or ``path/to/file.py``.
+        class_name: Name of the class there.
+        digest: Hash of the file, part of the track; "" for installed modules.
+        one_structure: Whether it builds one structure and never puts several together.
+    """
+
+    name: str
+    place: str
+    class_name: str
+    digest: str = ""
+    one_structure: bool = False
+
+
+BUILTIN: Final = (
+    WorkflowSource(
+        name="five-role", place="buildarena_worker.workflow.five_role", class_name="FiveRole"
+    ),
+    WorkflowSource(
+        name="guidance-builder",
+        place="buildarena_worker.workflow.guidance_builder",
+        class_name="GuidanceBuilder",
+        one_structure=True,
+    ),
+    WorkflowSource(
+        name="builder",
+        place="buildarena_worker.workflow.builder",
+        class_name="Builder",
+        one_structure=True,
+    ),
+)
+DEFAULT_WORKFLOW: Final = BUILTIN[0].name
+
+
+def workflow_sources(settings: Mapping[str, str]) -> dict[str, WorkflowSource]:
+    """All workflows by name.
+
+    Args:
+        settings: Operator's workflows: name to ``module:Class`` or ``path/to/file.py:Class``.
+
+    Raises:
+        StartupError: An entry can't be used; the message names it.
+    """
+    sources = {source.name: source for source in BUILTIN}
+    for name, target in settings.items():
+        place, colon, class_name = target.rpartition(":")
+        if not colon or not place or not class_name.isidentifier():
+            raise StartupError(
+                f"workflow {name!r}: {target!r} is neither module:Class nor path/to/file.py:Class"
+            )
+        digest = ""
+        if place.endswith(".py"):
+            try:
+                digest = hashlib.sha256(Path(place).read_bytes()).hexdigest()
+            except OSError as error:
+                raise StartupError(f"workflow {name!r}: {place}: {error.strerror}") from error
+        sources[name] = WorkflowSource(name=name, place=place, class_name=class_name, digest=digest)
+    return sources

@@ -1,0 +1,75 @@
+"""The tables of accounts: whose names are, keys, budgets and what is reserved of them."""
+
+from __future__ import annotations
+
+from sqlalchemy import BigInteger, Column, Computed, ForeignKey, Index, Numeric, Table, Text, text
+from sqlalchemy.dialects.postgresql import JSONB
+
+from buildarena_backend.database.tables import count_column, metadata, time_column
+
+MAX_USD = 99_999_999
+"""Sums stop here: what a provider claims to have used must not make a column overflow."""
+FOLD = (
+    "replace(replace(translate(lower(regexp_replace({}, '[._-]', '', 'g')), '01i5', 'olls'),"
+    " 'rn', 'm'), 'vv', 'w')"
+)
+"""SQL of a name's folded form: names that people may take for each other have the same one."""
+# Names that belong to the key that first used them, with all that look like them; the operator's
+# key is null.
+names = Table(
+    "names",
+    metadata,
+    Column("kind", Text, primary_key=True),
+    Column("name", Text, primary_key=True),
+    Column("owner", Text),
+    Column("folded", Text, Computed(FOLD.format("name"), persisted=True)),
+    Index("ix_names_folded", "folded"),
+)
+
+api_keys = Table(
+    "api_keys",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("secret_hash", Text, nullable=False, unique=True),
+    Column("previous_hash", Text, unique=True),
+    time_column("previous_until"),
+    Column("scopes", JSONB, nullable=False),
+    # Of a runner key: whose runners may lease these simulators' jobs, of these keys or of all.
+    Column("simulators", JSONB(none_as_null=True)),
+    Column("job_owners", JSONB(none_as_null=True)),
+    time_column("created_at", now=True),
+    time_column("expires_at"),
+    time_column("revoked_at"),
+    time_column("used_at"),
+    # Of a runner key: since when its runners may do nothing, and the verification that refuted one.
+    time_column("suspended_at"),
+    Column("suspended_for", Text),
+)
+
+# A row's id is that of the sweep or key whose budget it is.
+budgets = Table(
+    "budgets",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("max_cost_usd", Numeric(14, 6)),
+    Column("max_tokens", BigInteger),
+    Column("max_requests", BigInteger),
+    Column("spent_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    count_column("spent_tokens"),
+    count_column("spent_requests"),
+    Column("lost_cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    count_column("lost_requests"),
+)
+
+# What one open model request may cost: a job has one at a time.
+reservations = Table(
+    "reservations",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("budget_id", Text, ForeignKey("budgets.id", ondelete="CASCADE"), primary_key=True),
+    Column("token", BigInteger, nullable=False),
+    Column("cost_usd", Numeric(14, 6), nullable=False),
+    Column("tokens", BigInteger, nullable=False),
+    Index("ix_reservations_budget", "budget_id"),
+)

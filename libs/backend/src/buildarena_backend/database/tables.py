@@ -1,0 +1,427 @@
+"""The tables. One job is one row; its unique key makes a result impossible to have twice."""
+
+from __future__ import annotations
+
+from sqlalchemy import (
+    BigInteger,
+    Boolean,
+    Column,
+    DateTime,
+    Double,
+    ForeignKey,
+    Identity,
+    Index,
+    Integer,
+    MetaData,
+    Numeric,
+    Table,
+    Text,
+    func,
+    text,
+)
+from sqlalchemy.dialects.postgresql import JSON, JSONB
+
+from buildarena_backend.states import TURN, JobState, VerificationState
+
+metadata = MetaData(
+    naming_convention={
+        "pk": "pk_%(table_name)s",
+        "uq": "uq_%(table_name)s_%(column_0_N_name)s",
+        "ix": "ix_%(table_name)s_%(column_0_N_name)s",
+        "fk": "fk_%(table_name)s_%(column_0_N_name)s",
+    }
+)
+
+
+def time_column(name: str, *, now: bool = False) -> Column[object]:
+    """A time with its zone; empty at first, or when the row was made."""
+    return Column(
+        name,
+        DateTime(timezone=True),
+        nullable=not now,
+        server_default=func.clock_timestamp() if now else None,
+    )
+
+
+def count_column(name: str) -> Column[int]:
+    """A number of something, 0 at first."""
+    return Column(name, BigInteger, nullable=False, server_default=text("0"))
+
+
+jobs = Table(
+    "jobs",
+    metadata,
+    Column("id", Text, primary_key=True),
+    # What the job is: these columns never change.
+    Column("task", Text, nullable=False),
+    Column("task_version", Text, nullable=False),
+    Column("model", Text, nullable=False),
+    Column("model_hash", Text, nullable=False),
+    Column("model_config", JSONB, nullable=False),
+    Column("track", Text, nullable=False),
+    Column("track_config", JSONB, nullable=False),
+    Column("seed", BigInteger, nullable=False),
+    # Draws what its builder is not told, so no answer has it; jobs of earlier releases have none.
+    Column("draw", BigInteger),
+    Column("limits", JSONB, nullable=False, server_default=text("'{}'::jsonb")),
+    # Whose it is: the API key that submitted it, and the sweep whose budget pays for it.
+    Column("owner", Text),
+    Column("payer", Text),
+    # The span of its submission, which everything done for it is a part of.
+    Column("traceparent", Text),
+    # Where it is.
+    Column("stage", Text, nullable=False),
+    Column("queue", Text, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("outcome", Text),
+    Column("reason", Text),
+    Column("detail", Text),
+    Column("faults", Integer, nullable=False, server_default=text("0")),
+    Column("lease_owner", Text),
+    Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
+    time_column("lease_expires_at"),
+    time_column("available_at", now=True),
+    time_column("notified_at"),
+    # What it scored.
+    Column("success", Boolean),
+    Column("indicator", Double),
+    Column("metrics", JSONB),
+    Column("flags", JSONB),
+    Column("manifest", JSONB),
+    # What it cost.
+    count_column("requests"),
+    count_column("lost_requests"),
+    count_column("input_tokens"),
+    count_column("output_tokens"),
+    count_column("cached_tokens"),
+    count_column("reasoning_tokens"),
+    Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    count_column("actions"),
+    count_column("refused_actions"),
+    Column("refusals", JSONB),
+    # What it was imported from, if it was; whether a runner ran one of its trials; whether its
+    # score waits for a verification, and what the last one that could tell said, and when.
+    Column("by_runner", Boolean, nullable=False, server_default=text("false")),
+    Column("audit", Text),
+    time_column("verified_at"),
+    time_column("created_at", now=True),
+    time_column("started_at"),
+    time_column("finished_at"),
+    # What makes a job unique is in its id: see `JobKey`.
+)
+Index(
+    "ix_jobs_waiting",
+    jobs.c.queue,
+    func.coalesce(jobs.c.owner, text("''")),
+    jobs.c.created_at,
+    jobs.c.id,
+    postgresql_where=jobs.c.state == JobState.QUEUED,
+)
+Index(
+    "ix_jobs_recovered",
+    jobs.c.queue,
+    postgresql_where=(jobs.c.state == JobState.QUEUED) & (jobs.c.faults > 0),
+)
+Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
+Index("ix_jobs_cell", jobs.c.track, jobs.c.task, jobs.c.model_hash, jobs.c.model)
+# One for each order of lists, and for what lists are narrowed down by.
+# As the server writes it back, blanks and all: the check of the migrations compares texts.
+COST_OR_NULL = text(
+    "(\nCASE\n    WHEN (model_config ->> 'provider'::text) = 'external'::text THEN NULL::numeric\n"
+    "    ELSE cost_usd\nEND)"
+)
+Index("ix_jobs_created", jobs.c.created_at, jobs.c.id)
+Index("ix_jobs_finished", jobs.c.finished_at, jobs.c.id)
+Index("ix_jobs_indicator", jobs.c.indicator, jobs.c.id)
+# What waits has cost nothing yet, and would all come before the cheapest that ended.
+Index("ix_jobs_ended_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state == JobState.DONE)
+Index("ix_jobs_open_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state != JobState.DONE)
+Index("ix_jobs_task", jobs.c.task, jobs.c.id)
+Index("ix_jobs_model", jobs.c.model, jobs.c.id)
+Index("ix_jobs_seed", jobs.c.seed, jobs.c.id)
+Index("ix_jobs_outcome", jobs.c.outcome, jobs.c.id, postgresql_where=jobs.c.outcome.is_not(None))
+Index("ix_jobs_reason", jobs.c.reason, jobs.c.id, postgresql_where=jobs.c.reason.is_not(None))
+Index("ix_jobs_detail", jobs.c.id, postgresql_where=jobs.c.detail.is_not(None))
+Index(
+    "ix_jobs_flags",
+    jobs.c.flags,
+    postgresql_using="gin",
+    postgresql_ops={"flags": "jsonb_path_ops"},
+    postgresql_where=jobs.c.flags.is_not(None),
+)
+Index(
+    "ix_jobs_oldest",
+    jobs.c.queue,
+    jobs.c.created_at,
+    jobs.c.id,
+    postgresql_where=jobs.c.state == JobState.QUEUED,
+)
+Index(
+    "ix_jobs_available",
+    jobs.c.queue,
+    jobs.c.available_at,
+    postgresql_where=jobs.c.state == JobState.QUEUED,
+)
+Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != JobState.DONE)
+Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != JobState.DONE)
+
+# Until when leases are valid. Heartbeats change nothing else: a narrow row, no column of an index.
+leases = Table(
+    "leases",
+    metadata,
+    Column("job_id", Text, primary_key=True),
+    Column("token", BigInteger, nullable=False),
+    time_column("expires_at", now=True),
+)
+
+sweeps = Table(
+    "sweeps",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("spec", JSONB, nullable=False),
+    Column("state", Text, nullable=False),
+    Column("owner", Text),
+    Column("request_key", Text, unique=True),
+    Column("request_hash", Text),
+    Column("jobs_hash", Text, index=True),
+    time_column("created_at", now=True),
+)
+
+sweep_jobs = Table(
+    "sweep_jobs",
+    metadata,
+    Column("sweep_id", Text, ForeignKey("sweeps.id", ondelete="CASCADE"), primary_key=True),
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    # False when the owner cancelled just this job.
+    Column("wanted", Boolean, nullable=False, server_default=text("true")),
+    Index("ix_sweep_jobs_job", "job_id"),
+)
+
+# Who wants a job beside the sweeps that do; the operator's name is empty.
+job_claims = Table(
+    "job_wants",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("owner", Text, primary_key=True),
+)
+
+tasks = Table(
+    "tasks",
+    metadata,
+    Column("name", Text, primary_key=True),
+    Column("version", Text, primary_key=True),
+    Column("document", Text, nullable=False),
+    Column("owner", Text),
+    time_column("created_at", now=True),
+)
+
+attempts = Table(
+    "attempts",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("token", BigInteger, primary_key=True),
+    Column("stage", Text, nullable=False),
+    Column("worker", Text, nullable=False),
+    time_column("started_at", now=True),
+    time_column("ended_at"),
+    Column("result", Text),
+    Column("detail", Text),
+)
+
+journal = Table(
+    "journal",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("sequence", Integer, primary_key=True),
+    Column("token", BigInteger, nullable=False),
+    Column("stage", Text, nullable=False),
+    Column("role", Text, nullable=False),
+    Column("request_hash", Text, nullable=False),
+    # JSON keeps the order of keys, which replies are replayed with; JSONB does not.
+    Column("reply", JSON, nullable=False),
+    count_column("input_tokens"),
+    count_column("output_tokens"),
+    count_column("cached_tokens"),
+    count_column("reasoning_tokens"),
+    Column("cost_usd", Numeric(14, 6), nullable=False, server_default=text("0")),
+    Column("latency_s", Double, nullable=False),
+    Column("tries", Integer, nullable=False, server_default=text("1")),
+    Column("provider_request_id", Text),
+    # Who paid for it: a job may be handed over to another sweep later.
+    Column("payer", Text),
+    Column("owner", Text),
+    time_column("created_at", now=True),
+    # What the session told the role since its last reply; earlier releases did not keep it.
+    Column("told", JSON(none_as_null=True)),
+)
+# The words of transcripts, for searches through all of them: what models said, what they and
+# agents were answered. Of very long texts the beginning: a row that no index takes is no row.
+REPLY_WORDS = text("to_tsvector('english'::regconfig, \"left\"(reply ->> 'text'::text, 100000))")
+FEEDBACK_WORDS = text(
+    "(\nCASE\n    WHEN length(data::text) < 100000 THEN to_tsvector('english'::regconfig, "
+    "jsonb_path_query_array(data, '$.\"results\"[*][2]'::jsonpath))\n    "
+    "ELSE NULL::tsvector\nEND)"
+)
+ANSWER_WORDS = text("to_tsvector('english'::regconfig, \"left\"(feedback, 100000))")
+TOLD_WORDS = text(
+    "(\nCASE\n    WHEN length(told::text) < 100000 "
+    "THEN to_tsvector('english'::regconfig, told)\n    ELSE NULL::tsvector\nEND)"
+)
+Index("ix_journal_words", REPLY_WORDS, postgresql_using="gin", _table=journal)
+Index(
+    "ix_journal_told",
+    TOLD_WORDS,
+    postgresql_using="gin",
+    postgresql_where=journal.c.told.is_not(None),
+    _table=journal,
+)
+Index("ix_journal_owner", journal.c.owner, postgresql_where=journal.c.owner.is_not(None))
+
+external_calls = Table(
+    "external_calls",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("sequence", Integer, primary_key=True),
+    Column("machine", Text, nullable=False),
+    Column("tool", Text, nullable=False),
+    Column("arguments", JSON, nullable=False),
+    Column("ok", Boolean, nullable=False),
+    Column("reason", Text),
+    Column("feedback", Text, nullable=False),
+    time_column("at", now=True),
+)
+
+Index("ix_external_calls_words", ANSWER_WORDS, postgresql_using="gin", _table=external_calls)
+
+rollouts = Table(
+    "rollouts",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("number", Integer, primary_key=True),
+    Column("final", Boolean, nullable=False),
+    Column("engine", Text, nullable=False),
+    Column("machine_hash", Text, nullable=False),
+    Column("controls", JSON),
+    # Of the varied world in which it is done; none in the exact one.
+    Column("seed", BigInteger),
+    Column("success", Boolean),
+    Column("indicator", Double),
+    Column("metrics", JSON),
+    Column("flags", JSONB),
+    Column("trajectory_hash", Text),
+    Column("trace", JSON),
+    Column("versions", JSONB),
+    Column("annotations", JSONB(none_as_null=True)),
+    Column("wall_s", Double),
+    # The key whose runner ran it, if one did, and whether its job is verified before it counts.
+    Column("runner", Text),
+    Column("audited", Boolean, nullable=False, server_default=text("false")),
+    time_column("created_at", now=True),
+    time_column("finished_at"),
+)
+Index("ix_rollouts_runner", rollouts.c.runner, postgresql_where=rollouts.c.runner.is_not(None))
+
+artifacts = Table(
+    "artifacts",
+    metadata,
+    Column("hash", Text, primary_key=True),
+    Column("media_type", Text, nullable=False),
+    Column("size", BigInteger, nullable=False),
+    time_column("created_at", now=True),
+)
+
+job_artifacts = Table(
+    "job_artifacts",
+    metadata,
+    Column("job_id", Text, ForeignKey("jobs.id"), primary_key=True),
+    Column("name", Text, primary_key=True),
+    Column("hash", Text, ForeignKey("artifacts.hash"), nullable=False),
+)
+
+verifications = Table(
+    "verifications",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("job_id", Text, ForeignKey("jobs.id"), nullable=False),
+    Column("state", Text, nullable=False),
+    Column("report", JSONB),
+    Column("verdict", Text),
+    Column("owner", Text),
+    time_column("created_at", now=True),
+    time_column("claimed_at"),
+    time_column("notified_at"),
+    time_column("finished_at"),
+)
+# Equal verifications are one.
+Index(
+    "ix_verifications_open",
+    verifications.c.job_id,
+    unique=True,
+    postgresql_where=verifications.c.state != VerificationState.DONE,
+)
+
+# Written by triggers on jobs, so that no writer can forget it.
+board_changes = Table(
+    "board_changes",
+    metadata,
+    Column("id", BigInteger, Identity(), primary_key=True),
+    # The transaction that changed the job: ids alone become visible out of order.
+    Column("transaction", BigInteger, nullable=False),
+    Column("job_id", Text, nullable=False),
+    Column("track", Text, nullable=False),
+    Column("task", Text, nullable=False),
+    # With track and task the cell; null when no cell changed, or before there were these columns.
+    Column("task_version", Text),
+    Column("configuration", Text),
+    Column("model", Text, nullable=False),
+    Column("kind", Text, nullable=False),
+    Column("before", JSONB),
+    Column("after", JSONB),
+    Column("why", Text),
+    time_column("at", now=True),
+)
+Index("ix_board_changes_transaction", board_changes.c.transaction)
+Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
+
+
+events = Table(
+    "events",
+    metadata,
+    Column("id", BigInteger, Identity(), primary_key=True),
+    Column("job_id", Text),
+    Column("sweep_id", Text),
+    Column("kind", Text, nullable=False),
+    Column("data", JSONB, nullable=False),
+    time_column("at", now=True),
+)
+Index("ix_events_job", events.c.job_id, events.c.id)
+Index("ix_events_sweep", events.c.sweep_id, events.c.id)
+Index(
+    "ix_events_words",
+    FEEDBACK_WORDS,
+    postgresql_using="gin",
+    postgresql_where=events.c.kind == TURN,
+    _table=events,
+)
+
+
+workers = Table(
+    "workers",
+    metadata,
+    Column("id", Text, primary_key=True),
+    Column("kind", Text, nullable=False),
+    Column("queues", JSONB, nullable=False),
+    Column("host", Text, nullable=False),
+    Column("pid", Integer, nullable=False),
+    Column("versions", JSONB, nullable=False),
+    time_column("started_at", now=True),
+    time_column("seen_at", now=True),
+    Column("peak_memory_bytes", BigInteger),
+    Column("clock_ahead_s", Double),
+)
+
+# One row: since which schema programs work with this one; migrations write it.
+schema_compatibility = Table(
+    "schema_compatibility", metadata, Column("since", Text, primary_key=True)
+)

@@ -1,0 +1,1 @@
+"""Jobs: how they are added, found, changed, and what came of them."""

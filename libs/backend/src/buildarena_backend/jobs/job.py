@@ -1,0 +1,151 @@
+"""A job as a value: one task x model x seed on one track, and everything known about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+from decimal import Decimal
+from functools import cached_property
+from typing import Any
+
+from buildarena_backend.database.rows import columns_of
+from buildarena_backend.database.tables import jobs
+from buildarena_backend.ids import content_hash
+from buildarena_backend.states import EXTERNAL_PROVIDER
+
+
+def configuration_hash(model_config: Mapping[str, Any], limits: Mapping[str, Any]) -> str:
+    """The content hash of a model's configuration and of the limits of its session, if any.
+
+    Limits can change a result as much as decoding can: a job with other limits is another job, and
+    another row of a leaderboard.
+    """
+    return content_hash({**model_config, "limits": dict(limits)} if limits else model_config)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobKey:
+    """What makes a job unique; two submissions with equal keys are one job.
+
+    Attributes:
+        task: Task name.
+        task_version: Content hash of the task.
+        model_hash: `configuration_hash` of the model, its decoding and the job's limits.
+        track: Track identifier.
+        seed: Seed or sample number, 0 or more.
+    """
+
+    task: str
+    task_version: str
+    model_hash: str
+    track: str
+    seed: int
+
+    @cached_property
+    def job_id(self) -> str:
+        """The job's id, derived from the key: the same job has the same id everywhere."""
+        key = [self.task, self.task_version, self.model_hash, self.track, self.seed]
+        return "job_" + content_hash(key)[:20]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewJob:
+    """A job to be added.
+
+    Attributes:
+        key: Its unique key.
+        model: Model name.
+        model_config: The model's configuration, part of the hash in the key.
+        track_config: The track's parts, whose spelling is in the key.
+        limits: Token, request, cost and time limits of its session, part of that hash too.
+        owner: Id of the API key that submits it, if any.
+        payer: Id of the sweep whose budget pays for it, if any.
+        traceparent: The span of its submission, by W3C's Trace Context, if there is one.
+    """
+
+    key: JobKey
+    model: str
+    model_config: Mapping[str, Any]
+    track_config: Mapping[str, Any]
+    limits: Mapping[str, Any] = field(default_factory=dict)
+    owner: str | None = None
+    payer: str | None = None
+    traceparent: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """A job as the database has it. Times are in UTC; names are those of the columns.
+
+    `draw` draws what its builder is not told: no answer may have it while the job is under way.
+    """
+
+    id: str
+    task: str
+    task_version: str
+    model: str
+    model_hash: str
+    model_config: Mapping[str, Any]
+    track: str
+    track_config: Mapping[str, Any]
+    seed: int
+    draw: int | None
+    limits: Mapping[str, Any]
+    owner: str | None
+    payer: str | None
+    traceparent: str | None
+    stage: str
+    queue: str
+    state: str
+    outcome: str | None
+    reason: str | None
+    detail: str | None
+    faults: int
+    lease_owner: str | None
+    lease_token: int
+    success: bool | None
+    indicator: float | None
+    metrics: Mapping[str, Any] | None
+    flags: Sequence[str] | None
+    manifest: Mapping[str, Any] | None
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cached_tokens: int
+    reasoning_tokens: int
+    cost_usd: Decimal
+    actions: int
+    refused_actions: int
+    refusals: Mapping[str, int] | None
+    by_runner: bool
+    audit: str | None
+    verified_at: datetime | None
+    created_at: datetime
+    started_at: datetime | None
+    finished_at: datetime | None
+
+    @property
+    def usage_is_known(self) -> bool:
+        """Whether its requests, tokens and cost were counted: an external agent reports none."""
+        return self.model_config.get("provider") != EXTERNAL_PROVIDER
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobFile:
+    """An artifact of a job.
+
+    Attributes:
+        name: Its name in the job, for example ``trajectory-0``.
+        media_type: For example ``application/json``.
+        size: Length in bytes.
+        hash: SHA-256 of the bytes, 64 hex digits.
+    """
+
+    name: str
+    media_type: str
+    size: int
+    hash: str
+
+
+JOB_COLUMNS = columns_of(Job, jobs)

@@ -1,0 +1,220 @@
+"""Jobs in the database: added once for each key, found, cancelled and retried."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, any_, exists, select, text, update
+
+from buildarena_backend import events
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import bound_texts, columns_of, value_of
+from buildarena_backend.database.tables import artifacts, attempts, job_artifacts, jobs
+from buildarena_backend.errors import UnknownIdError
+from buildarena_backend.jobs.adding import add_jobs
+from buildarena_backend.jobs.attempts import Attempt, Ending, end_attempts
+from buildarena_backend.jobs.filters import JobFilter, distinct_values
+from buildarena_backend.jobs.job import JOB_COLUMNS, Job, JobFile, NewJob
+from buildarena_backend.jobs.pages import Order, SortValue, read_page
+from buildarena_backend.jobs.summaries import JobSummary, summarise
+from buildarena_backend.jobs.transitions import REOPENED, transition
+from buildarena_backend.states import AttemptResult, JobState, Outcome
+
+
+class Jobs:
+    """Adds, finds, cancels and retries jobs."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, new: Sequence[NewJob], *, connection: Connection) -> int:
+        """Adds the jobs that do not exist yet; the others stay as they are.
+
+        A job that was cancelled or put on hold before is opened again, because somebody wants it
+        now, who pays for the rest of it.
+
+        Returns:
+            How many were added or opened again.
+        """
+        ids = add_jobs(new, connection=connection)
+        if len(ids) < len(new):
+            ids += self._reopen([job.key.job_id for job in new], new[0], connection)
+        return len(ids)
+
+    def _reopen(self, ids: Sequence[str], wanted: NewJob, connection: Connection) -> list[str]:
+        return transition(
+            jobs.c.id == any_(bound_texts(ids)),
+            (jobs.c.outcome == Outcome.CANCELLED) | (jobs.c.state == JobState.ON_HOLD),
+            to=JobState.QUEUED,
+            allowed_from={JobState.DONE, JobState.ON_HOLD},
+            data={"why": "wanted again"},
+            connection=connection,
+            owner=wanted.owner,
+            payer=wanted.payer,
+            traceparent=wanted.traceparent,
+            **REOPENED,
+        )
+
+    def get(self, job_id: str) -> Job:
+        """The job with this id.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        with self._database.statement() as connection:
+            row = connection.execute(select(*JOB_COLUMNS).where(jobs.c.id == job_id)).first()
+        if row is None:
+            raise UnknownIdError("job", job_id)
+        return value_of(Job, row)
+
+    def page(
+        self,
+        *,
+        limit: int,
+        after: tuple[SortValue, str] | None = None,
+        order: Order | None = None,
+        wanted: JobFilter | None = None,
+        sweep_id: str | None = None,
+        **equals: str | int | None,
+    ) -> list[Job]:
+        """A page of jobs, the newest first by default, with keyset paging.
+
+        Args:
+            limit: Rows at most.
+            after: What the last row of the page before is sorted by, and its id.
+            order: In which order.
+            wanted: Which jobs.
+            sweep_id: Only this sweep's jobs, in the place of ``wanted``.
+            equals: Column values to match, in the place of ``wanted``; None means any.
+        """
+        chosen = wanted or JobFilter(sweep_id=sweep_id, equals=equals)
+        with self._database.transaction() as connection:
+            # One plan for all values would be a bad one for the rare ones.
+            connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
+            rows = read_page(connection, chosen, order or Order(), after, limit)
+            return [value_of(Job, row) for row in rows]
+
+    def summary(self, wanted: JobFilter) -> JobSummary:
+        """How many of some jobs ended how, for which reasons, and with which flags."""
+        with self._database.transaction() as connection:
+            connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))
+            return summarise(connection, wanted)
+
+    def attempts(self, job_id: str) -> list[Attempt]:
+        """Every attempt at the job, oldest first."""
+        query = (
+            select(*columns_of(Attempt, attempts))
+            .where(attempts.c.job_id == job_id)
+            .order_by(attempts.c.token)
+        )
+        with self._database.statement() as connection:
+            return [value_of(Attempt, row) for row in connection.execute(query)]
+
+    def distinct(self, column: str) -> list[str]:
+        """The values that jobs have in a column, in their order.
+
+        Args:
+            column: ``task``, ``model``, ``track`` or ``reason``.
+        """
+        with self._database.statement() as connection:
+            return list(connection.execute(distinct_values(jobs.c[column])).scalars())
+
+    def used_flags(self, flags: Sequence[str]) -> list[str]:
+        """Those of some flags that a job has, in their order."""
+        with self._database.statement() as connection:
+            return [
+                flag
+                for flag in sorted(set(flags))
+                if connection.execute(
+                    select(exists().where(jobs.c.flags.contains([flag])))
+                ).scalar()
+            ]
+
+    def files(self, job_id: str) -> list[JobFile]:
+        """The job's artifacts, with what is known of their bytes, by name."""
+        query = (
+            select(job_artifacts.c.name, *(artifacts.c[n] for n in ("media_type", "size", "hash")))
+            .join(artifacts, artifacts.c.hash == job_artifacts.c.hash)
+            .where(job_artifacts.c.job_id == job_id)
+            .order_by(job_artifacts.c.name)
+        )
+        with self._database.statement() as connection:
+            return [value_of(JobFile, row) for row in connection.execute(query)]
+
+    def artifacts(self, job_id: str) -> dict[str, str]:
+        """Hashes of the job's artifacts by name, for example ``machine``."""
+        query = select(job_artifacts.c.name, job_artifacts.c.hash).where(
+            job_artifacts.c.job_id == job_id
+        )
+        with self._database.statement() as connection:
+            return {row.name: row.hash for row in connection.execute(query)}
+
+    def cancel(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
+        """Ends jobs that have not ended; whoever holds a lease on one can write no more.
+
+        Returns:
+            The ids that were cancelled by this call.
+        """
+        ended = {"outcome": Outcome.CANCELLED, "finished_at": events.now}
+        return self._revoke(ids, JobState.DONE, ended, connection)
+
+    def hold(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
+        """Puts jobs that have not ended on hold, also those that somebody works on.
+
+        Returns:
+            The ids that were put on hold by this call.
+        """
+        return self._revoke(ids, JobState.ON_HOLD, {"notified_at": None}, connection)
+
+    def _revoke(
+        self, ids: Sequence[str], to: JobState, values: dict[str, Any], connection: Connection
+    ) -> list[str]:
+        """Moves jobs that have not ended, with an end to the lease that somebody may have."""
+        rows = connection.execute(
+            update(jobs)
+            .where(jobs.c.id == any_(bound_texts(ids)), jobs.c.state.not_in([JobState.DONE, to]))
+            .values(
+                state=to,
+                lease_owner=None,
+                lease_expires_at=None,
+                lease_token=jobs.c.lease_token + 1,
+                **values,
+            )
+            .returning(jobs.c.id, jobs.c.lease_token, jobs.c.outcome)
+        )
+        endings = [
+            Ending(
+                job_id=row.id,
+                token=row.lease_token - 1,
+                state=to,
+                data={} if row.outcome is None else {"outcome": row.outcome},
+            )
+            for row in rows
+        ]
+        end_attempts(endings, AttemptResult.CANCELLED, None, connection=connection)
+        return [ending.job_id for ending in endings]
+
+    def retry(
+        self, *which: ColumnElement[bool], connection: Connection, **values: Any
+    ) -> list[str]:
+        """Queues errored jobs again at the stage where they failed; never re-rolls a score.
+
+        Args:
+            which: Conditions on the jobs.
+            connection: The transaction it is part of.
+            values: Further columns to set.
+
+        Returns:
+            The ids that were queued: those that had errored.
+        """
+        return transition(
+            *which,
+            jobs.c.outcome == Outcome.ERRORED,
+            to=JobState.QUEUED,
+            allowed_from={JobState.DONE},
+            data={"why": "retry"},
+            connection=connection,
+            **REOPENED,
+            **values,
+        )

@@ -1,0 +1,1 @@
+"""What happened in a session: journal, turns, calls to providers, rollouts, and texts of them."""

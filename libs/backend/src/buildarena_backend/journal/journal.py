@@ -1,0 +1,209 @@
+"""The journal: every model reply, written before it is used, so that none is paid for twice."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from decimal import Decimal
+from typing import Any
+
+from sqlalchemy import bindparam, select, text
+
+from buildarena_backend.database.account_tables import MAX_USD
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import journal
+from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.states import JobState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Usage:
+    """What one or more model requests used.
+
+    Attributes:
+        requests: Model requests that were answered.
+        input_tokens: Tokens sent, those read from a cache included.
+        output_tokens: Tokens received, reasoning included.
+        cached_tokens: The part of the input that the provider read from its cache.
+        reasoning_tokens: The part of the output that was hidden reasoning.
+        cost_usd: Price in US dollars.
+    """
+
+    requests: int = 0
+    input_tokens: int = 0
+    output_tokens: int = 0
+    cached_tokens: int = 0
+    reasoning_tokens: int = 0
+    cost_usd: Decimal = field(default_factory=Decimal)
+
+    def __add__(self, other: Usage) -> Usage:
+        return Usage(
+            requests=self.requests + other.requests,
+            input_tokens=self.input_tokens + other.input_tokens,
+            output_tokens=self.output_tokens + other.output_tokens,
+            cached_tokens=self.cached_tokens + other.cached_tokens,
+            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
+            cost_usd=self.cost_usd + other.cost_usd,
+        )
+
+
+GARBAGE = "garbage"
+"""Finish word of an answer that can't be read."""
+OUT_OF_TIME = "out_of_time"
+"""Finish word of a request that was broken off because the job's time was over."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JournalEntry:
+    """One model request and its reply.
+
+    Attributes:
+        sequence: Place in the session, from 0.
+        stage: Session stage, for example ``build``.
+        role: Role that asked, for example ``guidance``.
+        request_hash: Content hash of what was asked.
+        reply: The reply in our own neutral form.
+        usage: What it used and cost.
+        latency_s: Seconds from sending to having the reply, waits for retries included.
+        tries: Sendings, 1 when the first was answered.
+        provider_request_id: The provider's own id, if it gave one.
+        created_at: When it was written; None before.
+        told: What the session told the role since its last reply: ``system``, its system message
+            where it had none yet, and ``user``, texts. What others said meanwhile is not in it.
+    """
+
+    sequence: int
+    stage: str
+    role: str
+    request_hash: str
+    reply: Mapping[str, Any]
+    usage: Usage
+    latency_s: float
+    tries: int = 1
+    provider_request_id: str | None = None
+    created_at: datetime | None = None
+    told: Mapping[str, Any] | None = None
+
+    @property
+    def answers(self) -> bool:
+        """Whether a session goes on with its reply; otherwise it only counts and was paid for."""
+        return self.reply.get("finish") not in {GARBAGE, OUT_OF_TIME}
+
+
+# One statement, because it is the one that every turn of every session waits for.
+_APPEND = text(
+    f"""
+    WITH job AS (
+        UPDATE jobs SET
+            requests = requests + :requests,
+            input_tokens = input_tokens + :input_tokens,
+            output_tokens = output_tokens + :output_tokens,
+            cached_tokens = cached_tokens + :cached_tokens,
+            reasoning_tokens = reasoning_tokens + :reasoning_tokens,
+            cost_usd = LEAST(cost_usd + :cost_usd, {MAX_USD}),
+            faults = CASE WHEN :answers THEN 0 ELSE faults END
+        WHERE id = :job_id AND lease_token = :token AND state = '{JobState.RUNNING}'
+        RETURNING id, payer, owner
+    ), settled AS (
+        DELETE FROM reservations USING job WHERE reservations.job_id = job.id
+    ), paying AS (
+        SELECT budgets.id FROM budgets JOIN job ON budgets.id IN (job.payer, job.owner)
+        ORDER BY budgets.id FOR UPDATE OF budgets
+    ), charged AS (
+        UPDATE budgets SET
+            spent_cost_usd = LEAST(spent_cost_usd + :cost_usd, {MAX_USD}),
+            spent_tokens = spent_tokens + :input_tokens + :output_tokens,
+            spent_requests = spent_requests + :requests
+        FROM paying WHERE budgets.id = paying.id
+    )
+    INSERT INTO journal (
+        job_id, sequence, token, stage, role, request_hash, reply, input_tokens, output_tokens,
+        cached_tokens, reasoning_tokens, cost_usd, latency_s, tries, provider_request_id,
+        payer, owner, told
+    )
+    SELECT
+        id, :sequence, :token, :stage, :role, :request_hash, CAST(:reply AS json), :input_tokens,
+        :output_tokens, :cached_tokens, :reasoning_tokens, :cost_usd, :latency_s, :tries,
+        CAST(:provider_request_id AS text), payer, owner, CAST(:told AS json)
+    FROM job
+    """  # noqa: S608 - the state is our own constant
+)
+
+
+_OF_JOB = (
+    select(journal).where(journal.c.job_id == bindparam("job_id")).order_by(journal.c.sequence)
+)
+
+
+class Journal:
+    """Appends to and reads the journals of jobs."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def append(self, lease: Lease, entry: JournalEntry) -> None:
+        """Writes a reply and charges its usage to the job and its budgets, all or nothing.
+
+        A job that makes progress is not given up for the faults it met before; what is no answer
+        is no progress.
+
+        Raises:
+            StaleLeaseError: The lease is over; nothing was written.
+        """
+        usage = entry.usage
+        with self._database.statement() as connection:
+            written = connection.execute(
+                _APPEND,
+                {
+                    "job_id": lease.job.id,
+                    "token": lease.token,
+                    "answers": entry.answers,
+                    "sequence": entry.sequence,
+                    "stage": entry.stage,
+                    "role": entry.role,
+                    "request_hash": entry.request_hash,
+                    "reply": json.dumps(entry.reply),
+                    "requests": usage.requests,
+                    "input_tokens": usage.input_tokens,
+                    "output_tokens": usage.output_tokens,
+                    "cached_tokens": usage.cached_tokens,
+                    "reasoning_tokens": usage.reasoning_tokens,
+                    "cost_usd": usage.cost_usd,
+                    "latency_s": entry.latency_s,
+                    "tries": entry.tries,
+                    "provider_request_id": entry.provider_request_id,
+                    "told": None if entry.told is None else json.dumps(entry.told),
+                },
+            )
+            if written.rowcount != 1:
+                raise StaleLeaseError(lease.job.id, lease.token)
+
+    def read(self, job_id: str) -> list[JournalEntry]:
+        """All entries of a job in their order."""
+        with self._database.statement() as connection:
+            return [
+                JournalEntry(
+                    sequence=row.sequence,
+                    stage=row.stage,
+                    role=row.role,
+                    request_hash=row.request_hash,
+                    reply=row.reply,
+                    usage=Usage(
+                        requests=1,
+                        input_tokens=row.input_tokens,
+                        output_tokens=row.output_tokens,
+                        cached_tokens=row.cached_tokens,
+                        reasoning_tokens=row.reasoning_tokens,
+                        cost_usd=row.cost_usd,
+                    ),
+                    latency_s=row.latency_s,
+                    tries=row.tries,
+                    provider_request_id=row.provider_request_id,
+                    created_at=row.created_at,
+                    told=row.told,
+                )
+                for row in connection.execute(_OF_JOB, {"job_id": job_id})
+            ]

@@ -1,0 +1,119 @@
+"""Rollouts: simulations that a session asked for, and what they scored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from sqlalchemy import Connection, bindparam, insert, select, update
+
+from buildarena_backend import events
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import value_of
+from buildarena_backend.database.tables import rollouts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RolloutRequest:
+    """A simulation to be done.
+
+    Attributes:
+        number: Place among the job's rollouts, from 0.
+        final: True when the job ends with this rollout's score.
+        engine: Simulator name.
+        machine_hash: Artifact hash of the machine document.
+        controls: The key presses of this rollout, or None for the task's own.
+        seed: Of the varied world in which it is done; None for the exact one.
+    """
+
+    number: int
+    final: bool
+    engine: str
+    machine_hash: str
+    controls: Sequence[Mapping[str, Any]] | None = None
+    seed: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RolloutRecord:
+    """A rollout as the database has it; the score is None until it was simulated.
+
+    Attributes:
+        seed: Of the varied world in which it was done; None for the exact one.
+        runner: The key whose runner ran it; None for a worker of the house.
+        audited: Whether its job is to be verified before it counts.
+        annotations: What our engines say of the machine, by engine; only of trials in the game.
+        trace: The tracked body at 1 Hz, rows of time, x, y, z (seconds, units, world frame).
+        wall_s: How long the simulation took; the other names are those of the columns.
+    """
+
+    number: int
+    final: bool
+    engine: str
+    machine_hash: str
+    controls: Sequence[Mapping[str, Any]] | None
+    seed: int | None = None
+    success: bool | None
+    indicator: float | None
+    metrics: Mapping[str, Any] | None
+    flags: Sequence[str] | None
+    trajectory_hash: str | None
+    trace: Sequence[Sequence[float]] | None
+    versions: Mapping[str, Any] | None
+    annotations: Mapping[str, Any] | None = None
+    wall_s: float | None
+    runner: str | None = None
+    audited: bool = False
+    created_at: datetime
+    finished_at: datetime | None
+
+
+# Made once, because making them takes longer than running them.
+_OF_JOB = (
+    select(rollouts).where(rollouts.c.job_id == bindparam("job_id")).order_by(rollouts.c.number)
+)
+_REQUEST = insert(rollouts)
+_COMPLETE = (
+    update(rollouts)
+    .where(rollouts.c.job_id == bindparam("of_job"), rollouts.c.number == bindparam("of_number"))
+    .values(finished_at=events.now)
+    .returning(rollouts)
+)
+
+
+class Rollouts:
+    """Keeps rollouts. Writes take the transaction that also moves the job."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def request(self, job_id: str, request: RolloutRequest, *, connection: Connection) -> None:
+        """Adds a rollout that is to be simulated."""
+        controls = None if request.controls is None else [dict(press) for press in request.controls]
+        connection.execute(
+            _REQUEST,
+            {
+                "job_id": job_id,
+                "number": request.number,
+                "final": request.final,
+                "engine": request.engine,
+                "machine_hash": request.machine_hash,
+                "controls": controls,
+                "seed": request.seed,
+            },
+        )
+
+    def complete(
+        self, job_id: str, number: int, *, connection: Connection, **values: Any
+    ) -> RolloutRecord:
+        """Writes a rollout's score and trajectory; returns the rollout as it is now."""
+        given = {"of_job": job_id, "of_number": number, **values}
+        return value_of(RolloutRecord, connection.execute(_COMPLETE, given).one())
+
+    def read(self, job_id: str) -> list[RolloutRecord]:
+        """All rollouts of a job in their order."""
+        with self._database.statement() as connection:
+            rows = connection.execute(_OF_JOB, {"job_id": job_id})
+            return [value_of(RolloutRecord, row) for row in rows]

@@ -1,0 +1,341 @@
+"""Leases: who may work on a job, and the writes that only their holders may make.
+
+Every claim raises the job's fencing token. A write names its token; when the job has a newer
+one, or is no longer running, nothing is written and StaleLeaseError is raised. All times are
+the database's, so a worker with a wrong clock does no harm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any, Final
+
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    Update,
+    and_,
+    delete,
+    select,
+    tuple_,
+    update,
+)
+
+from buildarena_backend import events
+from buildarena_backend.database.account_tables import budgets
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import value_of
+from buildarena_backend.database.tables import jobs
+from buildarena_backend.database.tables import leases as expiries
+from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.jobs.attempts import Ending, hand_back, move_on
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.leases.claiming import CLAIM
+from buildarena_backend.leases.lost_leases import recover_lost
+from buildarena_backend.leases.misses import require_fewer_leases
+from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage
+
+LONGEST_DELAY_S = 300.0
+"""A job waits no longer than this between two attempts."""
+REMEMBERED: Final = timedelta(hours=1)
+"""How long it is known when a lease ended."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Lease:
+    """The right to work on a job.
+
+    Attributes:
+        job: The job as it was when claimed.
+        owner: The worker's id.
+        token: The fencing token that goes with every write.
+        budgeted: Whether a budget paid for the job when it was claimed.
+    """
+
+    job: Job
+    owner: str
+    token: int
+    budgeted: bool = False
+
+    @property
+    def first(self) -> bool:
+        """Whether this is the job's first lease, so that it has neither journal nor rollouts."""
+        return self.token == 1
+
+
+class Leases:
+    """Claims, renews, hands over and ends leases.
+
+    Args:
+        database: Where the jobs are.
+        duration_s: Seconds that a lease is valid without a heartbeat.
+        max_faults: Infrastructure faults without progress after which a job is given up.
+    """
+
+    def __init__(
+        self, database: Database, *, duration_s: float = 15.0, max_faults: int = 8
+    ) -> None:
+        self._database = database
+        self.duration = timedelta(seconds=duration_s)
+        self.max_faults = max_faults
+
+    def claim(
+        self,
+        queue: str,
+        *,
+        owner: str,
+        hint: str | None = None,
+        full: Sequence[str] = (),
+        last: str | None = None,
+        only: Sequence[str] | None = None,
+        version: str | None = None,
+        prefix: str | None = None,
+        most: int = 0,
+    ) -> Lease | None:
+        """Takes a waiting job of a queue: a recovered one first, then the hinted, then the oldest.
+
+        Owners take turns: a job of the owner that had the last turn is only taken when no other
+        owner has one.
+
+        Args:
+            queue: Queue name.
+            owner: The worker's id.
+            hint: The job that a message named.
+            full: Owners whose jobs may not be taken now.
+            last: The owner whose job was taken last.
+            only: Owners whose jobs may be taken; None for everybody's.
+            version: The simulator's version that jobs must have been submitted for, if given.
+            prefix: Of a key's runners, what their ids begin with; jobs they missed are passed over.
+            most: Leases that these may have at once.
+
+        Returns:
+            The lease, or None when nothing waits.
+
+        Raises:
+            TooManyLeasesError: The key's runners have as many leases as they may.
+        """
+        given = {
+            "queue": queue,
+            "owner": owner,
+            "hint": hint,
+            "duration": self.duration,
+            "full": list(full),
+            "last": last,
+            "only": None if only is None else list(only),
+            "version": version,
+            "prefix": prefix,
+        }
+        if prefix is None:
+            with self._database.statement() as connection:
+                row = connection.execute(CLAIM, given).first()
+        else:
+            with self._database.transaction() as connection:
+                require_fewer_leases(prefix, most, connection=connection)
+                row = connection.execute(CLAIM, given).first()
+        if row is None:
+            return None
+        job = value_of(Job, row)
+        return Lease(job=job, owner=owner, token=job.lease_token, budgeted=row.budgeted)
+
+    def heartbeat(self, leases: Sequence[Lease]) -> dict[str, bool]:
+        """Renews leases.
+
+        Returns:
+            Ids of the jobs whose lease is still ours, each with whether a budget pays for the
+            job now; work on the others must stop.
+        """
+        if not leases:
+            return {}
+        with self._database.statement() as connection:
+            rows = connection.execute(self.renewal(_among(leases)).returning(jobs.c.id, _BUDGETED))
+            return {row.id: row.budgeted for row in rows}
+
+    def renewal(self, held: ColumnElement[bool]) -> Update:
+        """The statement that renews the leases of some jobs; it may return columns of `jobs`."""
+        return (
+            update(expiries)
+            .where(expiries.c.job_id == jobs.c.id, expiries.c.token == jobs.c.lease_token, held)
+            .values(expires_at=events.now + self.duration)
+        )
+
+    def held(self, leases: Sequence[Lease]) -> dict[str, bool]:
+        """Says what `heartbeat` says, without renewing anything: it only reads."""
+        if not leases:
+            return {}
+        with self._database.statement() as connection:
+            rows = connection.execute(select(jobs.c.id, _BUDGETED).where(_among(leases)))
+            return {row.id: row.budgeted for row in rows}
+
+    def advance(
+        self,
+        lease: Lease,
+        *,
+        to: JobState,
+        connection: Connection,
+        result: AttemptResult = AttemptResult.DONE,
+        note: str | None = None,
+        **values: Any,
+    ) -> None:
+        """Ends the lease with its attempt and writes the job's next place, all or nothing.
+
+        Args:
+            lease: The lease that ends.
+            to: The job's next state.
+            connection: The transaction that also holds what belongs to this step.
+            result: How the attempt ended.
+            note: A sentence for people, kept with the attempt.
+            values: Further columns of the job to set.
+
+        Raises:
+            StaleLeaseError: The lease is over; the transaction must be undone.
+        """
+        data = {name: values[name] for name in ("stage", "outcome", "reason") if values.get(name)}
+        move_on(
+            Ending(job_id=lease.job.id, token=lease.token, state=to, data=data),
+            result,
+            note,
+            values,
+            connection=connection,
+        )
+
+    def queue_again(
+        self, lease: Lease, *, stage: Stage, queue: str, connection: Connection, **values: Any
+    ) -> None:
+        """Passes the job on to a stage, to be claimed again there; its faults are forgotten."""
+        self.advance(
+            lease,
+            to=JobState.QUEUED,
+            connection=connection,
+            stage=stage,
+            queue=queue,
+            faults=0,
+            notified_at=None,
+            available_at=events.now,
+            **values,
+        )
+
+    def hand_back(self, lease: Lease) -> None:
+        """Gives up the work without fault.
+
+        Raises:
+            StaleLeaseError: The lease is over.
+        """
+        if not self.hand_back_all([lease]):
+            raise StaleLeaseError(lease.job.id, lease.token)
+
+    def hand_back_all(self, leases: Sequence[Lease]) -> set[str]:
+        """Gives up the work on many jobs in one statement, for example when a worker stops.
+
+        Returns:
+            Ids of the jobs that wait again; the leases of the others were over.
+        """
+        if not leases:
+            return set()
+        with self._database.statement() as connection:
+            return hand_back(
+                [(lease.job.id, lease.token) for lease in leases], connection=connection
+            )
+
+    def fault(
+        self,
+        lease: Lease,
+        detail: str,
+        *,
+        delay_s: float = 0.0,
+        reason: str,
+        endless: bool = False,
+    ) -> bool:
+        """Records an infrastructure fault: the job waits for another attempt, or is given up.
+
+        Args:
+            lease: The lease that ends.
+            detail: What happened, for people.
+            delay_s: How long the job waits before it may be claimed again, after the first fault;
+                twice as long after each further one, up to LONGEST_DELAY_S.
+            reason: The class of the fault, for the dead-letter view.
+            endless: Whether the job is not given up for it.
+
+        Returns:
+            True when the job will be tried again.
+        """
+        with self._database.transaction() as connection:
+            met = select(jobs.c.faults).where(jobs.c.id == lease.job.id)
+            faults = int(connection.execute(met).scalar_one()) + 1
+            again = endless or faults < self.max_faults
+            wait_s = min(delay_s * 2 ** min(faults - 1, 20), LONGEST_DELAY_S)
+            if again:
+                self.advance(
+                    lease,
+                    to=JobState.QUEUED,
+                    connection=connection,
+                    result=AttemptResult.FAULT,
+                    note=detail,
+                    faults=faults,
+                    notified_at=None,
+                    available_at=events.now + timedelta(seconds=wait_s),
+                    detail=detail,
+                )
+            else:
+                self.end_as_errored(lease, detail, reason=reason, connection=connection)
+        return again
+
+    def give_up(self, lease: Lease, detail: str, *, reason: str) -> None:
+        """Ends the job as errored: outside every average, and kept in the dead-letter view."""
+        with self._database.transaction() as connection:
+            self.end_as_errored(lease, detail, reason=reason, connection=connection)
+
+    def end_as_errored(
+        self,
+        lease: Lease,
+        detail: str,
+        *,
+        reason: str,
+        connection: Connection,
+        result: AttemptResult = AttemptResult.FAULT,
+    ) -> None:
+        """As `give_up`, in a transaction, with how the attempt ended."""
+        self.advance(
+            lease,
+            to=JobState.DONE,
+            connection=connection,
+            result=result,
+            note=detail,
+            outcome=Outcome.ERRORED,
+            reason=reason,
+            faults=jobs.c.faults + 1,
+            finished_at=events.now,
+            detail=detail,
+        )
+
+    def recover(self) -> list[str]:
+        """Re-queues jobs whose lease ran out, and gives up those that keep losing their workers.
+
+        Returns:
+            Ids of the jobs that wait again.
+        """
+        return recover_lost(self._database, max_faults=self.max_faults)
+
+    def forget_ended(self) -> None:
+        """Removes what is known of leases that ended an hour ago or earlier."""
+        theirs = and_(
+            jobs.c.id == expiries.c.job_id,
+            jobs.c.lease_token == expiries.c.token,
+            jobs.c.state == JobState.RUNNING,
+        )
+        ended = expiries.c.expires_at < events.now - REMEMBERED
+        with self._database.statement() as connection:
+            connection.execute(
+                delete(expiries).where(ended, ~select(jobs.c.id).where(theirs).exists())
+            )
+
+
+_BUDGETED = (
+    select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
+)
+
+
+def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:
+    pairs = [(lease.job.id, lease.token) for lease in leases]
+    return and_(jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs))

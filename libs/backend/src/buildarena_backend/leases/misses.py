@@ -1,0 +1,87 @@
+"""What keys of runners missed: trials that they leased and did not do, since the job's last step.
+
+A runner may fail, by fault or on purpose, and harms only itself by it: each key counts once against
+a job, however often it fails, and gets the job again after a while that grows, or never if it said
+that it never can do it. Workers of the house are not counted here.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from sqlalchemy import Connection, func, select
+
+from buildarena_backend.database.tables import jobs
+from buildarena_backend.errors import TooManyLeasesError
+from buildarena_backend.states import AttemptResult, JobState
+
+RUNNER: Final = "runner@"
+"""What the lease owners of all runners begin with; see `runner_leases.runner_prefix`."""
+MIN_KEYS: Final = 2
+"""Keys of runners that must agree before what they say ends a job."""
+CLAIM_LOCK: Final = 0x72756E  # "run"
+LONGEST_PAUSE_S: Final = 300
+"""A key gets a job that it missed again after this time at the latest."""
+
+_MISSES: Final = ", ".join(
+    f"'{result}'"
+    for result in (
+        AttemptResult.FAULT,
+        AttemptResult.PERMANENT_FAULT,
+        AttemptResult.HANDED_BACK,
+        AttemptResult.LOST,
+    )
+)
+_MISSED: Final = f"""
+    FROM attempts AS missed
+    WHERE missed.job_id = jobs.id AND missed.result IN ({_MISSES})
+        AND missed.token > COALESCE((
+            SELECT max(done.token) FROM attempts AS done
+            WHERE done.job_id = jobs.id AND done.result = '{AttemptResult.DONE}'
+        ), 0)
+"""  # noqa: S608 - made of our own names
+
+MISSED_LATELY: Final = f"""
+    SELECT FROM (
+        SELECT count(*) AS times, max(missed.ended_at) AS at,
+            bool_or(missed.result = '{AttemptResult.PERMANENT_FAULT}') AS never
+        {_MISSED} AND starts_with(missed.worker, :prefix)
+    ) AS misses
+    WHERE never OR at > clock_timestamp()
+        - LEAST({LONGEST_PAUSE_S}, power(2, LEAST(times, 20))) * interval '1 second'
+"""
+"""A row of no columns where a job in ``jobs`` is none for the key of ``:prefix`` now."""
+
+MISSED_BEFORE: Final = f"""
+    EXISTS (SELECT {_MISSED}
+        AND starts_with(missed.worker, split_part(jobs.lease_owner, '/', 1) || '/'))
+"""
+"""Whether the key whose runner has a job now missed it before."""
+
+OTHERS_REFUSED: Final = f"""
+    EXISTS (SELECT {_MISSED}
+        AND missed.result = '{AttemptResult.PERMANENT_FAULT}'
+        AND NOT starts_with(missed.worker, split_part(jobs.lease_owner, '/', 1) || '/'))
+"""
+"""Whether a runner of another key than the one at it said that the job can't be done."""
+
+
+def require_fewer_leases(prefix: str, most: int, *, connection: Connection) -> None:
+    """Has a key's claims wait for each other, and counts its leases.
+
+    Args:
+        prefix: What the names of the key's runners begin with.
+        most: How many leases they may have.
+        connection: The transaction that claims one more.
+
+    Raises:
+        TooManyLeasesError: They have so many.
+    """
+    lock = func.pg_advisory_xact_lock(CLAIM_LOCK, func.hashtext(prefix))
+    connection.execute(select(lock))
+    leases = select(func.count()).where(
+        jobs.c.state == JobState.RUNNING, func.starts_with(jobs.c.lease_owner, prefix)
+    )
+    number = connection.execute(leases).scalar_one()
+    if number >= most:
+        raise TooManyLeasesError(number, most)

@@ -1,0 +1,225 @@
+"""Leases of runners, which name them over HTTP: found by key, job and token.
+
+A lease's owner is ``runner@KEY/NAME``: a key's runners touch no lease of another key, and a runner
+that asks again under the same name, because an answer was lost, gets the same lease again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from datetime import timedelta
+from typing import Final
+
+from sqlalchemy import ColumnElement, and_, func, literal_column, select, true, tuple_
+
+from buildarena_backend import events
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import columns_of, value_of
+from buildarena_backend.database.tables import attempts, jobs, workers
+from buildarena_backend.errors import StaleLeaseError
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.leases.leases import Lease, Leases
+from buildarena_backend.leases.lost_leases import EXPIRES_AT
+from buildarena_backend.leases.misses import MIN_KEYS, MISSED_BEFORE, OTHERS_REFUSED, RUNNER
+from buildarena_backend.states import AttemptResult, JobState
+
+OPERATOR_KEY: Final = "operator"
+"""Stands for the key where none is asked for."""
+UNCONFIRMED: Final = "; it waits for a runner of another key, or a worker beside the database"
+LONGEST_TRIAL: Final = timedelta(hours=1)
+"""A lease that is older is renewed no more: a runner must not keep a job forever."""
+
+JobToken = tuple[str, int]
+
+
+def runner_prefix(key_id: str | None) -> str:
+    """What the lease owners of a key's runners begin with."""
+    return f"{RUNNER}{key_id or OPERATOR_KEY}/"
+
+
+def prefix_of(owner: str) -> str:
+    """What the lease owners of the same key's runners begin with."""
+    return owner[: owner.index("/") + 1]
+
+
+class RunnerLeases:
+    """Finds and renews the leases of one key's runners at a time.
+
+    Args:
+        database: Where the jobs are.
+        leases: All leases, of which these are some.
+    """
+
+    def __init__(self, database: Database, leases: Leases) -> None:
+        self._database = database
+        self._leases = leases
+
+    def of(self, owner: str) -> Lease | None:
+        """The live lease that a runner has under exactly this name, if any."""
+        query = select(*_COLUMNS).where(
+            jobs.c.state == JobState.RUNNING,
+            jobs.c.lease_owner == owner,
+            events.now < EXPIRES_AT,
+        )
+        with self._database.statement() as connection:
+            row = connection.execute(query.limit(1)).first()
+        return None if row is None else _lease(row)
+
+    def hand_back(self, runner: str) -> None:
+        """Hands back what a runner that leaves still has, such as a lease that it never heard of.
+
+        Args:
+            runner: Its name; its slots are called ``NAME.NUMBER``.
+        """
+        query = select(*_COLUMNS).where(
+            jobs.c.state == JobState.RUNNING,
+            jobs.c.lease_owner.regexp_match(rf"^{re.escape(runner)}(\.[0-9]+)?$"),
+        )
+        with self._database.statement() as connection:
+            held = [_lease(row) for row in connection.execute(query)]
+        self._leases.hand_back_all(held)
+
+    def live(self, job_id: str, token: int, prefix: str) -> Lease:
+        """The lease that a key's runner names.
+
+        Raises:
+            StaleLeaseError: It is over, never was, or is not this key's.
+        """
+        query = select(*_COLUMNS).where(
+            jobs.c.id == job_id,
+            jobs.c.lease_token == token,
+            jobs.c.state == JobState.RUNNING,
+            _begins(jobs.c.lease_owner, prefix),
+        )
+        with self._database.statement() as connection:
+            row = connection.execute(query).first()
+        if row is None:
+            raise StaleLeaseError(job_id, token)
+        return _lease(row)
+
+    def ending(self, job_id: str, token: int, prefix: str) -> str | None:
+        """How an attempt of a key's runner ended; None when it has not, or is not this key's."""
+        query = select(attempts.c.result).where(
+            attempts.c.job_id == job_id,
+            attempts.c.token == token,
+            _begins(attempts.c.worker, prefix),
+        )
+        with self._database.statement() as connection:
+            return connection.execute(query).scalar_one_or_none()
+
+    def heartbeat(self, named: Collection[JobToken], prefix: str) -> set[JobToken]:
+        """Renews leases of a key's runners.
+
+        Returns:
+            Those that live on; work on the others must stop.
+        """
+        if not named:
+            return set()
+        young = (
+            select(attempts)
+            .where(
+                attempts.c.job_id == jobs.c.id,
+                attempts.c.token == jobs.c.lease_token,
+                attempts.c.started_at > events.now - LONGEST_TRIAL,
+            )
+            .exists()
+        )
+        held = and_(_among(named), _begins(jobs.c.lease_owner, prefix), young)
+        statement = self._leases.renewal(held).returning(jobs.c.id, jobs.c.lease_token)
+        with self._database.statement() as connection:
+            return {(row.id, row.lease_token) for row in connection.execute(statement)}
+
+    def fault(self, lease: Lease, detail: str, *, reason: str, permanent: bool = False) -> bool:
+        """Records what a runner says against a job; its key counts once, however often it says so.
+
+        The job waits for others at once, and for the key longer each time, see `misses`. It ends
+        when runners of two keys say that it never can be done, or when as many keys and workers of
+        the house failed as may.
+
+        Args:
+            lease: The runner's lease, which ends.
+            detail: What happened, for people.
+            reason: The class of the fault, for the dead-letter view.
+            permanent: Whether no attempt of the key's runners can mend it.
+
+        Returns:
+            True when the job will be tried again.
+        """
+        with self._database.transaction() as connection:
+            standing = select(
+                jobs.c.faults,
+                literal_column(MISSED_BEFORE).label("missed_before"),
+                literal_column(OTHERS_REFUSED).label("others_refused"),
+            ).where(jobs.c.id == lease.job.id, jobs.c.lease_owner == lease.owner)
+            job = connection.execute(standing).first()
+            if job is None:
+                raise StaleLeaseError(lease.job.id, lease.token)
+            faults = job.faults + (not job.missed_before)
+            agreed = permanent and job.others_refused
+            result = AttemptResult.PERMANENT_FAULT if permanent else AttemptResult.FAULT
+            if agreed or faults >= max(self._leases.max_faults, MIN_KEYS):
+                self._leases.end_as_errored(
+                    lease, detail, reason=reason, connection=connection, result=result
+                )
+                return False
+            self._leases.advance(
+                lease,
+                to=JobState.QUEUED,
+                connection=connection,
+                result=result,
+                note=detail,
+                faults=faults,
+                notified_at=None,
+                detail=detail + UNCONFIRMED * permanent,
+            )
+        return True
+
+    def alive(self, named: Collection[JobToken]) -> set[JobToken]:
+        """Those of the leases, whoever's, that are not over."""
+        if not named:
+            return set()
+        query = select(jobs.c.id, jobs.c.lease_token).where(_among(named))
+        with self._database.statement() as connection:
+            return {(row.id, row.lease_token) for row in connection.execute(query)}
+
+    def counts(self, prefix: str, *, besides: str) -> Mapping[str, int]:
+        """How much a key's runners have: ``leases``, and ``names`` in the register of workers.
+
+        Args:
+            prefix: The key's.
+            besides: The name of the one that asks, which is not counted.
+        """
+        leases = select(func.count()).where(
+            jobs.c.state == JobState.RUNNING, _begins(jobs.c.lease_owner, prefix)
+        )
+        names = select(func.count()).where(
+            _begins(workers.c.id, prefix),
+            workers.c.id != besides,
+            workers.c.seen_at > events.now - timedelta(minutes=1),
+        )
+        query = select(
+            leases.scalar_subquery().label("leases"), names.scalar_subquery().label("names")
+        )
+        with self._database.statement() as connection:
+            row = connection.execute(query).one()
+        return {"leases": row.leases, "names": row.names}
+
+
+_COLUMNS = columns_of(Job, jobs)
+
+
+def _lease(row: object) -> Lease:
+    job = value_of(Job, row)
+    return Lease(job=job, owner=str(job.lease_owner), token=job.lease_token)
+
+
+def _among(named: Collection[JobToken]) -> ColumnElement[bool]:
+    pairs: Sequence[JobToken] = list(named)
+    return and_(
+        true(), jobs.c.state == JobState.RUNNING, tuple_(jobs.c.id, jobs.c.lease_token).in_(pairs)
+    )
+
+
+def _begins(column: ColumnElement[str], prefix: str) -> ColumnElement[bool]:
+    return func.starts_with(column, prefix)

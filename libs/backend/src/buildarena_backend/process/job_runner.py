@@ -1,0 +1,215 @@
+"""The job runner: how a worker takes a job, does its stage, and reports faults."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Protocol
+
+import structlog
+from opentelemetry.trace import SpanKind
+from sqlalchemy.exc import OperationalError
+
+from buildarena_backend.database.text import clean
+from buildarena_backend.errors import (
+    ArtifactDamagedError,
+    ArtifactMissingError,
+    ArtifactStoreError,
+    PermanentError,
+    StaleLeaseError,
+    TransientError,
+)
+from buildarena_backend.leases.claiming import OPERATOR
+from buildarena_backend.leases.leases import Lease, Leases
+from buildarena_backend.process.active_lease import ActiveLease, LeaseKeeper
+from buildarena_backend.process.owner_slots import OwnerSlots
+from buildarena_backend.telemetry.tracing import span
+
+log = structlog.get_logger(__name__)
+
+INTERNAL_DELAY_S = 2.0
+"""A thread takes its next job at once: without a delay it would meet a short trouble again and
+again, until the job is given up."""
+STORE_DELAY_S = 2.0
+"""How long a job waits after the artifact store failed for the first time."""
+SLICE_S = 0.25
+"""How long a process that does one job at a time goes on taking jobs for one message: it does not
+hear that it is to stop before it is done with the message."""
+LONGEST_DETAIL = 2000
+"""Characters of what is kept of a fault; some of them quote what strangers sent."""
+
+
+class StageHandler(Protocol):
+    """Does a job's stage. It may run twice for one job, so it must be idempotent."""
+
+    def __call__(self, active: ActiveLease) -> None:
+        """Works on the leased job and moves it on.
+
+        Args:
+            active: The right to work on the job; when it is lost, stop without writing.
+
+        Raises:
+            StaleLeaseError: The lease is over.
+            TransientError: The job should be tried again.
+            PermanentError: The job can't be done.
+        """
+
+
+class JobRunner:
+    """Runs a handler on the jobs that messages name.
+
+    Args:
+        leases: Where jobs are claimed.
+        handler: Does the work.
+        keeper: Keeps leases alive.
+        owner: The worker's id.
+        slots: What the owners of its jobs share; for a worker of one job at a time, one slot.
+    """
+
+    def __init__(
+        self,
+        leases: Leases,
+        handler: StageHandler,
+        keeper: LeaseKeeper,
+        owner: str,
+        slots: OwnerSlots | None = None,
+    ) -> None:
+        self._leases = leases
+        self._handler = handler
+        self._keeper = keeper
+        self._owner = owner
+        self._slots = slots or OwnerSlots(1)
+        self._claiming = threading.Lock()
+        self._last: str | None = None
+        self._stopping = False
+
+    def stop(self) -> None:
+        """Takes no further job."""
+        self._stopping = True
+
+    def process_all(self, queue: str, job_id: str) -> None:
+        """Does waiting jobs of the queue, the named one first if possible, until none is left.
+
+        A slot that comes free is so taken at once, although messages that found no slot are gone.
+        """
+        while self.process_next(queue, job_id):
+            pass
+
+    def process_some(self, queue: str, job_id: str) -> None:
+        """Does waiting jobs of the queue, the named one first if possible, until SLICE_S are over.
+
+        A message costs as much as a job's books do, so that short jobs share one.
+        """
+        until = time.monotonic() + SLICE_S
+        while self.process_next(queue, job_id) and time.monotonic() < until:
+            pass
+
+    def process_next(self, queue: str, job_id: str) -> bool:
+        """Takes one waiting job of the queue, the named one if possible, and does its stage.
+
+        Jobs of another owner than the last one's come first, those of owners without a free slot
+        wait.
+
+        Returns:
+            Whether there was one.
+        """
+        lease = self._claimed(queue, job_id)
+        if lease is None:
+            return False
+        try:
+            self._do_stage(lease)
+        finally:
+            with self._claiming:
+                self._slots.give_back(lease.job.owner or OPERATOR)
+        return True
+
+    def _claimed(self, queue: str, job_id: str) -> Lease | None:
+        # One at a time: what an owner has must not change between looking and taking.
+        with self._claiming:
+            if self._stopping or not self._slots.free:
+                return None
+            try:
+                lease = self._leases.claim(
+                    queue,
+                    owner=self._owner,
+                    hint=job_id,
+                    full=self._slots.full(),
+                    last=self._last,
+                )
+            except OperationalError as error:
+                log.warning("claim_failed", job=job_id, error=str(error).splitlines()[0])
+                return None
+            if lease is not None:
+                self._last = lease.job.owner or OPERATOR
+                self._slots.take(self._last)
+            return lease
+
+    def _do_stage(self, lease: Lease) -> None:
+        started = time.perf_counter()
+        bound = log.bind(stage=lease.job.stage, token=lease.token)
+        with (
+            structlog.contextvars.bound_contextvars(job=lease.job.id),
+            self._keeper.keeping(lease) as active,
+        ):
+            try:
+                with span(
+                    lease.job.stage,
+                    {"buildarena.job": lease.job.id, "buildarena.token": lease.token},
+                    parent=lease.job.traceparent,
+                    kind=SpanKind.CONSUMER,
+                ):
+                    self._handler(active)
+            except StaleLeaseError:
+                bound.warning("lease_over")
+            except TransientError as error:
+                self._retry_later(lease, error)
+            except PermanentError as error:
+                self._give_up(lease, error)
+            except (ArtifactStoreError, ArtifactMissingError, ArtifactDamagedError) as error:
+                self._retry_later(lease, _store_fault(error))
+            except OperationalError as error:
+                bound.warning("database_fault", error=str(error).splitlines()[0])
+            except Exception as error:  # noqa: BLE001 - a bug must not cost the job; it is logged whole
+                bound.exception("handler_failed")
+                text = f"{type(error).__name__}: {error}"
+                fault = TransientError(text, reason="internal_error", delay_s=INTERNAL_DELAY_S)
+                self._retry_later(lease, fault)
+            else:
+                bound.info("stage_done", seconds=round(time.perf_counter() - started, 3))
+
+    def _retry_later(self, lease: Lease, error: TransientError) -> None:
+        detail = _kept(error)
+        log.warning("transient_fault", reason=error.reason, detail=detail)
+        try:
+            self._leases.fault(
+                lease,
+                detail,
+                delay_s=error.delay_s,
+                reason=error.reason,
+                endless=error.endless,
+            )
+        except (StaleLeaseError, OperationalError) as failure:
+            log.warning("fault_not_recorded", error=str(failure))
+
+    def _give_up(self, lease: Lease, error: PermanentError) -> None:
+        detail = _kept(error)
+        log.error("permanent_fault", reason=error.reason, detail=detail)
+        try:
+            self._leases.give_up(lease, detail, reason=error.reason)
+        except (StaleLeaseError, OperationalError) as failure:
+            log.warning("fault_not_recorded", error=str(failure))
+
+
+def _store_fault(error: Exception) -> TransientError:
+    """A store that fails is waited for; bytes that are gone may come back from a backup."""
+    fails = isinstance(error, ArtifactStoreError)
+    return TransientError(
+        str(error),
+        reason="artifact_store" if fails else "artifact_lost",
+        delay_s=STORE_DELAY_S,
+        endless=fails,
+    )
+
+
+def _kept(error: Exception) -> str:
+    return str(clean(str(error)))[:LONGEST_DETAIL]

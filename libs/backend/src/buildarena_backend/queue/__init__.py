@@ -1,0 +1,1 @@
+"""Celery's queues: hints that there is work, sent, read, and checked."""

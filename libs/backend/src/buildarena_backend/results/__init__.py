@@ -1,0 +1,1 @@
+"""Scores of jobs, and who has verified or must still audit them."""

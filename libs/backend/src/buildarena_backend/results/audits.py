@@ -1,0 +1,230 @@
+"""Audits: scores that count once they were verified, and no longer once they were refuted.
+
+What another service's archive brought, and what runners simulated, is nobody's word but theirs. It
+waits for a verification, which a worker beside the database does. The last verification that could
+tell decides: a refuted score counts nowhere until another one verifies it. A key whose runner
+brought a trial that was refuted is suspended, and all that its runners ever brought is verified;
+so it is where one could not be told, as a runner may name any version as its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from sqlalchemy import (
+    ColumnElement,
+    Connection,
+    and_,
+    any_,
+    case,
+    cast,
+    exists,
+    func,
+    literal,
+    null,
+    select,
+    text,
+    true,
+    update,
+)
+from sqlalchemy.dialects.postgresql import JSONB, insert
+
+from buildarena_backend import events
+from buildarena_backend.database.account_tables import api_keys
+from buildarena_backend.database.rows import bound_texts
+from buildarena_backend.database.tables import jobs, rollouts, verifications
+from buildarena_backend.ids import new_id
+from buildarena_backend.jobs.transitions import REOPENED, transition
+from buildarena_backend.leases.misses import RUNNER
+from buildarena_backend.states import (
+    Audit,
+    JobState,
+    Stage,
+    Verdict,
+    VerificationState,
+    simulate_queue,
+)
+from buildarena_benchmark.scorers.scorer import REFUTED
+
+_SCORE: Final = ("success", "indicator", "metrics", "flags")
+_OF_JOB: Final = (*_SCORE, "manifest", "audit", "verified_at")
+_OF_TRIAL: Final = (
+    *(*_SCORE, "trajectory_hash", "trace", "versions", "annotations"),
+    *("wall_s", "runner", "finished_at"),
+)
+"""Columns that say what came of a job, and of a trial."""
+AUDITOR: Final = "audit"
+"""Owner of the verifications that nobody asked for; no key has such an id."""
+
+
+def runner_key(owner: str) -> str | None:
+    """The key of the runner that has a lease; None for a worker of the house.
+
+    Args:
+        owner: The lease's owner.
+    """
+    return owner.removeprefix(RUNNER).split("/")[0] if owner.startswith(RUNNER) else None
+
+
+def origin_of(job_id: str) -> dict[str, Any]:
+    """Columns of a job that ends: who ran its trials, and whether it must be verified."""
+    trials = exists().where(rollouts.c.job_id == job_id)
+    return {
+        "by_runner": trials.where(rollouts.c.runner.is_not(None)),
+        "audit": case((trials.where(rollouts.c.audited), Audit.REQUIRED.value), else_=None),
+    }
+
+
+def require_audits(job_ids: Sequence[str], *, connection: Connection) -> None:
+    """Asks for the verification of jobs that count once they were verified; others are left out."""
+    waiting = select(
+        func.unnest(bound_texts([new_id("check") for _ in job_ids])),
+        func.unnest(bound_texts(job_ids)).label("job_id"),
+    ).subquery()
+    asked = (
+        select(*waiting.c, literal(VerificationState.QUEUED.value), literal(AUDITOR))
+        .join(jobs, jobs.c.id == waiting.c.job_id)
+        .where(jobs.c.audit == Audit.REQUIRED)
+    )
+    columns = ["id", "job_id", "state", "owner"]
+    statement = insert(verifications).from_select(columns, asked).on_conflict_do_nothing()
+    connection.execute(statement)
+
+
+def note_verdict(
+    job_id: str,
+    verdict: Verdict,
+    verification_id: str,
+    refuted_trials: Sequence[int],
+    *,
+    connection: Connection,
+) -> None:
+    """Has a job count, or count no longer, as a verification of it found out.
+
+    Args:
+        job_id: The job.
+        verdict: What was found out; nothing follows from one that is inconclusive.
+        verification_id: The verification, for the history.
+        refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
+        connection: The transaction that ends the verification.
+    """
+    events.say_why(f"{verdict} by {verification_id}", connection)
+    if verdict == Verdict.INCONCLUSIVE:
+        _audit_all(_runners(job_id, true(), connection), connection)
+        return
+    flags = func.coalesce(func.nullif(jobs.c.flags, text("'null'::jsonb")), text("'[]'::jsonb"))
+    others = flags.op("-")(REFUTED.name)
+    scored = and_(jobs.c.id == job_id, jobs.c.state == JobState.DONE)
+    if verdict == Verdict.VERIFIED:
+        # What needs no verification needs no mark that it had one.
+        connection.execute(
+            update(jobs)
+            .where(scored, jobs.c.audit.in_([Audit.REQUIRED, Audit.REFUTED]))
+            .values(audit=Audit.VERIFIED, verified_at=events.now, flags=others)
+        )
+        return
+    refuted = connection.execute(
+        update(jobs)
+        .where(scored, jobs.c.audit.is_distinct_from(Audit.REFUTED.value))
+        .values(
+            audit=Audit.REFUTED,
+            verified_at=None,
+            flags=others.op("||")(cast([REFUTED.name], JSONB)),
+        )
+        .returning(jobs.c.id)
+    ).all()
+    if refuted:
+        events.record_jobs(connection, [job_id], REFUTED.name, {"verification": verification_id})
+        keys = _runners(job_id, rollouts.c.number.in_(refuted_trials), connection)
+        events.say_why(f"its runner was refuted by {verification_id}", connection)
+        connection.execute(
+            update(api_keys)
+            .where(api_keys.c.id == any_(bound_texts(keys)), api_keys.c.suspended_at.is_(None))
+            .values(suspended_at=events.now, suspended_for=verification_id)
+        )
+        _audit_all(keys, connection)
+
+
+def retry_refuted(job_id: str, *, connection: Connection, **values: Any) -> bool:
+    """Queues a refuted job for its trial again, of the same machine.
+
+    Only where trials of runners were its last: what a model replied to a lie was built on it.
+
+    Args:
+        job_id: The job.
+        connection: The transaction it is part of.
+        values: Further columns of the job to set.
+
+    Returns:
+        Whether it was queued.
+    """
+    trials = and_(rollouts.c.job_id == job_id, rollouts.c.runner.is_not(None))
+    lied = connection.execute(select(rollouts.c.final, rollouts.c.engine).where(trials)).all()
+    if not lied or not all(row.final for row in lied):
+        return False
+    under_way = exists().where(
+        verifications.c.job_id == job_id, verifications.c.state != VerificationState.DONE
+    )
+    moved = transition(
+        jobs.c.id == job_id,
+        jobs.c.audit == Audit.REFUTED,
+        ~under_way,
+        to=JobState.QUEUED,
+        allowed_from={JobState.DONE},
+        data={"why": "retry"},
+        connection=connection,
+        stage=Stage.SIMULATE,
+        queue=simulate_queue(lied[0].engine),
+        **{**REOPENED, **dict.fromkeys(_OF_JOB, null()), "by_runner": False, **values},
+    )
+    if moved:
+        undone = {**dict.fromkeys(_OF_TRIAL, null()), "audited": False}
+        connection.execute(update(rollouts).where(trials).values(undone))
+    return bool(moved)
+
+
+def is_unproved(key_id: str, *, connection: Connection) -> bool:
+    """Whether something that a key's runners brought was verified, and nothing could be told."""
+    unclear = exists().where(
+        verifications.c.job_id == jobs.c.id, verifications.c.verdict == Verdict.INCONCLUSIVE
+    )
+    query = (
+        select(rollouts.c.job_id)
+        .join(jobs, jobs.c.id == rollouts.c.job_id)
+        .where(rollouts.c.runner == key_id, jobs.c.audit == Audit.REQUIRED, unclear)
+        .limit(1)
+    )
+    return connection.execute(query).first() is not None
+
+
+def _runners(job_id: str, which: ColumnElement[bool], connection: Connection) -> list[str]:
+    """The keys whose runners ran some trials of a job."""
+    query = (
+        select(rollouts.c.runner)
+        .join(jobs, jobs.c.id == rollouts.c.job_id)
+        .where(jobs.c.id == job_id, rollouts.c.runner.is_not(None), which)
+        .distinct()
+        .order_by(rollouts.c.runner)
+    )
+    return list(connection.execute(query).scalars())
+
+
+def _audit_all(keys: Sequence[str], connection: Connection) -> None:
+    """Has all verified that keys' runners brought, also of jobs that have not ended."""
+    if not keys:
+        return
+    theirs = rollouts.c.runner == any_(bound_texts(keys))
+    connection.execute(update(rollouts).where(theirs, ~rollouts.c.audited).values(audited=True))
+    waiting = connection.execute(
+        update(jobs)
+        .where(
+            jobs.c.id.in_(select(rollouts.c.job_id).where(theirs)),
+            jobs.c.state == JobState.DONE,
+            jobs.c.success.is_not(None),
+            jobs.c.audit.is_(None),
+        )
+        .values(audit=Audit.REQUIRED)
+        .returning(jobs.c.id)
+    )
+    require_audits(list(waiting.scalars()), connection=connection)

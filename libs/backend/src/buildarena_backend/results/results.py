@@ -1,0 +1,147 @@
+"""Results: a finished job's score, written once, and the artifacts that belong to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import Connection, delete, text
+
+from buildarena_backend import events
+from buildarena_backend.artifacts.storing import ArtifactInfo
+from buildarena_backend.boards.reading import Boards
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import job_artifacts
+from buildarena_backend.leases.leases import Lease, Leases
+from buildarena_backend.results.audits import origin_of, require_audits
+from buildarena_backend.states import JobState, Outcome
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobScore:
+    """How a job ended.
+
+    Attributes:
+        outcome: One of the scored outcomes.
+        success: Whether the task's criterion was met.
+        indicator: The task's performance indicator.
+        metrics: Secondary metrics by name.
+        flags: Remarks on the score; see `buildarena_benchmark.flags`.
+        reason: Class of the failure, if it failed before it was simulated.
+        detail: A sentence for people.
+        manifest: Versions of everything that can change the score.
+    """
+
+    outcome: Outcome
+    success: bool
+    indicator: float
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    flags: Sequence[str] = ()
+    reason: str | None = None
+    detail: str | None = None
+    manifest: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Results:
+    """Writes scores.
+
+    Attributes:
+        boards: Reads scores in bulk, for leaderboards.
+    """
+
+    def __init__(self, database: Database, leases: Leases) -> None:
+        self.boards = Boards(database)
+        self._leases = leases
+
+    def finish(
+        self, lease: Lease, score: JobScore, *, connection: Connection, **values: Any
+    ) -> None:
+        """Ends a job with its score; nobody can score it again.
+
+        One with a trial of a runner's that is audited waits for its verification, which is asked
+        for, before it counts.
+
+        Args:
+            lease: The lease under which it was scored; it ends.
+            score: The score.
+            connection: The transaction that also ties the artifacts to the job.
+            values: Further columns, for example action counts.
+
+        Raises:
+            StaleLeaseError: The lease is over; the transaction must be undone.
+        """
+        self._leases.advance(
+            lease,
+            connection=connection,
+            to=JobState.DONE,
+            outcome=score.outcome,
+            reason=score.reason,
+            detail=score.detail,
+            success=score.success,
+            indicator=score.indicator,
+            metrics=dict(score.metrics),
+            flags=list(score.flags),
+            manifest=dict(score.manifest),
+            finished_at=events.now,
+            **{**origin_of(lease.job.id), **values},
+        )
+        require_audits([lease.job.id], connection=connection)
+
+    def attach(
+        self, job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
+    ) -> None:
+        """Ties artifacts that the artifact store holds to a job, by their names."""
+        attach_artifacts(job_id, made, connection=connection)
+
+    def replace_evidence(
+        self, job_id: str, number: int, made: Mapping[str, ArtifactInfo], *, connection: Connection
+    ) -> None:
+        """Ties what shows the latest fault to a job, in place of what showed those before it.
+
+        Args:
+            job_id: The job.
+            number: The rollout that failed; evidence of others stays.
+            made: Artifacts that the artifact store holds, by their names.
+            connection: The transaction.
+        """
+        earlier = rf"^[a-z]+-{number}(-[0-9-]+)?\.[a-z]+$"
+        connection.execute(
+            delete(job_artifacts).where(
+                job_artifacts.c.job_id == job_id, job_artifacts.c.name.regexp_match(earlier)
+            )
+        )
+        attach_artifacts(job_id, made, connection=connection)
+
+
+def attach_artifacts(
+    job_id: str, made: Mapping[str, ArtifactInfo], *, connection: Connection
+) -> None:
+    """Ties artifacts that the artifact store holds to a job, by their names."""
+    infos = list(made.values())
+    given = {
+        "job_id": job_id,
+        "names": list(made),
+        "hashes": [info.hash for info in infos],
+        "types": [info.media_type for info in infos],
+        "sizes": [info.size for info in infos],
+    }
+    connection.execute(_ATTACH, given)
+
+
+_ATTACH = text(
+    """
+    WITH given AS (
+        SELECT * FROM unnest(
+            CAST(:names AS text[]), CAST(:hashes AS text[]),
+            CAST(:types AS text[]), CAST(:sizes AS bigint[])
+        ) AS given (name, hash, media_type, size)
+    ), kept AS (
+        INSERT INTO artifacts (hash, media_type, size)
+        SELECT DISTINCT ON (hash) hash, media_type, size FROM given ORDER BY hash
+        ON CONFLICT DO NOTHING
+    )
+    INSERT INTO job_artifacts (job_id, name, hash) SELECT :job_id, name, hash FROM given
+    ON CONFLICT (job_id, name) DO UPDATE SET hash = excluded.hash
+    """
+)

@@ -1,0 +1,207 @@
+"""Verifications: finished jobs that are replayed and re-simulated to check every figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import ColumnElement, Connection, any_, func, or_, select, update
+from sqlalchemy.dialects.postgresql import insert
+
+from buildarena_backend import events
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import bound_texts, columns_of, value_of
+from buildarena_backend.database.tables import verifications
+from buildarena_backend.errors import UnknownIdError
+from buildarena_backend.ids import new_id
+from buildarena_backend.results.audits import note_verdict
+from buildarena_backend.states import Verdict, VerificationState
+
+ABANDONED_AFTER = timedelta(minutes=10)
+"""After so long without an end, a verification is done by another worker: it writes no score."""
+MAX_OPEN = 200
+"""Verifications that one owner may have waiting or running."""
+OWNER_LOCK = 0x766572  # "ver"
+QUEUED = VerificationState.QUEUED
+NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verification:
+    """One check of one job.
+
+    Attributes:
+        state: A `VerificationState`.
+        verdict: A `Verdict`, once it is done.
+        report: What was compared, once it is done.
+    """
+
+    id: str
+    job_id: str
+    state: str
+    verdict: str | None
+    report: Mapping[str, Any] | None
+    created_at: datetime
+    finished_at: datetime | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Requested:
+    """What came of a request for verifications.
+
+    Attributes:
+        ids: Ids of open verifications, by job.
+        left: Jobs that found no room, as the owner has as many open as one may.
+    """
+
+    ids: Mapping[str, str]
+    left: Sequence[str]
+
+
+class Verifications:
+    """Asks for, claims and ends verifications."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def request(self, job_ids: Sequence[str], *, owner: str | None = None) -> Requested:
+        """Asks for jobs to be verified, as many as the owner may have open at once.
+
+        A job whose verification is open already is not verified twice: whoever asks gets that one.
+
+        Args:
+            job_ids: The jobs, in the order in which they find room.
+            owner: The key that asks; None for the operator.
+        """
+        with self._database.transaction() as connection:
+            # Two requests of one owner must not both find the last places free.
+            lock = func.pg_advisory_xact_lock(OWNER_LOCK, func.hashtext(owner or ""))
+            connection.execute(select(lock))
+            known = self._open_ones(job_ids, connection)
+            mine = verifications.c.owner.is_not_distinct_from(owner) & _OPEN
+            count = select(func.count()).where(mine)
+            room = max(0, MAX_OPEN - connection.execute(count).scalar_one())
+            fresh = [job_id for job_id in dict.fromkeys(job_ids) if job_id not in known]
+            if fresh[:room]:
+                rows = [
+                    {"id": new_id("check"), "job_id": id_, "owner": owner, "state": QUEUED}
+                    for id_ in fresh[:room]
+                ]
+                # Another owner may ask for the same at this moment.
+                connection.execute(insert(verifications).on_conflict_do_nothing(), rows)
+                known = self._open_ones(job_ids, connection)
+        ids = {job_id: known[job_id] for job_id in dict.fromkeys(job_ids) if job_id in known}
+        return Requested(ids=ids, left=tuple(one for one in fresh[room:] if one not in ids))
+
+    @staticmethod
+    def _open_ones(job_ids: Sequence[str], connection: Connection) -> dict[str, str]:
+        """Ids of open verifications, by job."""
+        query = select(verifications.c.job_id, verifications.c.id).where(
+            verifications.c.job_id == any_(bound_texts(job_ids)), _OPEN
+        )
+        return {row.job_id: row.id for row in connection.execute(query)}
+
+    def claim_next(self) -> Verification | None:
+        """Takes the verification that waits longest, or one that was abandoned."""
+        waiting = (
+            select(verifications.c.id)
+            .where(_claimable())
+            .order_by(verifications.c.created_at)
+            .limit(1)
+            .with_for_update(skip_locked=True)
+        )
+        with self._database.transaction() as connection:
+            row = connection.execute(
+                update(verifications)
+                .where(verifications.c.id == waiting.scalar_subquery())
+                .values(state=VerificationState.RUNNING, claimed_at=events.now)
+                .returning(*_COLUMNS)
+            ).first()
+        return None if row is None else value_of(Verification, row)
+
+    def finish(
+        self,
+        verification_id: str,
+        report: Mapping[str, Any],
+        *,
+        verdict: Verdict,
+        refuted_trials: Sequence[int] = (),
+    ) -> None:
+        """Writes what came of a verification, and what follows from it; see `audits`.
+
+        Nothing follows from one that another worker has ended, after this one was thought dead.
+
+        Args:
+            verification_id: The verification.
+            report: What was compared.
+            verdict: What it found out.
+            refuted_trials: Numbers of the rollouts whose trajectories are not what they must be.
+        """
+        with self._database.transaction() as connection:
+            job_id = connection.execute(
+                update(verifications)
+                .where(verifications.c.id == verification_id, _OPEN)
+                .values(
+                    state=VerificationState.DONE,
+                    verdict=verdict,
+                    report=dict(report),
+                    finished_at=events.now,
+                )
+                .returning(verifications.c.job_id)
+            ).scalar()
+            if job_id is not None:
+                note_verdict(
+                    job_id, verdict, verification_id, refuted_trials, connection=connection
+                )
+
+    def get(self, verification_id: str) -> Verification:
+        """The verification with this id.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        with self._database.transaction() as connection:
+            row = connection.execute(
+                select(*_COLUMNS).where(verifications.c.id == verification_id)
+            ).first()
+        if row is None:
+            raise UnknownIdError("verification", verification_id)
+        return value_of(Verification, row)
+
+    def to_notify(self, limit: int) -> list[str]:
+        """Waiting or abandoned verifications that no message names; they are marked."""
+        unnotified = (
+            select(verifications.c.id)
+            .where(
+                _claimable(),
+                verifications.c.notified_at.is_(None)
+                | (verifications.c.notified_at < events.now - NOTIFY_AGAIN_AFTER),
+            )
+            .order_by(verifications.c.created_at)
+            .limit(limit)
+            .with_for_update(skip_locked=True)
+        )
+        # A plain subquery may be executed once a row, and then marks more than the limit.
+        chosen = unnotified.cte()
+        with self._database.transaction() as connection:
+            rows = connection.execute(
+                update(verifications)
+                .where(verifications.c.id == chosen.c.id)
+                .values(notified_at=events.now)
+                .returning(verifications.c.id)
+            )
+            return [row.id for row in rows]
+
+
+def _claimable() -> ColumnElement[bool]:
+    return or_(
+        verifications.c.state == QUEUED,
+        (verifications.c.state == VerificationState.RUNNING)
+        & (verifications.c.claimed_at < events.now - ABANDONED_AFTER),
+    )
+
+
+_OPEN = verifications.c.state != VerificationState.DONE
+_COLUMNS = columns_of(Verification, verifications)

@@ -1,0 +1,381 @@
+"""Settings of all processes, read from ``BUILDARENA_*`` once in main and passed down."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from ipaddress import ip_network
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import AfterValidator, Field, PrivateAttr, SecretStr, ValidationError, field_validator
+from pydantic.fields import FieldInfo
+from pydantic_settings import (
+    BaseSettings,
+    PydanticBaseSettingsSource,
+    SettingsConfigDict,
+    SettingsError,
+)
+
+from buildarena_backend.errors import StartupError
+from buildarena_backend.secret_files import read_secret
+from buildarena_simulation.constants import MAX_WORLDS
+
+PREFIX: Final = "BUILDARENA_"
+DEFAULT_PORT = 8321
+VERSION = r"^[A-Za-z0-9._-]{0,40}$"
+SIMULATOR_NAME: Final = re.compile(r"[a-z0-9][a-z0-9_-]{0,39}")
+
+
+def _simulator_name(name: str) -> str:
+    if not SIMULATOR_NAME.fullmatch(name):
+        raise ValueError(f"{name!r} names no simulator: up to 40 of a-z, 0-9, - and _")
+    return name
+
+
+SimulatorName = Annotated[str, AfterValidator(_simulator_name)]
+SimulatorVersion = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,40}$")]
+BASE_PATH: Final = re.compile(r"(?:/(?!\.{1,2}(?:/|$))[A-Za-z0-9._~-]+)+")
+PAGES: Final = ("sweeps", "jobs", "tasks", "models", "compare", "method", "build", "embed")
+"""First parts of the addresses of the dashboard's pages."""
+OWN_PATHS: Final = frozenset(
+    (
+        *("v1", "docs", "openapi.json", "static-offline-docs"),
+        *("assets", *PAGES, "favicon.svg", "scheme.js", "index.html"),
+    )
+)
+"""First parts of the API's and the dashboard's own paths; none can be a base path's."""
+SECRETS: Final = (
+    "database_url",
+    "database_direct_url",
+    "broker_url",
+    "artifacts_url",
+    "admin_key",
+    "previous_admin_key",
+    "metrics_key",
+)
+"""Settings that hold secrets: ``BUILDARENA_<FIELD>_FILE`` can name a file for each of them."""
+ARTIFACT_CREDENTIALS: Final = ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_SESSION_TOKEN")
+"""What an S3 store asks for by these names, which are everybody's; each also as a file."""
+
+
+class SecretFiles(PydanticBaseSettingsSource):
+    """Settings whose values stand in files."""
+
+    def get_field_value(self, field: FieldInfo, field_name: str) -> tuple[Any, str, bool]:
+        """The value of a field; None when it is not a secret, or not in a file."""
+        del field
+        if field_name not in SECRETS:
+            return None, field_name, False
+        return read_secret(PREFIX + field_name.upper(), os.environ), field_name, False
+
+    def __call__(self) -> dict[str, Any]:
+        """All values that are set."""
+        values = {name: self.get_field_value(field, name)[0] for name, field in self._fields}
+        return {name: value for name, value in values.items() if value is not None}
+
+    @property
+    def _fields(self) -> list[tuple[str, FieldInfo]]:
+        return list(self.settings_cls.model_fields.items())
+
+
+def _artifact_credentials() -> Mapping[str, SecretStr]:
+    found = {name: read_secret(name, os.environ) for name in ARTIFACT_CREDENTIALS}
+    return {name: SecretStr(value) for name, value in found.items() if value is not None}
+
+
+class Settings(BaseSettings):
+    """What an operator can set. Each field is the environment variable ``BUILDARENA_<FIELD>``.
+
+    Those that hold secrets can stand in files (see `SECRETS`).
+    """
+
+    # Compose files spell a variable that is left out as an empty one.
+    model_config = SettingsConfigDict(env_prefix=PREFIX, extra="ignore", env_ignore_empty=True)
+
+    _artifact_credentials: Mapping[str, SecretStr] = PrivateAttr(
+        default_factory=_artifact_credentials
+    )
+
+    data: Annotated[Path, Field(description="Folder of databases, artifacts and logs")] = Path(
+        ".buildarena"
+    )
+    database_url: Annotated[
+        str | None, Field(description="Postgres to use instead of the embedded one")
+    ] = None
+    database_direct_url: Annotated[
+        str | None,
+        Field(
+            description="The same Postgres past a pooler such as PgBouncer, for migrations, "
+            "backups and collections; default BUILDARENA_DATABASE_URL"
+        ),
+    ] = None
+    database_connections: Annotated[
+        int | None,
+        Field(
+            description="Connections to Postgres that a process keeps for its work; it may open as "
+            "many again for a moment, and an API has 9 more",
+            ge=1,
+            le=100,
+        ),
+    ] = None
+    broker_url: Annotated[
+        str | None, Field(description="Redis or Valkey to use instead of the embedded one")
+    ] = None
+    artifacts_url: Annotated[
+        str | None, Field(description="Folder or bucket URL of artifacts; default DATA/artifacts")
+    ] = None
+    host: Annotated[str, Field(description="Address the API binds to")] = "127.0.0.1"
+    port: Annotated[int, Field(description="Port of the API", ge=0, le=65535)] = DEFAULT_PORT
+    require_keys: Annotated[bool, Field(description="Whether requests need an API key")] = False
+    admin_key: Annotated[
+        SecretStr | None,
+        Field(description="Secret of the operator's own key, which makes others", min_length=16),
+    ] = None
+    previous_admin_key: Annotated[
+        SecretStr | None,
+        Field(
+            description="The operator's key before this one, while both are valid", min_length=16
+        ),
+    ] = None
+    metrics_key: Annotated[
+        SecretStr | None,
+        Field(description="Secret that opens the metrics, and nothing else", min_length=16),
+    ] = None
+    worlds: Annotated[
+        int,
+        Field(
+            description="In how many varied worlds finished machines are scored where a submission "
+            "does not say",
+            ge=0,
+            le=MAX_WORLDS,
+        ),
+    ] = 4
+    rate_limit: Annotated[
+        str, Field(description="Requests a caller may send, for example 600/minute")
+    ] = "6000/minute"
+    trusted_proxies: Annotated[
+        str,
+        Field(
+            description="Addresses or networks of proxies whose X-Forwarded-For counts, "
+            "separated by commas; none by default"
+        ),
+    ] = ""
+    base_path: Annotated[
+        str,
+        Field(
+            description="Path below which a proxy shows the API and the dashboard, for example "
+            "/arena; empty at a host's root"
+        ),
+    ] = ""
+    models_file: Annotated[
+        Path | None, Field(description="YAML of further models, added to the built-in registry")
+    ] = None
+    prompt_packs: Annotated[
+        Path | None, Field(description="Folder of further prompt packs, one folder each")
+    ] = None
+    workflows: Annotated[
+        dict[str, str],
+        Field(description='Further workflows as JSON, {"name": "path/to/file.py:Class"}'),
+    ] = {}
+    lease_s: Annotated[
+        float, Field(description="Seconds that a lease is valid without a heartbeat", gt=1)
+    ] = 10.0
+    stop_grace_s: Annotated[
+        float,
+        Field(
+            description="Seconds that a worker or runner has to stop when it is asked to: in two "
+            "thirds of them open requests and trials finish, then the rest is handed back",
+            gt=0,
+        ),
+    ] = 60.0
+    max_faults: Annotated[
+        int, Field(description="Faults without progress before a job is given up", ge=1)
+    ] = 8
+    sessions_per_worker: Annotated[
+        int,
+        Field(
+            description="Construction sessions of one API key that one worker runs at once", ge=1
+        ),
+    ] = 32
+    simulations_per_worker: Annotated[
+        int, Field(description="Simulations one worker runs at once", ge=1)
+    ] = 2
+    max_sweep_jobs: Annotated[int, Field(description="Largest sweep accepted", ge=1)] = 100_000
+    besiege_game: Annotated[
+        str,
+        Field(
+            description="Version of the game Besiege that workers play, for example 1.75-23370; "
+            "jobs for the game are taken once this and BESIEGE_MOD are set",
+            pattern=VERSION,
+        ),
+    ] = ""
+    besiege_mod: Annotated[
+        str, Field(description="Version of the game's Lua Scripting Mod", pattern=VERSION)
+    ] = ""
+    further_simulators: Annotated[
+        dict[SimulatorName, SimulatorVersion],
+        Field(
+            description="Simulators of other distributions, each with its version, that jobs and "
+            'keys of runners may name before a worker has announced them; JSON: {"drake": "1"}'
+        ),
+    ] = {}
+    audited_share: Annotated[
+        float,
+        Field(
+            description="Share of the trials by runners that a worker beside the database runs "
+            "again before their jobs count, on engines that repeat exactly; 0 to 1",
+            ge=0,
+            le=1,
+        ),
+    ] = 1.0
+    alive_file: Annotated[
+        Path | None,
+        Field(
+            description="File that a worker touches at each heartbeat, for its container's "
+            "health check"
+        ),
+    ] = None
+    otlp_endpoint: Annotated[
+        str | None, Field(description="OTLP/HTTP collector of traces; none are made without")
+    ] = None
+    log_level: Annotated[str, Field(description="debug, info, warning or error")] = "info"
+
+    @property
+    def finishing_s(self) -> float:
+        """Seconds in which what is under way may finish when a process is asked to stop."""
+        return self.stop_grace_s * 2 / 3
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _only_addresses(cls, value: str) -> str:
+        named = [part.strip() for part in value.split(",") if part.strip()]
+        for part in named:
+            try:
+                ip_network(part)
+            except ValueError as error:
+                raise ValueError(
+                    f"{part!r} is neither an address nor a network such as 10.0.0.0/8"
+                ) from error
+        return ",".join(named)
+
+    @field_validator("base_path")
+    @classmethod
+    def _a_path_of_its_own(cls, value: str) -> str:
+        path = value.rstrip("/")
+        if path and not BASE_PATH.fullmatch(path):
+            raise ValueError(
+                "it must begin with / and consist of letters, digits and any of . _ ~ - /, "
+                "for example /arena or /tools/arena"
+            )
+        if path.split("/")[1:2] and path.split("/")[1] in OWN_PATHS:
+            raise ValueError(
+                f"the service has paths of its own below /{path.split('/')[1]}: "
+                f"choose any but {', '.join(sorted(OWN_PATHS))}"
+            )
+        return path
+
+    @classmethod
+    def settings_customise_sources(  # noqa: D102 - pydantic's
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,
+        file_secret_settings: PydanticBaseSettingsSource,
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        del dotenv_settings, file_secret_settings
+        return init_settings, env_settings, SecretFiles(settings_cls)
+
+    @property
+    def admin_keys(self) -> tuple[str, ...]:
+        """The secrets that make a caller the operator: two while one is being replaced."""
+        given = (self.admin_key, self.previous_admin_key)
+        return tuple(key.get_secret_value() for key in given if key is not None)
+
+    @property
+    def artifact_options(self) -> dict[str, str]:
+        """What the artifact store needs besides its location: an S3 store's credentials."""
+        if not self.artifacts_location.startswith(("s3://", "s3a://")):
+            return {}
+        return {
+            name: value.get_secret_value() for name, value in self._artifact_credentials.items()
+        }
+
+    @property
+    def artifact_folder(self) -> Path:
+        """The folder whose disk fills up: that of artifacts, or the data folder without one."""
+        location = self.artifacts_location
+        return self.data.absolute() if "://" in location else Path(location).absolute()
+
+    @property
+    def artifacts_location(self) -> str:
+        """Where artifacts are kept."""
+        return self.artifacts_url or str(self.data.absolute() / "artifacts")
+
+    @property
+    def besiege_version(self) -> str | None:
+        """The game and mod that workers play, as tracks name them; None without a game."""
+        if not (self.besiege_game and self.besiege_mod):
+            return None
+        return f"{self.besiege_game}-{self.besiege_mod}"
+
+    def required_database_url(self) -> str:
+        """The database's URL.
+
+        Raises:
+            ValueError: It was not set.
+        """
+        if self.database_url is None:
+            raise ValueError(
+                "BUILDARENA_DATABASE_URL is not set: start this process through `buildarena up`, "
+                "or set it to postgresql://user:password@host:port/name"
+            )
+        return self.database_url
+
+    def direct_database_url(self) -> str:
+        """The database's URL past any pooler, for what needs one server for longer than a moment.
+
+        Raises:
+            ValueError: None was set.
+        """
+        return self.database_direct_url or self.required_database_url()
+
+    def required_broker_url(self) -> str:
+        """The broker's URL.
+
+        Raises:
+            ValueError: It was not set.
+        """
+        if self.broker_url is None:
+            raise ValueError(
+                "BUILDARENA_BROKER_URL is not set: start this process through `buildarena up`, "
+                "or set it to redis://:password@host:port/0"
+            )
+        return self.broker_url
+
+
+def load_settings(**given: Any) -> Settings:
+    """The settings of this process' environment.
+
+    Args:
+        given: Settings that go before the environment's.
+
+    Raises:
+        StartupError: One is wrong; the message names its variable, and shows no secret.
+    """
+    try:
+        return Settings(**given)
+    except ValidationError as error:
+        raise StartupError(problem_of(error)) from error
+    except (SettingsError, ValueError) as error:
+        raise StartupError(str(error)) from error
+
+
+def problem_of(error: ValidationError) -> str:
+    """What is wrong with the first setting that is, in one line that shows no secret."""
+    first = error.errors()[0]
+    name = str(first["loc"][0]) if first["loc"] else ""
+    got = "" if name in SECRETS else f", got {first['input']!r}"
+    return f"{PREFIX}{name.upper()}: {first['msg']}{got}"

@@ -1,0 +1,311 @@
+"""Submissions: from what people ask for to jobs in the database, all of them or none."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.catalog.prompt_packs import PromptPacks
+from buildarena_backend.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
+from buildarena_backend.catalog.tracks import Track, make_track
+from buildarena_backend.catalog.workflows import workflow_sources
+from buildarena_backend.errors import SubmissionError
+from buildarena_backend.ids import content_hash, new_id
+from buildarena_backend.jobs.job import Job, JobKey, NewJob, configuration_hash
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.notify import notify_waiting
+from buildarena_backend.states import CONSTRUCT_QUEUE
+from buildarena_backend.submission.estimates import SweepEstimate, estimate
+from buildarena_backend.sweeps.claims import add_claim
+from buildarena_backend.sweeps.sweeps import NewSweep, Sweep
+from buildarena_backend.telemetry.tracing import current_traceparent
+from buildarena_backend.trials.known_simulators import (
+    drawn_issues,
+    simulation_version,
+    simulator_issues,
+    worlds_here,
+    worlds_issues,
+)
+from buildarena_benchmark import Task, ValidationIssue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Submitted:
+    """A sweep that was accepted.
+
+    Attributes:
+        sweep: The sweep.
+        jobs: How many jobs it has.
+        added: How many of them are new; the others were there before.
+        resumed: Whether an earlier submission of the same jobs goes on.
+    """
+
+    sweep: Sweep
+    jobs: int
+    added: int
+    resumed: bool = False
+
+
+class Submissions:
+    """Checks and stores submissions.
+
+    Args:
+        context: The process' connections.
+        registry: The models that can be named.
+    """
+
+    def __init__(self, context: Context, registry: ModelRegistry) -> None:
+        self._context = context
+        self._registry = registry
+        self._packs = PromptPacks(context.settings.prompt_packs)
+        self._workflows = workflow_sources(context.settings.workflows)
+
+    def submit_job(self, spec: JobSpec, *, owner: str | None = None) -> tuple[Job, bool]:
+        """Stores a job and notifies workers of it.
+
+        Args:
+            spec: The job.
+            owner: Id of the API key that submits it, if any.
+
+        Returns:
+            The job, and whether it is new: an equal job is never done twice.
+
+        Raises:
+            SubmissionError: Something of it is unknown; nothing was stored.
+        """
+        new = self._plan(spec, {"task": spec.task}, {"model": spec.model}, [spec.seed])
+        traceparent = current_traceparent()
+        own = [replace(job, owner=owner, traceparent=traceparent) for job in new]
+        with self._context.store.lifecycle.submission() as connection:
+            added = self._context.store.jobs.add(own, connection=connection)
+            add_claim(own[0].key.job_id, owner, connection=connection)
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        return self._context.store.jobs.get(new[0].key.job_id), added > 0
+
+    def submit_sweep(
+        self,
+        spec: SweepSpec,
+        *,
+        owner: str | None = None,
+        request_key: str | None = None,
+        resume: bool = False,
+    ) -> Submitted:
+        """Stores a sweep with its jobs and notifies workers of them.
+
+        Args:
+            spec: The sweep.
+            owner: Id of the API key that submits it, if any.
+            request_key: Idempotency key, if any.
+            resume: Whether the owner's earlier sweep of just these jobs, if there is one, goes
+                on with this one's budget, instead of a further sweep being stored.
+
+        Raises:
+            SubmissionError: Something of it is unknown; nothing was stored.
+        """
+        new = self.plan(spec)
+        job_ids = [job.key.job_id for job in new]
+        jobs_hash = content_hash(sorted(job_ids))
+        sweep = NewSweep(
+            id=new_id("sweep"),
+            name=spec.name,
+            spec=spec.model_dump(mode="json", exclude_none=True),
+            owner=owner,
+            request_key=request_key,
+            request_hash=spec_hash(spec),
+            jobs_hash=jobs_hash,
+        )
+        traceparent = current_traceparent()
+        own = [replace(job, owner=owner, payer=sweep.id, traceparent=traceparent) for job in new]
+        limits = None if spec.budget is None else spec.budget.as_limits()
+        store = self._context.store
+        before, added = None, 0
+        with store.lifecycle.command() if resume else store.lifecycle.submission() as connection:
+            if resume:
+                before = store.sweeps.with_jobs(jobs_hash, owner=owner, connection=connection)
+            if before is not None:
+                store.lifecycle.ensure_active(before, limits, connection=connection)
+            else:
+                if limits is not None:
+                    store.budgets.set(sweep.id, limits, connection=connection)
+                added = store.jobs.add(own, connection=connection)
+                store.sweeps.add(sweep, job_ids, connection=connection)
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        return Submitted(
+            sweep=store.sweeps.get(before or sweep.id),
+            jobs=len(new),
+            added=added,
+            resumed=before is not None,
+        )
+
+    def resume(self, sweep_id: str, budget: Budget | None) -> None:
+        """Lets a paused or stopped sweep go on, with another budget if one is given.
+
+        Raises:
+            UnknownIdError: There is no such sweep.
+            TransitionError: It is active or cancelled.
+        """
+        limits = None if budget is None else budget.as_limits()
+        self._context.store.lifecycle.resume(sweep_id, limits)
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
+
+    def set_budget(self, sweep_id: str, budget: Budget) -> None:
+        """Gives a sweep another budget; one whose budget was used up goes on.
+
+        Raises:
+            UnknownIdError: There is no such sweep.
+            TransitionError: It is cancelled.
+        """
+        self._context.store.lifecycle.set_budget(sweep_id, budget.as_limits())
+        notify_waiting(self._context, CONSTRUCT_QUEUE)
+
+    def estimate(self, spec: SweepSpec) -> SweepEstimate:
+        """What a sweep would use, without storing anything.
+
+        Raises:
+            SubmissionError: Something of it is unknown, or it is too large.
+        """
+        return estimate(self.plan(spec), self._registry)
+
+    def plan(self, spec: SweepSpec) -> list[NewJob]:
+        """The jobs that a sweep consists of, without storing anything.
+
+        Raises:
+            SubmissionError: Something of it is unknown, or it is too large.
+        """
+        tasks = {f"tasks[{index}]": name for index, name in enumerate(spec.tasks)}
+        models = {f"models[{index}]": name for index, name in enumerate(spec.models)}
+        return self._plan(spec, tasks, models, spec.all_seeds())
+
+    def _plan(
+        self,
+        variant: Variant,
+        tasks: Mapping[str, str],
+        models: Mapping[str, str],
+        seeds: Sequence[int],
+    ) -> list[NewJob]:
+        """Every task with every model and every seed; names come by their paths in the spec."""
+        found = self._context.tasks.named(list(tasks.values()))
+        self._require_known(variant, tasks, models, found)
+        task_names, model_names = set(tasks.values()), set(models.values())
+        self._require_size(len(task_names) * len(model_names) * len(seeds))
+        tracks = {on_demand: self._track(variant, on_demand) for on_demand in (False, True)}
+        configs = {on_demand: track.as_config() for on_demand, track in tracks.items()}
+        limits = variant.limits.model_dump(exclude_none=True)
+        new = []
+        for task_name in dict.fromkeys(tasks.values()):
+            on_demand = found[task_name].constraints.on_demand
+            for model_name in dict.fromkeys(models.values()):
+                config = model_config(self._registry, model_name, variant.decoding)
+                config_hash = configuration_hash(config, limits)
+                new += [
+                    NewJob(
+                        key=JobKey(
+                            task=task_name,
+                            task_version=found[task_name].version,
+                            model_hash=config_hash,
+                            track=tracks[on_demand].id,
+                            seed=seed,
+                        ),
+                        model=model_name,
+                        model_config=config,
+                        track_config=configs[on_demand],
+                        limits=limits,
+                    )
+                    for seed in seeds
+                ]
+        return new
+
+    def _track(self, variant: Variant, on_demand: bool) -> Track:
+        return make_track(
+            self._workflows[variant.workflow],
+            variant.simulator,
+            self._packs.load(variant.prompts),
+            version=simulation_version(self._context, variant.simulator),
+            one_shot=variant.one_shot,
+            closed_loop=variant.closed_loop,
+            on_demand=on_demand,
+            data_sheets=variant.data_sheets,
+            worlds=worlds_here(self._context, variant.simulator, variant.worlds),
+        )
+
+    def _require_known(
+        self,
+        variant: Variant,
+        tasks: Mapping[str, str],
+        models: Mapping[str, str],
+        found: Mapping[str, Task],
+    ) -> None:
+        if any(name not in found for name in tasks.values()):
+            # The choices are all there are.
+            found = self._context.tasks.newest()
+        issues = [
+            *_unknown("task", tasks, found),
+            *_unknown("model", models, self._registry.models),
+            *_unknown("workflow", {"workflow": variant.workflow}, self._workflows),
+            *simulator_issues(self._context, variant.simulator),
+            *worlds_issues(self._context, variant.simulator, variant.worlds),
+            *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
+        ]
+        issues = issues or [
+            *self._infeasible(variant.workflow, tasks, found),
+            *drawn_issues(
+                self._context,
+                variant.simulator,
+                variant.worlds,
+                {path: found[name] for path, name in tasks.items()},
+            ),
+        ]
+        if issues:
+            raise SubmissionError(issues)
+
+    def _infeasible(
+        self, workflow: str, tasks: Mapping[str, str], found: Mapping[str, Task]
+    ) -> list[ValidationIssue]:
+        """An issue for each task that asks for something that the workflow never builds."""
+        kind = self._workflows[workflow]
+        issues = []
+        for path, name in tasks.items():
+            task = found[name]
+            if not kind.one_structure or task.constraints.min_sub_structures <= 1:
+                continue
+            why = f"asks for several sub-structures, and the workflow {workflow!r} builds one"
+            able = [other for other, one in self._workflows.items() if not one.one_structure]
+            issues.append(
+                ValidationIssue(path=path, message=f"{name} {why}", choices=tuple(sorted(able)))
+            )
+        return issues
+
+    def _require_size(self, jobs: int) -> None:
+        largest = self._context.settings.max_sweep_jobs
+        if jobs > largest:
+            message = f"the sweep has {jobs:,} jobs; the largest accepted has {largest:,}"
+            raise SubmissionError([ValidationIssue(path="seeds", message=message)])
+
+
+def spec_hash(spec: SweepSpec) -> str:
+    """The content hash of a submission."""
+    return content_hash(spec.model_dump(mode="json", exclude_none=True))
+
+
+def model_config(registry: ModelRegistry, name: str, decoding: Decoding) -> dict[str, Any]:
+    """Everything about a model that can change what it replies."""
+    entry = registry.models[name]
+    return {
+        "name": entry.name,
+        "provider": entry.provider,
+        "model": entry.model,
+        "decoding": decoding.model_dump(exclude_none=True),
+    }
+
+
+def _unknown(kind: str, names: Mapping[str, str], known: Collection[str]) -> list[ValidationIssue]:
+    """An issue for each unknown name; names come by their paths."""
+    return [
+        ValidationIssue(
+            path=path, message=f"there is no {kind} {name!r}", choices=tuple(sorted(known))
+        )
+        for path, name in names.items()
+        if name not in known
+    ]

@@ -1,0 +1,139 @@
+"""Forecasts of sweeps: when they end and what they come to cost, from what ran so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from decimal import Decimal
+from typing import Final
+
+from sqlalchemy import Connection, TextClause, func, or_, select, text
+
+from buildarena_backend.database.tables import events, jobs, sweep_jobs
+from buildarena_backend.events import now
+from buildarena_backend.states import JobState, Outcome, SweepState
+
+UNSCORED: Final = (Outcome.ERRORED, Outcome.CANCELLED)
+"""How jobs end that tell nothing of what others take and cost."""
+RATE_OVER: Final = 100
+"""Scored jobs that a rate is taken over: one more that ends moves it by a hundredth."""
+FEWEST: Final = 5
+"""Scored jobs that there must be before there is a rate."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepForecast:
+    """What is to come of a sweep.
+
+    Attributes:
+        jobs_left: Jobs that have not ended.
+        jobs_per_minute: How fast its jobs are scored now; None until a few were.
+        ends_at: When the last one ends at that rate; None unless the sweep is active.
+        cost_usd_left: What the jobs left come to cost yet, by the means of the same model on the
+            same task, or of the same model on other tasks.
+        own_cost_usd_left: The part of it that the sweep itself pays.
+        unknown_models: Models of which no job has been scored: the costs leave them out.
+    """
+
+    jobs_left: int
+    jobs_per_minute: float | None
+    ends_at: datetime | None
+    cost_usd_left: Decimal
+    own_cost_usd_left: Decimal
+    unknown_models: tuple[str, ...]
+
+
+def read_forecast(connection: Connection, sweep_id: str, state: str) -> SweepForecast:
+    """What is to come of a sweep, from its jobs that have ended.
+
+    Args:
+        connection: Where to read.
+        sweep_id: The sweep.
+        state: Its state; only an active one has a rate.
+    """
+    values = {
+        "sweep": sweep_id,
+        "done": JobState.DONE,
+        "unscored": list(UNSCORED),
+    }
+    rows = connection.execute(_COSTS, values).all()
+    left = sum(row.jobs for row in rows)
+    per_minute, at = None, None
+    if state == SweepState.ACTIVE and left:
+        per_minute, at = _rate(connection, sweep_id)
+    return SweepForecast(
+        jobs_left=left,
+        jobs_per_minute=per_minute,
+        ends_at=None if per_minute is None or at is None else _end(at, left / per_minute),
+        cost_usd_left=sum((row.cost for row in rows if row.known), Decimal()),
+        own_cost_usd_left=sum((row.own_cost for row in rows if row.known), Decimal()),
+        unknown_models=tuple(row.model for row in rows if not row.known),
+    )
+
+
+def _rate(connection: Connection, sweep_id: str) -> tuple[float | None, datetime]:
+    """Jobs that are scored in a minute, up to this moment, and the moment.
+
+    A sweep that stands still slows down, though nothing ends; what ended before it was submitted
+    or last resumed tells nothing.
+    """
+    started = select(func.max(events.c.at)).where(
+        events.c.sweep_id == sweep_id,
+        or_(events.c.kind == "submitted", events.c.kind == SweepState.ACTIVE),
+    )
+    since: datetime | None
+    moment, since = connection.execute(select(now, started.scalar_subquery())).one()
+    if since is None:
+        return None, moment
+    ends = (
+        select(jobs.c.finished_at)
+        .join(sweep_jobs, sweep_jobs.c.job_id == jobs.c.id)
+        .where(
+            sweep_jobs.c.sweep_id == sweep_id,
+            jobs.c.finished_at > since,
+            jobs.c.outcome.not_in(UNSCORED),
+        )
+        .order_by(jobs.c.finished_at.desc())
+        .limit(RATE_OVER + 1)
+    )
+    times = list(connection.execute(ends).scalars())
+    if len(times) < FEWEST:
+        return None, moment
+    begin = times[RATE_OVER] if len(times) > RATE_OVER else since
+    minutes = max((moment - begin).total_seconds(), 1.0) / 60
+    return min(len(times), RATE_OVER) / minutes, moment
+
+
+def _end(moment: datetime, minutes: float) -> datetime | None:
+    """A time that lies so many minutes ahead; None where no calendar reaches."""
+    try:
+        return moment + timedelta(minutes=minutes)
+    except OverflowError:
+        return None
+
+
+_COSTS: Final[TextClause] = text(
+    """
+    WITH members AS (
+        SELECT jobs.* FROM jobs JOIN sweep_jobs ON sweep_jobs.job_id = jobs.id
+        WHERE sweep_jobs.sweep_id = :sweep AND sweep_jobs.wanted
+    ),
+    means AS (
+        SELECT model, task, avg(cost_usd) AS mean FROM members
+        WHERE state = :done AND outcome <> ALL(:unscored)
+        GROUP BY GROUPING SETS ((model, task), (model))
+    )
+    SELECT members.model, count(*) AS jobs, bool_or(of_model.mean IS NOT NULL) AS known,
+        coalesce(sum(greatest(
+            coalesce(on_task.mean, of_model.mean) - members.cost_usd, 0)), 0) AS cost,
+        coalesce(sum(greatest(
+            coalesce(on_task.mean, of_model.mean) - members.cost_usd, 0)
+        ) FILTER (WHERE members.payer = :sweep), 0) AS own_cost
+    FROM members
+    LEFT JOIN means AS on_task
+        ON on_task.model = members.model AND on_task.task = members.task
+    LEFT JOIN means AS of_model ON of_model.model = members.model AND of_model.task IS NULL
+    WHERE members.state <> :done
+    GROUP BY members.model ORDER BY members.model
+    """
+)

@@ -1,0 +1,299 @@
+"""Sweeps: submitted matrices of jobs. Jobs are shared: two sweeps that want one job get one."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+from typing import Any, Final
+
+from sqlalchemy import Connection, Row, func, literal, select
+from sqlalchemy.dialects.postgresql import insert
+
+from buildarena_backend import events
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.derived_tables import OF_A_SWEEP, kept_figures
+from buildarena_backend.database.rows import bound_texts, columns_of, value_of
+from buildarena_backend.database.tables import attempts, jobs, sweep_jobs, sweeps
+from buildarena_backend.errors import UnknownIdError
+from buildarena_backend.ids import begins_with
+from buildarena_backend.states import AttemptResult, JobState, SweepState
+from buildarena_backend.sweeps.forecasts import SweepForecast, read_forecast
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewSweep:
+    """A sweep to be stored.
+
+    Attributes:
+        id: Its identifier.
+        name: What its owner calls it.
+        spec: The submitted matrix.
+        owner: Id of the API key that submitted it, if any.
+        request_key: Idempotency key of the submission, if any.
+        request_hash: Content hash of the submission.
+        jobs_hash: Content hash of its jobs' ids.
+    """
+
+    id: str
+    name: str
+    spec: Mapping[str, Any]
+    owner: str | None = None
+    request_key: str | None = None
+    request_hash: str | None = None
+    jobs_hash: str | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sweep:
+    """A sweep as the database has it."""
+
+    id: str
+    name: str
+    spec: Mapping[str, Any]
+    state: str
+    owner: str | None
+    request_hash: str | None
+    created_at: datetime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SweepProgress:
+    """Progress of a sweep.
+
+    Attributes:
+        total: Jobs in all.
+        stages: Jobs that have not ended, by ``construct queued`` … ``simulate running``.
+        outcomes: Ended jobs by outcome.
+        cost_usd: What its jobs cost so far.
+        requests: Model requests so far.
+        lost_requests: Requests whose replies may have been paid for and are in no journal: at most
+            one for each process that was killed in a session.
+        input_tokens: Tokens sent so far.
+        output_tokens: Tokens received so far.
+    """
+
+    total: int
+    stages: Mapping[str, int]
+    outcomes: Mapping[str, int]
+    cost_usd: Decimal
+    requests: int
+    lost_requests: int
+    input_tokens: int
+    output_tokens: int
+
+    @property
+    def done(self) -> int:
+        """Jobs that have ended, however."""
+        return sum(self.outcomes.values())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trouble:
+    """Attempts at a sweep's jobs that failed alike and were, or will be, made again.
+
+    Attributes:
+        model: Whose jobs.
+        stage: At which stage.
+        result: How they ended: ``fault`` or ``lost``.
+        detail: A sentence for people, if there was one.
+        attempts: How many.
+        jobs: Of how many jobs.
+        newest: When the last one ended.
+    """
+
+    model: str
+    stage: str
+    result: str
+    detail: str | None
+    attempts: int
+    jobs: int
+    newest: datetime
+
+
+class Sweeps:
+    """Adds and finds sweeps."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, sweep: NewSweep, job_ids: Sequence[str], *, connection: Connection) -> None:
+        """Stores a sweep with its jobs, which exist already."""
+        connection.execute(
+            insert(sweeps).values(
+                id=sweep.id,
+                name=sweep.name,
+                spec=dict(sweep.spec),
+                state=SweepState.ACTIVE,
+                owner=sweep.owner,
+                request_key=sweep.request_key,
+                request_hash=sweep.request_hash,
+                jobs_hash=sweep.jobs_hash,
+            )
+        )
+        members = select(literal(sweep.id), func.unnest(bound_texts(sorted(job_ids))))
+        connection.execute(insert(sweep_jobs).from_select(["sweep_id", "job_id"], members))
+        events.record_sweep(connection, sweep.id, "submitted", {"jobs": len(job_ids)})
+
+    def get(self, sweep_id: str) -> Sweep:
+        """The sweep with this id.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        found = self._find(sweeps.c.id == sweep_id)
+        if found is None:
+            raise UnknownIdError("sweep", sweep_id)
+        return found
+
+    def by_request_key(self, request_key: str) -> Sweep | None:
+        """The sweep that was submitted with this idempotency key, if any."""
+        return self._find(sweeps.c.request_key == request_key)
+
+    def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
+        """Id of an owner's newest sweep of just these jobs that was not cancelled, if any.
+
+        In a transaction of `SweepLifecycle.command` the answer holds until its end: whoever finds
+        no sweep can store one, and it stays the only one.
+        """
+        query = (
+            select(sweeps.c.id)
+            .where(
+                sweeps.c.jobs_hash == jobs_hash,
+                sweeps.c.owner.is_not_distinct_from(owner),
+                sweeps.c.state != SweepState.CANCELLED,
+            )
+            .order_by(sweeps.c.created_at.desc())
+            .limit(1)
+        )
+        found: str | None = connection.execute(query).scalar()
+        return found
+
+    def _find(self, condition: Any) -> Sweep | None:
+        with self._database.statement() as connection:
+            row = connection.execute(select(*_COLUMNS).where(condition)).first()
+        return None if row is None else value_of(Sweep, row)
+
+    def page(
+        self,
+        *,
+        limit: int,
+        after: tuple[datetime, str] | None = None,
+        id_prefix: str | None = None,
+    ) -> list[Sweep]:
+        """The newest sweeps first, with keyset paging and beginnings of ids as for jobs."""
+        query = select(*_COLUMNS).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
+        if id_prefix is not None:
+            query = query.where(begins_with(sweeps.c.id, id_prefix))
+        if after is not None:
+            created_at, id_ = after
+            query = query.where(
+                (sweeps.c.created_at < created_at)
+                | ((sweeps.c.created_at == created_at) & (sweeps.c.id > id_))
+            )
+        with self._database.statement() as connection:
+            return [value_of(Sweep, row) for row in connection.execute(query)]
+
+    def progress(self, sweep_id: str) -> SweepProgress:
+        """Where a sweep's jobs are, and what they cost."""
+        return self.progress_of([sweep_id])[sweep_id]
+
+    def progress_of(self, ids: Sequence[str]) -> dict[str, SweepProgress]:
+        """The same of several sweeps, by id: figures that triggers keep."""
+        amounts: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids}
+        with self._database.statement() as connection:
+            for row in connection.execute(_FIGURES, {"ids": list(ids)}):
+                amounts[row.key[0]].append(row)
+        return {id_: _progress(rows) for id_, rows in amounts.items()}
+
+    def forecast(self, sweep_id: str) -> SweepForecast:
+        """When a sweep ends and what it comes to cost, from what ran so far.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        state = self.get(sweep_id).state
+        with self._database.transaction() as connection:
+            return read_forecast(connection, sweep_id, state)
+
+    def troubles(self, sweep_id: str, *, limit: int) -> list[Trouble]:
+        """Attempts at the sweep's jobs that faults ended or whose worker was lost, newest first.
+
+        Args:
+            sweep_id: The sweep.
+            limit: Kinds of trouble at most.
+        """
+        newest = func.max(attempts.c.ended_at)
+        alike = jobs.c.model, attempts.c.stage, attempts.c.result, attempts.c.detail
+        query = (
+            select(
+                *alike,
+                func.count().label("attempts"),
+                func.count(jobs.c.id.distinct()).label("jobs"),
+                newest.label("newest"),
+            )
+            .join(jobs, jobs.c.id == attempts.c.job_id)
+            .join(sweep_jobs, sweep_jobs.c.job_id == attempts.c.job_id)
+            .where(
+                sweep_jobs.c.sweep_id == sweep_id,
+                attempts.c.result.in_([AttemptResult.FAULT, AttemptResult.LOST]),
+            )
+            .group_by(*alike)
+            .order_by(newest.desc(), *alike)
+            .limit(limit)
+        )
+        with self._database.transaction() as connection:
+            return [value_of(Trouble, row) for row in connection.execute(query)]
+
+    def size(self, sweep_id: str) -> int:
+        """How many jobs the sweep has.
+
+        Raises:
+            UnknownIdError: Nobody has it.
+        """
+        self.get(sweep_id)
+        query = (
+            select(func.count()).select_from(sweep_jobs).where(sweep_jobs.c.sweep_id == sweep_id)
+        )
+        with self._database.statement() as connection:
+            return int(connection.execute(query).scalar_one())
+
+    def job_ids(self, sweep_id: str) -> list[str]:
+        """Ids of all the sweep's jobs."""
+        query = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
+        with self._database.statement() as connection:
+            return [row.job_id for row in connection.execute(query)]
+
+
+def _progress(rows: Sequence[Row[Any]]) -> SweepProgress:
+    stages: Counter[str] = Counter()
+    outcomes: Counter[str] = Counter()
+    used, lost = [Decimal()] * 4, 0
+    for row in rows:
+        if row.kind == "sweep_use":
+            used = [row.a, row.b, row.c, row.d]
+        elif row.kind == "sweep_lost":
+            lost = int(row.a)
+        elif row.a:
+            _, state, stage, outcome = row.key
+            if state == JobState.DONE:
+                outcomes[outcome] += int(row.a)
+            else:
+                stages[f"{stage} {state}"] += int(row.a)
+    requests, input_tokens, output_tokens, cost_usd = used
+    return SweepProgress(
+        total=stages.total() + outcomes.total(),
+        stages=stages,
+        outcomes=outcomes,
+        cost_usd=Decimal(cost_usd),
+        requests=int(requests),
+        lost_requests=lost,
+        input_tokens=int(input_tokens),
+        output_tokens=int(output_tokens),
+    )
+
+
+_COLUMNS = columns_of(Sweep, sweeps)
+_FIGURES: Final = kept_figures(f"key ->> 0 = ANY(:ids) AND {OF_A_SWEEP}")

@@ -1,0 +1,185 @@
+"""The simulators that jobs can name: our engines, the game, and what workers announce.
+
+A service knows its simulators without having them: the engines' names come with the physics (where
+a process has engines of its own, only those count: others are missing on that machine), the game's
+version from the settings, and any other simulator from the workers that bring it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+from buildarena_backend.process.context import Context
+from buildarena_backend.settings import Settings
+from buildarena_backend.states import simulate_queue
+from buildarena_backend.trials.simulator import BESIEGE, SimulatorKind
+from buildarena_backend.workers import Announcement
+from buildarena_benchmark import Task, ValidationIssue
+from buildarena_simulation import (
+    ALL_ENGINES,
+    DEFAULT_ENGINE,
+    ENGINES,
+    SIMULATION_VERSION,
+    UnknownEngineError,
+    require_engine,
+)
+
+NO_GAME: Final = (
+    "this service has no game to play: its operator names one by BUILDARENA_BESIEGE_GAME and "
+    "BUILDARENA_BESIEGE_MOD, the versions of Besiege and of its Lua Scripting Mod"
+)
+"""Why a job for the game is refused."""
+PREFIX: Final = simulate_queue("")
+VERSION: Final = re.compile(r"[A-Za-z0-9._-]{1,80}")
+"""What a simulator may be called, and its version: tracks and queues have both in their names."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatorInfo:
+    """What a service must know of a simulator to take jobs for it.
+
+    Attributes:
+        name: The name that jobs give it.
+        version: The version in a track's name: only trials of one version are compared.
+        kind: Whether it is an engine, which calculates, or a game, which is played.
+        repeatable: Whether the same input gives the same bytes.
+    """
+
+    name: str
+    version: str
+    kind: SimulatorKind = "engine"
+    repeatable: bool = True
+
+
+def configured_simulators(settings: Settings) -> dict[str, SimulatorInfo]:
+    """The simulators that a service takes jobs for whether or not a worker is there, by name."""
+    engines = ENGINES or ALL_ENGINES
+    known = {name: SimulatorInfo(name=name, version=SIMULATION_VERSION) for name in engines}
+    game = settings.besiege_version
+    if game is not None:
+        known[BESIEGE] = SimulatorInfo(name=BESIEGE, version=game, kind="game", repeatable=False)
+    for name, version in settings.further_simulators.items():
+        known.setdefault(name, SimulatorInfo(name=name, version=version, repeatable=False))
+    return known
+
+
+def known_simulators(context: Context) -> dict[str, SimulatorInfo]:
+    """Those, and the simulators of all workers that reported within the last hour, by name."""
+    known = configured_simulators(context.settings)
+    for announcement in context.store.workers.announcements():
+        for name, simulator in announced_simulators(announcement).items():
+            known.setdefault(name, simulator)
+    return known
+
+
+def find_simulator(context: Context, name: str) -> SimulatorInfo | None:
+    """A simulator by its name; None where nobody knows it."""
+    configured = configured_simulators(context.settings).get(name)
+    return configured or known_simulators(context).get(name)
+
+
+def simulation_version(context: Context, name: str) -> str:
+    """The version in a track's name.
+
+    Raises:
+        ValueError: There is no such simulator.
+    """
+    simulator = find_simulator(context, name)
+    if simulator is None:
+        raise ValueError(_refusal(name))
+    return simulator.version
+
+
+def worlds_here(context: Context, name: str, asked: int | None) -> int:
+    """In how many varied worlds machines are scored on a simulator.
+
+    Args:
+        context: The process' connections.
+        name: The simulator's name.
+        asked: What a submission asks for; None for the service's default, which is none where no
+            seed repeats a trial.
+    """
+    if asked is not None:
+        return asked
+    simulator = find_simulator(context, name)
+    return context.settings.worlds if simulator is not None and simulator.repeatable else 0
+
+
+def worlds_issues(context: Context, name: str, asked: int | None) -> list[ValidationIssue]:
+    """What is wrong with the number of worlds that somebody asks for, if anything."""
+    simulator = find_simulator(context, name)
+    if not asked or simulator is None or simulator.repeatable:
+        return []
+    able = tuple(n for n, info in known_simulators(context).items() if info.repeatable)
+    message = (
+        f"{name} can't vary a world by a seed: leave `worlds` out, or take a simulator that can: "
+        f"{', '.join(able)}"
+    )
+    return [ValidationIssue(path="worlds", message=message, choices=("0",))]
+
+
+def drawn_issues(
+    context: Context, name: str, asked: int | None, tasks: Mapping[str, Task]
+) -> list[ValidationIssue]:
+    """An issue for each task that is scored in drawn worlds where machines are tried in none.
+
+    Args:
+        context: The process' connections.
+        name: The simulator's name.
+        asked: For how many worlds somebody asks; None for the service's default.
+        tasks: By their paths in what was submitted.
+    """
+    if worlds_here(context, name, asked):
+        return []
+    able = ", ".join(n for n, info in known_simulators(context).items() if info.repeatable)
+    return [
+        ValidationIssue(
+            path=path,
+            message=f"{task.name} is scored in worlds that differ: ask for `worlds` of 1 or more, "
+            f"on a simulator that can vary them: {able}",
+        )
+        for path, task in tasks.items()
+        if task.scenario.draws
+    ]
+
+
+def simulator_issues(
+    context: Context, *names: str, path: str = "simulator"
+) -> list[ValidationIssue]:
+    """What is wrong with simulators that somebody names: an issue for each that is unknown."""
+    unknown = [name for name in names if find_simulator(context, name) is None]
+    choices = tuple(known_simulators(context)) if unknown else ()
+    return [ValidationIssue(path=path, message=_refusal(n), choices=choices) for n in unknown]
+
+
+def announced_simulators(worker: Announcement) -> dict[str, SimulatorInfo]:
+    """The simulators whose jobs workers do, as they say, by name."""
+    said = worker.versions
+    version = said.get("simulation")
+    if not isinstance(version, str) or not VERSION.fullmatch(version):
+        return {}
+    names = [queue.removeprefix(PREFIX) for queue in worker.queues if queue.startswith(PREFIX)]
+    return {
+        name: SimulatorInfo(
+            name=name,
+            version=version,
+            kind="game" if said.get("kind") == "game" else "engine",
+            repeatable=said.get("repeatable") is True,
+        )
+        for name in names
+        if VERSION.fullmatch(name)
+    }
+
+
+def _refusal(name: str) -> str:
+    if name == BESIEGE:
+        return NO_GAME
+    if name == DEFAULT_ENGINE:
+        try:
+            require_engine(name)
+        except UnknownEngineError as error:
+            return str(error)
+    return f"there is no simulator {name!r}"

@@ -1,0 +1,166 @@
+"""From rollouts to a job's score, and the manifest that lets anybody check it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from buildarena_backend import __version__
+from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.errors import PermanentError
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.results.results import JobScore
+from buildarena_backend.states import Outcome
+from buildarena_benchmark import Task, failed_score
+from buildarena_benchmark.families.unknowns import drawn_numbers
+from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS
+from buildarena_geometry import DOCUMENT_VERSION, Machine
+from buildarena_geometry import __version__ as geometry_version
+
+
+def task_of(job: Job, catalogue: TaskCatalog) -> Task:
+    """The job's task, in the version that the job was submitted for, drawn by its seed.
+
+    Raises:
+        PermanentError: It is gone, or is no longer scored as it was.
+    """
+    task = catalogue.exact(job.task, job.task_version)
+    if task is None:
+        raise PermanentError(
+            f"task {job.task} is no longer at version {job.task_version[:12]}: submit it again",
+            reason="task_changed",
+        )
+    return drawn_for(job, task)
+
+
+def drawn_for(job: Job, task: Task) -> Task:
+    """A task as a job has it.
+
+    What its builder is not told is drawn by a number that the job keeps to itself: a seed is chosen
+    by who submits, and other jobs have it too.
+    """
+    hidden = None if task.unknowns is None else job.draw
+    return task.drawn(job.seed if hidden is None else hidden)
+
+
+def has_counted(records: Sequence[RolloutRecord], task: Task) -> bool:
+    """Whether a trial is done that may count: where a task has test trials, the one after them."""
+    return any(r.finished_at is not None and (r.final or not task.tests) for r in records)
+
+
+def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
+    """The rollout that counts.
+
+    Where a task has test trials it is the last, which is none. Otherwise, of those in the exact
+    world a success before none, one that no flag disqualifies before others,
+    then the larger indicator, then the first.
+    """
+    done = [r for r in records if r.finished_at is not None and r.seed is None]
+    if task.tests:
+        return max(done, key=lambda r: (r.final, r.number))
+    return max(
+        done,
+        key=lambda r: (
+            bool(r.success) and not is_disqualified(r.flags or ()),
+            bool(r.success),
+            r.indicator or 0.0,
+            -r.number,
+        ),
+    )
+
+
+def varied_rollouts(records: Sequence[RolloutRecord]) -> Sequence[RolloutRecord]:
+    """Those in varied worlds, done or not."""
+    return [record for record in records if record.seed is not None]
+
+
+def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> JobScore:
+    """The score of a job.
+
+    Args:
+        job: The job.
+        task: Its task, as the job has it.
+        records: All its rollouts: those in varied worlds are of the best one's machine.
+    """
+    record = best_rollout(records, task)
+    success = bool(record.success)
+    return JobScore(
+        outcome=Outcome.SUCCESS if success else Outcome.UNSUCCESSFUL,
+        success=success,
+        indicator=float(record.indicator or 0.0),
+        metrics={**(record.metrics or {}), **_robustness(varied_rollouts(records))},
+        flags=record.flags or (),
+        manifest=job_manifest(job, task, record),
+    )
+
+
+def _robustness(varied: Sequence[RolloutRecord]) -> Mapping[str, float]:
+    """What a machine did in varied worlds, as metrics of its job; empty without any.
+
+    In a world in which it fails, or succeeds in a way that disqualifies, it has done nothing.
+    """
+    if not varied:
+        return {}
+    gained = [
+        float(record.indicator or 0.0)
+        for record in varied
+        if record.success and not is_disqualified(record.flags or ())
+    ]
+    return {
+        "worlds": len(varied),
+        ROBUSTNESS: len(gained) / len(varied),
+        ROBUST_INDICATOR: math.fsum(gained) / len(varied),
+    }
+
+
+def failure_score(
+    job: Job, task: Task, machine: Machine | None, *, outcome: Outcome, reason: str, detail: str
+) -> JobScore:
+    """The score of a job that ended without a rollout.
+
+    Args:
+        job: The job.
+        task: Its task.
+        machine: What was built, if anything: its parts are counted.
+        outcome: ``construction_failed`` or ``limit``.
+        reason: Class of the failure.
+        detail: A sentence for people.
+    """
+    failed = failed_score(task, machine)
+    return JobScore(
+        outcome=outcome,
+        success=failed.success,
+        indicator=failed.indicator,
+        metrics=failed.metrics,
+        flags=failed.flags,
+        reason=reason,
+        detail=detail,
+        manifest=job_manifest(job, task, None),
+    )
+
+
+def job_manifest(job: Job, task: Task, record: RolloutRecord | None) -> Mapping[str, Any]:
+    """Versions of everything that can change the score, and hashes of what it was made from.
+
+    What was drawn and not told is in it: the job has ended, so nobody gains by it.
+    """
+    manifest: dict[str, Any] = {
+        "buildarena": __version__,
+        "geometry": geometry_version,
+        "document": DOCUMENT_VERSION,
+        "task": {"name": job.task, "version": job.task_version},
+        "model": dict(job.model_config),
+        "track": dict(job.track_config),
+        "seed": job.seed,
+    }
+    if task.unknowns is not None:
+        manifest["drawn"] = drawn_numbers(task.unknowns, task.seed)
+    if record is not None:
+        manifest["simulator"] = dict(record.versions or {})
+        manifest["machine"] = record.machine_hash
+        manifest["trajectory"] = record.trajectory_hash
+        manifest["rollout"] = record.number
+    return manifest

@@ -1,0 +1,87 @@
+"""What a simulator is to the simulate stage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, Literal, Protocol
+
+from buildarena_backend.trials.trials import File, TrialRequest, TrialResult
+
+__all__ = [
+    "BESIEGE",
+    "File",
+    "MachineRefusedError",
+    "Simulator",
+    "SimulatorFaultError",
+    "SimulatorKind",
+    "TrialRequest",
+    "TrialResult",
+]
+
+SimulatorKind = Literal["engine", "game"]
+
+BESIEGE: Final = "besiege"
+"""The game Besiege itself, played by a runner on a machine that has it."""
+
+
+class MachineRefusedError(Exception):
+    """The simulator cannot run the machine, whoever asks and however often: a failed trial."""
+
+
+class SimulatorFaultError(Exception):
+    """The simulator failed, not the machine: the trial is to be run again.
+
+    Args:
+        message: A sentence for people.
+        files: What shows the fault, such as a screenshot, by name.
+        delay_s: How long to wait before it is run again.
+        endless: Whether it waits for a person and so never counts against the job.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        files: Mapping[str, File] | None = None,
+        delay_s: float = 2.0,
+        endless: bool = False,
+    ) -> None:
+        super().__init__(message)
+        self.files = dict(files or {})
+        self.delay_s = delay_s
+        self.endless = endless
+
+
+class Simulator(Protocol):
+    """Runs trials, one at a time.
+
+    Attributes:
+        name: The name that jobs give it.
+        versions: What can change a trajectory, for manifests.
+        repeatable: Whether the same input gives the same bytes.
+    """
+
+    @property
+    def name(self) -> str:
+        """The name that jobs give it."""
+
+    @property
+    def versions(self) -> Mapping[str, Any]:
+        """What can change a trajectory, for manifests."""
+
+    @property
+    def repeatable(self) -> bool:
+        """Whether the same input gives the same bytes."""
+
+    def run(self, trial: TrialRequest) -> TrialResult:
+        """Runs a trial.
+
+        Raises:
+            MachineRefusedError: It cannot run the machine.
+            SimulatorFaultError: It failed.
+            PermanentError: It never will be able to run this job.
+            StaleLeaseError: The job is somebody else's by now.
+        """
+
+    def close(self) -> None:
+        """Lets go of whatever it holds."""

@@ -1,0 +1,277 @@
+"""The repository of trials: what leased jobs are to have simulated, and what came of it, scored.
+
+Workers beside the database and the API's runner routes use the same code, so that a trial's score
+does not depend on where it was run.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from random import SystemRandom
+from typing import Any
+
+from buildarena_backend.artifacts.storing import ArtifactInfo, ArtifactStore
+from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
+from buildarena_backend.errors import PermanentError
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.leases.leases import Lease
+from buildarena_backend.process.context import Context
+from buildarena_backend.process.notify import Notifier
+from buildarena_backend.results.audits import is_unproved, runner_key
+from buildarena_backend.states import CONSTRUCT_QUEUE, EXTERNAL_QUEUE, Stage
+from buildarena_backend.store import Store
+from buildarena_backend.trials.known_simulators import configured_simulators
+from buildarena_backend.trials.scoring import task_of
+from buildarena_backend.trials.trials import PARQUET, File, TrialResult
+from buildarena_backend.trials.worlds import finish_or_vary
+from buildarena_benchmark import Score, Task, failed_score, score
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import Trajectory, write_trajectory
+
+SCORED = ("success", "indicator", "metrics", "flags")
+MADE = (*SCORED, "trajectory_hash", "trace", "versions", "annotations", "runner", "audited")
+"""What a simulation adds to a rollout's row."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DueTrial:
+    """A trial that a job waits for.
+
+    Attributes:
+        job: The job.
+        task: What the machine is put through.
+        machine: The machine.
+        request: The rollout that was asked for.
+        records: All rollouts of the job.
+    """
+
+    job: Job
+    task: Task
+    machine: Machine
+    request: RolloutRecord
+    records: Sequence[RolloutRecord]
+
+    @property
+    def controls(self) -> tuple[KeyPress, ...] | None:
+        """Key presses of this trial; None for the machine's own."""
+        presses = self.request.controls
+        return None if presses is None else tuple(KeyPress(**press) for press in presses)
+
+    @property
+    def version(self) -> str:
+        """The simulator's version that the job was submitted for."""
+        return str(self.job.track_config["simulation_version"])
+
+
+class TrialRepository:
+    """Finds what is to be simulated, and writes what came of it.
+
+    Args:
+        store: Where jobs and rollouts are.
+        artifacts: Where machines and trajectories are.
+        queues: Where construct workers are notified.
+        tasks: The tasks.
+        audited_shares: Of simulators whose trials a verification can repeat, the share of the
+            trials by runners that is verified before it counts, 0 to 1.
+    """
+
+    def __init__(
+        self,
+        *,
+        store: Store,
+        artifacts: ArtifactStore,
+        queues: Notifier,
+        tasks: TaskCatalog,
+        audited_shares: Mapping[str, float],
+    ) -> None:
+        self._store = store
+        self._artifacts = artifacts
+        self._queues = queues
+        self._tasks = tasks
+        self._audited_shares = audited_shares
+
+    @staticmethod
+    def of(context: Context) -> TrialRepository:
+        """The repository of a process' connections."""
+        return TrialRepository(
+            store=context.store,
+            artifacts=context.artifacts,
+            queues=context.queues,
+            tasks=context.tasks,
+            audited_shares={
+                name: context.settings.audited_share
+                for name, simulator in configured_simulators(context.settings).items()
+                if simulator.repeatable
+            },
+        )
+
+    def due(self, job: Job) -> DueTrial:
+        """The trial that a job in the simulate stage waits for.
+
+        Raises:
+            PermanentError: It waits for none, or its task is gone.
+            ArtifactStoreError: The machine can't be read now.
+        """
+        records = self._store.rollouts.read(job.id)
+        waiting = [record for record in records if record.finished_at is None]
+        if not waiting:
+            raise PermanentError("no rollout waits", reason="no_rollout")
+        request = waiting[0]
+        document: dict[str, Any] = json.loads(self._artifacts.get(request.machine_hash))
+        return DueTrial(
+            job=job,
+            task=task_of(job, self._tasks),
+            machine=Machine.from_document(document),
+            request=request,
+            records=records,
+        )
+
+    def repeat(self, lease: Lease, due: DueTrial) -> bool:
+        """Ends the trial with the result of an earlier one with the same input, if there is one.
+
+        Only where the same input gives the same bytes.
+
+        Returns:
+            Whether there was one.
+
+        Raises:
+            StaleLeaseError: The lease is over; nothing was written.
+        """
+        same = _same_trial(due.request, due.records)
+        if same is None:
+            return False
+        values = {name: getattr(same, name) for name in MADE} | {"wall_s": 0.0}
+        self._write(lease, due, values, {})
+        return True
+
+    def complete(self, lease: Lease, due: DueTrial, outcome: TrialResult) -> None:
+        """Scores a trial and moves its job on, all or nothing: it ends, or goes on being built.
+
+        Raises:
+            StaleLeaseError: The lease is over; nothing was written.
+            ArtifactStoreError: The trajectory can't be kept now.
+        """
+        trajectory, runner = outcome.trajectory, runner_key(lease.owner)
+        kept: dict[str, ArtifactInfo] = {}
+        values: dict[str, Any] = {
+            "versions": dict(outcome.versions),
+            "wall_s": outcome.wall_s,
+            "trajectory_hash": None,
+            "trace": [],
+            "runner": runner,
+            "audited": runner is not None and self._is_audited(runner, due, trajectory),
+        }
+        if trajectory is None:
+            values |= _scored(failed_score(due.task, due.machine))
+        else:
+            values |= _scored(score(due.task, due.machine, trajectory))
+            info = self._artifacts.put(write_trajectory(trajectory), PARQUET)
+            values |= {"trajectory_hash": info.hash, "trace": tracked_at_1_hz(trajectory)}
+            kept[f"trajectory-{due.request.number}"] = info
+        if outcome.annotations is not None:
+            values["annotations"] = dict(outcome.annotations)
+        self._write(lease, due, values, kept | self._put(outcome.files))
+
+    def _is_audited(self, runner: str, due: DueTrial, trajectory: Trajectory | None) -> bool:
+        """Whether a runner's trial is verified before it counts; no runner can tell which are.
+
+        That a program failed is always verified, as nothing else shows it.
+        """
+        share = self._audited_shares.get(due.request.engine)
+        if share is None:
+            return False
+        if trajectory is None and due.machine.controller and due.controls is None:
+            return True
+        if SystemRandom().random() < share:
+            return True
+        with self._store.database.statement() as connection:
+            return is_unproved(runner, connection=connection)
+
+    def keep_evidence(self, job: Job, files: Mapping[str, File]) -> None:
+        """Stores what shows a fault with the job, in place of what showed the fault before.
+
+        Raises:
+            PermanentError: The job waits for no trial.
+        """
+        if files:
+            stored, number = self._put(files), self.due(job).request.number
+            with self._store.database.transaction() as connection:
+                self._store.results.replace_evidence(job.id, number, stored, connection=connection)
+
+    def _write(
+        self,
+        lease: Lease,
+        due: DueTrial,
+        values: Mapping[str, Any],
+        kept: Mapping[str, ArtifactInfo],
+    ) -> None:
+        store, job, request = self._store, due.job, due.request
+        with store.database.transaction() as connection:
+            if kept:
+                store.results.attach(job.id, kept, connection=connection)
+            completed = store.rollouts.complete(
+                job.id, request.number, connection=connection, **values
+            )
+            queue: str | None = CONSTRUCT_QUEUE
+            external = job.track_config.get("workflow") == EXTERNAL_WORKFLOW
+            if external and not request.final:
+                store.leases.queue_again(
+                    lease, stage=Stage.CONSTRUCT, queue=EXTERNAL_QUEUE, connection=connection
+                )
+                store.external_calls.go_on(job.id, connection=connection)
+                queue = None
+            elif request.final:
+                records = [completed if r.number == completed.number else r for r in due.records]
+                queue = finish_or_vary(store, lease, records, task=due.task, connection=connection)
+            else:
+                store.leases.queue_again(
+                    lease, stage=Stage.CONSTRUCT, queue=CONSTRUCT_QUEUE, connection=connection
+                )
+        if queue is not None:
+            self._queues.notify_one(queue, job.id)
+
+    def _put(self, files: Mapping[str, File]) -> dict[str, ArtifactInfo]:
+        return {
+            name: self._artifacts.put(file.data, file.media_type) for name, file in files.items()
+        }
+
+
+def _same_trial(request: RolloutRecord, records: Sequence[RolloutRecord]) -> RolloutRecord | None:
+    """An earlier rollout with the same input: the same input gives the same bytes."""
+    for record in records:
+        done = record.finished_at is not None and record.engine == request.engine
+        if done and (record.machine_hash, record.controls, record.seed) == (
+            request.machine_hash,
+            request.controls,
+            request.seed,
+        ):
+            return record
+    return None
+
+
+def _scored(found: Score) -> dict[str, Any]:
+    return {
+        "success": found.success,
+        "indicator": found.indicator,
+        "metrics": dict(found.metrics),
+        "flags": list(found.flags),
+    }
+
+
+def tracked_at_1_hz(trajectory: Trajectory) -> list[list[float]]:
+    """The tracked body at 1 Hz: the cargo where there is one, otherwise the first block."""
+    times = trajectory.time_s
+    track = trajectory.cargo_position
+    if track is None:
+        track = trajectory.positions[:, 0]
+    rows = []
+    last = -1
+    for time_s, point in zip(times, track, strict=True):
+        if int(time_s + 1e-9) > last:
+            last = int(time_s + 1e-9)
+            rows.append([round(float(value), 3) for value in (time_s, *point)])
+    return rows

@@ -1,0 +1,228 @@
+"""Workers: which processes serve which queues, and when they were last seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import Any, Final
+
+from sqlalchemy import bindparam, cast, delete, func, not_, select, tuple_
+from sqlalchemy.dialects.postgresql import Insert, insert
+from sqlalchemy.types import DateTime, Double
+
+from buildarena_backend import events
+from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import value_of
+from buildarena_backend.database.tables import workers
+
+FORGOTTEN_AFTER = timedelta(hours=1)
+WORST_CLOCKS: Final = 10
+ANNOUNCED: Final = ("simulation", "kind", "repeatable")
+MAX_ANNOUNCEMENTS: Final = 1000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerInfo:
+    """A worker process.
+
+    Attributes:
+        id: ``kind@host:pid-nonce``: a process that takes another's place has a name of its own.
+        kind: ``construct`` or ``simulate``.
+        queues: Queues it serves.
+        host: Its machine.
+        pid: Its process id there.
+        versions: Versions of what it runs.
+        started_at: When it first reported.
+        seen_at: When it last reported.
+        alive: Whether it reported within the last 15 seconds, by the database's clock.
+        peak_memory_bytes: The most memory it and its children ever had, if it says so.
+        clock_ahead_s: How far its clock is ahead of the database's, if it says so.
+    """
+
+    id: str
+    kind: str
+    queues: Sequence[str]
+    host: str
+    pid: int
+    versions: Mapping[str, Any]
+    started_at: datetime
+    seen_at: datetime
+    alive: bool
+    peak_memory_bytes: int | None
+    clock_ahead_s: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkerCounts:
+    """The register of workers in a few numbers, however many there are.
+
+    Attributes:
+        serving: Workers alive, by the queue they serve.
+        alive: Workers alive, by kind.
+        lost: Workers that went silent without signing off and are not forgotten, by kind.
+        peak_memory_bytes: The most memory that one alive ever had, by kind.
+        clocks: Ids of workers alive whose clocks differ most from the database's, and by how many
+            seconds they are ahead; the worst first.
+    """
+
+    serving: Mapping[str, int]
+    alive: Mapping[str, int]
+    lost: Mapping[str, int]
+    peak_memory_bytes: Mapping[str, int]
+    clocks: Sequence[tuple[str, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Announcement:
+    """What workers of one sort say of the simulators that they have.
+
+    Attributes:
+        queues: Queues they serve.
+        versions: Of what they say: ``simulation``, ``kind`` and ``repeatable``, null if missing.
+    """
+
+    queues: Sequence[str]
+    versions: Mapping[str, Any]
+
+
+class Workers:
+    """The register of workers."""
+
+    def __init__(self, database: Database, *, alive_for_s: float = 15.0) -> None:
+        self._database = database
+        self._alive_for = timedelta(seconds=alive_for_s)
+
+    def report(
+        self,
+        *,
+        worker_id: str,
+        kind: str,
+        queues: Sequence[str],
+        host: str,
+        pid: int,
+        versions: Mapping[str, Any],
+        peak_memory_bytes: int | None = None,
+        own_time: datetime | None = None,
+    ) -> None:
+        """Reports that a worker is alive; forgets those that have not reported for an hour."""
+        given = {
+            "id": worker_id,
+            "kind": kind,
+            "queues": list(queues),
+            "host": host,
+            "pid": pid,
+            "versions": dict(versions),
+            "peak_memory_bytes": peak_memory_bytes,
+            "own_time": own_time,
+        }
+        with self._database.statement() as connection:
+            connection.execute(_REPORT, given)
+
+    def leave(self, worker_id: str) -> None:
+        """Removes a worker that shuts down from the register."""
+        with self._database.transaction() as connection:
+            connection.execute(delete(workers).where(workers.c.id == worker_id))
+
+    def forget_ended(self, host: str, is_running: Callable[[int], bool]) -> None:
+        """Removes a host's workers that were killed: nobody has to look for them.
+
+        Args:
+            host: As they reported it.
+            is_running: Whether a process of that host runs, by its id.
+        """
+        ours = select(workers.c.id, workers.c.pid).where(workers.c.host == host)
+        with self._database.transaction() as connection:
+            ended = [row.id for row in connection.execute(ours) if not is_running(row.pid)]
+            connection.execute(delete(workers).where(workers.c.id.in_(ended)))
+
+    def trim(self, prefix: str, *, most: int) -> None:
+        """Forgets all but the workers whose ids begin so that reported last.
+
+        Args:
+            prefix: Of the ids.
+            most: How many stay.
+        """
+        ours = select(workers.c.id).where(func.starts_with(workers.c.id, prefix))
+        old = ours.order_by(workers.c.seen_at.desc()).offset(most)
+        with self._database.transaction() as connection:
+            connection.execute(delete(workers).where(workers.c.id.in_(old)))
+
+    def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> list[WorkerInfo]:
+        """Known workers, the last started first: an order that reports do not change.
+
+        Args:
+            limit: How many at most.
+            after: Start and id of the worker behind which the page begins.
+        """
+        alive = (workers.c.seen_at > events.now - self._alive_for).label("alive")
+        query = select(workers, alive).order_by(workers.c.started_at.desc(), workers.c.id.desc())
+        if after is not None:
+            query = query.where(tuple_(workers.c.started_at, workers.c.id) < tuple_(*after))
+        with self._database.transaction() as connection:
+            return [value_of(WorkerInfo, row) for row in connection.execute(query.limit(limit))]
+
+    def counts(self) -> WorkerCounts:
+        """The register in a few numbers; no worker's versions are read."""
+        alive = workers.c.seen_at > events.now - self._alive_for
+        kinds = select(
+            workers.c.kind,
+            func.count().filter(alive).label("alive"),
+            func.count().filter(not_(alive)).label("lost"),
+            func.max(workers.c.peak_memory_bytes).filter(alive).label("peak"),
+        ).group_by(workers.c.kind)
+        queues = select(func.jsonb_array_elements_text(workers.c.queues).label("queue"))
+        queue = queues.where(alive).subquery().c.queue
+        serving = select(queue, func.count().label("alive")).group_by(queue)
+        clocks = (
+            select(workers.c.id, workers.c.clock_ahead_s)
+            .where(alive, workers.c.clock_ahead_s.is_not(None))
+            .order_by(func.abs(workers.c.clock_ahead_s).desc())
+            .limit(WORST_CLOCKS)
+        )
+        with self._database.transaction() as connection:
+            by_kind = list(connection.execute(kinds))
+            return WorkerCounts(
+                serving={row.queue: row.alive for row in connection.execute(serving)},
+                alive={row.kind: row.alive for row in by_kind if row.alive},
+                lost={row.kind: row.lost for row in by_kind},
+                peak_memory_bytes={row.kind: row.peak for row in by_kind if row.peak is not None},
+                clocks=[(row.id, row.clock_ahead_s) for row in connection.execute(clocks)],
+            )
+
+    def announcements(self) -> list[Announcement]:
+        """What the known workers say of their simulators, each saying once."""
+        said = workers.c.versions
+        query = (
+            select(workers.c.queues, *(said[name].label(name) for name in ANNOUNCED))
+            .where(workers.c.kind == "simulate")
+            .distinct()
+            .limit(MAX_ANNOUNCEMENTS)
+        )
+        with self._database.transaction() as connection:
+            return [
+                Announcement(
+                    queues=row.queues,
+                    versions={name: getattr(row, name) for name in ANNOUNCED},
+                )
+                for row in connection.execute(query)
+            ]
+
+
+def _report() -> Insert:
+    """Writes a worker's row and forgets silent ones; made once, as every worker says it often."""
+    named = ("id", "kind", "queues", "host", "pid", "versions", "peak_memory_bytes")
+    row: dict[str, Any] = {name: bindparam(name, type_=workers.c[name].type) for name in named}
+    own_time = bindparam("own_time", type_=DateTime(timezone=True))
+    row["clock_ahead_s"] = cast(func.extract("epoch", own_time - events.now), Double)
+    silent = delete(workers).where(
+        workers.c.seen_at < events.now - FORGOTTEN_AFTER, workers.c.id != row["id"]
+    )
+    statement = insert(workers).values(row)
+    renewed = {name: statement.excluded[name] for name in row if name != "id"}
+    return statement.on_conflict_do_update(
+        index_elements=["id"], set_={**renewed, "seen_at": events.now}
+    ).add_cte(silent.cte("forgotten"))
+
+
+_REPORT: Final = _report()

@@ -1,0 +1,170 @@
+"""An episode played by tool calls, as models make them: `submit` is one of the tools."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+from buildarena_benchmark.environment.environment import Environment
+from buildarena_benchmark.environment.episodes import Submission
+from buildarena_benchmark.environment.errors import CallError, NothingToSubmitError
+from buildarena_benchmark.environment.tools import MAIN, SUBMIT
+from buildarena_benchmark.environment.trials.trials import Trial
+from buildarena_geometry.json_texts import read_json
+
+EXAMPLE: Final = '{"tool": "start", "arguments": {}}'
+"""A call as text."""
+LONGEST_CALL: Final = 80_000
+"""Characters that an adapter reads of a call: JSON that quotes the longest program has room."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """What came of a tool call.
+
+    Attributes:
+        text: What a model reads about it.
+        accepted: Whether it was carried out.
+        reward: What the episode is worth now.
+        gained: How much that is more than before.
+        terminated: Whether a submission ended the episode.
+        truncated: Whether the episode ended because its calls are used up; what there was has been
+            submitted.
+        trial: The trial, if the call led to one.
+    """
+
+    text: str
+    accepted: bool
+    reward: float
+    gained: float
+    terminated: bool = False
+    truncated: bool = False
+    trial: Trial | None = None
+
+
+def call(environment: Environment, tool: object, arguments: object = None) -> Answer:
+    """Carries out a call of one of the tools that `Environment.observation` lists.
+
+    Whatever a model gives is answered: a refused call counts as a step, also a submission of
+    nothing. After the last step there is a submission of what there is.
+
+    Args:
+        environment: The episode.
+        tool: The tool's name.
+        arguments: Its arguments with `machine` among them, or None for none.
+
+    Raises:
+        EpisodeOverError: The episode has ended.
+        SimulationError: The simulator failed. The episode stands where it stood but for a last
+            step, after which any call submits.
+    """
+    before = environment.reward
+    if not environment.done and environment.steps_left == 0:
+        return _submitted(environment.finish(), before, truncated=True)
+    text: str | None = None
+    if tool == SUBMIT.name:
+        try:
+            _require_none(arguments)
+            return _submitted(environment.submit(), before)
+        except (CallError, NothingToSubmitError) as refusal:
+            text = str(refusal)
+    return _stepped(environment, tool, arguments, text, before)
+
+
+def call_text(environment: Environment, text: str, *, longest: int | None = None) -> Answer:
+    """Carries out a call that is written as JSON, such as `EXAMPLE`.
+
+    Text that is no call counts as a refused step.
+
+    Args:
+        environment: The episode.
+        text: The call.
+        longest: Characters that it may have; None for any number.
+
+    Raises:
+        EpisodeOverError: The episode has ended.
+        SimulationError: As for `call`.
+    """
+    before = environment.reward
+    try:
+        tool, arguments = read_call(text, longest=longest)
+    except CallError as error:
+        if not environment.done and environment.steps_left == 0:
+            return _submitted(environment.finish(), before, truncated=True)
+        return _stepped(environment, None, None, str(error), before)
+    return call(environment, tool, arguments)
+
+
+def read_call(text: str, *, longest: int | None = None) -> tuple[str, dict[str, Any]]:
+    """Tool and arguments of a call that is written as JSON.
+
+    Args:
+        text: The call.
+        longest: Characters that it may have; None for any number.
+
+    Raises:
+        CallError: It is none; the message says what is wrong.
+    """
+    if longest is not None and len(text) > longest:
+        raise CallError(f"the call has {len(text):,} characters: at most {longest:,} are read")
+    try:
+        value = read_json(text)
+    except ValueError as error:
+        raise CallError(f"this is not valid JSON ({error}): write {EXAMPLE}") from None
+    if not isinstance(value, dict):
+        raise CallError(f"a call is an object: write {EXAMPLE}")
+    for name in value:
+        if name not in ("tool", "arguments"):
+            raise CallError(f"a call has no {name[:40]!r}: choose from tool, arguments")
+    tool, arguments = value.get("tool"), value.get("arguments", {})
+    if not isinstance(tool, str):
+        raise CallError(f"'tool' is a tool's name: write {EXAMPLE}")
+    if not isinstance(arguments, dict):
+        raise CallError(f"'arguments' are an object: write {EXAMPLE}")
+    return tool, arguments
+
+
+def _stepped(
+    environment: Environment, tool: object, arguments: object, refusal: str | None, before: float
+) -> Answer:
+    machine: object = MAIN
+    if isinstance(arguments, dict) and "machine" in arguments:
+        arguments = dict(arguments)
+        machine = arguments.pop("machine")
+    if refusal is None and not isinstance(machine, str):
+        refusal = f"'machine' is a name, not {type(machine).__name__}"
+    if refusal is not None:
+        step = environment.refuse(refusal)
+    else:
+        step = environment.step(tool, arguments, machine=str(machine))
+    if not step.truncated:
+        return Answer(
+            text=step.feedback, accepted=step.ok, reward=step.reward, gained=step.reward - before
+        )
+    ended = _submitted(environment.finish(), before, truncated=True)
+    text = f"{step.feedback}\nThat was the last call: what there is was submitted. {ended.text}"
+    return Answer(
+        text=text,
+        accepted=step.ok,
+        reward=ended.reward,
+        gained=ended.gained,
+        truncated=True,
+        trial=ended.trial,
+    )
+
+
+def _submitted(submission: Submission, before: float, *, truncated: bool = False) -> Answer:
+    return Answer(
+        text=submission.report,
+        accepted=True,
+        reward=submission.reward,
+        gained=submission.reward - before,
+        terminated=submission.done and not truncated,
+        truncated=truncated,
+        trial=submission.trial,
+    )
+
+
+def _require_none(arguments: object) -> None:
+    if arguments not in (None, {}):
+        raise CallError(f"the tool {SUBMIT.name!r} takes no arguments")

@@ -1,0 +1,69 @@
+"""What an environment is made with, by name: tasks, simulators, reference indicators."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from buildarena_benchmark import Task, builtin_tasks, references
+from buildarena_benchmark.environment.errors import UnknownChoiceError
+from buildarena_simulation import DEFAULT_ENGINE, ENGINES, require_engine
+
+WITHOUT: Final = 1.0
+"""The reference of a task that has none, where no reward asks for it."""
+
+
+def chosen_task(task: Task | str) -> Task:
+    """The task, or the built-in one of this name; underscores count as dashes.
+
+    Raises:
+        UnknownChoiceError: There is none.
+    """
+    if isinstance(task, Task):
+        return task
+    builtin = builtin_tasks().get(task.replace("_", "-"))
+    if builtin is None:
+        raise UnknownChoiceError("task", task, builtin_tasks())
+    return builtin
+
+
+def checked_simulator(name: str) -> str:
+    """The name, if an engine of ours has it.
+
+    Raises:
+        UnknownChoiceError: None has.
+        UnknownEngineError: It is the default one, and not installed.
+    """
+    if name not in ENGINES and name != DEFAULT_ENGINE:
+        raise UnknownChoiceError("simulator", name, ENGINES)
+    return require_engine(name)
+
+
+def is_builtin(task: Task) -> bool:
+    """Whether it is a built-in task, whatever a seed has drawn of it."""
+    known = builtin_tasks().get(task.name)
+    return known is not None and known.drawn(0) == task.drawn(0)
+
+
+def reference_of(task: Task, given: float | None = None, *, needed: bool = False) -> float:
+    """The indicator that is worth 1.
+
+    Args:
+        task: The task.
+        given: What takes its place.
+        needed: Whether a task without a reference is refused.
+
+    Raises:
+        ValueError: It is not above 0, or the task has none and one is needed.
+    """
+    if given is not None:
+        if not given > 0:
+            raise ValueError(f"reference is {given}: it must be above 0")
+        return given
+    reference = references().get(task.name)
+    if reference is not None and is_builtin(task):
+        return reference
+    if needed:
+        raise ValueError(
+            f"{task.name} has no reference indicator: give one, or leave the reward 'indicator' out"
+        )
+    return WITHOUT

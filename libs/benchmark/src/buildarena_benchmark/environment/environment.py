@@ -1,0 +1,332 @@
+"""One building task as an environment: reset, step, submit, and back to any state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from buildarena_benchmark import Task
+from buildarena_benchmark.environment.briefing import (
+    briefing,
+    catalogue_told,
+    file_text,
+    trials_told,
+)
+from buildarena_benchmark.environment.choices import checked_simulator, chosen_task, reference_of
+from buildarena_benchmark.environment.episodes import Limits, Observation, Step, Submission
+from buildarena_benchmark.environment.errors import (
+    EpisodeOverError,
+    NothingToSubmitError,
+    SnapshotError,
+)
+from buildarena_benchmark.environment.rewards import (
+    DEFAULT_WEIGHTS,
+    REWARDS,
+    TERMINAL,
+    Progress,
+    checked_weights,
+    weighed,
+)
+from buildarena_benchmark.environment.snapshots import Snapshot
+from buildarena_benchmark.environment.tools import MAIN, tools_of_models
+from buildarena_benchmark.environment.trials.trials import (
+    Trial,
+    Tries,
+    counted_trial,
+    score_text,
+    try_machine,
+)
+from buildarena_benchmark.environment.workbench import Workbench
+from buildarena_geometry import Accepted, Cause, Machine, Refused, ToolDefinition
+from buildarena_simulation import DEFAULT_ENGINE
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Outcome
+
+LAST: Final = "That ends the episode."
+AGAIN: Final = "After each trial but the last you read what was measured and may build on."
+
+
+class Environment:
+    """A task that is played by steps. The same task, seed and steps give the same results.
+
+    Args:
+        task: The task, or the name of a built-in one.
+        simulator: Name of the engine that tries machines.
+        seed: Varies where machine and cargo start, as a fair repetition would, and draws what a
+            family's task has drawn; None for the exact start, which the service has, and seed 0's.
+        rounds: How often a builder may submit; a successful trial ends the episode. A task with
+            test trials has one submission more than those, whatever is given: the last one counts,
+            and nothing before ends the episode.
+        limits: How long an episode may be.
+        rewards: Weights by the names in `REWARDS`; success alone by default.
+        reference: The indicator that is worth 1; the task's reference where there is one.
+        tries: What tries machines, such as a `TrialPool`'s `try_machine`; by default this process.
+        data_sheets: Whether the builder is told the numbers of modules and world, or finds them
+            out by trials.
+
+    Raises:
+        UnknownChoiceError: Task, simulator or a reward does not exist.
+        ValueError: A number is out of range.
+    """
+
+    def __init__(
+        self,
+        task: Task | str,
+        simulator: str = DEFAULT_ENGINE,
+        *,
+        seed: int | None = None,
+        rounds: int = 1,
+        limits: Limits | None = None,
+        rewards: Mapping[str, float] | None = None,
+        reference: float | None = None,
+        tries: Tries = try_machine,
+        data_sheets: bool = True,
+    ) -> None:
+        if rounds < 1:
+            raise ValueError(f"rounds is {rounds}: a builder submits at least once")
+        self.task = chosen_task(task).drawn(seed or 0)
+        self.simulator = checked_simulator(simulator)
+        self.seed = seed
+        self.rounds = self.task.tests + 1 if self.task.tests else rounds
+        self.limits = limits or Limits()
+        self.weights = checked_weights(DEFAULT_WEIGHTS if rewards is None else rewards)
+        self.reference = reference_of(self.task, reference, needed="indicator" in self.weights)
+        self.data_sheets = data_sheets
+        self._tries = tries
+        self._shaped = bool(self.weights.keys() - TERMINAL)
+        self._bench = self._new_bench()
+        self._steps = self._changes = self._refused = 0
+        self._trials: tuple[Trial, ...] = ()
+        self._done = False
+        self._reward = self._worth()
+
+    def reset(self, *, seed: int | None = None) -> Observation:
+        """Begins an episode.
+
+        Args:
+            seed: Takes the place of the environment's, if given.
+        """
+        if seed is not None:
+            self.seed = seed
+            self.task = self.task.drawn(seed)
+            self._bench = self._new_bench()
+        self._go_to(Snapshot(task=self.task.name, task_version=self.task.version))
+        return self.observation
+
+    @property
+    def observation(self) -> Observation:
+        """What a builder has before its first step."""
+        text = briefing(
+            self.task,
+            trials=trials_told(self.rounds, self.task.tests),
+            guidelines=file_text("guidelines.md"),
+            values={
+                "calls": f"{self.limits.steps:,}",
+                "after": LAST if self.rounds == 1 else AGAIN,
+            },
+            data_sheets=self.data_sheets,
+        )
+        return Observation(task=self.task.name, briefing=text, tools=self.tools)
+
+    @property
+    def tools(self) -> tuple[ToolDefinition, ...]:
+        """What a builder may call in this task, the submission among it."""
+        return tools_of_models(
+            on_demand=self.task.constraints.on_demand, programs=self.task.takes_programs
+        )
+
+    @property
+    def machines(self) -> Mapping[str, Machine]:
+        """What was built so far, by name."""
+        return self._bench.machines
+
+    def submitted(self) -> Machine:
+        """What a submission would try now.
+
+        Raises:
+            NothingToSubmitError: There is no machine, or there are several without an assembly.
+        """
+        return self._bench.submitted()
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The trials of this episode, in order."""
+        return self._trials
+
+    @property
+    def counted(self) -> Trial | None:
+        """The trial that counts so far: the best, or the last where a task has test trials."""
+        return counted_trial(self.task, self._trials) if self._trials else None
+
+    @property
+    def reward(self) -> float:
+        """What the episode is worth so far."""
+        return self._reward
+
+    @property
+    def named_rewards(self) -> Mapping[str, float]:
+        """Every reward as it stands, by name and without weights."""
+        progress = self._progress()
+        return {name: reward(progress) for name, reward in REWARDS.items()}
+
+    @property
+    def done(self) -> bool:
+        """Whether the episode has ended."""
+        return self._done
+
+    @property
+    def steps_left(self) -> int:
+        """Steps that the episode may still have."""
+        return 0 if self._done else self.limits.steps - self._steps
+
+    def step(self, tool: object, arguments: Any = None, *, machine: str = MAIN) -> Step:
+        """Carries out one action.
+
+        Args:
+            tool: The action's name; whatever is given, the machine stays sound.
+            arguments: Its arguments, JSON values by name.
+            machine: The machine it is meant for, a new one if there is none of this name.
+
+        Raises:
+            EpisodeOverError: The episode has ended, or has no steps left.
+        """
+        self._require_a_step()
+        return self._stepped(self._acted(machine, tool, arguments))
+
+    def refuse(self, reason: str) -> Step:
+        """Counts a step that names no action, as a refused one.
+
+        Args:
+            reason: What was wrong, for who made it.
+
+        Raises:
+            EpisodeOverError: The episode has ended, or has no steps left.
+        """
+        self._require_a_step()
+        return self._stepped(Refused(cause=Cause.MALFORMED_ARGUMENTS, text=reason))
+
+    def _new_bench(self) -> Workbench:
+        limits = self.task.constraints
+        catalogue = catalogue_told(limits, data_sheets=self.data_sheets)
+        return Workbench(catalogue, on_demand=limits.on_demand, task=self.task)
+
+    def _acted(self, machine: str, tool: object, arguments: Any) -> Outcome:
+        room = self.limits.parts
+        if room is None:
+            return self._bench.act(machine, tool, arguments)
+        before = self._bench.values()
+        outcome = self._bench.act(machine, tool, arguments)
+        count = sum(machine.part_count for machine in self._bench.machines.values())
+        if count <= room:
+            return outcome
+        self._bench.return_to(before)
+        return Refused(
+            cause=Cause.OUT_OF_RANGE,
+            text=f"Your machines would have {count:,} parts together; there is room for {room:,}.",
+        )
+
+    def _require_a_step(self) -> None:
+        if self._done:
+            raise EpisodeOverError("the episode has ended: reset begins another")
+        if self._steps >= self.limits.steps:
+            raise EpisodeOverError(f"all {self.limits.steps:,} steps are used up: submit")
+
+    def _stepped(self, outcome: Outcome) -> Step:
+        self._steps += 1
+        if not isinstance(outcome, Accepted):
+            self._refused += 1
+        elif outcome.changed:
+            self._changes += 1
+        if self._shaped:
+            self._reward = self._worth()
+        return Step(outcome, self._reward, truncated=self._steps >= self.limits.steps)
+
+    def submit(self) -> Submission:
+        """Has what was built simulated and scored.
+
+        Raises:
+            EpisodeOverError: The episode has ended.
+            NothingToSubmitError: There is no machine, or there are several without an assembly; the
+                message says what to do, and the episode goes on.
+            SimulationError: The simulator failed; the episode stands where it stood.
+        """
+        if self._done:
+            raise EpisodeOverError("the episode has ended: reset begins another")
+        trial = self._tries(self.task, self.submitted(), self.simulator, seed=self.seed)
+        self._trials = (*self._trials, trial)
+        succeeded = trial.counts and not self.task.tests
+        self._done = succeeded or len(self._trials) >= self.rounds
+        self._reward = self._worth()
+        report = trial.detail or score_text(self.task, trial.score, trial.trajectory)
+        return Submission(trial=trial, reward=self._reward, report=report, done=self._done)
+
+    def finish(self) -> Submission:
+        """Submits what there is and ends the episode; nothing to submit is a failure as well.
+
+        Raises:
+            EpisodeOverError: The episode has ended.
+        """
+        try:
+            submitted = self.submit()
+        except NothingToSubmitError as nothing:
+            empty = try_machine(self.task, Machine())
+            trial = Trial(score=empty.score, reason="nothing_submitted", detail=str(nothing))
+            self._trials = (*self._trials, trial)
+            self._reward = self._worth()
+            submitted = Submission(trial=trial, reward=self._reward, report=trial.detail, done=True)
+        self._done = True
+        return Submission(
+            trial=submitted.trial, reward=submitted.reward, report=submitted.report, done=True
+        )
+
+    def state(self) -> Snapshot:
+        """Where the episode stands, as a value that no later step changes."""
+        return Snapshot(
+            task=self.task.name,
+            task_version=self.task.version,
+            machines=self._bench.values(),
+            steps=self._steps,
+            changes=self._changes,
+            refused=self._refused,
+            trials=self._trials,
+            done=self._done,
+        )
+
+    def restore(self, state: Snapshot | Mapping[str, Any]) -> None:
+        """Goes to a state; costs what differs from where the episode stands.
+
+        Args:
+            state: What `state` gave, here or in another environment of the task, or its document.
+
+        Raises:
+            SnapshotError: It is another task's, or no state.
+        """
+        snapshot = state if isinstance(state, Snapshot) else Snapshot.from_document(state)
+        if (snapshot.task, snapshot.task_version) != (self.task.name, self.task.version):
+            raise SnapshotError(
+                f"the state is of {snapshot.task} at version {snapshot.task_version}, and this is "
+                f"{self.task.name} at {self.task.version}"
+            )
+        self._go_to(snapshot)
+
+    def _go_to(self, snapshot: Snapshot) -> None:
+        self._bench.return_to(snapshot.machines)
+        self._steps, self._changes = snapshot.steps, snapshot.changes
+        self._refused, self._trials = snapshot.refused, snapshot.trials
+        self._done = snapshot.done
+        self._reward = self._worth()
+
+    def _worth(self) -> float:
+        return weighed(self.weights, self._progress())
+
+    def _progress(self) -> Progress:
+        result = self._bench.result()
+        return Progress(
+            task=self.task,
+            reference=self.reference,
+            machine=None if result is None else result[1],
+            changes=self._changes,
+            refused=self._refused,
+            trial=self.counted,
+        )

@@ -1,0 +1,94 @@
+"""What an episode is played by: its bounds, and what comes of resets, steps and submissions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from buildarena_geometry import ToolDefinition
+
+if TYPE_CHECKING:
+    from buildarena_benchmark.environment.trials.trials import Trial
+    from buildarena_geometry import Outcome
+
+DEFAULT_STEPS: Final = 2000
+"""Steps that an episode may have unless it is given another limit."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """How long an episode may be.
+
+    Attributes:
+        steps: Steps that it may have, refused ones included.
+        parts: Parts that all its machines may have together, for those who serve strangers: copies
+            of copies grow fast. None for any number.
+    """
+
+    steps: int = DEFAULT_STEPS
+    parts: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.steps < 1:
+            raise ValueError(f"steps is {self.steps}: an episode has at least one")
+        if self.parts is not None and self.parts < 1:
+            raise ValueError(f"parts is {self.parts}: a machine has at least one")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observation:
+    """What a builder has before its first step.
+
+    Attributes:
+        task: Name of the task.
+        briefing: Markdown with all that it must know: statement, rules and modules.
+        tools: What it may call: the actions, each with the argument `machine`, and `submit`.
+    """
+
+    task: str
+    briefing: str
+    tools: tuple[ToolDefinition, ...]
+
+
+class Step:
+    """What came of a step.
+
+    Attributes:
+        outcome: Whether the action was accepted, and why not.
+        reward: What the episode is worth so far.
+        truncated: Whether it was the last step that the episode may have: what is left is `submit`.
+    """
+
+    __slots__ = ("outcome", "reward", "truncated")
+
+    def __init__(self, outcome: Outcome, reward: float, *, truncated: bool) -> None:
+        self.outcome = outcome
+        self.reward = reward
+        self.truncated = truncated
+
+    @property
+    def ok(self) -> bool:
+        """Whether the action was accepted."""
+        return self.outcome.ok
+
+    @property
+    def feedback(self) -> str:
+        """What a model reads about it; put into words when it is asked for."""
+        return self.outcome.text
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Submission:
+    """What came of a submission.
+
+    Attributes:
+        trial: Its trial.
+        reward: What the episode is worth now.
+        report: The trial in words.
+        done: Whether the episode has ended.
+    """
+
+    trial: Trial
+    reward: float
+    report: str
+    done: bool

@@ -1,0 +1,109 @@
+"""Rewards by name: what an episode is worth so far, each between 0 and 1 but for the indicator.
+
+Each is a function of where the episode stands and not of the way there, so that a builder who goes
+in circles earns nothing by it. Success and indicator are known after a trial; the other two shape
+the way there, are off unless asked for, and are no figures of the benchmark.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Final
+
+from buildarena_benchmark import Task
+from buildarena_benchmark.constraints import share_of_constraints
+from buildarena_benchmark.environment.errors import UnknownChoiceError
+from buildarena_benchmark.environment.trials.trials import Trial
+from buildarena_benchmark.flags import is_disqualified
+from buildarena_geometry import Machine
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """Where an episode stands.
+
+    Attributes:
+        task: The task.
+        reference: The indicator that is worth 1.
+        machine: What would be submitted now; None where there is nothing.
+        changes: Accepted actions that changed a machine.
+        refused: Refused actions.
+        trial: The best trial so far, if any.
+    """
+
+    task: Task
+    reference: float
+    machine: Machine | None
+    changes: int
+    refused: int
+    trial: Trial | None
+
+
+Reward = Callable[[Progress], float]
+
+
+def success(progress: Progress) -> float:
+    """1 when the best trial met the task's criterion and nothing disqualifies it, otherwise 0."""
+    return float(progress.trial is not None and progress.trial.counts)
+
+
+def indicator(progress: Progress) -> float:
+    """The best trial's indicator over the task's reference, from 0; it may exceed 1.
+
+    A trial that failed the criterion keeps its indicator, a disqualified one has none.
+    """
+    trial = progress.trial
+    if trial is None or is_disqualified(trial.score.flags):
+        return 0.0
+    return max(0.0, trial.score.indicator) / progress.reference
+
+
+def accepted_share(progress: Progress) -> float:
+    """Accepted actions that changed something, as a share of those and the refused ones.
+
+    Questions count on neither side. 0 before the first.
+    """
+    tried = progress.changes + progress.refused
+    return progress.changes / tried if tried else 0.0
+
+
+def constraint_progress(progress: Progress) -> float:
+    """The share of the task's constraints that the machine meets as it stands now.
+
+    Counted in the order in which they are checked, up to the first that is broken.
+    """
+    if progress.machine is None:
+        return 0.0
+    return share_of_constraints(progress.task, progress.machine)
+
+
+REWARDS: Final[Mapping[str, Reward]] = MappingProxyType(
+    {
+        reward.__name__: reward
+        for reward in (success, indicator, accepted_share, constraint_progress)
+    }
+)
+"""All rewards by name."""
+TERMINAL: Final = frozenset({"success", "indicator"})
+"""Those that only a trial can change."""
+DEFAULT_WEIGHTS: Final[Mapping[str, float]] = MappingProxyType({"success": 1.0})
+"""What an environment rewards unless it is told otherwise."""
+
+
+def checked_weights(weights: Mapping[str, float]) -> Mapping[str, float]:
+    """The weights, if every one is of a reward that exists.
+
+    Raises:
+        UnknownChoiceError: One is not.
+    """
+    for name in weights:
+        if name not in REWARDS:
+            raise UnknownChoiceError("reward", name, REWARDS)
+    return MappingProxyType({name: float(weight) for name, weight in weights.items()})
+
+
+def weighed(weights: Mapping[str, float], progress: Progress) -> float:
+    """The sum of the rewards, each times its weight."""
+    return sum(weight * REWARDS[name](progress) for name, weight in weights.items())

@@ -1,0 +1,114 @@
+"""Trials of many machines, over processes that stay warm."""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future
+from typing import Any, Final, Self
+
+from buildarena_benchmark import Task
+from buildarena_benchmark.environment.choices import checked_simulator, chosen_task
+from buildarena_benchmark.environment.trials.trial_pool import (
+    LONGEST_TRIAL_S,
+    Evaluation,
+    TrialPool,
+    task_from,
+    text_of,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import DEFAULT_ENGINE
+
+AHEAD: Final = 4
+"""Machines of an iterable that are taken before their turn, for each process."""
+
+
+class Evaluator:
+    """Tries machines in several processes; results do not depend on their number or order.
+
+    Use it as a context, or close it. A machine that crashes the engine costs its own trial, and the
+    process is started again.
+
+    Args:
+        task: The task, or the name of a built-in one.
+        simulator: Name of the engine.
+        seed: As for `Environment`.
+        processes: How many; by default one for each core that this process may use.
+        timeout_s: Seconds after which a trial is broken off.
+        trajectories: Whether trials bring their trajectories, which is slower.
+        whole: False ends each trial when it is decided, see `try_machine`.
+
+    Raises:
+        UnknownChoiceError: Task or simulator does not exist.
+        TaskError: The task is not one that a file could describe.
+        ValueError: A number is out of range.
+    """
+
+    def __init__(
+        self,
+        task: Task | str,
+        simulator: str = DEFAULT_ENGINE,
+        *,
+        seed: int | None = None,
+        processes: int | None = None,
+        timeout_s: float = LONGEST_TRIAL_S,
+        trajectories: bool = False,
+        whole: bool = True,
+    ) -> None:
+        self.task = chosen_task(task)
+        self.simulator = checked_simulator(simulator)
+        self.seed = seed
+        task_from(text_of(self.task))
+        self._pool = TrialPool(
+            processes, timeout_s=timeout_s, trajectories=trajectories, whole=whole
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def map(self, machines: Iterable[Machine | Mapping[str, Any]]) -> Iterator[Evaluation]:
+        """Tries machines.
+
+        Args:
+            machines: Machines, or their documents; taken as they are needed.
+
+        Yields:
+            One evaluation for each, in their order.
+
+        Raises:
+            DocumentError: One is not a machine.
+        """
+        waiting: deque[Future[Evaluation]] = deque()
+        try:
+            for machine in machines:
+                waiting.append(self._submit(machine))
+                if len(waiting) >= AHEAD * len(self._pool.processes):
+                    yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            for future in waiting:
+                future.cancel()
+
+    def evaluate(self, machine: Machine | Mapping[str, Any]) -> Evaluation:
+        """Tries one machine; may be called from several threads."""
+        return self._submit(machine).result()
+
+    def close(self) -> None:
+        """Ends the processes; trials under way are broken off."""
+        self._pool.close()
+
+    def _submit(self, machine: Machine | Mapping[str, Any]) -> Future[Evaluation]:
+        return self._pool.submit(self.task, _document(machine), self.simulator, self.seed)
+
+
+def _document(machine: Machine | Mapping[str, Any]) -> str:
+    """A machine as text; how it came about plays no part in a trial."""
+    if isinstance(machine, Machine):
+        return json.dumps(machine.to_document())
+    Machine.from_document(machine)
+    return json.dumps(machine)

@@ -1,0 +1,301 @@
+"""Processes that stay warm and try machines of any task; one that dies costs its trial only."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from queue import SimpleQueue
+from typing import Any, Final, Self
+
+from buildarena_benchmark import Task, builtin_tasks, parse_task
+from buildarena_benchmark.environment.choices import is_builtin
+from buildarena_benchmark.environment.trials.trials import Trial, try_machine
+from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError, WarmProcess
+from buildarena_geometry import DocumentError, KeyPress, Machine
+from buildarena_simulation import (
+    DEFAULT_ENGINE,
+    MachineNotSimulable,
+    SimulationError,
+    Trajectory,
+    read_trajectory,
+    simulate,
+    write_trajectory,
+)
+
+LONGEST_TRIAL_S: Final = 600.0
+TASKS_READ: Final = 64
+"""Tasks that a process remembers."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Evaluation:
+    """What came of one machine of many.
+
+    Attributes:
+        trial: Its trial; None where there was none.
+        error: Why there was none: the engine failed or crashed, or it took too long. It says
+            nothing of the machine, and the trial may be tried again.
+    """
+
+    trial: Trial | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Question:
+    """What a process is asked, in documents: a task and a machine have parts that no pipe takes.
+
+    See `TrialPool.submit` and `text_of`; without `scored`, only a simulation is asked for.
+    """
+
+    task: str
+    machine: str
+    simulator: str
+    seed: int | None = None
+    whole: bool = True
+    trajectory: bool = True
+    scored: bool = True
+    controls: Sequence[KeyPress] | None = None
+
+
+class TrialPool:
+    """Tries machines in processes that environments of any tasks may share.
+
+    Its `try_machine` takes the place of the module's in an `Environment`: a machine that crashes
+    the engine then costs its own trial, not the program. Processes start with the first trials.
+    Use it as a context, or close it.
+
+    Args:
+        processes: How many; by default one for each core that this process may use.
+        timeout_s: Seconds after which a trial is broken off.
+        trajectories: Whether trials bring their trajectories, which is slower.
+        whole: False ends each trial when it is decided, see `try_machine`.
+        name: What its processes are called in messages.
+
+    Raises:
+        ValueError: A number is out of range.
+    """
+
+    def __init__(
+        self,
+        processes: int | None = None,
+        *,
+        timeout_s: float = LONGEST_TRIAL_S,
+        trajectories: bool = False,
+        whole: bool = True,
+        name: str = "trials",
+    ) -> None:
+        count = len(os.sched_getaffinity(0)) if processes is None else processes
+        if count < 1:
+            raise ValueError(f"processes is {count}: at least one is needed")
+        if not timeout_s > 0:
+            raise ValueError(f"timeout_s is {timeout_s}: it must be above 0")
+        self._timeout_s, self._trajectories, self._whole = timeout_s, trajectories, whole
+        numbers = [f" {number + 1}" for number in range(count)] if count > 1 else [""]
+        self.processes = [WarmProcess(name + number, _answering) for number in numbers]
+        self._free: SimpleQueue[WarmProcess] = SimpleQueue()
+        for process in self.processes:
+            self._free.put(process)
+        self._threads = ThreadPoolExecutor(count, thread_name_prefix="trials")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def start(self) -> None:
+        """Starts the processes, so that the first trials find them warm."""
+        for process in self.processes:
+            process.start()
+
+    def simulate(
+        self,
+        task: Task,
+        machine: Machine,
+        simulator: str,
+        *,
+        controls: Sequence[KeyPress] | None = None,
+        seed: int | None = None,
+        meanwhile: Callable[[], object] = lambda: None,
+    ) -> Trajectory:
+        """As `buildarena_simulation.simulate`, in one of the processes; waits for it.
+
+        Args:
+            task: The task whose scenario the machine is put through; it is not scored.
+            machine: The machine.
+            simulator: Name of the engine.
+            controls: Key presses of this run; None for the machine's own.
+            seed: Of a varied world; None for the exact one.
+            meanwhile: Called every now and then; what it raises breaks the trial off.
+
+        Raises:
+            MachineNotSimulable: The engine can't take the machine.
+            SimulationError: The engine failed, which says nothing of the machine.
+            ProcessEndedError: The engine ended its process.
+        """
+        question = _Question(
+            task=text_of(task),
+            machine=json.dumps(machine.to_document()),
+            simulator=simulator,
+            scored=False,
+            controls=controls,
+            seed=seed,
+        )
+        process = self._free.get()
+        try:
+            outcome = process.ask(question, meanwhile=meanwhile)
+        finally:
+            self._free.put(process)
+        if isinstance(outcome, Exception):
+            raise outcome
+        simulated: Trajectory = outcome
+        return simulated
+
+    def submit(
+        self, task: Task, document: str, simulator: str, seed: int | None = None
+    ) -> Future[Evaluation]:
+        """Has a machine tried when its turn comes.
+
+        Args:
+            task: A task that a file could describe.
+            document: The machine as JSON.
+            simulator: Name of the engine.
+            seed: As for `Environment`.
+        """
+        question = _Question(
+            task=text_of(task),
+            machine=document,
+            simulator=simulator,
+            seed=seed,
+            whole=self._whole,
+            trajectory=self._trajectories,
+        )
+        return self._threads.submit(self._evaluate, question)
+
+    def try_machine(
+        self,
+        task: Task,
+        machine: Machine,
+        simulator: str = DEFAULT_ENGINE,
+        *,
+        seed: int | None = None,
+    ) -> Trial:
+        """As `buildarena_benchmark.environment.try_machine`, in one of the processes; waits for it.
+
+        Raises:
+            SimulationError: The engine failed or crashed, or the trial took too long.
+        """
+        document = json.dumps(machine.to_document())
+        evaluation = self.submit(task, document, simulator, seed).result()
+        if evaluation.trial is None:
+            raise SimulationError(evaluation.error)
+        return evaluation.trial
+
+    def close(self) -> None:
+        """Ends the processes; trials under way are broken off."""
+        # What waits must not start a process again that was just ended.
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        self._end_processes()
+        self._threads.shutdown()
+        self._end_processes()
+
+    def _end_processes(self) -> None:
+        for process in self.processes:
+            process.close()
+
+    def _evaluate(self, question: _Question) -> Evaluation:
+        process = self._free.get()
+        try:
+            return self._asked(process, question)
+        finally:
+            self._free.put(process)
+
+    def _asked(self, process: WarmProcess, question: _Question) -> Evaluation:
+        until = time.monotonic() + self._timeout_s
+        try:
+            answer = process.ask(question, meanwhile=partial(_require_before, until))
+        except TimeoutError:
+            return Evaluation(error=f"the trial took longer than {self._timeout_s:g} s")
+        except ProcessEndedError as ended:
+            return Evaluation(error=str(ended))
+        if "error" in answer:
+            return Evaluation(error=answer["error"])
+        data = answer["trajectory"]
+        trajectory = None if data is None else read_trajectory(data)
+        return Evaluation(trial=Trial.from_document(answer["trial"], trajectory))
+
+
+_SEED: Final = "\n# seed "
+"""Stands in no task's JSON, which has one line."""
+
+
+def text_of(task: Task) -> str:
+    """A task as text: its name if it is a built-in one, otherwise its file; what draws it after."""
+    text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
+    drawn = task.seed or task.unknowns is not None
+    return f"{text}{_SEED}{task.seed}" if drawn else text
+
+
+@lru_cache(maxsize=TASKS_READ)
+def task_from(text: str) -> Task:
+    """The task of `text_of`; YAML, which tasks are written in, contains JSON.
+
+    Raises:
+        TaskError: The task is not one that a file could describe.
+    """
+    written, _, seed = text.partition(_SEED)
+    known = builtin_tasks().get(written)
+    task = parse_task(written, origin="task") if known is None else known
+    return task.drawn(int(seed)) if seed else task
+
+
+def _require_before(until: float) -> None:
+    if time.monotonic() > until:
+        raise TimeoutError
+
+
+def _answering() -> Callable[[Any], Any]:
+    """What a process answers with; whatever is slow to load is loaded before the first question."""
+    builtin_tasks()
+    return _answered
+
+
+def _answered(question: _Question) -> Any:
+    task = task_from(question.task)
+    if not question.scored:
+        return _simulated(task, question)
+    try:
+        trial = try_machine(
+            task,
+            Machine.from_document(json.loads(question.machine)),
+            question.simulator,
+            seed=question.seed,
+            whole=question.whole,
+        )
+    except (SimulationError, DocumentError) as error:
+        return {"error": str(error)}
+    trajectory = trial.trajectory if question.trajectory else None
+    return {
+        "trial": trial.as_document(),
+        "trajectory": None if trajectory is None else write_trajectory(trajectory),
+    }
+
+
+def _simulated(task: Task, question: _Question) -> Trajectory | Exception:
+    machine = Machine.from_document(json.loads(question.machine))
+    try:
+        return simulate(
+            machine,
+            task.scenario,
+            question.simulator,
+            controls=question.controls,
+            seed=question.seed,
+        )
+    except (MachineNotSimulable, SimulationError) as error:
+        return error

@@ -1,0 +1,154 @@
+"""The workbench of one who builds alone: the machines it builds, by name, and their assembly."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, Self
+
+from buildarena_benchmark.environment.errors import NothingToSubmitError
+from buildarena_benchmark.environment.given import acting
+from buildarena_benchmark.environment.tools import ASSEMBLY, LOOKUPS, TEST_CONTROLLER
+from buildarena_benchmark.environment.trials.programs import asked, program_tool, refused_program
+from buildarena_geometry import Cause, Machine, Refused
+from buildarena_geometry.modules.names import CaselessNames
+
+if TYPE_CHECKING:
+    from buildarena_benchmark import Task
+    from buildarena_geometry import Catalogue, Outcome
+    from buildarena_geometry.documents.log import LoggedState
+
+NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+"""What a machine may be called."""
+_LOOKUPS: Final = CaselessNames(LOOKUPS)
+
+
+class Workbench:
+    """Machines that are made by calls; the same calls make the same machines.
+
+    The machine called ``assembly`` is put together from copies of all others, as they are when
+    the first call to it is made.
+
+    Args:
+        catalogue: The modules they may be made of; the basic ones if left out.
+        on_demand: Whether modules may be looked up here; the calls are refused where they are told.
+        task: What is built for; where it gives a machine, every new one is that.
+    """
+
+    def __init__(
+        self,
+        catalogue: Catalogue | None = None,
+        *,
+        on_demand: bool = False,
+        task: Task | None = None,
+    ) -> None:
+        self._catalogue = catalogue
+        self._task = task
+        self._looked_up = on_demand
+        self._machines: dict[str, Machine] = {}
+
+    @property
+    def machines(self) -> Mapping[str, Machine]:
+        """What was built, by name, in the order of the first calls."""
+        return MappingProxyType(self._machines)
+
+    def act(self, machine: str, tool: object, arguments: Any) -> Outcome:
+        """Carries out an action on a machine; no argument makes it raise."""
+        if machine not in self._machines and NAME.fullmatch(machine) is None:
+            return Refused(
+                cause=Cause.MALFORMED_ARGUMENTS,
+                text="A machine's name has 1 to 40 letters, digits, dashes and underscores.",
+            )
+        if not self._looked_up and isinstance(tool, str) and _LOOKUPS.find(tool) is not None:
+            return Refused(
+                cause=Cause.UNKNOWN_ACTION,
+                text=f"There is no action {tool} in this task, which tells its modules.",
+            )
+        on_program = program_tool(tool)
+        if on_program is not None:
+            refusal = refused_program(self._task, on_program, arguments)
+            if refusal is not None:
+                return refusal
+        made = self.machine(machine)
+        if on_program == TEST_CONTROLLER.name:
+            return asked(self._task, made, arguments)
+        act = made.act if self._task is None else acting(self._task, made)
+        return act(tool, arguments)
+
+    def machine(self, name: str) -> Machine:
+        """The machine with a name; where there was none an empty one, or the one that is given."""
+        machine = self._machines.get(name)
+        if machine is None:
+            machine = self._machines[name] = self._new_machine(name)
+        return machine
+
+    def _new_machine(self, name: str) -> Machine:
+        if name == ASSEMBLY:
+            return Machine(catalogue=self._catalogue, available=self._machines)
+        if self._task is None or self._catalogue is None:
+            return Machine(catalogue=self._catalogue)
+        return self._task.new_machine(self._catalogue)
+
+    def result(self) -> tuple[str, Machine] | None:
+        """What is to be simulated: the assembly if there is one, otherwise the only machine."""
+        if ASSEMBLY in self._machines:
+            return ASSEMBLY, self._machines[ASSEMBLY]
+        if len(self._machines) == 1:
+            return next(iter(self._machines.items()))
+        return None
+
+    def submitted(self) -> Machine:
+        """The machine that is to be simulated.
+
+        Raises:
+            NothingToSubmitError: There is none, or there are several; the message says what to do.
+        """
+        result = self.result()
+        if result is None:
+            raise NothingToSubmitError(_what_to_do(self._machines))
+        return result[1]
+
+    def values(self) -> dict[str, LoggedState]:
+        """Everything that stands on it, as values by name."""
+        return {name: machine.logged for name, machine in self._machines.items()}
+
+    def return_to(self, values: Mapping[str, LoggedState]) -> None:
+        """Puts on it what `values` gave; costs what differs where the machines are its own."""
+        self._machines = {
+            name: _returned(self._machines.get(name), self._offered(value))
+            for name, value in values.items()
+        }
+
+    def _offered(self, value: LoggedState) -> LoggedState:
+        """A value from elsewhere goes on with what may be used here."""
+        if self._catalogue is None or value.state.catalogue is self._catalogue:
+            return value
+        return replace(value, state=replace(value.state, catalogue=self._catalogue))
+
+    @classmethod
+    def holding(cls, machines: Mapping[str, Machine]) -> Self:
+        """A workbench with these machines on it."""
+        bench = cls()
+        bench._machines = dict(machines)
+        return bench
+
+
+def _returned(machine: Machine | None, value: LoggedState) -> Machine:
+    if machine is None or machine.state.available is not value.state.available:
+        return Machine.restored(value)
+    machine.return_to(value)
+    return machine
+
+
+def _what_to_do(machines: Mapping[str, Machine]) -> str:
+    """Why there is nothing to submit, and how there would be."""
+    if not machines:
+        return "there is no machine to simulate: build one, beginning with the tool 'start'"
+    listed = ", ".join(repr(name) for name in machines)
+    return (
+        f"there are {len(machines)} machines ({listed}) and no assembly: put them together in the "
+        f"machine {ASSEMBLY!r}, with add_machine for each and connect_blocks between them, then "
+        "submit again"
+    )

@@ -1,1 +1,0 @@
-"""Celery's application, the queues, and the watchdog of their consumer."""

@@ -1,1 +1,0 @@
-"""What every process runs on: settings, context, stages, leases, the reaper."""

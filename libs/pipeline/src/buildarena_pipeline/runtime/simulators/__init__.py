@@ -1,1 +1,0 @@
-"""Simulators: what one is, which are installed here, and which jobs can name."""

@@ -1,1 +1,0 @@
-"""Jobs with their leases, journals, rollouts, results and attempts."""

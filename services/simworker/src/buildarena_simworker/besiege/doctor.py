@@ -1,0 +1,190 @@
+"""Whether this machine can play the game, point by point."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from buildarena_simworker.besiege.errors import DesktopError, GameChangedError, NotSetUpError
+from buildarena_simworker.besiege.installed import APP, MOD_FOLDERS, Installed, installed
+from buildarena_simworker.besiege.screen.calibration import load_calibration
+from buildarena_simworker.besiege.screen.window_types import Wanted
+from buildarena_simworker.besiege.settings import BesiegeSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One point.
+
+    Attributes:
+        name: What was looked at.
+        ok: Whether it is as it should be.
+        detail: What was found.
+        advice: What to do; "" when nothing need be done.
+    """
+
+    name: str
+    ok: bool
+    detail: str
+    advice: str = ""
+
+
+def examine(settings: BesiegeSettings) -> list[Finding]:
+    """Everything that a run needs, whether or not something earlier is missing."""
+    return list(_findings(settings))
+
+
+def _findings(settings: BesiegeSettings) -> Iterator[Finding]:
+    yield Finding(
+        name="versions",
+        ok=settings.version is not None,
+        detail=f"besiege-{settings.version}" if settings.version else "not set",
+        advice=""
+        if settings.version
+        else "set BUILDARENA_BESIEGE_GAME and BUILDARENA_BESIEGE_MOD as the service has them",
+    )
+    yield _machines(settings)
+    yield _command(settings)
+    present = installed(settings.folder)
+    yield _mod(settings, present)
+    yield _build(settings, present)
+    yield _tried("display", "screen found", _display)
+    yield _tried("calibration", str(settings.calibration_file), lambda: _calibration(settings))
+    yield _tried("unchanged", "the game that was calibrated", lambda: _unchanged(settings, present))
+    yield _tried("window", str(_wanted(settings)), lambda: _window(settings))
+
+
+def _machines(settings: BesiegeSettings) -> Finding:
+    folder = settings.machines_folder
+    name = "folder of machine files"
+    if folder is None:
+        advice = "set BUILDARENA_BESIEGE_FOLDER to the game's folder"
+        return Finding(name=name, ok=False, detail="not set", advice=advice)
+    able = folder.is_dir() and os.access(folder, os.W_OK)
+    detail = str(folder) if able else f"{folder} is missing or cannot be written"
+    advice = "" if able else "start the game once, or correct BUILDARENA_BESIEGE_MACHINES"
+    return Finding(name=name, ok=able, detail=detail, advice=advice)
+
+
+def _command(settings: BesiegeSettings) -> Finding:
+    if not settings.command:
+        return Finding(
+            name="restart",
+            ok=True,
+            detail="the runner cannot start the game by itself",
+            advice="set BUILDARENA_BESIEGE_COMMAND, so that a frozen game is restarted",
+        )
+    try:
+        program = settings.words(None)[0]
+    except (ValueError, IndexError) as error:
+        advice = "correct BUILDARENA_BESIEGE_COMMAND"
+        return Finding(name="restart", ok=False, detail=str(error), advice=advice)
+    if shutil.which(program) is None:
+        return Finding(
+            name="restart",
+            ok=False,
+            detail=f"there is no program {program}",
+            advice='correct BUILDARENA_BESIEGE_COMMAND; a path with blanks stands in quotes ("…")',
+        )
+    opens = "and opens levels" if settings.opens_levels else "with the level opened by hand"
+    return Finding(name="restart", ok=True, detail=f"{settings.command} {opens}")
+
+
+def _mod(settings: BesiegeSettings, present: Installed) -> Finding:
+    name = "Lua Scripting Mod"
+    if settings.folder is None:
+        return Finding(
+            name=name,
+            ok=True,
+            detail="not looked for: the game's folder is not set",
+            advice="set BUILDARENA_BESIEGE_FOLDER to have it looked for",
+        )
+    if present.mod_file is None:
+        return Finding(
+            name=name,
+            ok=False,
+            detail=f"no Mod.xml of it in {', '.join(MOD_FOLDERS)} below {settings.folder}",
+            advice="subscribe to it in Steam's workshop, start the game once, and enable it",
+        )
+    same = not settings.mod or not present.mod or settings.mod == present.mod
+    return Finding(
+        name=name,
+        ok=same,
+        detail=f"{present.mod or 'no version'} in {present.mod_file}",
+        advice="" if same else f"BUILDARENA_BESIEGE_MOD is {settings.mod}: set it to {present.mod}",
+    )
+
+
+def _build(settings: BesiegeSettings, present: Installed) -> Finding:
+    name = "build of the game"
+    if settings.folder is None:
+        return Finding(name=name, ok=True, detail="not looked for: the game's folder is not set")
+    if not present.build:
+        return Finding(
+            name=name,
+            ok=True,
+            detail=f"no appmanifest_{APP}.acf of Steam beside {settings.folder}",
+            advice="look yourself that the game is still the version that was calibrated",
+        )
+    return Finding(name=name, ok=True, detail=f"{present.build}, as Steam has it")
+
+
+def _unchanged(settings: BesiegeSettings, present: Installed) -> None:
+    """Whether the game is the one that was calibrated."""
+    try:
+        present.require(load_calibration(settings.calibration_file).installed)
+    except GameChangedError as error:
+        raise NotSetUpError(str(error)) from error
+
+
+def _tried(name: str, detail: str, check: Callable[[], None]) -> Finding:
+    try:
+        check()
+    except (NotSetUpError, DesktopError) as error:
+        what, _, advice = str(error).rpartition(": ")
+        return Finding(name=name, ok=False, detail=what or str(error), advice=advice)
+    return Finding(name=name, ok=True, detail=detail)
+
+
+def _display() -> None:
+    from buildarena_simworker.besiege.screen.capture import screenshot
+    from buildarena_simworker.besiege.screen.input import ScreenInput
+
+    screen_input = ScreenInput()
+    try:
+        screenshot()
+        screen_input.clear_clipboard()
+    finally:
+        screen_input.close()
+
+
+def _calibration(settings: BesiegeSettings) -> None:
+    from buildarena_simworker.besiege.screen.windows import open_windows
+
+    calibration = load_calibration(settings.calibration_file)
+    _display()
+    area = open_windows(_wanted(settings)).find()
+    if area is not None and calibration.window not in {None, (area.width, area.height)}:
+        was = "x".join(map(str, calibration.window or ()))
+        raise NotSetUpError(
+            f"it was made for a window of {was}, and the window is {area.width}x{area.height}: "
+            "run `buildarena besiege calibrate`"
+        )
+
+
+def _window(settings: BesiegeSettings) -> None:
+    from buildarena_simworker.besiege.screen.windows import open_windows
+
+    _display()
+    wanted = _wanted(settings)
+    if open_windows(wanted).find() is None and not settings.command:
+        raise NotSetUpError(
+            f"there is no {wanted}: start the game, or correct BUILDARENA_BESIEGE_TITLE and "
+            "BUILDARENA_BESIEGE_EXECUTABLE"
+        )
+
+
+def _wanted(settings: BesiegeSettings) -> Wanted:
+    return Wanted(title=settings.title, executable=settings.executable)

@@ -1,0 +1,238 @@
+"""The game's process: started, found again after the runner died, and ended for certain."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final
+
+import psutil
+
+from buildarena_simworker.besiege.errors import GameGoneError
+from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
+from buildarena_simworker.besiege.whole_files import write_whole
+
+END_S: Final = 5.0
+"""How long a game may take to end before it is killed."""
+
+
+class GameProcess:
+    """The one game that this runner plays.
+
+    What it knows is stored in a file: a runner that follows a dead one finds the same game.
+
+    Args:
+        settings: The command that starts it, and where to keep its pid.
+    """
+
+    def __init__(self, settings: BesiegeSettings) -> None:
+        self._settings = settings
+        self._file = settings.state / "game.json"
+        self._child: subprocess.Popen[str] | None = None
+        settings.state.mkdir(parents=True, exist_ok=True)
+
+    @property
+    def can_start(self) -> bool:
+        """Whether a command was set."""
+        return bool(self._settings.command)
+
+    @property
+    def output(self) -> Path:
+        """Where what it prints is written."""
+        return self._settings.state / "game.log"
+
+    def last_words(self) -> str:
+        """The last line that it printed."""
+        try:
+            lines = self.output.read_text(encoding="utf-8", errors="replace").split("\n")
+        except OSError:
+            lines = []
+        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+
+    @property
+    def level(self) -> str | None:
+        """Digest of the level it was started with; None when it was not started here."""
+        return None if self._process() is None else str(self._known().get("level"))
+
+    @property
+    def started(self) -> bool:
+        """Whether a runner started it; otherwise a person did, whose game outlives the runner."""
+        return bool(self._known().get("started"))
+
+    def is_running(self) -> bool:
+        """Whether the game that was started here still runs."""
+        return self._process() is not None
+
+    def awaited(self) -> bool:
+        """Whether the game may still show its window: it runs, or its launcher handed over.
+
+        A launcher ends, or stays beside the game, once it handed over; it is never started again
+        while the game may be on its way: six games were started in a row.
+        """
+        return self.is_running() or (self._child is not None and self._child.poll() == 0)
+
+    def adopt(self, pid: int | None) -> None:
+        """Takes the process of the game's window for the game, where a launcher started it.
+
+        Args:
+            pid: Of the window; None where the screen does not say, and the name must do.
+        """
+        known = self._known()
+        if pid is None and not self.is_running():
+            others = sorted(self._others(), key=lambda other: other.create_time())
+            pid = others[-1].pid if others else None
+        if pid is None or pid == known.get("pid"):
+            return
+        if not self._settings.executable and pid in self._children():
+            return
+        self._note(pid, str(known.get("level", "")), started=self.started)
+
+    def start(self, level: bytes | None) -> subprocess.Popen[str]:
+        """Starts it, with a level where the command opens one.
+
+        Args:
+            level: The level file's bytes; None for the sandbox.
+
+        Raises:
+            GameGoneError: There is no command, or it cannot be run.
+        """
+        if not self.can_start:
+            raise GameGoneError(
+                "the game does not run: start it, or set BUILDARENA_BESIEGE_COMMAND"
+            )
+        command = self._settings.words(self._level_file(level))
+        with self.output.open("ab") as log:
+            try:
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=log,
+                    stderr=log,
+                    text=True,
+                    encoding="utf-8",
+                    errors="replace",
+                    **_apart(),
+                )
+            except OSError as error:
+                raise GameGoneError(f"the game cannot be started: {error}") from error
+        self._child = process
+        self._note(process.pid, level_digest(level), started=True)
+        return process
+
+    def kill(self) -> None:
+        """Ends it and everything it started, and games that a launcher left on this screen.
+
+        A machine has one game: one more would take the keyboard, and Steam starts no second.
+        """
+        process = self._process()
+        family = [] if process is None else [process]
+        with suppress(psutil.NoSuchProcess):
+            family += [] if process is None else process.children(recursive=True)
+        if self.can_start:
+            family += [other for other in self._others() if other not in family]
+        for member in family:
+            with suppress(psutil.Error):
+                member.terminate()
+        _, alive = psutil.wait_procs(family, timeout=END_S)
+        for member in alive:
+            with suppress(psutil.Error):
+                member.kill()
+        psutil.wait_procs(alive, timeout=END_S)
+        if self._is_launcher(process):
+            self._child = None
+        if self._child is not None:
+            self._child.wait()
+            self._child = None
+        self._file.unlink(missing_ok=True)
+
+    def _level_file(self, level: bytes | None) -> Path | None:
+        """The level as a file for the game; None for the sandbox."""
+        if level is None:
+            return None
+        file = self._settings.state / "levels" / f"{level_digest(level)}.blv"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(level)
+        return file.absolute()
+
+    def _children(self) -> set[int]:
+        """The processes that the started one began, whose window may be one's."""
+        process = self._process()
+        with suppress(psutil.NoSuchProcess):
+            return set() if process is None else {child.pid for child in process.children(True)}
+        return set()
+
+    def _is_launcher(self, game: psutil.Process | None) -> bool:
+        """Whether what was started runs on, beside the game that it started."""
+        child = self._child
+        return (
+            child is not None
+            and child.poll() is None
+            and game is not None
+            and (child.pid != game.pid)
+        )
+
+    def _note(self, pid: int, level: str, *, started: bool) -> None:
+        with suppress(psutil.NoSuchProcess):
+            created = psutil.Process(pid).create_time()
+            known = {"pid": pid, "created": created, "level": level, "started": started}
+            write_whole(self._file, json.dumps(known).encode())
+
+    def _others(self) -> list[psutil.Process]:
+        """Processes of the game's name that this account runs on this screen."""
+        wanted = executable_stem(self._settings.executable)
+        own = psutil.Process()
+        processes = []
+        for process in psutil.process_iter():
+            with suppress(psutil.Error, OSError):
+                if (
+                    wanted
+                    and executable_stem(process.name()) == wanted
+                    and process.username() == own.username()
+                    and _screen_of(process) == _screen_of(own)
+                    and process.status() != psutil.STATUS_ZOMBIE
+                ):
+                    processes.append(process)
+        return processes
+
+    def _known(self) -> dict[str, Any]:
+        try:
+            known = json.loads(self._file.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return known if isinstance(known, dict) else {}
+
+    def _process(self) -> psutil.Process | None:
+        known = self._known()
+        try:
+            process = psutil.Process(int(known["pid"]))
+            same = abs(process.create_time() - float(known["created"])) < 1.0
+            alive = process.status() != psutil.STATUS_ZOMBIE
+        except (KeyError, ValueError, psutil.NoSuchProcess):
+            return None
+        return process if same and alive else None
+
+
+def executable_stem(name: str) -> str:
+    """A program's name without the ending that its system adds, in lower case."""
+    stem = name.strip().casefold()
+    for ending in (".exe", ".x86_64", ".x86", ".app"):
+        stem = stem.removesuffix(ending)
+    return stem
+
+
+def _screen_of(process: psutil.Process) -> str:
+    """Which X11 screen a process shows its windows on; one for all elsewhere."""
+    if sys.platform in {"win32", "darwin"}:
+        return ""
+    return str(process.environ().get("DISPLAY", ""))
+
+
+def _apart() -> Mapping[str, Any]:
+    """What keeps the runner's signals, and its death, away from the game."""
+    if sys.platform == "win32":
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    return {"start_new_session": True}

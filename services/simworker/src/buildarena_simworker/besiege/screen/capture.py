@@ -1,0 +1,59 @@
+"""Pictures of a screen, and how much they differ."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Final
+
+from buildarena_simworker.besiege.errors import ScreenError
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+    from buildarena_simworker.besiege.screen.window_types import Area
+
+_VISIBLE: Final = 16
+"""Shades of grey, of 256, by which a pixel must change to count."""
+
+
+def picture(area: Area) -> Image:
+    """A part of the screen, in shades of grey."""
+    return _grabbed(area.box).convert("L")
+
+
+def screenshot() -> bytes:
+    """The whole screen as PNG; raises `ScreenError` where there is none."""
+    data = io.BytesIO()
+    _grabbed(None).save(data, "PNG")
+    return data.getvalue()
+
+
+def is_black(image: Image) -> bool:
+    """Whether nothing is to be seen, as while the screen is locked or asleep."""
+    return not any(image.convert("L").histogram()[_VISIBLE:])
+
+
+def _grabbed(box: tuple[int, int, int, int] | None) -> Image:
+    """The screen, or a part of it.
+
+    Raises:
+        ScreenError: The system gives no picture, as while the screen is locked.
+    """
+    from PIL import ImageGrab
+
+    try:
+        return ImageGrab.grab(bbox=box)
+    except OSError as error:
+        raise ScreenError(f"the screen shows nothing, as while it is locked: {error}") from error
+
+
+def difference(first: Image, second: Image) -> float:
+    """Share of two pictures that looks different, 0 to 1."""
+    from PIL import ImageChops
+
+    if first.size != second.size:
+        return 1.0
+    small = (256, 256)
+    changed = ImageChops.difference(first.resize(small), second.resize(small))
+    counts = changed.histogram()
+    return sum(counts[_VISIBLE:]) / (small[0] * small[1])

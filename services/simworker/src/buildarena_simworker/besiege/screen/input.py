@@ -1,0 +1,173 @@
+"""Mouse, keyboard and clipboard of a screen; the only module that uses PyAutoGUI."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any, Final
+
+from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError, ScreenError
+from buildarena_simworker.besiege.screen.clipboard import open_clipboard
+
+MODIFIERS: Final = ("ctrl", "shift", "alt", "command", "win")
+SELECT: Final = "command" if sys.platform == "darwin" else "ctrl"
+"""The modifier of "select all" and "copy"."""
+KEY_S: Final = 0.05
+"""How long a key of a shortcut stays down, and from one to the next: three frames of a game."""
+COPY_S: Final = 1.0
+"""How long a copy may take to be in the clipboard."""
+SENTINEL: Final = "nothing was copied"
+"""Put into the clipboard before copying: when it is still there, nothing was copied."""
+
+
+class ScreenInput:
+    """Moves the mouse, types and copies, as a person does.
+
+    Args:
+        pace: Factor by which all waits are shorter than usual.
+
+    Raises:
+        NotSetUpError: There is no screen, or the extra `besiege` is not installed.
+    """
+
+    def __init__(self, pace: float = 1.0) -> None:
+        self._pace = pace
+        _need_no_authority()
+        try:
+            # Xlib prints what it misses to standard output, which is for results.
+            with contextlib.redirect_stdout(io.StringIO()):
+                import pyautogui
+        except ImportError as error:
+            raise NotSetUpError(
+                f"playing the game needs `pip install buildarena[besiege]` ({error})"
+            ) from error
+        except Exception as error:
+            raise NotSetUpError(f"there is no screen to play on: {error}") from error
+        pyautogui.PAUSE = 0.0
+        self._gui: Any = pyautogui
+        self._clipboard = open_clipboard()
+
+    def wait(self, seconds: float) -> None:
+        """Waits as long as a game needs at the usual pace."""
+        time.sleep(seconds / self._pace)
+
+    def click(self, x: int, y: int) -> None:
+        """A slow click: games miss fast ones."""
+        gui = self._gui
+        with _stopped_by_hand(gui):
+            gui.moveTo(x, y)
+            self.wait(0.1)
+            gui.mouseDown()
+            self.wait(0.05)
+            gui.mouseUp()
+
+    def move(self, x: int, y: int) -> None:
+        """Moves the mouse."""
+        with _stopped_by_hand(self._gui):
+            self._gui.moveTo(x, y)
+
+    def screen_size(self) -> tuple[int, int]:
+        """Width and height of the screen, pixels."""
+        size = self._gui.size()
+        return (int(size.width), int(size.height))
+
+    def position(self) -> tuple[int, int]:
+        """Where the mouse is."""
+        point = self._gui.position()
+        return (int(point.x), int(point.y))
+
+    def press(self, key: str) -> None:
+        """Presses and releases one key."""
+        with _stopped_by_hand(self._gui):
+            self._gui.press(key)
+
+    def hotkey(self, modifier: str, *keys: str) -> None:
+        """Presses keys, each for a moment, while a modifier is down; whatever happens, none stays.
+
+        A game that looks at its keys once a frame misses those that go down and up in between.
+        """
+        with _stopped_by_hand(self._gui):
+            try:
+                self._gui.keyDown(modifier)
+                for key in keys:
+                    self.wait(KEY_S)
+                    self._gui.keyDown(key)
+                    self.wait(KEY_S)
+                    self._gui.keyUp(key)
+                self.wait(KEY_S)
+            finally:
+                for key in (*keys, modifier):
+                    self._gui.keyUp(key)
+
+    def write(self, text: str) -> None:
+        """Types a text of letters and digits."""
+        with _stopped_by_hand(self._gui):
+            self._gui.write(text)
+
+    def release_all(self) -> None:
+        """Releases all keys and buttons that a runner that died may have held."""
+        with _stopped_by_hand(self._gui):
+            for key in MODIFIERS:
+                self._gui.keyUp(key)
+            self._gui.mouseUp()
+
+    def close(self) -> None:
+        """Releases keys and clipboard."""
+        try:
+            self.release_all()
+        finally:
+            self._clipboard.close()
+
+    def clear_clipboard(self) -> None:
+        """Marks the clipboard, so that a later copy can be recognised."""
+        self._clipboard.put(SENTINEL)
+
+    def copy_all(self) -> str | None:
+        """Selects and copies everything where the keyboard is; None when nothing was copied.
+
+        The copy follows the selection at once: a text that grows from its top moves on under the
+        selection, and loses its end.
+        """
+        self.clear_clipboard()
+        self.hotkey(SELECT, "a", "c")
+        ends = time.monotonic() + COPY_S / self._pace
+        while True:
+            text = self._clipboard.get()
+            if text is not None and text != SENTINEL:
+                return text
+            if time.monotonic() >= ends:
+                return None
+            self.wait(KEY_S)
+
+
+def _need_no_authority() -> None:
+    """Python's Xlib insists on a file of authorities, also on a screen that asks for none."""
+    if sys.platform in {"win32", "darwin"} or "XAUTHORITY" in os.environ:
+        return
+    if not Path("~/.Xauthority").expanduser().exists():
+        os.environ["XAUTHORITY"] = os.devnull
+
+
+class _stopped_by_hand:  # noqa: N801 - reads as a statement
+    """Turns what PyAutoGUI raises into our own errors.
+
+    Its fail-safe is the mouse in the screen's corner; everything else is a screen that does not
+    take what is pressed, as while it is locked.
+    """
+
+    def __init__(self, gui: Any) -> None:
+        self._gui = gui
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(self, kind: type[BaseException] | None, error: object, _: object) -> None:
+        if kind is None or not issubclass(kind, Exception) or issubclass(kind, DesktopError):
+            return
+        if issubclass(kind, self._gui.FailSafeException):
+            raise DesktopError("somebody moved the mouse into the screen's corner to stop")
+        raise ScreenError(f"mouse and keyboard cannot be used: {error or kind.__name__}")

@@ -1,0 +1,83 @@
+"""What a game's window shows, and where its places are on the screen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final
+
+from buildarena_simworker.besiege.errors import GameGoneError
+from buildarena_simworker.besiege.screen.calibration import Calibration
+from buildarena_simworker.besiege.screen.capture import difference, is_black, picture
+from buildarena_simworker.besiege.screen.window_types import Area, Windows
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+CHANGED: Final = 0.02
+"""Share of a patch that looks different after something was opened or closed there."""
+PATCH: Final = (0.14, 0.10)
+"""Width and height of a patch, shares of the window."""
+
+
+class View:
+    """The window of one game.
+
+    Args:
+        calibration: Where its places are.
+        windows: Finds it.
+    """
+
+    def __init__(self, calibration: Calibration, windows: Windows) -> None:
+        self._calibration = calibration
+        self._windows = windows
+
+    def point(self, place: str) -> tuple[int, int]:
+        """Where a place is on the screen, pixels.
+
+        Raises:
+            GameGoneError: There is no window.
+        """
+        window = self._window()
+        pixels = self._calibration.pixels.get(place)
+        if pixels is not None:
+            return (window.left + pixels[0], window.top + pixels[1])
+        return self.at(*self._calibration.positions[place])
+
+    def at(self, x: float, y: float) -> tuple[int, int]:
+        """Where fractions of the window are on the screen, pixels."""
+        window = self._window()
+        return (window.left + round(x * window.width), window.top + round(y * window.height))
+
+    def patch(self, place: str) -> Image:
+        """What the window shows around a place."""
+        window = self._window()
+        width, height = round(PATCH[0] * window.width), round(PATCH[1] * window.height)
+        x, y = self.point(place)
+        left = min(max(x - width // 2, window.left), window.left + window.width - width)
+        top = min(max(y - height // 2, window.top), window.top + window.height - height)
+        return picture(Area(left, top, width, height))
+
+    def differs(self, place: str, before: Image) -> bool:
+        """Whether the window looks different there now."""
+        return difference(self.patch(place), before) > CHANGED
+
+    def whole(self) -> Image:
+        """All that the window shows."""
+        return picture(self._window())
+
+    def size_finding(self) -> str | None:
+        """What is wrong with the window's size; None where it is as calibrated, and shows much."""
+        window = self._window()
+        size, wanted = (window.width, window.height), self._calibration.window
+        if wanted is not None and size != wanted:
+            return (
+                f"the window is {size[0]}x{size[1]}, and was calibrated at {wanted[0]}x{wanted[1]}"
+            )
+        if is_black(self.whole()):
+            return "the window is black, as while the screen is locked or asleep"
+        return None
+
+    def _window(self) -> Area:
+        window = self._windows.find()
+        if window is None:
+            raise GameGoneError(f"there is no {self._windows.wanted}")
+        return window

@@ -1,0 +1,325 @@
+"""A game with a window, driven by mouse and keyboard.
+
+The steps are those of the published runner; each is verified by what can be seen: the clipboard,
+the pixels near what was clicked, the log.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import TYPE_CHECKING, Final
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_besiege import GameLog, GameRun, level_file, level_finding, trajectory_of
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simworker.besiege.errors import (
+    DesktopError,
+    GameGoneError,
+    LevelClosedError,
+    ScreenError,
+    StepFailedError,
+    WrongLevelError,
+)
+from buildarena_simworker.besiege.game_lock import GameLock, screen_name
+from buildarena_simworker.besiege.installed import installed
+from buildarena_simworker.besiege.log_sources import LogFile
+from buildarena_simworker.besiege.process import GameProcess
+from buildarena_simworker.besiege.screen.actions import ScreenActions
+from buildarena_simworker.besiege.screen.calibration import Calibration
+from buildarena_simworker.besiege.screen.capture import difference, screenshot
+from buildarena_simworker.besiege.screen.game_start import start_game
+from buildarena_simworker.besiege.screen.input import ScreenInput
+from buildarena_simworker.besiege.screen.machine_list import load_by_name
+from buildarena_simworker.besiege.screen.steps import ATTEMPTS, wait_for
+from buildarena_simworker.besiege.screen.view import View
+from buildarena_simworker.besiege.screen.window_types import Windows
+from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
+from buildarena_simworker.besiege.traces import Traces
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+LIKE_EMPTY: Final = 0.35
+"""A window is empty again when it differs from an empty one by less than this share of what a
+loaded machine changed."""
+
+
+class WindowDesktop:
+    """Plays a game in a window.
+
+    Args:
+        settings: Title, folders and command.
+        calibration: Where to click.
+        screen_input: Mouse, keyboard and clipboard.
+        windows: The screen's windows.
+    """
+
+    def __init__(
+        self,
+        settings: BesiegeSettings,
+        calibration: Calibration,
+        screen_input: ScreenInput,
+        windows: Windows,
+    ) -> None:
+        self._settings = settings
+        self._limits = settings.time_limits
+        self._calibration = calibration
+        self._lock = GameLock(screen_name())
+        self._view = View(calibration, windows)
+        self._input = screen_input
+        self._windows = windows
+        self._process = GameProcess(settings)
+        self._actions = ScreenActions(
+            self._view, screen_input, windows, self._limits, self.is_alive
+        )
+        self._traces = Traces(settings.state)
+        self._log_file = None if settings.log_file is None else LogFile(settings.log_file)
+        self._empty: Image | None = None
+        self._level: bytes | None = None
+        self._loaded_changed = 0.0
+        self._panel_shown = False
+        self._early_copies: list[str] = []
+
+    def require_able(self, run: GameRun) -> None:
+        """Checks that the calibrated game is played, with the run's level open or to be opened."""
+        installed(self._settings.folder).require(self._calibration.installed)
+        if self._settings.opens_levels:
+            return
+        wanted = level_digest(run.level)
+        if wanted != self._open_level():
+            raise LevelClosedError(
+                f"the game has the level of {self._settings.level or 'the sandbox'} open, and this "
+                "task needs another: write it with `buildarena besiege level TASK --out FILE.blv`, "
+                "open it in the game, and set BUILDARENA_BESIEGE_LEVEL to the task's name"
+            )
+
+    def prepare(self, run: GameRun) -> None:
+        """Brings an empty game with the run's level to the front."""
+        self._input.release_all()
+        left = self._traces.left
+        self._traces.remove()
+        other_level = self._settings.opens_levels and self._process.level != level_digest(run.level)
+        doubtful = left and self._process.can_start
+        if other_level or doubtful or not self.is_alive():
+            self._start_anew(run.level)
+        elif left:
+            self._tidy()
+        self._level = run.level
+        self._actions.to_front()
+        self._actions.step(
+            "look at the window", self._windows.raise_, self._view.size_finding, attempts=1
+        )
+        self._empty = self._view.whole()
+
+    def load(self, run: GameRun) -> None:
+        """Loads the machine by its name; the name that was typed is read back."""
+        folder = self._settings.machines_folder
+        if folder is None or not folder.is_dir():
+            raise DesktopError(f"the folder of machine files {folder} does not exist")
+        self._traces.put(folder / f"{run.name}.bsg", run.machine_file)
+        self._actions.by_attempts(lambda: self._load(run.name))
+        if run.set_ground:
+            self._actions.click("set_ground")
+            self._input.wait(0.5)
+
+    def start(self, run: GameRun) -> None:
+        """Starts, and shows the mod's log until the run's begin line is in it.
+
+        The log is drawn only once something was printed, and nobody can see whether the mod's panel
+        is shown before: Ctrl+L is right if the begin line can be copied afterwards, and pressed
+        once more if not.
+        """
+        self._early_copies.clear()
+        if self._log_file is not None:
+            self._log_file.skip()
+        self._input.wait(0.3)
+        self._actions.click("start")
+        if self._log_file is None:
+            self._actions.step(
+                "show the log",
+                lambda: self._input.hotkey("ctrl", "l"),
+                lambda: self._no_begin_line(run),
+                timeout_s=self._limits.begin_s / ATTEMPTS,
+            )
+            self._panel_shown = True
+
+    def _no_begin_line(self, run: GameRun) -> str | None:
+        text = self.read_log()
+        self._early_copies.append(text)
+        begun = GameLog(run.run_id)
+        begun.read(text)
+        return None if begun.begun else "the begin line of the run is not in what was copied"
+
+    def new_log(self, run: GameRun) -> GameLog:
+        """A log that collects the run's lines, with what was copied as it started."""
+        log = GameLog(run.run_id)
+        for text in self._early_copies:
+            log.read(text)
+        return log
+
+    def require_level(self, run: GameRun, log: GameLog) -> None:
+        """Checks what the run's script measured: the level, and the size the game draws to."""
+        world = log.world
+        if world is None:
+            return
+        wanted = self._calibration.screen
+        if wanted is not None and world.screen != wanted:
+            raise ScreenError(
+                f"the game draws {_size(world.screen)}, and was calibrated at {_size(wanted)}"
+            )
+        finding = level_finding(world, run.scenario)
+        if finding is not None and self._settings.opens_levels:
+            raise WrongLevelError(f"another level is open than the task's: {finding}")
+        if finding is not None:
+            opened = self._settings.level or "the sandbox"
+            raise LevelClosedError(
+                f"BUILDARENA_BESIEGE_LEVEL says that the level of {opened} is open, and it is not: "
+                f"{finding}; open it in the game"
+            )
+
+    def trajectory(self, log: GameLog, machine: Machine, scenario: Scenario) -> Trajectory:
+        """The run's trajectory from its lines."""
+        game, mod = self._settings.game, self._settings.mod
+        return trajectory_of(log, machine, scenario, game=game, mod=mod)
+
+    def read_log(self) -> str:
+        """A copy of the log window, or what the file brought."""
+        if self._log_file is not None:
+            return self._log_file.read()
+        self._actions.click("log_window")
+        return self._input.copy_all() or ""
+
+    def print_lines(self, run: GameRun) -> None:
+        """Loads and starts a machine and shows the mod's log, for a person to point at."""
+        self.prepare(run)
+        self.load(run)
+        self._actions.click("start")
+        self._input.wait(1.0)
+        self._input.hotkey("ctrl", "l")
+        self._panel_shown = True
+
+    def stop(self) -> None:
+        """Stops the simulation: its lines come to an end."""
+        if self._log_file is None:
+            self._actions.step("stop the simulation", self._click_start, self._still_moves)
+        else:
+            self._click_start()
+
+    def clear(self) -> None:
+        """Deletes the machine, until the window looks as it did without one."""
+        self._actions.click("empty_space")
+        self._input.wait(0.3)
+        if self._panel_shown:
+            self._input.hotkey("ctrl", "l")
+            self._panel_shown = False
+            self._input.wait(0.3)
+        self._actions.step("delete the machine", self._delete, self._still_there)
+        self._traces.remove()
+
+    def recover(self) -> None:
+        """Closes dialogs and takes the keyboard back."""
+        self._actions.recover()
+
+    def is_alive(self) -> bool:
+        """Whether the game has a window; one that a person started is taken as it is."""
+        if self._windows.find() is None:
+            return False
+        if self._process.can_start and not self._process.is_running():
+            self._process.adopt(self._windows.process())
+            return self._process.is_running()
+        return True
+
+    def restart(self) -> None:
+        """Kills the game and starts it again with the level it had."""
+        self._input.release_all()
+        if not self._process.can_start:
+            raise GameGoneError(
+                "the game must be restarted, and BUILDARENA_BESIEGE_COMMAND is not set: "
+                "start it again by hand"
+            )
+        self._start_anew(self._level)
+        self._traces.remove()
+
+    def screenshot(self) -> bytes | None:
+        """The whole screen."""
+        return screenshot()
+
+    def close(self) -> None:
+        """Lets go of the keys, and ends the game if it was started here."""
+        try:
+            with suppress(DesktopError):
+                self._input.close()
+        finally:
+            if self._process.started:
+                self._process.kill()
+            self._traces.remove()
+            self._lock.release()
+
+    def _start_anew(self, level: bytes | None) -> None:
+        self._panel_shown = False
+        start_game(self._process, self._actions, level, self._calibration.path)
+
+    def _load(self, name: str) -> None:
+        load_by_name(self._actions, name)
+        self._saw_machine(name)
+
+    def _open_level(self) -> str:
+        """Digest of the level that the owner says is open."""
+        if not self._settings.level:
+            return level_digest(None)
+        task = builtin_tasks().get(self._settings.level)
+        if task is None:
+            known = ", ".join(builtin_tasks())
+            raise LevelClosedError(
+                f"BUILDARENA_BESIEGE_LEVEL: no task {self._settings.level!r}; there are {known}"
+            )
+        return level_digest(level_file(task.scenario))
+
+    def _tidy(self) -> None:
+        """Takes out of a game what a dead runner left, by hand."""
+        self.recover()
+        self._actions.click("empty_space")
+        self._actions.click("delete")
+        self._input.wait(0.5)
+        self._actions.click("confirm")
+        self._input.wait(0.5)
+        self._input.press("escape")
+
+    def _saw_machine(self, name: str) -> None:
+        """Notes how much a loaded machine changes the window."""
+        finding = wait_for(
+            lambda: None if self._changed_since_empty() > 0.0 else "the window shows no machine",
+            timeout_s=self._limits.effect_s,
+        )
+        if finding is not None:
+            raise StepFailedError(f"load the machine {name}", finding)
+        self._loaded_changed = self._changed_since_empty()
+
+    def _changed_since_empty(self) -> float:
+        return 1.0 if self._empty is None else difference(self._view.whole(), self._empty)
+
+    def _still_there(self) -> str | None:
+        changed = self._changed_since_empty()
+        if changed <= LIKE_EMPTY * self._loaded_changed:
+            return None
+        return "the window does not look as it did without a machine"
+
+    def _delete(self) -> None:
+        self._actions.click("delete")
+        self._input.wait(0.5)
+        self._actions.click("confirm")
+        self._input.wait(0.5)
+
+    def _click_start(self) -> None:
+        self._actions.click("start")
+        self._input.wait(0.5)
+
+    def _still_moves(self) -> str | None:
+        before = self.read_log()
+        self._input.wait(0.7)
+        return None if before == self.read_log() else "lines are still added to the log"
+
+
+def _size(size: tuple[int, int]) -> str:
+    return f"{size[0]}x{size[1]}"

@@ -1,0 +1,44 @@
+"""The desktop of the game on this machine, as its settings say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from buildarena_simworker.besiege.errors import NotSetUpError
+from buildarena_simworker.besiege.installed import installed
+from buildarena_simworker.besiege.screen.calibration import load_calibration
+from buildarena_simworker.besiege.settings import BesiegeSettings
+
+if TYPE_CHECKING:
+    from buildarena_simworker.besiege.screen.window import WindowDesktop
+
+
+def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str, Any]]:
+    """The game, and what a manifest should say of how it is driven.
+
+    Raises:
+        NotSetUpError: Something is missing; the message says what to do.
+    """
+    folder = settings.machines_folder
+    if folder is None or not folder.is_dir():
+        raise NotSetUpError(
+            f"there is no folder of machine files {folder}: set BUILDARENA_BESIEGE_FOLDER to the "
+            "game's folder, or BUILDARENA_BESIEGE_MACHINES to the folder itself"
+        )
+    from buildarena_simworker.besiege.screen.input import ScreenInput
+    from buildarena_simworker.besiege.screen.window import WindowDesktop
+    from buildarena_simworker.besiege.screen.window_types import Wanted
+    from buildarena_simworker.besiege.screen.windows import open_windows
+
+    calibration = load_calibration(settings.calibration_file)
+    screen_input = ScreenInput(settings.pace)
+    windows = open_windows(Wanted(title=settings.title, executable=settings.executable))
+    desktop = WindowDesktop(settings, calibration, screen_input, windows)
+    facts = {
+        "calibration": calibration.digest,
+        "screen": "x".join(map(str, screen_input.screen_size())),
+        "log": "window" if settings.log_file is None else "file",
+        **installed(settings.folder).as_facts(),
+    }
+    return desktop, facts

@@ -1,0 +1,114 @@
+"""What the runner must know of the game on its machine, read from ``BUILDARENA_BESIEGE_*``."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from buildarena_simworker.besiege.commands import command_words
+from buildarena_simworker.besiege.time_limits import TimeLimits
+
+LEVEL_FIELD = "{level}"
+"""Placeholder in the game's command: the level file to open, or "" for the sandbox."""
+
+
+class BesiegeSettings(BaseSettings):
+    """What the owner of a machine with the game can set."""
+
+    model_config = SettingsConfigDict(env_prefix="BUILDARENA_BESIEGE_", extra="ignore")
+
+    game: Annotated[str, Field(description="Version of the game, for example 1.75-23370")] = ""
+    mod: Annotated[str, Field(description="Version of its Lua Scripting Mod")] = ""
+    folder: Annotated[Path | None, Field(description="Folder of the game")] = None
+    machines: Annotated[
+        Path | None, Field(description="Folder of machine files; default FOLDER/SavedMachines")
+    ] = None
+    command: Annotated[
+        str,
+        Field(
+            description="Command that starts the game, so that the runner can restart it; "
+            "{level} in it is replaced by the level file to open"
+        ),
+    ] = ""
+    level: Annotated[
+        str,
+        Field(
+            description="Task whose level is open, for example support-1, where the command "
+            "cannot open levels; default: the flat sandbox"
+        ),
+    ] = ""
+    title: Annotated[str, Field(description="Title of the game's window, whatever its case")] = (
+        "Besiege"
+    )
+    executable: Annotated[
+        str,
+        Field(
+            description="Name of the game's program, with or without its ending; with an empty one "
+            "a window's title is enough"
+        ),
+    ] = "Besiege"
+    calibration: Annotated[
+        Path | None, Field(description="Calibration file; default STATE/calibration.json")
+    ] = None
+    log_file: Annotated[
+        Path | None,
+        Field(description="File to which the game writes its log; default: the log window"),
+    ] = None
+    state: Annotated[
+        Path, Field(description="Folder of the runner's own files: calibration, pid, screenshots")
+    ] = Path.home() / ".buildarena" / "besiege"
+    pace: Annotated[
+        float,
+        Field(description="How much shorter than usual the waits between clicks are", gt=0, le=20),
+    ] = 1.0
+
+    patience: Annotated[
+        float,
+        Field(description="How many times as long as usual the game may take", gt=0, le=100),
+    ] = 1.0
+
+    @property
+    def time_limits(self) -> TimeLimits:
+        """How long to wait for the game."""
+        return TimeLimits().scaled(self.patience)
+
+    @property
+    def version(self) -> str | None:
+        """The game and mod as tracks name them; None while one of them is not set."""
+        return f"{self.game}-{self.mod}" if self.game and self.mod else None
+
+    @property
+    def machines_folder(self) -> Path | None:
+        """Where the game looks for machine files; None while no folder is set."""
+        if self.machines is not None:
+            return self.machines
+        if self.folder is None:
+            return None
+        # Source: the published projects; the game's builds differ in where they look.
+        places = ("SavedMachines", "Besiege_Data/SavedMachines", "Contents/SavedMachines")
+        folders = [self.folder / place for place in places if (self.folder / place).is_dir()]
+        return folders[0] if folders else self.folder / places[0]
+
+    @property
+    def calibration_file(self) -> Path:
+        """The file of the calibration."""
+        return self.calibration or self.state / "calibration.json"
+
+    def words(self, level: Path | None) -> list[str]:
+        """The command that starts the game with a level; empty where none is set."""
+        text = "" if level is None else str(level)
+        return [word.replace(LEVEL_FIELD, text) for word in command_words(self.command)]
+
+    @property
+    def opens_levels(self) -> bool:
+        """Whether the game can be started with a level."""
+        return LEVEL_FIELD in self.command
+
+
+def level_digest(level: bytes | None) -> str:
+    """A short name of a level, "sandbox" for none: equal levels have equal names."""
+    return "sandbox" if level is None else hashlib.sha256(level).hexdigest()[:12]

@@ -1,0 +1,40 @@
+"""What a run leaves on the machine until it is cleaned up, so that the next runner can do it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from buildarena_simworker.besiege.whole_files import write_whole
+
+
+class Traces:
+    """Notes which machine file a run put into the game's folder.
+
+    Args:
+        state: The runner's own folder.
+    """
+
+    def __init__(self, state: Path) -> None:
+        self._note = state / "run.json"
+
+    @property
+    def left(self) -> bool:
+        """Whether a run was begun and never cleaned up."""
+        return self._note.exists()
+
+    def put(self, file: Path, data: bytes) -> None:
+        """Puts a machine file into the game's folder, noted first."""
+        write_whole(self._note, json.dumps({"file": str(file)}).encode())
+        write_whole(file, data)
+
+    def remove(self) -> None:
+        """Removes the machine file and then the note."""
+        try:
+            file = Path(json.loads(self._note.read_text(encoding="utf-8"))["file"])
+        except (OSError, ValueError, KeyError, TypeError):
+            file = None
+        if file is not None and file.suffix == ".bsg":
+            file.unlink(missing_ok=True)
+            file.with_name(file.name + ".part").unlink(missing_ok=True)
+        self._note.unlink(missing_ok=True)

@@ -1,0 +1,354 @@
+"""The broker: messages, and that one which is away, stopped or behind a dead link slows nobody."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import queue
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from typing import Any
+
+import httpx
+import psutil
+import pytest
+import uvicorn
+import uvloop
+from celery.signals import task_received
+from fastapi import FastAPI
+from kombu.exceptions import OperationalError
+from support.servers.live_api import changed, live_api
+from support.servers.stacks import wait_until
+
+from buildarena_api.http import overload
+from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.http.serving import UNANSWERED_S, Server
+from buildarena_backend.keepalive import socket_options
+from buildarena_backend.process.active_lease import LeaseKeeper
+from buildarena_backend.queue.announcer import Announcer
+from buildarena_backend.queue.app import LONGEST_PAUSE_S, celery_app
+from buildarena_backend.queue.breakers import AsyncCircuitBreaker, CircuitBreaker
+from buildarena_backend.queue.queues import ENOUGH_WAITING, TIMEOUT_S, Queues
+from buildarena_backend.queue.watchdog import ConsumerWatchdog, reconnect
+from buildarena_cli.local import EmbeddedValkey, free_port
+from buildarena_worker.providers.throttle import Throttle
+
+QUICK_S = 1.0
+SOON_S = 0.01
+JOB = {"task": "support-1", "model": "builtin/idle"}
+ANSWERS: list[bool | Exception] = [False, OSError("refused"), RuntimeError("?"), True]
+"""A server that is not there, a probe that breaks, and the server again."""
+
+
+@pytest.fixture
+def valkey(tmp_path) -> Iterator[tuple[str, int]]:
+    """The URL and process id of a broker of this test's own."""
+    server = EmbeddedValkey(tmp_path / "valkey", tmp_path / "valkey.log")
+    process = server.start()
+    yield server.url, process.pid
+    os.kill(process.pid, signal.SIGCONT)
+    server.stop(process)
+
+
+@contextmanager
+def stopped(pid: int) -> Iterator[None]:
+    """Stopped, not killed: it takes connections and says nothing."""
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(pid, signal.SIGCONT)
+
+
+@pytest.mark.ci
+def test_requests_stay_quick_beside_a_stopped_broker_and_jobs_flow_again(
+    context, valkey, monkeypatch
+) -> None:
+    # Refusals are held back by up to a second on purpose, which is not what is measured here.
+    monkeypatch.setattr(overload, "HELD_S", (0.0, 0.0))
+    url, pid = valkey
+    with (
+        changed(context, broker_url=url, rate_limit="25/minute") as own,
+        live_api(own) as api,
+        httpx.Client(base_url=api, timeout=30) as client,
+    ):
+        assert client.post("/v1/jobs", json=JOB).status_code == 202
+        with stopped(pid):
+            # The first to meet it pay one short time-out each: counting and announcing.
+            client.post("/v1/jobs", json={**JOB, "seed": 1})
+            times, answers = [], []
+            for number in range(40):
+                started = time.monotonic()
+                job = {**JOB, "seed": 2 + number}
+                answers.append(client.post("/v1/jobs", json=job).status_code)
+                times.append(time.monotonic() - started)
+            started = time.monotonic()
+            checks = client.get("/v1/health").json()["checks"]
+            times.append(time.monotonic() - started)
+            assert max(times) < QUICK_S
+            # This process counts alone meanwhile.
+            assert set(answers) == {202, 429}
+            broker = next(check for check in checks if check["name"] == "broker")
+            assert (broker["ok"], "not reachable" in broker["detail"]) == (False, True)
+        wait_until(lambda: (own.queues.waiting("construct") or 0) > 20, 20, "jobs flow again")
+    with closing(Queues(url)) as queues, stopped(pid):
+        started = time.monotonic()
+        assert not queues.notify("construct", ["job_2"])
+        assert time.monotonic() - started < 4 * TIMEOUT_S
+
+
+@pytest.mark.ci
+def test_provider_requests_go_on_without_waiting_each(valkey) -> None:
+    url, pid = valkey
+
+    async def main() -> None:
+        throttle = Throttle(url, "p")
+        async with throttle.slot() as slot:
+            slot.succeeded()
+        times = []
+        with stopped(pid):
+            for _ in range(20):
+                started = time.monotonic()
+                async with throttle.slot() as slot:
+                    slot.succeeded()
+                times.append(time.monotonic() - started)
+        assert times[0] < 5
+        assert max(times[1:]) < QUICK_S
+        async with asyncio.timeout(10):
+            while True:
+                try:
+                    assert await throttle.limit() >= 1
+                    break
+                except (ConnectionError, OSError):
+                    await asyncio.sleep(0.1)
+        await throttle.close()
+
+    asyncio.run(main())
+
+
+@pytest.mark.ci
+def test_messages_are_sent_again_when_the_broker_is_back(tmp_path) -> None:
+    valkey = EmbeddedValkey(tmp_path / "valkey", tmp_path / "valkey.log")
+    process = valkey.start()
+    queues = Queues(valkey.url)
+    try:
+        assert queues.notify("construct", ["job_1"])
+        valkey.stop(process)
+        assert not queues.notify("construct", ["job_2"])
+        assert queues.waiting("construct") is None
+        process = valkey.start()
+        wait_until(lambda: queues.waiting("construct") is not None, 10, "the broker is back")
+        before = queues.waiting("construct")
+        for _ in range(2):
+            assert queues.notify("construct", ["job_3"])
+        assert queues.waiting("construct") == before + 2
+    finally:
+        queues.close()
+        valkey.stop(process)
+
+
+def test_a_message_is_left_out_where_enough_wait(context) -> None:
+    context.queues.notify_one("construct", "job_1")
+    assert context.queues.settle()
+    assert context.queues.waiting("construct") == 1
+    context.queues.notify("construct", ["job_2"] * ENOUGH_WAITING)
+    context.queues.notify_one("construct", "job_3")
+    assert context.queues.settle()
+    assert context.queues.waiting("construct") == ENOUGH_WAITING + 1
+
+
+def test_announcements_are_merged_bounded_and_outlive_one_that_fails() -> None:
+    sent: list[tuple[str, list[str]]] = []
+
+    def send(name: str, ids: list[str]) -> None:
+        if name == "bad":
+            raise RuntimeError("no")
+        sent.append((name, list(ids)))
+
+    announcer = Announcer(send, most=3)
+    with announcer._changed:
+        announcer.announce("bad", ["1"])
+        announcer.announce("a", ["1", "2"])
+        announcer.announce("a", ["2", "3", "4", "5"])
+        announcer.announce("b", ["9"])
+    assert announcer.wait()
+    announcer.close()
+    assert [name for name, _ in sent] == ["a", "b"]
+    assert (len(sent[0][1]) <= 3, sent[0][1][:2]) == (True, ["1", "2"])
+
+
+def has_options(sock: socket.socket, **more: int) -> None:
+    for level, name, value in socket_options(**more):
+        assert sock.getsockopt(level, name) == value
+
+
+def test_consumers_give_up_dead_links_and_try_again_every_few_seconds(
+    broker_url, monkeypatch
+) -> None:
+    app = celery_app(broker_url)
+    with app.connection_for_read() as connection, connection.channel() as channel:
+        one = channel.pool.get_connection()
+        has_options(one._sock)
+        channel.pool.release(one)
+    app.close()
+    away = celery_app(f"redis://127.0.0.1:{free_port()}/0")
+    pauses = []
+    monkeypatch.setattr("kombu.utils.functional.sleep", lambda _: None)
+    with away.connection_for_read() as connection, pytest.raises(OperationalError):
+        connection.ensure_connection(lambda _, pause: pauses.append(pause), 9)
+    assert pauses == [1, 2, 3, 4, *[LONGEST_PAUSE_S] * 5]
+    away.close()
+
+
+def test_the_api_gives_up_clients_that_are_gone() -> None:
+    def accepted(client_port: int) -> socket.socket | None:
+        """A handle of this process' own end of a client's connection."""
+        for one in psutil.Process().net_connections("tcp"):
+            if one.raddr and one.raddr.port == client_port:
+                return socket.socket(fileno=os.dup(one.fd))
+        return None
+
+    port = free_port()
+    server = Server(uvicorn.Config(FastAPI(), port=port, log_config=None, loop="uvloop"))
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    wait_until(lambda: server.started, 10, "it listens")
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        inner = wait_until(lambda: accepted(client.getsockname()[1]), 5, "it is accepted")
+        has_options(inner, unanswered_s=UNANSWERED_S)
+        inner.close()
+    server.should_exit = True
+    thread.join()
+
+
+def test_a_connection_that_ended_unseen_leaves_a_request_to_the_own_count(broker_url) -> None:
+    async def asked() -> list[int | None]:
+        limits = RateLimits(broker_url, "2/minute")
+        found = [await limits.hit("dead-links")]
+        for connection in limits._pool._available_connections:
+            connection._writer.transport.abort()
+        found += [await limits.hit("dead-links") for _ in range(3)]
+        await limits.close()
+        return found
+
+    first, *others = uvloop.run(asked())
+    assert first is None
+    # The process' own count begins anew.
+    assert others[:2] == [None, None]
+    assert others[2] is not None
+
+
+@pytest.mark.ci
+def test_heartbeats_go_on_whatever_they_meet(context) -> None:
+    beats = []
+
+    def beat() -> None:
+        beats.append(1)
+        raise RuntimeError("nobody foresaw this")
+
+    keeper = LeaseKeeper(context.store.leases, beat)
+    keeper.start()
+    wait_until(lambda: len(beats) >= 2, 5, "a second beat after the first failed")
+    keeper.stop()
+
+
+def scripted(asked: list[int]) -> Callable[[], bool]:
+    def probe() -> bool:
+        asked.append(1)
+        answer = ANSWERS[(len(asked) - 1) % len(ANSWERS)]
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    return probe
+
+
+def test_a_breaker_is_open_until_a_probe_is_answered() -> None:
+    asked: list[int] = []
+    breaker = CircuitBreaker(scripted(asked), period_s=SOON_S)
+    assert not breaker.is_open
+    for times in (1, 2):
+        breaker.failed()
+        breaker.failed()
+        assert breaker.is_open
+        wait_until(lambda: not breaker.is_open, 5, "the breaker closes")
+        assert len(asked) == times * len(ANSWERS)
+    breaker.close()
+    breaker.failed()
+    assert not breaker.is_open
+    waiting = CircuitBreaker(lambda: False, period_s=60)
+    waiting.failed()
+    waiting.close()
+    assert not waiting.is_open
+
+
+def test_one_of_coroutines_is_too_and_ends_though_a_probe_swallows_its_end() -> None:
+    asked: list[int] = []
+    script, probing = scripted(asked), asyncio.Event()
+
+    async def probe() -> bool:
+        return script()
+
+    async def stubborn() -> bool:
+        probing.set()
+        try:
+            await asyncio.sleep(60)
+        except asyncio.CancelledError:
+            return False
+        return True
+
+    async def main() -> None:
+        breaker = AsyncCircuitBreaker(probe, period_s=SOON_S)
+        assert not breaker.is_open
+        breaker.failed()
+        breaker.failed()
+        assert breaker.is_open
+        for _ in range(500):
+            await asyncio.sleep(SOON_S * breaker.is_open)
+        assert not breaker.is_open
+        assert len(asked) == len(ANSWERS)
+        await breaker.close()
+        breaker.failed()
+        assert not breaker.is_open
+        own = AsyncCircuitBreaker(stubborn, period_s=SOON_S)
+        own.failed()
+        async with asyncio.timeout(5):
+            await probing.wait()
+            await own.close()
+        assert asyncio.all_tasks() == {asyncio.current_task()}
+
+    asyncio.run(main())
+
+
+class Consumer:
+    """Keeps what it is to call."""
+
+    def __init__(self) -> None:
+        self.called: queue.Queue[Any] = queue.Queue()
+
+    def call_soon(self, callback: Any) -> None:
+        self.called.put(callback)
+
+
+def test_a_worker_takes_a_new_connection_when_messages_wait_and_none_comes(context) -> None:
+    consumer = Consumer()
+    dog = ConsumerWatchdog(context.queues, ["simulate.x"], period_s=0.02, stalled_after_s=0.1)
+    dog.start(consumer)
+    with pytest.raises(queue.Empty):  # nothing waits
+        consumer.called.get(timeout=0.4)
+    task_received.send(sender=None)
+    context.queues.notify("simulate.x", ["job_1"])
+    ends = time.monotonic() + 0.4
+    while time.monotonic() < ends:  # messages wait, and some come
+        task_received.send(sender=None)
+        time.sleep(0.005)
+    assert consumer.called.empty()
+    for _ in range(2):  # again, if that did not help
+        assert consumer.called.get(timeout=10) is reconnect
+    with pytest.raises(OSError, match="reconnecting"):
+        reconnect()
+    dog.stop()

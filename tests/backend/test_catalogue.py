@@ -1,0 +1,250 @@
+"""Models, prompt packs, workflows and tasks: what operators add, its versions, and wrong files."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from support.statements import statements_of
+
+from buildarena_api.routes.tasks import EXAMPLE
+from buildarena_backend.agents.workbench import bench_of, rebuild
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.prices import free_models
+from buildarena_backend.catalog.prompt_packs import PromptPacks, builtin_folder, read_pack
+from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
+from buildarena_backend.catalog.tasks import TaskCatalog, TaskChangedError
+from buildarena_backend.catalog.tracks import make_track
+from buildarena_backend.catalog.workflows import workflow_sources
+from buildarena_backend.errors import PermanentError, StartupError, SubmissionError, UnknownIdError
+from buildarena_backend.replays.from_turns import replay_of_turns
+from buildarena_backend.trials.scoring import task_of
+from buildarena_benchmark import TaskError, broken_constraint, builtin_tasks, parse_custom_task
+from buildarena_benchmark.families.given import given_machine
+from buildarena_benchmark.tasks import task as task_module
+
+OTHER = EXAMPLE.replace("final_mass: 200", "final_mass: 300")
+REPAIR = builtin_tasks()["repair-1"]
+SPEC = JobSpec(task="narrow-gap", model="builtin/idle")
+PAPER = (
+    *("grok4-0709", "gpt-4o", "gpt-5-2025-08-07", "claude-sonnet-4-20250514", "gemini-2.0-flash"),
+    *("deepseek-chat", "doubao-seed-1-6-250615", "kimi-k2-turbo-preview", "qwen-plus"),
+    *("qwen3.5-9b", "qwen3.5-27b", "ministral-14b"),
+)
+"""Snapshots of the models that the paper has figures of."""
+MODELS = """
+providers:
+  own: {protocol: openai, base_url: 'http://127.0.0.1:9/v1'}
+models:
+  - {name: own/unpriced, provider: own, model: nobody-knows-it}
+  - {name: own/local, provider: own, model: local, price: {input: 0, output: 0}}
+  - {name: own/cached, provider: own, model: c, price: {input: 0, output: 0, cached: 1}}
+  - {name: own/dear, provider: own, model: dear, price: {input: 1, output: 0}}
+"""
+PUBLISHED = """
+agents:
+  planner: {system_message: Plan it.}
+  draft_reviewer: {system_message: Review it.}
+controller: Drive it.
+"""
+LEVELS = """
+category: support
+level: soft
+task: Carry it over.
+---
+category: lift
+level: hard
+task: Lift it.
+"""
+
+
+def test_an_operator_adds_models_and_only_what_costs_nothing_is_free(tmp_path: Path) -> None:
+    file = tmp_path / "models.yaml"
+    file.write_text(MODELS)
+    registry = load_registry(file)
+    assert set(PAPER) <= {entry.model for entry in registry.models.values()}
+    entry = registry.models["own/local"]
+    assert registry.provider_of(entry).base_url == "http://127.0.0.1:9/v1"
+    free = set(free_models(registry))
+    assert {"own/local", "builtin/expert", "builtin/idle"} <= free
+    assert not {"own/unpriced", "own/cached", "own/dear"} & free
+
+
+def test_a_bad_file_of_models_or_workflow_is_named(tmp_path: Path) -> None:
+    for text, says in [
+        ("models: [", "is not valid YAML"),
+        ("models:\n  - {name: a/b, provider: nobody, model: b}", "'nobody'; known are alibaba"),
+        ("models:\n  - {name: b, provider: openai, model: b}", r"models\.0\.name"),
+        ("modles: []", "modles"),
+    ]:
+        file = tmp_path / "models.yaml"
+        file.write_text(text)
+        with pytest.raises(StartupError, match=says):
+            load_registry(file)
+    with pytest.raises(StartupError, match=r"none\.yaml"):
+        load_registry(tmp_path / "none.yaml")
+    for target in ("nowhere", "file.py", ":Class", "no/such/file.py:Class", "m:1"):
+        with pytest.raises(StartupError, match="workflow 'mine'"):
+            workflow_sources({"mine": target})
+
+
+def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path) -> None:
+    copy = tmp_path / "pack"
+    shutil.copytree(builtin_folder() / "default", copy)
+    pack = PromptPacks().load("default")
+    assert read_pack(copy, name="mine").digest == pack.digest
+    (copy / "planner.md").write_text("# Role: planner\n\nPlan well.")
+    assert read_pack(copy, name="mine").digest != pack.digest
+    five_role = workflow_sources({})["five-role"]
+    assert pack.digest[:8] in make_track(five_role, "pybullet", pack, version="2").id
+    loop = ClosedLoop(rounds=5, analyst=True)
+    varied = make_track(five_role, "pybullet", pack, version="2", one_shot=True, closed_loop=loop)
+    assert varied.id.startswith("five-role+one-shot+data-sheets+5-rounds-analyst/pybullet-")
+
+
+def test_a_pack_of_the_published_layout_takes_the_place_of_our_sentences(tmp_path: Path) -> None:
+    folder = tmp_path / "packs" / "theirs"
+    folder.mkdir(parents=True)
+    (folder / "prompt.yaml").write_text(PUBLISHED)
+    (folder / "levels.yaml").write_text(LEVELS)
+    packs = PromptPacks(tmp_path / "packs")
+    assert packs.names == ["default", "theirs"]
+    pack, default = packs.load("theirs"), packs.load("default")
+    told = {"planner": "Plan it.", "reviewer": "Review it.", "controller": "Drive it."}
+    assert pack.roles == {**default.roles, **told}
+    assert pack.statements == {"support-1": "Carry it over.", "lift-3": "Lift it."}
+    assert pack.digest != default.digest
+
+
+def test_a_malformed_pack_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StartupError, match=r"planner\.md"):
+        read_pack(tmp_path, name="empty")
+    with pytest.raises(StartupError, match="no prompt pack 'x'; there are default"):
+        PromptPacks().load("x")
+    for file, text, says in [
+        ("prompt.yaml", "agents: {planner: {}}", "system_message"),
+        ("prompt.yaml", "agents: [", "can't be read"),
+        ("levels.yaml", "category: x\nlevel: extreme\ntask: y", "document 1 .* soft, medium, hard"),
+    ]:
+        (tmp_path / "prompt.yaml").write_text(PUBLISHED)
+        (tmp_path / file).write_text(text)
+        with pytest.raises(StartupError, match=says):
+            read_pack(tmp_path, name="bad")
+
+
+def add(context, text: str) -> str:
+    task = parse_custom_task(text, origin="task")
+    context.tasks.add(task, text)
+    return task.version
+
+
+def test_the_newest_version_is_named_and_jobs_keep_theirs(context, submissions) -> None:
+    old = add(context, EXAMPLE)
+    first, _ = submissions.submit_job(SPEC)
+    new = add(context, OTHER)
+    second, is_new = submissions.submit_job(SPEC)
+    assert (first.task_version, second.task_version, is_new) == (old, new, True)
+    names = context.tasks.newest()
+    assert list(names) == [*builtin_tasks(), "narrow-gap"]
+    assert names["narrow-gap"].version == new
+    fresh = TaskCatalog(context.store.tasks)
+    for catalogue in (context.tasks, fresh):
+        for version, mass, current in ((old, 200, False), (new, 300, True)):
+            assert catalogue.exact("narrow-gap", version).scenario.cargo.final_mass == mass
+            assert catalogue.find("narrow-gap", version).current is current
+        assert catalogue.exact("narrow-gap", "0" * 12) is None
+        assert catalogue.find("narrow-gap").current
+    assert task_of(first, fresh).version == old
+    with pytest.raises(UnknownIdError, match="nowhere"):
+        context.tasks.find("nowhere")
+
+
+def test_the_same_content_is_stored_once_and_a_title_alone_does_not_change(context) -> None:
+    task = parse_custom_task(EXAMPLE, origin="task")
+    assert context.tasks.add(task, EXAMPLE, owner=None)
+    assert not context.tasks.add(task, EXAMPLE + "# again\n")
+    assert len(context.store.tasks.versions("narrow-gap")) == 1
+    text = EXAMPLE.replace("A bridge", "No bridge").replace("unit: mass units", "unit: kg")
+    with pytest.raises(TaskChangedError, match="another title and indicator"):
+        context.tasks.add(parse_custom_task(text, origin="task"), text)
+    with pytest.raises(TaskError, match=r"task:1: name: support-1 is a built-in task"):
+        parse_custom_task(EXAMPLE.replace("narrow-gap", "support-1"), origin="task")
+
+
+def test_a_version_that_is_gone_or_has_another_scorer_is_a_fault_and_no_score(
+    context, submissions, monkeypatch
+) -> None:
+    old = add(context, EXAMPLE)
+    job, _ = submissions.submit_job(SPEC)
+    monkeypatch.setattr(task_module, "SCORER_VERSION", task_module.SCORER_VERSION + 1)
+    updated = TaskCatalog(context.store.tasks)
+    renewed = updated.newest()["narrow-gap"]
+    assert renewed.version != old
+    assert (
+        updated.find("narrow-gap").task == updated.exact("narrow-gap", renewed.version) == renewed
+    )
+    assert len(context.store.tasks.versions("narrow-gap")) == 2
+    with pytest.raises(PermanentError, match="submit it again"):
+        task_of(job, updated)
+    with context.store.database.transaction() as connection:
+        connection.exec_driver_sql("DELETE FROM tasks")
+    with pytest.raises(PermanentError, match="submit it again"):
+        task_of(job, TaskCatalog(context.store.tasks))
+
+
+def test_the_database_is_asked_once_for_a_version_and_never_for_built_in_tasks(context) -> None:
+    version = add(context, EXAMPLE)
+    fresh, support = TaskCatalog(context.store.tasks), builtin_tasks()["support-1"]
+    with statements_of(context.store.database.engine) as queries:
+        for _ in range(3):
+            assert fresh.exact("support-1", support.version) is support
+            assert fresh.named(["support-1", "lift-2"])["support-1"] is support
+        assert queries == []
+        tasks = {id(fresh.exact("narrow-gap", version)) for _ in range(3)}
+        assert (len(tasks), len(queries)) == (1, 1)
+
+
+@pytest.mark.parametrize("document", ["name: broken\n", EXAMPLE])
+def test_a_row_that_is_no_task_of_its_name_is_left_out(context, submissions, document) -> None:
+    context.store.tasks.add(name="broken", version="0" * 12, document=document)
+    assert list(context.tasks.newest()) == list(builtin_tasks())
+    add(context, OTHER)
+    with pytest.raises(SubmissionError) as caught:
+        submissions.plan(SweepSpec(tasks=["narrow-gap", "broken"], models=["builtin/idle"]))
+    (error,) = caught.value.issues
+    assert error.path == "tasks[1]"
+    assert {"narrow-gap", "support-1"} <= set(error.choices)
+    with pytest.raises(UnknownIdError, match="broken"):
+        context.tasks.find("broken")
+
+
+def test_a_jobs_task_is_drawn_by_its_seed() -> None:
+    catalogue = SimpleNamespace(exact=lambda *_: REPAIR)
+    for seed in (0, 3, 2**53 - 1):
+        job = SimpleNamespace(task=REPAIR.name, task_version=REPAIR.version, seed=seed)
+        assert task_of(job, catalogue) == REPAIR.drawn(seed)
+        machine = given_machine(REPAIR.beginning, seed)
+        assert broken_constraint(task_of(job, catalogue), machine) is None
+
+
+def test_calls_made_again_begin_with_the_same_machine() -> None:
+    task = REPAIR.drawn(6)
+    bench = bench_of(task, data_sheets=True)
+    wheels = [b.id for b in given_machine(REPAIR.beginning, 6).blocks.values() if b.module.spins]
+    calls = [bench.call("main", "flip_spin", {"block_id": wheel}) for wheel in wheels]
+    assert [call.ok for call in calls].count(True) == 4
+    assert rebuild(calls, task, data_sheets=True).submitted() == bench.submitted()
+    told = ("arguments", "ok", "reason", "feedback")
+    turns = [
+        {
+            "index": number,
+            "stage": "external",
+            "sub_structure": call.machine,
+            "actions": [{"name": call.tool, **{each: getattr(call, each) for each in told}}],
+        }
+        for number, call in enumerate(calls)
+    ]
+    assert replay_of_turns(turns, task).machine == bench.submitted()
+    assert replay_of_turns(turns).machine != bench.submitted()

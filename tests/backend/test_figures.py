@@ -1,0 +1,264 @@
+"""Counts that triggers keep are what counting finds; pages of jobs; the register of workers."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
+
+import pytest
+from benchmarks.filling import TRACKS, Amount, fill
+from sqlalchemy import delete, select, text, update
+from support.jobs import execute
+from support.servers.stacks import wait_until
+
+from buildarena_backend.database.tables import attempts, jobs, sweep_jobs
+from buildarena_backend.jobs.filters import JobFilter
+from buildarena_backend.jobs.pages import Order
+from buildarena_backend.process.worker_process import worker_id
+from buildarena_backend.sweeps.sweeps import NewSweep
+from buildarena_backend.telemetry.metrics import STAGE_SECONDS
+
+RUNNER = "runner@key_1/"
+
+
+@pytest.fixture
+def store(context):
+    return context.store
+
+
+@pytest.fixture
+def filled(store):
+    fill(store.database, Amount(ended=900, queued=400, models=5))
+    return store
+
+
+def counted(store) -> tuple[object, ...]:
+    """The figures after counting anew; how long the oldest has waited goes on."""
+    with store.database.transaction() as connection:
+        connection.execute(text("SELECT recount_jobs()"))
+    return as_said(store.metrics.read())
+
+
+def as_said(figures) -> tuple[object, ...]:
+    return (
+        sorted((j.state, j.stage, j.outcome, j.reason, j.jobs) for j in figures.jobs if j.jobs),
+        sorted((queue.queue, queue.jobs) for queue in figures.queues),
+        sorted(
+            (m.model, m.requests, m.input_tokens, m.output_tokens, round(m.cost_usd, 6))
+            for m in figures.models
+        ),
+        [(s.stage, s.result, list(s.counts), round(s.total_s, 3)) for s in figures.stages],
+    )
+
+
+def require_progress(store) -> None:
+    """The progress of every sweep is that which its jobs, counted one by one, come to."""
+    query = select(sweep_jobs.c.sweep_id, jobs).join(jobs, jobs.c.id == sweep_jobs.c.job_id)
+    members: dict[str, list] = {sweep.id: [] for sweep in store.sweeps.page(limit=100)}
+    with store.database.statement() as connection:
+        for row in connection.execute(query):
+            members[row.sweep_id].append(row)
+    assert members
+    for sweep_id, progress in store.sweeps.progress_of(list(members)).items():
+        rows = members[sweep_id]
+        waiting = [row for row in rows if row.state != "done"]
+        assert progress.total == len(rows)
+        assert progress.outcomes == Counter(row.outcome for row in rows if row.state == "done")
+        assert progress.stages == Counter(f"{row.stage} {row.state}" for row in waiting)
+        for name in ("requests", "lost_requests", "input_tokens", "output_tokens", "cost_usd"):
+            assert getattr(progress, name) == sum(getattr(row, name) for row in rows), name
+
+
+def test_kept_counts_are_those_that_counting_finds(filled) -> None:
+    rng = random.Random(1)
+    for step in range(25):
+        with filled.database.transaction() as connection:
+            ids = connection.execute(select(jobs.c.id).order_by(jobs.c.id)).scalars().all()
+            some = rng.sample(ids, 20)
+            change = (
+                {"state": "done", "outcome": "limit"},
+                {"state": "queued", "outcome": None, "queue": "simulate.mujoco"},
+                {"cost_usd": 1.5, "requests": step, "lost_requests": step},
+                {"outcome": "errored", "reason": f"class {step}"},
+                None,
+            )[step % 5]
+            if change is not None:
+                connection.execute(update(jobs).where(jobs.c.id.in_(some)).values(**change))
+            else:
+                for table in (attempts, sweep_jobs):
+                    connection.execute(delete(table).where(table.c.job_id.in_(some)))
+        for _ in range(3):
+            lease = filled.leases.claim("construct", owner="w")
+            if step % 2:
+                filled.leases.hand_back(lease)
+            else:
+                filled.leases.give_up(lease, "gone", reason="lost_worker")
+        if step % 4 == 0:
+            filled.metrics.read()
+    require_progress(filled)
+    kept = as_said(filled.metrics.read())
+    # Attempts that were taken out have been counted.
+    assert kept[:3] == counted(filled)[:3]
+
+
+def test_a_job_that_moves_while_a_sweep_takes_it_in_is_counted_once(filled) -> None:
+    """Whichever of the two began first, and whichever ends first."""
+    waits = text("SELECT count(*) FROM pg_locks WHERE NOT granted")
+    with filled.database.statement() as connection:
+        queued = select(jobs.c.id).where(jobs.c.state == "queued").order_by(jobs.c.id).limit(2)
+        first, second = connection.execute(queued).scalars()
+
+    def blocked() -> bool:
+        with filled.database.statement() as connection:
+            return bool(connection.execute(waits).scalar())
+
+    def move(job_id: str, connection) -> None:
+        done = {"state": "done", "outcome": "limit", "requests": 7}
+        connection.execute(update(jobs).where(jobs.c.id == job_id).values(**done))
+
+    def move_alone() -> None:
+        with filled.database.transaction() as own:
+            move(second, own)
+
+    def take_in(name: str, connection) -> None:
+        new = NewSweep(id=name, name=name, spec={})
+        filled.sweeps.add(new, [first, second], connection=connection)
+
+    def take_in_alone() -> None:
+        with filled.lifecycle.submission() as connection:
+            take_in("sweep_later", connection)
+
+    with ThreadPoolExecutor(1) as pool:
+        with filled.database.transaction() as moving:
+            move(first, moving)
+            other = pool.submit(take_in_alone)
+            wait_until(blocked, 10, "the sweep waits")
+        other.result()
+        require_progress(filled)
+        with filled.lifecycle.submission() as connection:
+            take_in("sweep_first", connection)
+            other = pool.submit(move_alone)
+            wait_until(blocked, 10, "the job waits")
+        other.result()
+    require_progress(filled)
+    assert filled.sweeps.progress("sweep_first").outcomes == {"limit": 2}
+
+
+def test_attempts_are_counted_by_how_long_they_took(filled) -> None:
+    assert as_said(filled.metrics.read()) == counted(filled)
+    insert = text(
+        "INSERT INTO attempts (job_id, token, stage, worker, started_at, ended_at, result) SELECT "
+        "min(id), :token, 'construct', 'w', now(), now() + :s * interval '1 s', 'done' FROM jobs"
+    )
+    near = [bound + by for bound in STAGE_SECONDS for by in (-0.0005, 0.0005)]
+    with filled.database.transaction() as connection:
+        for number, seconds in enumerate(near):
+            connection.execute(insert, {"token": 100 + number, "s": seconds})
+    assert as_said(filled.metrics.read()) == counted(filled)
+
+
+FILTERS = {
+    "all": (JobFilter(), lambda _: True),
+    "queued": (JobFilter(equals={"state": "queued"}), lambda row: row.state == "queued"),
+    "errored": (JobFilter(equals={"outcome": "errored"}), lambda row: row.outcome == "errored"),
+    "flagged": (JobFilter(flag="unstable"), lambda row: "unstable" in (row.flags or ())),
+    "track": (JobFilter(equals={"track": TRACKS[1]}), lambda row: row.track == TRACKS[1]),
+    "text": (JobFilter(text="LIFT"), lambda row: "lift" in row.task),
+    "id": (JobFilter(text="b_a"), lambda row: "b_a" in row.id),
+    "sweep": (JobFilter(sweep_id="sweep_ended0"), lambda row: row.state == "done"),
+}
+
+
+@pytest.mark.ci
+@pytest.mark.nightly(keep=2)
+@pytest.mark.parametrize("few", [0, 40_000])
+@pytest.mark.parametrize("by", ["created", "finished", "indicator", "cost", "task", "seed"])
+def test_pages_in_every_order_hold_each_job_once(filled, monkeypatch, few, by) -> None:
+    """Whether all that a filter finds are sorted, or the order's index is gone along."""
+    monkeypatch.setattr("buildarena_backend.jobs.pages.MAX_SORTED", few)
+    monkeypatch.setattr("buildarena_backend.jobs.filters.MAX_SORTED", few)
+    with filled.database.transaction() as connection:
+        unpriced = {"model_config": {"name": "x", "provider": "external"}}
+        ours = jobs.c.model == "made-up/model-1"
+        connection.execute(update(jobs).where(ours).values(**unpriced))
+        every = connection.execute(select(jobs)).all()
+
+    def value(row) -> object:
+        if by == "cost":
+            return None if row.model == "made-up/model-1" else row.cost_usd
+        return getattr(row, {"created": "created_at", "finished": "finished_at"}.get(by, by))
+
+    for descending in (False, True):
+        for name, (chosen, holds) in FILTERS.items():
+            rows = {row.id: row for row in every if holds(row)}
+            known = [row for row in rows.values() if value(row) is not None]
+            known.sort(key=lambda row: (value(row), row.id), reverse=descending)
+            unknown = sorted((i for i, r in rows.items() if value(r) is None), reverse=descending)
+            order, found, after = Order(by=by, descending=descending), [], None
+            while page := filled.jobs.page(limit=170, after=after, wanted=chosen, order=order):
+                found += [job.id for job in page]
+                after = value(rows[found[-1]]), found[-1]
+            assert found == [*(row.id for row in known), *unknown], name
+
+
+@pytest.fixture
+def report(store):
+    def say(name: str, **more) -> None:
+        values = {"kind": "simulate", "queues": ["simulate.mujoco"], "host": "h", "pid": 1}
+        store.workers.report(worker_id=name, versions={"simulation": "3"}, **values | more)
+
+    return say
+
+
+def silence(context, *names: str) -> None:
+    silent = "UPDATE workers SET seen_at = now() - interval '1 minute' WHERE id = ANY(:ids)"
+    execute(context, silent, {"ids": list(names)})
+
+
+def test_pages_of_workers_follow_each_other_though_they_report_meanwhile(store, report) -> None:
+    names = [f"w{number}" for number in range(5)]
+    for name in names:
+        report(name)
+    seen, after = [], None
+    while page := store.workers.page(limit=2, after=after):
+        seen += [worker.id for worker in page]
+        after = page[-1].started_at, page[-1].id
+        report(names[0])
+    assert seen == names[::-1]
+    (announcement,) = store.workers.announcements()
+    assert announcement.versions == {"simulation": "3", "kind": None, "repeatable": None}
+
+
+def test_the_register_of_workers_in_a_few_numbers(context, store, report) -> None:
+    now = datetime.now(UTC)
+    report("a", peak_memory_bytes=5, own_time=now)
+    report("b", peak_memory_bytes=9, own_time=now + timedelta(hours=1))
+    report("c", queues=["simulate.mujoco", "simulate.pybullet"])
+    report("d", kind="construct", queues=["construct"])
+    killed = [worker_id("simulate") for _ in range(3)]  # under the same number
+    for name in killed:
+        report(name)
+    silence(context, *killed)
+    counts = store.workers.counts()
+    assert counts.serving == {"simulate.mujoco": 3, "simulate.pybullet": 1, "construct": 1}
+    assert counts.alive == {"simulate": 3, "construct": 1}
+    assert counts.lost == {"simulate": 3, "construct": 0}
+    assert counts.peak_memory_bytes == {"simulate": 9}
+    assert [name for name, _ in counts.clocks] == ["b", "a"]
+    assert counts.clocks[0][1] == pytest.approx(3600, abs=5)
+
+
+def test_names_of_keys_and_of_killed_workers_go_and_no_others(store, report) -> None:
+    for number in range(9):
+        report(f"{RUNNER}{number}", host="there")
+    report("runner@key_2/x", host="there")
+    store.workers.trim(RUNNER, most=3)
+    report("killed", pid=2)
+    report("running", pid=3)
+    report("elsewhere", pid=2, host="other")
+    store.workers.forget_ended("h", lambda pid: pid == 3)
+    left = {f"{RUNNER}{number}" for number in (6, 7, 8)} | {"runner@key_2/x"}
+    ids = {worker.id for worker in store.workers.page(limit=100)}
+    assert ids == left | {"running", "elsewhere"}

@@ -1,0 +1,168 @@
+"""Submissions, calls of agents, which rollout counts, and how transcripts are written."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+from support.servers.live_api import changed
+
+from buildarena_backend.agents.turn_views import turn_of_call
+from buildarena_backend.agents.workbench import MAX_BYTES, MAX_DEPTH, check_arguments
+from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.specs import JobSpec, SweepSpec
+from buildarena_backend.errors import SubmissionError
+from buildarena_backend.journal.external_calls import ExternalCall
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
+from buildarena_backend.submission.submission import Submissions
+from buildarena_backend.trials.scoring import best_rollout
+from buildarena_benchmark import builtin_tasks
+
+MODELS = ["builtin/expert", "builtin/idle"]
+
+
+def spec(**changes: object) -> SweepSpec:
+    given = {"tasks": ["support-1"], "models": MODELS, "seeds": [0, 1, 2], **changes}
+    return SweepSpec.model_validate(given)
+
+
+def test_a_sweep_is_the_product_of_its_lists_and_adds_no_job_twice(context, submissions) -> None:
+    done = submissions.submit_sweep(spec())
+    assert (done.jobs, done.added) == (6, 6)
+    jobs = context.store.jobs.page(limit=100, sweep_id=done.sweep.id)
+    assert {(job.model, job.seed) for job in jobs} == {(m, s) for m in MODELS for s in (0, 1, 2)}
+    assert context.queues.settle()
+    assert context.queues.waiting("construct") == 6
+    again = submissions.submit_sweep(spec(models=[*MODELS, "builtin/random", *MODELS]))
+    assert (again.jobs, again.added) == (9, 3)
+    assert context.store.sweeps.progress(again.sweep.id).total == 9
+
+
+def test_what_is_asked_for_otherwise_is_another_job(submissions) -> None:
+    made = [
+        submissions.submit_job(JobSpec(task="support-1", model="builtin/idle", **changes))
+        for changes in (
+            {},
+            {},
+            {"decoding": {"temperature": 0}},
+            {"simulator": "mujoco"},
+            {"workflow": "builder"},
+            {"seed": 1},
+        )
+    ]
+    assert [new for _, new in made] == [True, False, True, True, True, True]
+    assert len({job.id for job, _ in made}) == 5
+
+
+def test_everything_that_is_wrong_is_named_with_the_choices(context, submissions) -> None:
+    with pytest.raises(SubmissionError) as caught:
+        submissions.submit_sweep(
+            spec(tasks=["support-1", "support-9"], models=["gpt"], simulator="moon", workflow="x")
+        )
+    errors = {issue.path: issue for issue in caught.value.issues}
+    assert set(errors) == {"tasks[1]", "models[0]", "simulator", "workflow"}
+    assert "support-1" in errors["tasks[1]"].choices
+    assert "builtin/expert" in errors["models[0]"].choices
+    assert set(errors["simulator"].choices) == {"pybullet", "mujoco"}
+    for workflow in ("builder", "guidance-builder"):
+        with pytest.raises(SubmissionError) as caught:
+            submissions.submit_sweep(spec(tasks=["lift-2", "lift-3"], workflow=workflow))
+        (issue,) = caught.value.issues
+        assert (issue.path, issue.choices) == ("tasks[1]", ("five-role",))
+        assert "lift-3 asks for several sub-structures" in issue.message
+    with pytest.raises(SubmissionError, match="200,000 jobs; the largest accepted has 100,000"):
+        submissions.submit_sweep(spec(seeds=None, samples=100_000))
+    assert context.store.jobs.page(limit=1) == []
+    assert spec(seeds=None).all_seeds() == list(range(64)), "as in the paper"
+
+
+def test_work_goes_on_when_the_broker_is_gone(context) -> None:
+    with changed(context, broker_url="redis://127.0.0.1:1/0") as lonely:
+        assert Submissions(lonely, load_registry()).submit_sweep(spec()).added == 6
+        assert lonely.queues.waiting("construct") is None
+
+
+def lists(levels: int, inner: Any) -> Any:
+    for _ in range(levels):
+        inner = [inner]
+    return inner
+
+
+def objects(levels: int, inner: Any) -> Any:
+    for _ in range(levels):
+        inner = {"k": inner}
+    return inner
+
+
+def test_arguments_of_an_agents_call_are_bounded() -> None:
+    for arguments in (
+        *(lists(MAX_DEPTH, 1), objects(MAX_DEPTH, "x"), lists(MAX_DEPTH - 1, {}), None),
+        *([1, "x", objects(MAX_DEPTH - 1, None)], "x" * (MAX_BYTES - 2)),
+    ):
+        check_arguments(arguments)
+    for arguments in (
+        *(lists(MAX_DEPTH + 1, 1), objects(MAX_DEPTH + 1, "x"), lists(MAX_DEPTH, {})),
+        [1, "x", objects(MAX_DEPTH // 2, lists(MAX_DEPTH // 2, None))],
+        objects(5_000, 1),
+    ):
+        with pytest.raises(SubmissionError, match="more than 20 lists or objects inside each"):
+            check_arguments(arguments)
+    with pytest.raises(SubmissionError, match="65,537 bytes"):
+        check_arguments("x" * (MAX_BYTES - 1))
+
+
+def test_of_rollouts_an_honest_success_comes_first_then_the_larger_indicator() -> None:
+    nothing = dict.fromkeys(RolloutRecord.__dataclass_fields__)
+    nothing["finished_at"] = datetime(2026, 1, 1, tzinfo=UTC)
+    for rollouts, best in [
+        ([(False, 90.0, ()), (True, 20.0, ())], 1),
+        ([(True, 20.0, ()), (True, 30.0, ())], 1),
+        ([(True, 20.0, ()), (True, 20.0, ())], 0),
+        ([(True, 90.0, ("no_wheels",)), (True, 20.0, ())], 1),
+        ([(True, 90.0, ("never_fell",)), (True, 20.0, ())], 0),
+        ([(False, 9.0, ()), (True, 90.0, ("no_wheels",))], 1),
+    ]:
+        made = [
+            RolloutRecord(**nothing | {"number": n, "success": s, "indicator": i, "flags": f})
+            for n, (s, i, f) in enumerate(rollouts)
+        ]
+        assert best_rollout(made, builtin_tasks()["transport-1"]).number == best, rollouts
+
+
+REFUSED = {"arguments": {"n": [1, "ü"]}, "ok": False, "reason": "block_presence", "feedback": "No."}
+
+
+def test_a_models_transcript_has_no_blanks_and_tells_what_each_turn_cost() -> None:
+    turn = ModelTurn(
+        index=0,
+        stage="build",
+        sub_structure=None,
+        role="builder",
+        text="",
+        actions=(ActionResult(name="start", **REFUSED),),
+        finish="stop",
+        input_tokens=10,
+        output_tokens=5,
+        cost_usd="0.000001",
+        latency_s=1.0,
+        tries=1,
+    )
+    assert Transcript([turn]).to_json().decode() == (
+        '{"version":"1","turns":[{"index":0,"stage":"build","sub_structure":null,"role":"builder",'
+        '"text":"","actions":[{"name":"start","arguments":{"n":[1,"ü"]},"ok":false,'
+        '"reason":"block_presence","feedback":"No."}],"finish":"stop","input_tokens":10,'
+        '"output_tokens":5,"cost_usd":"0.000001","latency_s":1.0,"tries":1}]}'
+    )
+
+
+def test_an_external_agents_transcript_has_blanks_and_no_costs() -> None:
+    call = ExternalCall(machine="main", tool="start", **REFUSED)
+    transcript = Transcript([turn_of_call(0, call)])
+    assert transcript.to_json(spaced=True).decode() == (
+        '{"version": "1", "turns": [{"index": 0, "stage": "external", "sub_structure": "main", '
+        '"role": "agent", "text": "", "actions": [{"name": "start", "arguments": {"n": [1, "ü"]}, '
+        '"ok": false, "reason": "block_presence", "feedback": "No."}]}]}'
+    )
+    assert (transcript.actions, transcript.refusals) == (1, {"block_presence": 1})

@@ -1,0 +1,191 @@
+"""What a builder is told: of modules, of the world, and of its trial afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from support.machines.references import load_machine
+from support.machines.trials import changed
+from support.machines.trials import trial as trial_of
+
+from buildarena_backend.catalog.prompt_packs import PromptPacks
+from buildarena_backend.catalog.specs import SweepSpec
+from buildarena_backend.catalog.tracks import external_track, has_data_sheets, make_track
+from buildarena_backend.catalog.workflows import workflow_sources
+from buildarena_benchmark import Score, builtin_tasks, score
+from buildarena_benchmark.environment import Environment
+from buildarena_benchmark.environment import briefing as words_around
+from buildarena_benchmark.environment.briefing import briefing_digest
+from buildarena_benchmark.environment.trials.trials import TOPPLED_DEG, score_text
+from buildarena_benchmark.environment.trials.world import world_text
+from buildarena_benchmark.flags import meaning
+from buildarena_geometry import LOOKUP, module_set, modules_named, tool_definitions
+from buildarena_geometry.feedback.words import plain
+from buildarena_simulation import constants, simulate
+from buildarena_simulation.constants import JOINT_STRENGTH, JointKind
+
+
+def world(*names: str) -> str:
+    return world_text(module_set("workshop"), names)
+
+
+def test_the_world_is_told_from_the_constants(monkeypatch):
+    text = world(*modules_named("workshop"))
+    strengths = (JOINT_STRENGTH[JointKind.ATTACHMENT], JOINT_STRENGTH[JointKind.FAR_JOINT])
+    names = ("GRAVITY", "ROPE_STRENGTH", "LOAD_FILTER_S", "BLOW_FILTER_S", "CARGO_BOUNCE")
+    figures = [getattr(constants, name) for name in names]
+    for figure in (*figures, *(f for joint in strengths for f in (joint.force, joint.moment))):
+        assert plain(figure) in text
+    monkeypatch.setattr(constants, "GRAVITY", 9.75)
+    assert "Gravity is 9.75 units/s²" in world()
+    orbit = builtin_tasks()["orbit-1"]
+    modules = orbit.constraints.catalogue.with_data_sheets()
+    assert "Gravity is" not in world_text(modules, [], orbit), "the task tells it"
+
+
+def test_one_strength_is_told_because_all_joints_have_it():
+    told = {JOINT_STRENGTH[kind] for kind in JointKind if kind not in ("far_joint", "mount")}
+    assert len({(strength.force, strength.moment) for strength in told}) == 1
+
+
+def test_the_world_is_told_as_far_as_the_modules_go():
+    tellings = {
+        "Cog Large Unpowered": {"pitch radii", "locks it", "a joint that moves"},
+        "Winch": {"rope", "Connectors"},
+        "Brace": {"so does a brace", "Connectors"},
+        "Small Wooden Block": {"far end joins"},
+        "Wing Panel": {"Air figures"},
+        "Hinge": {"locks it", "a joint that moves"},
+    }
+    every = set().union(*tellings.values())
+    for name, told in tellings.items():
+        assert {words for words in every if words in world(name)} == told, name
+    assert not any(words in world() for words in every)
+
+
+def test_a_builder_is_told_numbers_unless_it_is_to_find_them_out():
+    for name in builtin_tasks():
+        told = Environment(name).observation.briefing
+        withheld = Environment(name, data_sheets=False).observation.briefing
+        assert "  Data: " in told
+        assert plain(constants.GRAVITY) in told
+        assert "  Data: " not in withheld
+        assert "Gravity" not in withheld
+        assert withheld.splitlines()[:20] == told.splitlines()[:20]
+
+
+def test_told_and_withheld_are_tracks_of_their_own():
+    digests = [briefing_digest("once", "guidelines", data_sheets=how) for how in (False, True)]
+    assert digests[0] != digests[1]
+    pack = PromptPacks().load("default")
+    source = workflow_sources({})["five-role"]
+    tracks = [external_track("mujoco", "3", digests[h], data_sheets=bool(h)) for h in (0, 1)]
+    tracks += [make_track(source, "mujoco", pack, version="3", data_sheets=bool(h)) for h in (0, 1)]
+    assert len({track.id for track in tracks}) == 4
+    configs = [track.as_config() for track in tracks]
+    assert [has_data_sheets(config) for config in configs] == [False, True, False, True]
+    # Tracks of before there were data sheets say nothing of them, and had none.
+    assert "data_sheets" not in configs[0]
+    assert SweepSpec(tasks=["lift-1"], models=["a"]).data_sheets
+
+
+def test_other_words_around_a_statement_are_another_digest(monkeypatch):
+    caches = (briefing_digest, words_around._text)
+    digest, read = briefing_digest("once", "guidelines"), words_around.file_text
+    digests = {digest}
+    for file in ("briefing.md", "controller.md", "senses.json"):
+        with monkeypatch.context() as patched:
+            changed = lambda name, file=file: read(name) + "!" * (name == file)  # noqa: E731
+            patched.setattr(words_around, "file_text", changed)
+            for cached in caches:
+                cached.cache_clear()
+            digests.add(briefing_digest("once", "guidelines"))
+    for cached in caches:
+        cached.cache_clear()
+    assert len(digests) == 4
+
+
+LOOKUPS = {tool.name for tool in tool_definitions([LOOKUP])}
+
+
+def task(**update):
+    given = builtin_tasks()["support-1"]
+    return replace(given, constraints=given.constraints.model_copy(update=update))
+
+
+def test_a_builder_is_told_the_set_of_its_task():
+    for modules, count in ((None, 6), ("workshop", 40)):
+        observation = Environment(task(modules=modules)).observation
+        listed = observation.briefing.partition("# Modules")[2].strip().splitlines()
+        assert sum(line.startswith("- ") for line in listed) == count + 1
+        assert not LOOKUPS & {tool.name for tool in observation.tools}
+
+
+def test_a_builder_that_looks_up_reads_how_and_has_the_tools():
+    environment = Environment(task(modules="workshop", module_list="on_demand"))
+    observation = environment.observation
+    assert {tool.name for tool in observation.tools} >= LOOKUPS
+    assert "list_modules" in observation.briefing
+    assert module_set("workshop")["Hinge"].description not in observation.briefing
+    told = Environment(task(modules="workshop")).observation
+    assert len(observation.briefing) < 0.5 * len(told.briefing)
+    step = environment.step("describe_module", {"module": "Hinge"})
+    assert module_set("workshop")["Hinge"].description in step.feedback
+
+
+def test_where_modules_are_told_they_cannot_be_looked_up():
+    environment = Environment(task(modules="workshop"))
+    for name in (*LOOKUPS, "List_Modules", " describe_module "):
+        step = environment.step(name, {"category": "basic", "module": "Hinge"})
+        assert not step.ok
+        assert "Hinge" not in step.feedback
+
+
+FAILED = Score(success=False, indicator=0.25, metrics={}, flags=())
+
+
+def test_a_failure_names_every_threshold_of_its_scorer():
+    for given in builtin_tasks().values():
+        text = score_text(given, FAILED)
+        for parameter, value in given.scoring.model_dump(mode="json").items():
+            if isinstance(value, int | float) and not isinstance(value, bool) and value:
+                assert f"{parameter.replace('_', ' ')} {value:g}" in text
+        # Where a trial looks for progress is no threshold.
+        assert "target" not in text
+        assert "0.25" in text
+        assert ": 0.25 1." not in text, "a ratio has no unit"
+        assert "Criterion" not in score_text(given, replace(FAILED, success=True))
+
+
+def test_a_success_that_a_flag_disqualifies_is_none():
+    flagged = replace(FAILED, success=True, flags=("start_too_high",))
+    text = score_text(builtin_tasks()["lift-2"], flagged)
+    assert text.startswith("It did not succeed.")
+    assert meaning("start_too_high") in text
+
+
+def test_toppling_is_told_from_the_starting_blocks_lean():
+    given = builtin_tasks()["transport-1"]
+    short = changed(given, duration_s=1.0)
+    trial = simulate(load_machine("car-without-keys"), short.scenario, "mujoco")
+    told = score(given, load_machine("car-without-keys"), trial)
+    for degrees in (30.0, 59.0, 61.0, 90.0, 180.0):
+        for axis in ((1, 0, 0), (0, 1, 0), (0.6, 0.8, 0), (0, 0, 1)):
+            half = np.radians(degrees) / 2
+            turned = trial.quaternions.copy()
+            turned[:10, 0] = (1, 0, 0, 0)
+            turned[10:, 0] = [np.cos(half), *(np.sin(half) * np.array(axis))]
+            text = score_text(given, told, replace(trial, quaternions=turned))
+            toppled = degrees > TOPPLED_DEG and not axis[2]
+            assert ("It toppled" in text) == toppled
+            if toppled:
+                assert f"from {trial.time_s[10]:.2f} s on" in text
+                assert f"by {degrees:.0f}°" in text
+
+
+def test_the_first_break_is_told():
+    given = builtin_tasks()["support-1"]
+    told, path = trial_of(given, load_machine("beam"), "mujoco", duration_s=3.0)
+    assert f"First to break: {path.breaks[0].joint}" in score_text(given, told, path)
+    assert "First to break" not in score_text(given, told)

@@ -1,0 +1,69 @@
+"""A runner killed at any step: the next one cleans up and plays the run again."""
+
+import json
+import os
+import random
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import psutil
+import pytest
+from support.game.game_rig import Rig, our_score, short_trial
+
+pytestmark = pytest.mark.timeout(900)
+KILLS = int(os.environ.get("BESIEGE_KILLS", "3"))
+LONGEST_S = 9.0
+"""A run from the game's start to its end takes a little less."""
+
+
+@pytest.fixture
+def clean(rig: Rig) -> Iterator[Rig]:
+    """Ends the game that killed runners leave running, as a next runner would."""
+    yield rig
+    known = rig.folder / "state" / "game.json"
+    if known.exists():
+        psutil.Process(json.loads(known.read_text())["pid"]).kill()
+
+
+def runner(rig: Rig, screen: dict[str, str]) -> subprocess.Popen[str]:
+    environment = {**os.environ, **rig.environment(), **screen}
+    words = [sys.executable, "-m", "support.game.one_run", str(rig.folder)]
+    return subprocess.Popen(words, env=environment, stdout=subprocess.PIPE, text=True)
+
+
+@pytest.mark.ci
+def test_the_next_runner_cleans_up_and_plays_the_run_again(clean, screen) -> None:
+    task, machine = short_trial("transport-1")
+    right = our_score(task, machine)
+    draw = random.Random(KILLS)
+    for number in range(KILLS):
+        with runner(clean, screen) as killed:
+            # Spread over the whole run: each kill meets another step.
+            time.sleep(1.5 + (LONGEST_S - 1.5) * (number + draw.random()) / KILLS)
+            killed.kill()
+    with runner(clean, screen) as last:
+        told, _ = last.communicate(timeout=120)
+    assert last.returncode == 0
+    success, indicator = json.loads(told)
+    assert success == right.success
+    assert indicator == pytest.approx(right.indicator, rel=0.01)
+    assert not list(clean.machines.iterdir())
+    assert not (clean.folder / "state" / "run.json").exists()
+    report = clean.report()
+    assert (report["phase"], report["machine"]) == ("build", None)
+    assert report["modifiers"] == []
+
+
+@pytest.mark.nightly
+def test_a_log_in_a_file_takes_the_place_of_the_log_window(clean, screen) -> None:
+    task, machine = short_trial("transport-1")
+    right = our_score(task, machine)
+    log = clean.folder / "mod.log"
+    command = clean.environment()["BUILDARENA_BESIEGE_COMMAND"] + f" --log-file {log}"
+    given = {"BUILDARENA_BESIEGE_COMMAND": command, "BUILDARENA_BESIEGE_LOG_FILE": str(log)}
+    with runner(clean, {**screen, **given}) as playing:
+        told, _ = playing.communicate(timeout=120)
+    assert json.loads(told)[1] == pytest.approx(right.indicator, rel=0.01)
+    assert clean.report()["counts"]["copies"] == 1, "only the name was copied back"

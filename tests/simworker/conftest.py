@@ -1,0 +1,26 @@
+from collections.abc import Iterator
+
+import pytest
+from support.clients.tenants import WITH_KEYS
+from support.servers.live_api import changed, live_api
+
+from buildarena_backend.process.context import Context
+from buildarena_backend.settings import Settings
+
+
+@pytest.fixture
+def lease_s() -> float:
+    """Longer than any machine takes between two heartbeats of a test."""
+    return 60.0
+
+
+@pytest.fixture
+def settings(settings: Settings, lease_s: float) -> Settings:
+    return settings.model_copy(update={"lease_s": lease_s})
+
+
+@pytest.fixture
+def url(context: Context) -> Iterator[str]:
+    """An API that asks for keys."""
+    with changed(context, **WITH_KEYS) as own, live_api(own) as found:
+        yield found

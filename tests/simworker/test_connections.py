@@ -1,0 +1,242 @@
+"""Connections that break and an API that is away cost time only; files come in pieces."""
+
+import hashlib
+import os
+import threading
+import time
+from dataclasses import replace
+
+import httpx
+import httpx2
+import pytest
+from support.clients.tenants import WITH_KEYS
+from support.jobs import execute
+from support.servers.flaky_proxy import flaky_proxy
+from support.servers.live_api import changed, live_api
+from support.servers.runner_rig import MUJOCO, Caller, ended, runner_key, slot, waiting
+
+from buildarena_api.runners.outcomes import drop_dead_uploads
+from buildarena_backend.artifacts import uploads
+from buildarena_backend.artifacts.uploads import UploadedFile, Uploads
+from buildarena_backend.errors import UploadError
+from buildarena_backend.keepalive import socket_options
+from buildarena_backend.trials.simulator import File, TrialResult
+from buildarena_simworker.engines import EngineSimulator
+from buildarena_simworker.remote import api as remote_api
+from buildarena_simworker.remote.api import RunnerApi, tls_context
+
+PIECE = uploads.PIECE_BYTES
+LEASE = ("job_0a", 3)
+
+
+class WithLog(EngineSimulator):
+    """The engine with a long log beside each trajectory."""
+
+    log = File(data=os.urandom(1_500_000), media_type="text/plain")
+
+    def run(self, trial) -> TrialResult:
+        return replace(super().run(trial), files={"log-0.txt": self.log})
+
+
+@pytest.fixture(autouse=True)
+def short_pauses(monkeypatch) -> None:
+    monkeypatch.setattr(remote_api, "LONGEST_PAUSE_S", 0.2)
+
+
+def test_uploads_go_on_where_they_were_cut_and_lost_answers_do_nothing_twice(context, url) -> None:
+    job = waiting(context)
+    with (
+        flaky_proxy(url) as proxy,
+        slot(proxy.url, runner_key(context)[1], WithLog("mujoco")) as one,
+    ):
+        proxy.cut_after = [700_000, 300_000]
+        proxy.swallow_answers = 2
+        assert one.do_next(0)
+    assert proxy.cuts == 4
+    now = ended(context, job)
+    assert (now.lease_token, now.faults) == (2, 0)
+    kept = {file.name: file.hash for file in context.store.jobs.files(job.id)}
+    assert context.artifacts.get(kept["log-0.txt"]) == WithLog.log.data
+    assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
+    kinds = [event.kind for event in context.store.events.after(0, job_id=job.id)]
+    assert kinds.count("done") == 1
+
+
+def test_links_that_fall_silent_cost_a_time_out_each(context, url, monkeypatch) -> None:
+    monkeypatch.setattr(remote_api, "TIMEOUT_S", 0.4)
+    job = waiting(context)
+    with flaky_proxy(url) as proxy, slot(proxy.url, runner_key(context)[1]) as one:
+        proxy.silent = 1
+        assert one.do_next(0)
+        assert proxy.cuts >= 1
+    assert ended(context, job).faults == 0
+    assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
+
+
+def test_a_runner_gives_up_dead_links_unless_a_proxy_ends_them(url, monkeypatch) -> None:
+    for name in [name for name in os.environ if name.lower().endswith("_proxy")]:
+        monkeypatch.delenv(name)
+
+    def options() -> object:
+        api = RunnerApi(url, None, tls=tls_context(None), stopping=threading.Event())
+        found = api._http._transport_for_url(httpx2.URL(url))._pool._socket_options
+        api.close()
+        return found
+
+    assert options() == socket_options()
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
+    assert options() is None
+
+
+@pytest.mark.ci
+def test_an_api_that_is_away_is_waited_for(context) -> None:
+    job = waiting(context)
+    with (
+        changed(context, **WITH_KEYS, lease_s=30.0) as own,
+        live_api(own) as url,
+        flaky_proxy(url) as proxy,
+    ):
+        comes_back = threading.Timer(1.0, lambda: setattr(proxy, "away", False))
+
+        class Away(EngineSimulator):
+            def run(self, trial) -> TrialResult:
+                done = super().run(trial)
+                proxy.away = True
+                comes_back.start()
+                return done
+
+        with slot(proxy.url, runner_key(context)[1], Away("mujoco")) as one:
+            assert one.do_next(0)
+        comes_back.join()
+    ended(context, job)
+
+
+@pytest.mark.ci
+def test_who_waits_gets_what_comes_at_once_and_who_has_left_nothing(context, url) -> None:
+    secret = runner_key(context)[1]
+    with httpx.Client(base_url=url, headers={"Authorization": f"Bearer {secret}"}) as client:
+        payload = {"name": "gone", "simulators": MUJOCO, "wait_s": 20}
+        with pytest.raises(httpx.ReadTimeout):
+            client.post("/v1/runner/leases", json=payload, timeout=0.7)
+    with slot(url, secret) as one:
+        comes = threading.Timer(0.8, waiting, [context])
+        comes.start()
+        started = time.monotonic()
+        assert one.do_next(20)
+        assert 0.7 < time.monotonic() - started < 5
+        comes.join()
+        assert not one.do_next(0.1)
+
+
+@pytest.fixture
+def store(tmp_path) -> Uploads:
+    return Uploads(tmp_path)
+
+
+def file_of(data: bytes) -> UploadedFile:
+    return UploadedFile(sha256=hashlib.sha256(data).hexdigest(), size=len(data))
+
+
+def pieces(data: bytes) -> list[tuple[int, bytes]]:
+    return [(at, data[at : at + PIECE]) for at in range(0, len(data), PIECE)]
+
+
+def test_a_file_is_received_in_pieces_however_often_each_comes(store) -> None:
+    for size in (0, 1, PIECE - 1, PIECE, PIECE + 1, 2 * PIECE, 2 * PIECE + 5):
+        data = os.urandom(size)
+        file = file_of(data)
+        assert store.offset(LEASE, file) == 0
+        for at, piece in pieces(data) or [(0, b"")]:
+            for _ in range(2):
+                assert store.append(LEASE, file, at, piece) == at + len(piece)
+        assert store.take(LEASE, file) == data
+        store.drop(LEASE)
+        assert store.leases() == set()
+        with pytest.raises(UploadError, match="only 0 of" if size else "not all"):
+            store.take(LEASE, file)
+
+
+def test_pieces_that_do_not_fit_and_other_bytes_than_the_hash_says_are_refused(store) -> None:
+    file = file_of(bytes(2 * PIECE + 7))
+    for offset, length, says in [
+        (PIECE, PIECE, "0 bytes were received: go on there"),
+        (1, PIECE - 1, "pieces begin at multiples"),
+        (4 * PIECE, 0, "no piece"),
+        (0, PIECE - 1, "has 1,048,576, not 1,048,575"),
+        (0, PIECE + 1, "has 1,048,576, not 1,048,577"),
+    ]:
+        with pytest.raises(UploadError, match=says):
+            store.append(LEASE, file, offset, bytes(length))
+    assert store.leases() == set()
+    data = os.urandom(PIECE + 3)
+    for at, piece in pieces(data[::-1]):
+        store.append(LEASE, file_of(data), at, piece)
+    with pytest.raises(UploadError, match="send it again"):
+        store.take(LEASE, file_of(data))
+    for at, piece in pieces(data):
+        store.append(LEASE, file_of(data), at, piece)
+    assert store.take(LEASE, file_of(data)) == data
+
+
+def test_what_is_uploaded_under_a_lease_is_bounded(store, monkeypatch) -> None:
+    for name, most in (("MAX_FILE_BYTES", 10), ("MAX_LEASE_BYTES", 25), ("MAX_LEASE_FILES", 3)):
+        monkeypatch.setattr(uploads, name, most)
+
+    def send(data: bytes, lease: tuple[str, int] = LEASE) -> None:
+        store.append(lease, file_of(data), 0, data)
+
+    with pytest.raises(UploadError, match="at most 10 bytes"):
+        send(bytes(11))
+    send(b"a" * 10)
+    send(b"b" * 10)
+    with pytest.raises(UploadError, match="at most 25 bytes"):
+        send(b"c" * 10)
+    send(b"d")
+    with pytest.raises(UploadError, match="at most 3 files"):
+        send(b"e")
+    send(b"e", ("job_0a", 4))  # another lease has its own
+    assert store.leases() == {LEASE, ("job_0a", 4)}
+
+
+def test_uploads_of_leases_that_ended_are_removed(context, url) -> None:
+    caller = Caller(url, runner_key(context)[1])
+    leases = []
+    for number in range(3):
+        waiting(context, seed=number)
+        caller.name = f"r{number}"
+        leases.append(caller.lease())
+        caller.upload(leases[-1], b"half a trial")
+    dead, live, ended_one = leases
+    caller.ask("POST", caller.at(ended_one, "/hand-back"))
+    kept = Uploads(context.settings.artifacts_location)
+    assert kept.leases() == {(each["job_id"], each["token"]) for each in (dead, live)}
+    execute(
+        context,
+        "UPDATE jobs SET lease_token = lease_token + 1 WHERE id = :id",
+        {"id": dead["job_id"]},
+    )
+    assert drop_dead_uploads(context, kept) == 1
+    assert kept.leases() == {(live["job_id"], live["token"])}
+
+
+def test_requests_for_uploads_are_bounded(context, url) -> None:
+    waiting(context)
+    caller = Caller(url, runner_key(context)[1])
+    lease = caller.lease()
+
+    def put(sha256: str, content: bytes = b"x", **params: int) -> httpx.Response:
+        path = caller.at(lease, f"/uploads/{sha256}")
+        return caller.ask("PUT", path, params=params, content=content)
+
+    for wrong in (
+        {"size": uploads.MAX_FILE_BYTES + 1, "offset": 0},
+        *({"size": -1, "offset": 0}, {"size": 5}, {"size": 5, "offset": -1}),
+    ):
+        assert put("a" * 64, **wrong).status_code == 422, wrong
+    assert put("a" * 64, bytes(5 << 20), size=9 << 20, offset=0).status_code == 413
+    # Bytes that look like deep JSON are bytes.
+    brackets = b"[" * 1000
+    sent = put(hashlib.sha256(brackets).hexdigest(), brackets, size=1000, offset=0)
+    assert sent.json() == {"offset": 1000, "whole": True}
+    for sha256 in ("A" * 64, "a" * 63, "a" * 65, "..%2f" + "a" * 60, "g" * 64):
+        assert put(sha256, size=1, offset=0).status_code == 404, sha256
