@@ -1,4 +1,4 @@
-"""Measures a service with a million ended and a million queued jobs, by a real API process.
+"""Measures a service with 200,000 ended and as many queued jobs, by a real API process.
 
 Everything is asked over HTTP, but for claims and the reaper's statements, which workers make
 themselves. The database is made in a temporary folder and is gone afterwards.
@@ -30,13 +30,13 @@ from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
 BARS = {
     "board_at_rest_ms": 20.0,
     "board_after_a_change_ms": 60.0,
-    "board_ready_s": 3.0,
-    "slowest_other_board_ms": 800.0,
+    "first_board_s": 5.0,
+    "slowest_other_board_ms": 1000.0,
     "api_memory_mb": 300.0,
     "claim_ms": 5.0,
     "list_ms": 100.0,
     "sweeps_ms": 100.0,
-    "sweep_of_100000_s": 12.0,
+    "sweep_of_100000_s": 10.0,
 }
 SORTS = ("created", "finished", "indicator", "cost", "task", "model", "seed")
 FILTERS: dict[str, dict[str, Any]] = {
@@ -135,13 +135,10 @@ def memory_mb(pid: int) -> float:
 
 
 def measure_boards(settings: dict[str, str], database: Database, times: int) -> dict[str, Any]:
-    """Boards of a process that finds no cells, and of one that finds them all."""
-    with api_process(settings) as (client, _, _):
-        first = ask(client, "/v1/leaderboard") / 1000
+    """Boards of a process that has read no cell, and later ones."""
     with api_process(settings) as (client, pid, started):
         alive = time.perf_counter() - started
-        ask(client, "/v1/leaderboard")
-        ready = time.perf_counter() - started
+        first = ask(client, "/v1/leaderboard") / 1000
         rest = [ask(client, "/v1/leaderboard") for _ in range(times)]
         changed = []
         for number in range(times):
@@ -155,9 +152,8 @@ def measure_boards(settings: dict[str, str], database: Database, times: int) -> 
             "sweep": ask(client, "/v1/leaderboard", sweep="sweep_ended0"),
         }
         return {
-            "first_board_with_nothing_kept_s": round(first, 1),
             "alive_s": round(alive, 1),
-            "board_ready_s": round(ready, 1),
+            "first_board_s": round(first, 1),
             "board_at_rest_ms": spread(rest),
             "board_after_a_change_ms": spread(changed),
             "other_boards_ms": {name: round(value) for name, value in other.items()},
@@ -272,7 +268,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path)
     parser.add_argument(
-        "--jobs", type=int, default=1_000_000, help="Ended ones, and as many queued"
+        "--jobs", type=int, default=200_000, help="Ended ones, and as many queued"
     )
     given = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="buildarena-bench-"))

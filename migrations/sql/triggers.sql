@@ -1,13 +1,10 @@
 -- What SQLAlchemy has no words for: storage, counters of jobs, and the log of board changes.
 
-ALTER TABLE board_cells ALTER COLUMN figures SET STORAGE EXTERNAL;
-ALTER TABLE board_cells ALTER COLUMN details SET STORAGE EXTERNAL;
-ALTER TABLE board_cells ALTER COLUMN samples SET STORAGE EXTERNAL;
 ALTER TABLE jobs SET (fillfactor = 90);
 ALTER TABLE leases SET (fillfactor = 10);
 
 DO $$ DECLARE large text; BEGIN
-    FOREACH large IN ARRAY ARRAY['jobs', 'attempts', 'journal', 'board_cells', 'figure_changes'] LOOP
+    FOREACH large IN ARRAY ARRAY['jobs', 'attempts', 'journal', 'figure_changes'] LOOP
         EXECUTE format('ALTER TABLE %I SET (autovacuum_vacuum_scale_factor = 0.02,
             autovacuum_vacuum_insert_scale_factor = 0.05, autovacuum_analyze_scale_factor = 0.02)', large);
     END LOOP;

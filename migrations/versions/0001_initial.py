@@ -9,7 +9,7 @@ from alembic import op
 from buildarena_backend.database.migrating import TRIGGERS
 from buildarena_backend.database.tables import metadata
 
-revision = "0001_fe7855c0"
+revision = "0001_ad06809e"
 down_revision = None
 branch_labels = None
 depends_on = None

@@ -127,7 +127,7 @@ NOT_WORKERS = (
     *("INSERT INTO sweeps (id) VALUES ('sweep_x')", "INSERT INTO jobs (id) VALUES ('job_x')"),
     *("INSERT INTO tasks (name) VALUES ('x')", "UPDATE journal SET reply = '{}'"),
     *("UPDATE sweeps SET owner = 'key_x'", "UPDATE sweep_jobs SET wanted = false"),
-    *("UPDATE events SET kind = 'x'", "SELECT 1 FROM board_cells"),
+    "UPDATE events SET kind = 'x'",
 )
 """Workers read no keys and raise no limit."""
 NOT_SIMULATORS = (

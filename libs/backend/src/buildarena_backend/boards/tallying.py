@@ -1,4 +1,4 @@
-"""Cells with their tallies: made from jobs by the database, and kept as rows."""
+"""Cells with their tallies, made from jobs by the database."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from buildarena_geometry import kernels  # noqa: F401 - before numpy
 # isort: split
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -30,27 +32,24 @@ from sqlalchemy import (
     select,
 )
 
-from buildarena_backend.boards.packing import floats, integers
 from buildarena_backend.boards.trials import COUNTS, CellId, TrialFilter, decoding_of, published
 from buildarena_backend.database.database import AS_THEY_ARE
 from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.states import EXTERNAL_PROVIDER
 from buildarena_benchmark.leaderboard import (
-    DETAILS,
     ROBUST_INDICATOR,
     ROBUSTNESS,
     UNKNOWN_TOKENS,
     Cell,
     CellName,
-    Details,
     Tally,
+    Total,
     summarise_tallies,
-    tally_between,
 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class CellRecord:
     """A cell as boards are made of it.
 
@@ -61,10 +60,6 @@ class CellRecord:
         jobs: How many ended jobs it has; 0 when all have left.
         newest: When the last of them ended.
         tallies: What its figures are made of.
-        details: Of each tally, what its totals are made of; not read with others than those of a
-            period.
-        summary: What boards show of it, if that was made.
-        snapshot: When its row was so, in the database's words; empty of one that is not a row's.
     """
 
     id: CellId
@@ -73,45 +68,21 @@ class CellRecord:
     jobs: int
     newest: datetime | None
     tallies: Sequence[Tally]
-    details: Sequence[Details] = ()
-    summary: Cell | None = None
-    snapshot: str = ""
 
-    @property
-    def name(self) -> CellName:
-        """Whose trials it has."""
-        return CellName(
+    @cached_property
+    def summary(self) -> Cell:
+        """What boards show of it."""
+        name = CellName(
             task=self.id.task,
             model=self.model,
             configuration=self.id.configuration,
             decoding=self.decoding,
         )
-
-    def summarise(self) -> Cell:
-        """What boards show of it; made of its tallies."""
-        return summarise_tallies(self.name, self.tallies)
-
-    def summarised(self) -> CellRecord:
-        """The same with its summary, if it has jobs."""
-        return replace(self, summary=self.summarise()) if self.jobs else self
-
-    def without_tallies(self) -> CellRecord:
-        """The same without what takes memory."""
-        return replace(self, tallies=(), details=())
-
-    def between(self, since: datetime | None, until: datetime | None) -> CellRecord:
-        """The same of the jobs that ended in a period; needs the details."""
-        pairs = zip(self.tallies, self.details, strict=True)
-        tallies = [tally_between(tally, details, since, until) for tally, details in pairs]
-        return cell_record(self.id, self.model, self.decoding, [t for t in tallies if t.number])
+        return summarise_tallies(name, self.tallies)
 
 
 def cell_record(
-    id_: CellId,
-    model: str,
-    decoding: Mapping[str, Any],
-    tallies: Sequence[Tally],
-    details: Sequence[Details] = (),
+    id_: CellId, model: str, decoding: Mapping[str, Any], tallies: Sequence[Tally]
 ) -> CellRecord:
     """The cell of some tallies."""
     return CellRecord(
@@ -121,7 +92,6 @@ def cell_record(
         jobs=sum(tally.number for tally in tallies),
         newest=max((tally.newest for tally in tallies if tally.newest), default=None),
         tallies=tallies,
-        details=details,
     )
 
 
@@ -139,10 +109,8 @@ def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
     records = []
     for id_, rows in found.items():
         config = configs[rows[0].sample]
-        details = [_details_of(row) for row in rows]
-        tallies = [_tally_of(row, own) for row, own in zip(rows, details, strict=True)]
         decoding = decoding_of(config[2], config.limits)
-        records.append(cell_record(id_, config.model, decoding, tallies, details))
+        records.append(cell_record(id_, config.model, decoding, [_tally_of(row) for row in rows]))
     return records
 
 
@@ -190,19 +158,18 @@ _EACH: Final = [
     _bytes_of(func.float8send(_GAINED)).label("gained"),
     _bytes_of(func.float8send(cast(jobs.c.cost_usd, Double))).label("costs"),
     _bytes_of(func.int8send(jobs.c.output_tokens)).label("output_tokens"),
-    _bytes_of(func.timestamptz_send(func.coalesce(jobs.c.finished_at, jobs.c.created_at))).label(
-        "finished_us"
-    ),
-    _bytes_of(func.int8send(jobs.c.requests)).label("requests"),
-    _bytes_of(func.int8send(jobs.c.input_tokens)).label("input_tokens"),
-    _bytes_of(func.int8send(func.coalesce(_PARTS, UNKNOWN_TOKENS))).label("parts"),
-    _bytes_of(func.int8send(jobs.c.actions)).label("actions"),
-    _bytes_of(func.int8send(jobs.c.refused_actions)).label("refused_actions"),
+    func.max(func.coalesce(jobs.c.finished_at, jobs.c.created_at)).label("newest"),
+    func.sum(jobs.c.requests).label("requests"),
+    func.sum(jobs.c.input_tokens).label("input_tokens"),
+    func.count(_PARTS).label("with_parts"),
+    func.coalesce(func.sum(_PARTS), 0).label("parts"),
+    func.sum(jobs.c.actions).label("actions"),
+    func.sum(jobs.c.refused_actions).label("refused_actions"),
     func.string_agg(case((_OBJECT, cast(jobs.c.refusals, Text)), else_="{}"), "\n").label(
         "refusals"
     ),
 ]
-"""Figures of each trial, all in one order."""
+"""Figures of each trial, all in one order, and sums."""
 
 
 def _id_of(row: Row[Any]) -> CellId:
@@ -219,28 +186,12 @@ def _configs(ids: Sequence[str]) -> Any:
     return select(*columns).where(jobs.c.id == func.any(bound_texts(ids)))
 
 
-def _details_of(row: Row[Any]) -> Details:
-    details = np.stack([integers(getattr(row, name)) for name in DETAILS])
-    if row.external:
-        # What an external agent used is unknown, which is not nothing.
-        details[[DETAILS.index("requests"), DETAILS.index("input_tokens")]] = UNKNOWN_TOKENS
-    return Details(columns=details, refusals=_refusals(row.refusals.split("\n")))
-
-
-def _refusals(texts: Sequence[str]) -> dict[str, NDArray[np.int64]]:
-    """Refused actions of each trial by class."""
-    places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
-    distinct = [json.loads(text) for text in places]
-    place = np.array([places[text] for text in texts])
-    classes = sorted({name for one in distinct for name in one})
-    return {
-        name: np.array([int(one.get(name, 0)) for one in distinct], np.int64)[place]
-        for name in classes
-    }
-
-
-def _tally_of(row: Row[Any], details: Details) -> Tally:
-    number = row.number
+def _tally_of(row: Row[Any]) -> Tally:
+    # What an external agent used is unknown, which is not nothing.
+    known = 0 if row.external else row.number
+    refusals: Counter[str] = Counter()
+    for said, times in Counter(row.refusals.split("\n")).items():
+        refusals.update({name: int(one) * times for name, one in json.loads(said).items()})
     return Tally(
         outcome=row.outcome,
         reason=row.reason,
@@ -248,12 +199,23 @@ def _tally_of(row: Row[Any], details: Details) -> Tally:
         flags=tuple(row.flags),
         by_runner=row.by_runner,
         unverified=row.unverified,
-        indicators=floats(row.indicators),
-        shares=floats(row.shares),
-        gained=floats(row.gained),
-        costs_usd=np.full(number, np.nan) if row.external else floats(row.costs),
-        output_tokens=np.full(number, UNKNOWN_TOKENS)
-        if row.external
-        else integers(row.output_tokens),
-        **details.totals(),
+        indicators=_numbers(row.indicators, ">f8"),
+        shares=_numbers(row.shares, ">f8"),
+        gained=_numbers(row.gained, ">f8"),
+        costs_usd=_numbers(row.costs, ">f8") if known else np.full(row.number, np.nan),
+        output_tokens=_numbers(row.output_tokens, ">i8")
+        if known
+        else np.full(row.number, UNKNOWN_TOKENS),
+        requests=Total(known=known, sum=int(row.requests) if known else 0),
+        input_tokens=Total(known=known, sum=int(row.input_tokens) if known else 0),
+        parts=Total(known=row.with_parts, sum=int(row.parts)),
+        actions=int(row.actions),
+        refused_actions=int(row.refused_actions),
+        refusals=dict(refusals),
+        newest=row.newest,
     )
+
+
+def _numbers(sent: bytes, kind: str) -> NDArray[Any]:
+    """Numbers as the database sends them, in the machine's order of bytes."""
+    return np.frombuffer(sent, kind).astype(kind.replace(">", "="))

@@ -5,13 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from sqlalchemy import (
-    JSON,
-    BigInteger,
     Column,
-    DateTime,
     Index,
-    Integer,
-    LargeBinary,
     Numeric,
     Table,
     Text,
@@ -22,51 +17,6 @@ from sqlalchemy import (
 from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_backend.database.tables import metadata
-
-
-def _snapshot() -> tuple[Column[str], Column[int], Column[int]]:
-    """What had been committed; the later of two has the greater end, or fewer open before it."""
-    return (
-        Column("snapshot", Text, nullable=False),
-        Column("snapshot_end", BigInteger, nullable=False),
-        Column("snapshot_open", Integer, nullable=False),
-    )
-
-
-# What leaderboards are made of: made from jobs by whoever finds a cell changed, used by all.
-board_cells = Table(
-    "board_cells",
-    metadata,
-    # Programs of two releases may be at work: each has cells of its own format.
-    Column("format", Integer, primary_key=True, autoincrement=False),
-    Column("track", Text, primary_key=True),
-    Column("task", Text, primary_key=True),
-    Column("task_version", Text, primary_key=True),
-    Column("configuration", Text, primary_key=True),
-    Column("model", Text, nullable=False),
-    Column("decoding", JSON, nullable=False),
-    # None are left of a cell whose jobs all left; its row says so.
-    Column("jobs", BigInteger, nullable=False),
-    Column("newest", DateTime(timezone=True)),
-    Column("tallies", JSON, nullable=False),
-    Column("figures", LargeBinary, nullable=False),
-    # Read for boards of a period alone.
-    Column("details", LargeBinary, nullable=False, server_default=text("''")),
-    # True as long as `summarised` names who made them, and the row's snapshot.
-    Column("summaries", JSON),
-    Column("samples", LargeBinary, nullable=False, server_default=text("''")),
-    Column("summarised", Text),
-    *_snapshot(),
-)
-
-# Up to when no cell of a format is missing or out of date.
-board_state = Table(
-    "board_state",
-    metadata,
-    Column("format", Integer, primary_key=True, autoincrement=False),
-    Column("server", Text, nullable=False),
-    *_snapshot(),
-)
 
 
 def _amounts() -> list[Column[object]]:

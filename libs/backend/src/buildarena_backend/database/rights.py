@@ -25,7 +25,6 @@ _SUBMITTED = (
 _WORK = ("artifacts", "attempts", "events", "job_artifacts", "jobs", "leases", "rollouts")
 _SESSIONS = ("external_calls", "journal")
 _FIGURES = ("board_changes", "figure_changes", "figures", "workers")
-_BOARDS = ("board_cells", "board_state")
 _SCHEMA = ("alembic_version", "schema_compatibility")
 _EVERY = (
     *_ACCOUNTS,
@@ -33,7 +32,6 @@ _EVERY = (
     *_WORK,
     *_SESSIONS,
     *_FIGURES,
-    *_BOARDS,
     *_SCHEMA,
     "reservations",
     "verifications",
@@ -81,11 +79,11 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
             changes={
                 name: _WHOLE for name in _EVERY if name not in {*_SCHEMA, "events", "journal"}
             },
-            removes=(*_REAPS, *_BOARDS, "job_wants"),
+            removes=(*_REAPS, "job_wants"),
         ),
         "construct": Role(
             meaning="Construct workers: sessions, their costs, verifications.",
-            reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS}),
+            reads=tuple(name for name in _EVERY if name not in _ACCOUNTS),
             adds=(
                 *("artifacts", "attempts", "events", "job_artifacts", "leases", "rollouts"),
                 *_SESSIONS,
@@ -107,7 +105,7 @@ ROLES: Final[Mapping[str, Role]] = MappingProxyType(
         ),
         "simulate": Role(
             meaning="Simulation workers: trials and their scores.",
-            reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, *_BOARDS, "journal"}),
+            reads=tuple(name for name in _EVERY if name not in {*_ACCOUNTS, "journal"}),
             adds=(
                 *("artifacts", "attempts", "events", "job_artifacts", "leases"),
                 # Trials in varied worlds are asked for when the exact one is done.

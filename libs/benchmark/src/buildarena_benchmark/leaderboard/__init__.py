@@ -25,7 +25,6 @@ from buildarena_benchmark.leaderboard.ended_jobs import (
     EndedJob,
 )
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
-from buildarena_benchmark.leaderboard.making import summaries_made_by
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.plot_data import (
     FailureRow,
@@ -40,19 +39,15 @@ from buildarena_benchmark.leaderboard.published import (
 )
 from buildarena_benchmark.leaderboard.standings import TestCache
 from buildarena_benchmark.leaderboard.tallies import (
-    DETAILS,
     UNKNOWN_TOKENS,
-    Details,
     Tally,
     Total,
     tallied,
-    tally_between,
 )
 from buildarena_benchmark.leaderboard.verdict import Verdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
-    "DETAILS",
     "ROBUSTNESS",
     "ROBUST_INDICATOR",
     "SCORED",
@@ -65,7 +60,6 @@ __all__ = [
     "CellName",
     "ChosenCells",
     "Comparison",
-    "Details",
     "EndedJob",
     "FailureRow",
     "OverallRow",
@@ -89,10 +83,8 @@ __all__ = [
     "plain_table",
     "published_rows",
     "ranked_board",
-    "summaries_made_by",
     "summarise",
     "summarise_tallies",
     "tallied",
-    "tally_between",
     "verdict_of",
 ]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
-from typing import Any, Final
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,19 +19,6 @@ Integers = NDArray[np.int64]
 
 UNKNOWN_TOKENS: Final = -1
 """An unknown number of tokens, requests or parts, in arrays."""
-EPOCH: Final = datetime(2000, 1, 1, tzinfo=UTC)
-"""From when microseconds are counted."""
-DETAILS: Final = (
-    "finished_us",
-    "input_tokens",
-    "requests",
-    "parts",
-    "actions",
-    "refused_actions",
-)
-"""Of each trial: when it ended, in microseconds after `EPOCH`, tokens sent, model requests, parts
-of its machine (-1 where unknown), actions, refused ones included, and these."""
-_MICROSECOND: Final = timedelta(microseconds=1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -101,73 +88,6 @@ class Tally:
     def scored(self) -> bool:
         """Whether its trials count in averages."""
         return self.outcome in SCORED and not self.unverified
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Details:
-    """What each trial of a tally adds to its totals, so that those of a period can be had.
-
-    Attributes:
-        columns: (6, N) int64, a row for each of `DETAILS`, a column for each trial.
-        refusals: (N,) int64 for each refusal class: refused actions.
-    """
-
-    columns: Integers
-    refusals: Mapping[str, Integers]
-
-    def between(self, since: datetime | None, until: datetime | None) -> NDArray[np.bool_]:
-        """(N,) bool: which trials ended at `since` or later and before `until`."""
-        finished_us = self.columns[0]
-        inside = np.ones(len(finished_us), bool)
-        if since is not None:
-            inside &= finished_us >= (since - EPOCH) // _MICROSECOND
-        if until is not None:
-            inside &= finished_us < (until - EPOCH) // _MICROSECOND
-        return inside
-
-    def inside(self, chosen: NDArray[np.bool_]) -> Details:
-        """The same of some of the trials, (N,) bool."""
-        return Details(
-            columns=self.columns[:, chosen],
-            refusals={name: times[chosen] for name, times in self.refusals.items()},
-        )
-
-    def totals(self) -> dict[str, Any]:
-        """What they come to, as fields of a `Tally`."""
-        finished_us, counts = self.columns[0], self.columns[1:]
-        known = counts != UNKNOWN_TOKENS
-        sums = [
-            Total(known=number, sum=amount)
-            for number, amount in zip(
-                known.sum(axis=1).tolist(), (counts * known).sum(axis=1).tolist(), strict=True
-            )
-        ]
-        totals: dict[str, Any] = dict(zip(DETAILS[1:], sums, strict=True))
-        for name in ("actions", "refused_actions"):
-            totals[name] = totals[name].sum
-        refusals = {name: int(times.sum()) for name, times in self.refusals.items()}
-        last = EPOCH + int(finished_us.max()) * _MICROSECOND if len(finished_us) else None
-        return {**totals, "refusals": refusals, "newest": last}
-
-
-def tally_between(
-    tally: Tally, details: Details, since: datetime | None, until: datetime | None
-) -> Tally:
-    """The same of the trials that ended in a period: at `since` or later and before `until`."""
-    inside = details.between(since, until)
-    if inside.all():
-        return tally
-    totals = details.inside(inside).totals()
-    refusals = {name: times for name, times in totals["refusals"].items() if times}
-    return replace(
-        tally,
-        indicators=tally.indicators[inside],
-        shares=tally.shares[inside],
-        gained=tally.gained[inside],
-        costs_usd=tally.costs_usd[inside],
-        output_tokens=tally.output_tokens[inside],
-        **{**totals, "refusals": refusals},
-    )
 
 
 def total_of(values: Integers) -> Total:

@@ -1,20 +1,33 @@
-"""The boards of this process: summaries of cells, and answers as long as they are true."""
+"""The boards of this process: cells in memory, and answers as long as they are true."""
 
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Final
 
+from cachetools import LRUCache
+
 from buildarena_api.http.etags import Answer
-from buildarena_api.http.fair_cache import FairCache
-from buildarena_api.leaderboard.cells import Cells, Shown
 from buildarena_backend.boards.reading import Boards
+from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId, TrialFilter
 from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_benchmark import Task
-from buildarena_benchmark.leaderboard import Board, BoardQuery, EndedJob, Tally
+from buildarena_benchmark.leaderboard import (
+    Board,
+    BoardQuery,
+    Cell,
+    CellHead,
+    CellKey,
+    ChosenCells,
+    EndedJob,
+    TestCache,
+    choose_cells,
+    ranked_board,
+)
 
 MAX_CACHED_ANSWERS: Final = 256
 """Answers in memory at most; one of a full board is about 200 kB."""
@@ -29,14 +42,12 @@ class Question:
         query: Which tasks, models and times.
         sweeps: Ids of sweeps, if only jobs of these count.
         members: How many jobs these sweeps have: answers from before one had more are not true.
-        asked_by: Whose share of the cached answers it takes; the answer is the same for all.
     """
 
     track: str
     query: BoardQuery
     sweeps: frozenset[str] | None = None
     members: int = 0
-    asked_by: str = field(default="", compare=False)
 
     @property
     def is_partial(self) -> bool:
@@ -55,8 +66,43 @@ class Question:
         )
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shown:
+    """The cells of one board, as they were when it was asked for."""
+
+    question: Question
+    chosen: ChosenCells
+    records: Mapping[CellKey, CellRecord]
+    weights: Mapping[str, Mapping[str, int]]
+    tests: TestCache
+
+    def board(self) -> Board:
+        """Summarises and ranks what was asked for."""
+        outdated = {
+            task: sum(self.records[key].jobs for key in keys if key in self.records)
+            for task, keys in self.chosen.outdated.items()
+        }
+        return ranked_board(
+            self.chosen,
+            self._cell,
+            outdated,
+            overall=self.question.query.overall,
+            weights=self.weights,
+            tests=self.tests,
+        )
+
+    def inside(self) -> dict[CellId, CellRecord]:
+        """The board's cells, as far as jobs of them were asked for."""
+        found = (self.records.get(key) for keys in self.chosen.shown.values() for key in keys)
+        return {record.id: record for record in found if record is not None}
+
+    def _cell(self, key: CellKey) -> Cell | None:
+        record = self.records.get(key)
+        return None if record is None else record.summary
+
+
 class BoardCache:
-    """Keeps summaries of every cell up to date, and answers as long as they are true.
+    """Keeps every cell up to date in memory, and answers as long as they are true.
 
     Each question first asks the database what changed since the last one, which is one indexed
     look-up; nothing that a question is answered with is older than the question.
@@ -69,11 +115,14 @@ class BoardCache:
     def __init__(self, boards: Boards, catalogue: TaskCatalog) -> None:
         self._boards = boards
         self._catalogue = catalogue
+        self._lock = threading.Lock()
+        self._mark: str | None = None
+        self._records: dict[str, dict[CellKey, CellRecord]] = {}
+        self._generations: Counter[str] = Counter()
         self._task_versions: int | None = None
         self._tasks: Mapping[str, Task] = {}
-        self._lock = threading.Lock()
-        self._cells = Cells(boards.cells)
-        self._answers: FairCache[tuple[Question, str], tuple[int, Answer]] = FairCache(
+        self._tests = TestCache()
+        self._answers: LRUCache[tuple[Question, str], tuple[int, Answer]] = LRUCache(
             MAX_CACHED_ANSWERS
         )
 
@@ -85,7 +134,7 @@ class BoardCache:
         """
         with self._lock:
             self._refresh()
-            found = self._cells.tracks()
+            found = sorted(track for track, records in self._records.items() if records)
         if sweeps is None:
             return found
         return [
@@ -95,7 +144,8 @@ class BoardCache:
     def known_models(self, names: Iterable[str]) -> frozenset[str]:
         """Those of some models that have an ended job, as of the last question."""
         with self._lock:
-            return frozenset(names) & self._cells.models()
+            known = {one.model for records in self._records.values() for one in records.values()}
+        return frozenset(names) & known
 
     def tasks(self) -> Mapping[str, Task]:
         """Every task by name in its newest version, as of the last question."""
@@ -104,7 +154,7 @@ class BoardCache:
                 self._refresh()
             return self._tasks
 
-    def answer(self, question: Question, kind: str, render: Callable[[Board], bytes]) -> Answer:
+    def answer(self, question: Question, kind: str, render: Callable[[Shown], bytes]) -> Answer:
         """The rendered board of a track.
 
         Args:
@@ -112,71 +162,76 @@ class BoardCache:
             kind: Names the rendering: one kind is always rendered alike.
             render: Makes the body; called only when there is no true answer in memory.
         """
-        return self._answer(
-            question, kind, lambda shown: render(shown.board()), reads=question.is_partial
-        )
+        key = (question, kind)
+        with self._lock:
+            self._refresh()
+            generation = self._generations[question.track]
+            kept = self._answers.get(key)
+            if kept is not None and kept[0] == generation:
+                return kept[1]
+            shown = self._shown(question)
+            if not question.is_partial:
+                # Whoever asks the same meanwhile gets this answer.
+                return self._keep(key, generation, render(shown))
+        # Making it reads jobs: others need not wait for it.
+        body = render(self._of_jobs(shown))
+        with self._lock:
+            return self._keep(key, generation, body)
 
-    def answer_from_tallies(
-        self,
-        question: Question,
-        kind: str,
-        render: Callable[[Board, Mapping[CellId, tuple[str, Sequence[Tally]]]], bytes],
-    ) -> Answer:
-        """The same from the board and its cells, with model and tallies of each."""
-        return self._answer(
-            question, kind, lambda shown: render(shown.board(), shown.tallies()), reads=True
-        )
-
-    def inside(self, question: Question) -> dict[CellId, tuple[str, int]]:
-        """The cells of a board: their models, and how many jobs of each were asked for."""
-        return self._shown(question).inside()
+    def inside(self, question: Question) -> dict[CellId, CellRecord]:
+        """The cells of a board, as far as jobs of them were asked for."""
+        with self._lock:
+            self._refresh()
+            shown = self._shown(question)
+        return (self._of_jobs(shown) if question.is_partial else shown).inside()
 
     def trials(self, question: Question, cells: Sequence[CellId]) -> list[EndedJob]:
         """Single ended jobs of some of a board's cells."""
-        wanted = question.filter()
-        return self._boards.trials(wanted.within(cells))
+        return self._boards.trials(question.filter().within(cells))
 
     def scored_ids(self, question: Question, cells: Sequence[CellId]) -> list[str]:
         """Ids of scored jobs of some of a board's cells, in their order."""
         return self._boards.scored_ids(question.filter().within(cells))
 
-    def _answer(
-        self, question: Question, kind: str, render: Callable[[Shown], bytes], *, reads: bool
-    ) -> Answer:
-        """A kept answer, or a new one; when making it reads jobs, others need not wait for it."""
-        key = (question, kind)
-        with self._lock:
-            self._refresh()
-            generation = self._cells.generation(question.track)
-            kept = self._answers.get(key)
-            if kept is not None and kept[0] == generation:
-                return kept[1]
-            shown = self._cells.shown(question)
-            if not question.is_partial:
-                shown.summarise()
-            if not reads:
-                # Whoever asks the same meanwhile gets this answer.
-                return self._keep(key, generation, render(shown))
-        body = render(shown)
-        with self._lock:
-            return self._keep(key, generation, body)
-
     def _keep(self, key: tuple[Question, str], generation: int, body: bytes) -> Answer:
         answer = Answer.of(body)
-        self._answers.put(key, (generation, answer), who=key[0].asked_by)
+        self._answers[key] = (generation, answer)
         return answer
 
     def _shown(self, question: Question) -> Shown:
-        with self._lock:
-            self._refresh()
-            return self._cells.shown(question)
+        records = self._records.get(question.track, {})
+        heads = [CellHead(key=k, model=r.model, newest=r.newest) for k, r in records.items()]
+        versions = {name: task.version for name, task in self._tasks.items()}
+        chosen = choose_cells(heads, versions, question.query)
+        wanted = (*chosen.shown.values(), *chosen.outdated.values())
+        tasks = self._tasks.items()
+        return Shown(
+            question=question,
+            chosen=chosen,
+            records={key: records[key] for keys in wanted for key in keys},
+            weights={name: task.difficulty for name, task in tasks if task.difficulty},
+            tests=self._tests,
+        )
+
+    def _of_jobs(self, shown: Shown) -> Shown:
+        """The same cells, of just the jobs that were asked for."""
+        found = self._boards.cells.of(shown.question.filter())
+        return replace(shown, records={record.id[1:]: record for record in found})
 
     def _refresh(self) -> None:
-        task_versions = self._cells.refresh()
-        if task_versions != self._task_versions:
-            self._tasks, self._task_versions = self._catalogue.newest(), task_versions
-            tasks = self._tasks.values()
-            self._cells.use(
-                {task.name: task.version for task in tasks},
-                {task.name: task.difficulty for task in tasks if task.difficulty},
-            )
+        feed = self._boards.cells.feed(self._mark)
+        changed = {record.id.track for record in feed.cells}
+        if feed.whole:
+            changed.update(self._records)
+            self._records.clear()
+        for record in feed.cells:
+            records = self._records.setdefault(record.id.track, {})
+            if record.jobs:
+                records[record.id[1:]] = record
+            else:
+                records.pop(record.id[1:], None)
+        if feed.task_versions != self._task_versions:
+            self._tasks, self._task_versions = self._catalogue.newest(), feed.task_versions
+            changed.update(self._records)
+        self._generations.update(changed)
+        self._mark = feed.mark

@@ -10,7 +10,6 @@ from typing import Annotated, Final
 from fastapi import Depends, Query, Request
 
 from buildarena_api.dependencies import ContextDep, Track
-from buildarena_api.http.access import who_asks
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.http.weights import HEAVIEST
 from buildarena_api.leaderboard.cache import BoardCache, Question
@@ -59,7 +58,6 @@ class Selection:
 def select_board(
     boards: BoardsDep,
     context: ContextDep,
-    request: Request,
     *,
     track: Annotated[Track | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
@@ -127,7 +125,6 @@ def select_board(
         query=query,
         sweeps=sweeps,
         members=members,
-        asked_by=who_asks(request),
     )
     return Selection(track=track, tracks=tracks, query=query, question=question)
 

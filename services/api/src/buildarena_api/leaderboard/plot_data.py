@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_benchmark import Task
 from buildarena_benchmark.flags import ScoringPolicy
@@ -82,7 +83,7 @@ class Figures(BaseModel):
 def figures_view(
     track: str,
     board: Board,
-    cells: Mapping[CellId, tuple[str, Sequence[Tally]]],
+    cells: Mapping[CellId, CellRecord],
     *,
     tasks: Mapping[str, Task],
 ) -> Figures:
@@ -91,14 +92,14 @@ def figures_view(
     Args:
         track: Its track.
         board: The board.
-        cells: Its cells: model and tallies of each.
+        cells: Its cells.
         tasks: Every task by name.
     """
     by_task: dict[str, list[Tally]] = {}
     by_row: dict[tuple[str, str], list[Tally]] = {}
-    for id_, (model, tallies) in sorted(cells.items()):
-        by_task.setdefault(id_.task, []).extend(tallies)
-        by_row.setdefault((model, id_.configuration), []).extend(tallies)
+    for id_, cell in sorted(cells.items()):
+        by_task.setdefault(id_.task, []).extend(cell.tallies)
+        by_row.setdefault((cell.model, id_.configuration), []).extend(cell.tallies)
     categories = {name: task.category for name, task in tasks.items()}
     found = cost_bins_of(by_task, policy=ScoringPolicy.OURS, categories=categories)
     failures = [failure_row(*row, tallies) for row, tallies in sorted(by_row.items())]

@@ -129,7 +129,11 @@ async def export(
         body = await exporting.run(render, RankedBoard(tasks=(), overall=()))
     else:
         kind = f"{format} {' '.join(tracks)}"
-        body = (await exporting.run(boards.answer, selection.question, kind, render)).body
+        question = selection.question
+        answer = await exporting.run(
+            boards.answer, question, kind, lambda shown: render(shown.board())
+        )
+        body = answer.body
     name = f"leaderboard.{'tex' if format == 'latex' else format}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(body, media_type=MEDIA_TYPES[format], headers=headers)

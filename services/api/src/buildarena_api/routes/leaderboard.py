@@ -20,6 +20,7 @@ from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown,
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
+from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
 
@@ -124,9 +125,9 @@ def leaderboard(
     answer = boards.answer(
         selection.question,
         "json " + " ".join(tracks),
-        lambda board: (
+        lambda shown: (
             board_view(
-                board,
+                shown.board(),
                 track=track,
                 tracks=tracks,
                 registry=registry,
@@ -149,11 +150,13 @@ def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any
     if track is None:
         return Figures(track=None, dimensions=[], failures=[], cost=[], front=[])
     tasks = boards.tasks()
-    answer = boards.answer_from_tallies(
+    answer = boards.answer(
         selection.question,
         "figures",
-        lambda board, cells: (
-            figures_view(track, board, cells, tasks=tasks).model_dump_json().encode()
+        lambda shown: (
+            figures_view(track, shown.board(), shown.inside(), tasks=tasks)
+            .model_dump_json()
+            .encode()
         ),
     )
     return conditional(request, answer, "application/json")
@@ -185,15 +188,15 @@ def compare(
     )
 
 
-def _usual(every: Mapping[CellId, tuple[str, int]], field: str, name: str) -> list[CellId]:
+def _usual(every: Mapping[CellId, CellRecord], field: str, name: str) -> list[CellId]:
     """The cells of a model's configuration with the most jobs, of those that are meant."""
     model, _, wanted = name.partition("@")
     jobs: Counter[str] = Counter()
-    for id_, (of, number) in every.items():
-        if of == model and id_.configuration.startswith(wanted):
-            jobs[id_.configuration] += number
+    for id_, cell in every.items():
+        if cell.model == model and id_.configuration.startswith(wanted):
+            jobs[id_.configuration] += cell.jobs
     if not jobs:
-        choices = sorted({f"{of}@{id_.configuration[:8]}" for id_, (of, _) in every.items()})
+        choices = sorted({f"{cell.model}@{id_.configuration[:8]}" for id_, cell in every.items()})
         raise unknown(field, name, choices)
     usual = max(sorted(jobs), key=jobs.__getitem__)
     return [id_ for id_ in every if id_.configuration == usual]
@@ -238,7 +241,7 @@ def manifest(
     inside = boards.inside(selection.question)
     entries: dict[str, list[dict[str, Any]]] = {}
     for task, version, model in sorted(
-        {(i.task, i.task_version, m) for i, (m, _) in inside.items()}
+        {(i.task, i.task_version, cell.model) for i, cell in inside.items()}
     ):
         for name, value, jobs in context.store.results.boards.manifest_values(
             selection.track, task, version, model
@@ -269,10 +272,10 @@ def verify(
     query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None)
     question = Question(track=track or "", query=query)
     every = boards.inside(question)
-    own = [id_ for id_, (model, _) in every.items() if model == body.model]
+    own = [id_ for id_, cell in every.items() if cell.model == body.model]
     scored = boards.scored_ids(question, own)
     if not scored:
-        raise unknown("model", body.model, sorted({model for model, _ in every.values()}))
+        raise unknown("model", body.model, sorted({cell.model for cell in every.values()}))
     chosen = scored
     if body.sample is not None and body.sample < len(scored):
         # Whoever names the seed gets the same sample again; nothing secret hangs on it.
