@@ -44,7 +44,6 @@ def fill(database: Database, amount: Amount) -> None:
             _jobs(connection, "queued", amount.queued, amount.models)
             _ended(connection)
         connection.execute(text("SET session_replication_role = origin"))
-        connection.execute(text("SELECT recount_jobs()"))
         connection.execute(text("VACUUM ANALYZE"))
         connection.execute(text("DROP TABLE made_up_tasks"))
         connection.execute(text("RESET ALL"))

@@ -267,9 +267,7 @@ def measure(folder: Path, jobs: int) -> dict[str, Any]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", type=Path)
-    parser.add_argument(
-        "--jobs", type=int, default=200_000, help="Ended ones, and as many queued"
-    )
+    parser.add_argument("--jobs", type=int, default=200_000, help="Ended ones, and as many queued")
     given = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="buildarena-bench-"))
     try:

@@ -1,23 +1,20 @@
-"""Counts that triggers keep are what counting finds; pages of jobs; the register of workers."""
+"""Figures of the service and of sweeps; pages of jobs; the register of workers."""
 
 from __future__ import annotations
 
-import random
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from benchmarks.filling import TRACKS, Amount, fill
-from sqlalchemy import delete, select, text, update
+from sqlalchemy import select, text, update
 from support.jobs import execute
-from support.servers.stacks import wait_until
 
-from buildarena_backend.database.tables import attempts, jobs, sweep_jobs
+from buildarena_backend.database.tables import jobs, sweep_jobs
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.jobs.pages import Order
 from buildarena_backend.process.worker_process import worker_id
-from buildarena_backend.sweeps.sweeps import NewSweep
+from buildarena_backend.sweeps.sweeps import COUNTED_EVERY_S
 from buildarena_backend.telemetry.metrics import STAGE_SECONDS
 
 RUNNER = "runner@key_1/"
@@ -32,25 +29,6 @@ def store(context):
 def filled(store):
     fill(store.database, Amount(ended=900, queued=400, models=5))
     return store
-
-
-def counted(store) -> tuple[object, ...]:
-    """The figures after counting anew; how long the oldest has waited goes on."""
-    with store.database.transaction() as connection:
-        connection.execute(text("SELECT recount_jobs()"))
-    return as_said(store.metrics.read())
-
-
-def as_said(figures) -> tuple[object, ...]:
-    return (
-        sorted((j.state, j.stage, j.outcome, j.reason, j.jobs) for j in figures.jobs if j.jobs),
-        sorted((queue.queue, queue.jobs) for queue in figures.queues),
-        sorted(
-            (m.model, m.requests, m.input_tokens, m.output_tokens, round(m.cost_usd, 6))
-            for m in figures.models
-        ),
-        [(s.stage, s.result, list(s.counts), round(s.total_s, 3)) for s in figures.stages],
-    )
 
 
 def require_progress(store) -> None:
@@ -71,92 +49,64 @@ def require_progress(store) -> None:
             assert getattr(progress, name) == sum(getattr(row, name) for row in rows), name
 
 
-def test_kept_counts_are_those_that_counting_finds(filled) -> None:
-    rng = random.Random(1)
-    for step in range(25):
-        with filled.database.transaction() as connection:
-            ids = connection.execute(select(jobs.c.id).order_by(jobs.c.id)).scalars().all()
-            some = rng.sample(ids, 20)
-            change = (
-                {"state": "done", "outcome": "limit"},
-                {"state": "queued", "outcome": None, "queue": "simulate.mujoco"},
-                {"cost_usd": 1.5, "requests": step, "lost_requests": step},
-                {"outcome": "errored", "reason": f"class {step}"},
-                None,
-            )[step % 5]
-            if change is not None:
-                connection.execute(update(jobs).where(jobs.c.id.in_(some)).values(**change))
-            else:
-                for table in (attempts, sweep_jobs):
-                    connection.execute(delete(table).where(table.c.job_id.in_(some)))
-        for _ in range(3):
-            lease = filled.leases.claim("construct", owner="w")
-            if step % 2:
-                filled.leases.hand_back(lease)
-            else:
-                filled.leases.give_up(lease, "gone", reason="lost_worker")
-        if step % 4 == 0:
-            filled.metrics.read()
+def test_figures_are_those_of_the_jobs_one_by_one(filled) -> None:
+    with filled.database.transaction() as connection:
+        ids = connection.execute(select(jobs.c.id).order_by(jobs.c.id)).scalars().all()
+        changes = (
+            {"state": "done", "outcome": "errored", "reason": "lost_worker"},
+            {"cost_usd": 1.5, "requests": 7, "lost_requests": 2},
+            {"audit": "required"},
+        )
+        for number, change in enumerate(changes):
+            some = jobs.c.id.in_(ids[number::9])
+            connection.execute(update(jobs).where(some).values(**change))
+        every = connection.execute(select(jobs)).all()
     require_progress(filled)
-    kept = as_said(filled.metrics.read())
-    # Attempts that were taken out have been counted.
-    assert kept[:3] == counted(filled)[:3]
+    figures = filled.metrics.read()
+    assert {
+        (one.state, one.stage, one.outcome, one.reason): one.jobs for one in figures.jobs
+    } == Counter(
+        (j.state, j.stage, j.outcome or "", j.reason if j.outcome == "errored" else "")
+        for j in every
+    )
+    queued = Counter(job.queue for job in every if job.state == "queued")
+    assert {one.queue: one.jobs for one in figures.queues} == queued
+    assert all(one.oldest_s >= 0 for one in figures.queues)
+    for use in figures.models:
+        own = [job for job in every if job.model == use.model]
+        for name in ("requests", "input_tokens", "output_tokens"):
+            assert getattr(use, name) == sum(getattr(job, name) for job in own)
+        assert use.cost_usd == pytest.approx(float(sum(job.cost_usd for job in own)))
+    assert {one.model for one in figures.models} == {job.model for job in every}
+    assert figures.audits["required"] == sum(job.audit == "required" for job in every)
+    assert figures.audits["verified"] == 0
 
 
-def test_a_job_that_moves_while_a_sweep_takes_it_in_is_counted_once(filled) -> None:
-    """Whichever of the two began first, and whichever ends first."""
-    waits = text("SELECT count(*) FROM pg_locks WHERE NOT granted")
-    with filled.database.statement() as connection:
-        queued = select(jobs.c.id).where(jobs.c.state == "queued").order_by(jobs.c.id).limit(2)
-        first, second = connection.execute(queued).scalars()
-
-    def blocked() -> bool:
-        with filled.database.statement() as connection:
-            return bool(connection.execute(waits).scalar())
-
-    def move(job_id: str, connection) -> None:
-        done = {"state": "done", "outcome": "limit", "requests": 7}
-        connection.execute(update(jobs).where(jobs.c.id == job_id).values(**done))
-
-    def move_alone() -> None:
-        with filled.database.transaction() as own:
-            move(second, own)
-
-    def take_in(name: str, connection) -> None:
-        new = NewSweep(id=name, name=name, spec={})
-        filled.sweeps.add(new, [first, second], connection=connection)
-
-    def take_in_alone() -> None:
-        with filled.lifecycle.submission() as connection:
-            take_in("sweep_later", connection)
-
-    with ThreadPoolExecutor(1) as pool:
-        with filled.database.transaction() as moving:
-            move(first, moving)
-            other = pool.submit(take_in_alone)
-            wait_until(blocked, 10, "the sweep waits")
-        other.result()
-        require_progress(filled)
-        with filled.lifecycle.submission() as connection:
-            take_in("sweep_first", connection)
-            other = pool.submit(move_alone)
-            wait_until(blocked, 10, "the job waits")
-        other.result()
-    require_progress(filled)
-    assert filled.sweeps.progress("sweep_first").outcomes == {"limit": 2}
+def test_a_large_sweeps_progress_is_counted_anew_after_some_seconds(filled, monkeypatch) -> None:
+    monkeypatch.setattr("buildarena_backend.sweeps.sweeps.LARGE", 10)
+    before = filled.sweeps.progress("sweep_ended0")
+    with filled.database.transaction() as connection:
+        connection.execute(update(jobs).values(state="queued", stage="construct", outcome=None))
+    assert filled.sweeps.progress("sweep_ended0") == before
+    filled.sweeps._large.expire(filled.sweeps._large.timer() + COUNTED_EVERY_S + 1)
+    assert filled.sweeps.progress("sweep_ended0").outcomes == {}
 
 
 def test_attempts_are_counted_by_how_long_they_took(filled) -> None:
-    assert as_said(filled.metrics.read()) == counted(filled)
     insert = text(
         "INSERT INTO attempts (job_id, token, stage, worker, started_at, ended_at, result) SELECT "
         "min(id), :token, 'construct', 'w', now(), now() + :s * interval '1 s', 'done' FROM jobs"
     )
     near = [bound + by for bound in STAGE_SECONDS for by in (-0.0005, 0.0005)]
     with filled.database.transaction() as connection:
+        connection.execute(text("DELETE FROM attempts"))
         for number, seconds in enumerate(near):
             connection.execute(insert, {"token": 100 + number, "s": seconds})
-    assert as_said(filled.metrics.read()) == counted(filled)
+    (times,) = filled.metrics.read().stages
+    assert (times.stage, times.result) == ("construct", "done")
+    # Each class has its lower bound in it.
+    assert times.counts == [1] + [2] * (len(STAGE_SECONDS) - 1) + [1]
+    assert times.total_s == pytest.approx(sum(near))
 
 
 FILTERS = {

@@ -202,7 +202,7 @@ def test_an_owner_who_is_no_superuser_takes_an_older_installation_over(database_
     with owner.transaction() as connection:
         assert connection.execute(foreign).one() == (0, True)
         connection.execute(text("ALTER TABLE jobs ADD COLUMN further int"))
-        connection.execute(text("DROP FUNCTION recount_jobs()"))
+        connection.execute(text("DROP TRIGGER log_board_delete ON jobs"))
         assert not connection.execute(may).scalar()
     owner.close()
     database.close()

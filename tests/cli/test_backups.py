@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from sqlalchemy import create_engine, text
 from support.clients.commands import Done, run
-from support.servers.databases import MADE_OF_OTHERS
 from support.stages import work
 
 from buildarena_backend.catalog.specs import SweepSpec
@@ -61,7 +60,6 @@ def rows(context: Context) -> dict[str, list[str]]:
                 str(row[0]) for row in connection.execute(text(f"SELECT t::text FROM {table} t"))
             )
             for table in metadata.sorted_tables
-            if table.name not in MADE_OF_OTHERS
         }
 
 

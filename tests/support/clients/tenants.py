@@ -6,7 +6,6 @@ from typing import Any
 from httpx import Client, Response
 from pydantic import SecretStr
 from sqlalchemy import text
-from support.servers.databases import MADE_OF_OTHERS
 
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import metadata
@@ -66,5 +65,5 @@ def everything(database: Database) -> dict[str, list[str]]:
         return {
             table.name: sorted(connection.execute(text(rows.format(table.name))).scalars())
             for table in metadata.sorted_tables
-            if table.name not in {"workers", *MADE_OF_OTHERS}
+            if table.name != "workers"
         }

@@ -8,8 +8,6 @@ from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import metadata, schema_compatibility
 
 KEPT: Final = {schema_compatibility}
-MADE_OF_OTHERS: Final = {"figures", "figure_changes"}
-"""Tables whose rows are gathered at any moment: they say nothing that others do not."""
 
 
 def empty(database: Database) -> None:

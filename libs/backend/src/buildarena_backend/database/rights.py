@@ -24,7 +24,7 @@ _SUBMITTED = (
 )
 _WORK = ("artifacts", "attempts", "events", "job_artifacts", "jobs", "leases", "rollouts")
 _SESSIONS = ("external_calls", "journal")
-_FIGURES = ("board_changes", "figure_changes", "figures", "workers")
+_FIGURES = ("board_changes", "workers")
 _SCHEMA = ("alembic_version", "schema_compatibility")
 _EVERY = (
     *_ACCOUNTS,
@@ -63,10 +63,10 @@ class Role:
 
 
 _WHOLE: tuple[str, ...] = ()
-_REAPS: Final = ("figure_changes", "job_artifacts", "leases", "reservations", "workers")
-"""What every process removes: each may be the one whose reaper ends leases and counts figures."""
+_REAPS: Final = ("job_artifacts", "leases", "reservations", "workers")
+"""What every process removes: each may be the one whose reaper ends leases."""
 _WORKED: Final = dict.fromkeys(
-    ("artifacts", "attempts", "figures", "job_artifacts", "jobs", "leases", "rollouts", "workers"),
+    ("artifacts", "attempts", "job_artifacts", "jobs", "leases", "rollouts", "workers"),
     _WHOLE,
 )
 

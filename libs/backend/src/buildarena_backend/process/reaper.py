@@ -87,8 +87,6 @@ class Reaper:
         checks = store.verifications.to_notify(MAX_WAITING)
         if checks:
             self._context.queues.announce(VERIFY_QUEUE, checks)
-        # So that whoever reads the counts first after a year finds little to add.
-        store.metrics.gather()
 
     def _notify(self, queue: str) -> None:
         """Notifies a queue's workers; of twice as many jobs each time they have taken all."""

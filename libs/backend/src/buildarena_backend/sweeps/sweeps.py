@@ -9,18 +9,22 @@ from datetime import datetime
 from decimal import Decimal
 from typing import Any, Final
 
+from cachetools import TTLCache
 from sqlalchemy import Connection, Row, func, literal, select
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.derived_tables import OF_A_SWEEP, kept_figures
 from buildarena_backend.database.rows import bound_texts, columns_of, value_of
 from buildarena_backend.database.tables import attempts, jobs, sweep_jobs, sweeps
 from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.ids import begins_with
 from buildarena_backend.states import AttemptResult, JobState, SweepState
 from buildarena_backend.sweeps.forecasts import SweepForecast, read_forecast
+
+LARGE: Final = 2000
+"""Jobs of a sweep whose progress is not counted anew for every question."""
+COUNTED_EVERY_S: Final = 15.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -118,6 +122,7 @@ class Sweeps:
 
     def __init__(self, database: Database) -> None:
         self._database = database
+        self._large: TTLCache[str, SweepProgress] = TTLCache(1000, COUNTED_EVERY_S)
 
     def add(self, sweep: NewSweep, job_ids: Sequence[str], *, connection: Connection) -> None:
         """Stores a sweep with its jobs, which exist already."""
@@ -201,12 +206,25 @@ class Sweeps:
         return self.progress_of([sweep_id])[sweep_id]
 
     def progress_of(self, ids: Sequence[str]) -> dict[str, SweepProgress]:
-        """The same of several sweeps, by id: figures that triggers keep."""
-        amounts: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids}
-        with self._database.statement() as connection:
-            for row in connection.execute(_FIGURES, {"ids": list(ids)}):
-                amounts[row.key[0]].append(row)
-        return {id_: _progress(rows) for id_, rows in amounts.items()}
+        """The same of several sweeps, by id; of a large one as it was some seconds ago."""
+        known = {id_: kept for id_ in ids if (kept := self._large.get(id_)) is not None}
+        rows: dict[str, list[Row[Any]]] = {id_: [] for id_ in ids if id_ not in known}
+        place = (sweep_jobs.c.sweep_id, jobs.c.stage, jobs.c.state, jobs.c.outcome)
+        query = (
+            select(
+                *place, func.count().label("jobs"), *(func.sum(jobs.c[n]).label(n) for n in _USE)
+            )
+            .join(jobs, jobs.c.id == sweep_jobs.c.job_id)
+            .where(sweep_jobs.c.sweep_id == func.any(bound_texts(list(rows))))
+            .group_by(*place)
+        )
+        if rows:
+            with self._database.statement() as connection:
+                for row in connection.execute(query):
+                    rows[row.sweep_id].append(row)
+        counted = {id_: _progress(found) for id_, found in rows.items()}
+        self._large.update({id_: one for id_, one in counted.items() if one.total > LARGE})
+        return known | counted
 
     def forecast(self, sweep_id: str) -> SweepForecast:
         """When a sweep ends and what it comes to cost, from what ran so far.
@@ -267,33 +285,25 @@ class Sweeps:
             return [row.job_id for row in connection.execute(query)]
 
 
+_USE: Final = ("requests", "lost_requests", "input_tokens", "output_tokens", "cost_usd")
+
+
 def _progress(rows: Sequence[Row[Any]]) -> SweepProgress:
     stages: Counter[str] = Counter()
     outcomes: Counter[str] = Counter()
-    used, lost = [Decimal()] * 4, 0
     for row in rows:
-        if row.kind == "sweep_use":
-            used = [row.a, row.b, row.c, row.d]
-        elif row.kind == "sweep_lost":
-            lost = int(row.a)
-        elif row.a:
-            _, state, stage, outcome = row.key
-            if state == JobState.DONE:
-                outcomes[outcome] += int(row.a)
-            else:
-                stages[f"{stage} {state}"] += int(row.a)
-    requests, input_tokens, output_tokens, cost_usd = used
+        if row.state == JobState.DONE:
+            outcomes[row.outcome] += row.jobs
+        else:
+            stages[f"{row.stage} {row.state}"] += row.jobs
+    used = {name: sum(getattr(row, name) for row in rows) for name in _USE}
     return SweepProgress(
         total=stages.total() + outcomes.total(),
         stages=stages,
         outcomes=outcomes,
-        cost_usd=Decimal(cost_usd),
-        requests=int(requests),
-        lost_requests=lost,
-        input_tokens=int(input_tokens),
-        output_tokens=int(output_tokens),
+        cost_usd=Decimal(used.pop("cost_usd")),
+        **{name: int(number) for name, number in used.items()},
     )
 
 
 _COLUMNS = columns_of(Sweep, sweeps)
-_FIGURES: Final = kept_figures(f"key ->> 0 = ANY(:ids) AND {OF_A_SWEEP}")

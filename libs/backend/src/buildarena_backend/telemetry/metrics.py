@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any, Final
 
-from sqlalchemy import Connection, func, select, text
+from sqlalchemy import ARRAY, ColumnElement, Connection, Double, case, cast, func, select, text
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.derived_tables import OF_A_SWEEP, kept_figures
-from buildarena_backend.database.tables import jobs, sweeps
-from buildarena_backend.states import Audit, JobState, SweepState, Verdict
+from buildarena_backend.database.tables import attempts, jobs, sweeps, verifications
+from buildarena_backend.states import Audit, JobState, Outcome, SweepState, Verdict
 from buildarena_backend.telemetry.server_figures import ServerFigures, read_server
 
-GATHER_LOCK: Final = 0x636F756E74  # "count": one process at a time adds changes to the counts
 STAGE_SECONDS = (0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600, 1800, 3600)
 """Bounds of the classes of stage durations, in seconds; each class has its lower bound in it."""
 
@@ -108,136 +104,122 @@ class MetricValues:
 
 
 class Metrics:
-    """Reads the service's figures, which triggers keep: nothing is counted over all jobs."""
+    """Counts the service's figures over all jobs: who asks often keeps the answer."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
 
     def read(self) -> MetricValues:
         """All figures."""
-        self.gather()
         with self._database.transaction() as connection:
             connection.execute(text("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"))
-            kept = _Stored.read(connection)
+            places, used, audits = _count_jobs(connection)
             return MetricValues(
-                jobs=_jobs(kept),
-                queues=_queues(connection, kept),
-                models=_models(kept),
-                stages=_stages(kept),
-                sweeps=_sweeps(connection),
-                running=_running(connection),
-                verifications=_by_state(kept, "verifications", Verdict),
-                audits=_by_state(kept, "audits", Audit),
+                jobs=places,
+                queues=_queues(connection),
+                models=used,
+                stages=_stages(connection),
+                sweeps=dict.fromkeys(map(str, SweepState), 0)
+                | _counted(connection, sweeps.c.state),
+                running=_counted(connection, jobs.c.queue, jobs.c.state == JobState.RUNNING),
+                verifications=dict.fromkeys(map(str, Verdict), 0)
+                | _counted(
+                    connection, verifications.c.verdict, verifications.c.verdict.is_not(None)
+                ),
+                audits=audits,
                 server=read_server(connection),
             )
 
-    def gather(self) -> None:
-        """Adds what changed to the counts; when another process is about it, that one does."""
-        with self._database.transaction() as connection:
-            if connection.execute(select(func.pg_try_advisory_xact_lock(GATHER_LOCK))).scalar():
-                connection.execute(_GATHER)
+
+def _count_jobs(
+    connection: Connection,
+) -> tuple[list[JobCount], list[ModelUse], dict[str, int]]:
+    """Jobs by where they are, what models used, and jobs by audit: all by one look at the jobs."""
+    place = (
+        jobs.c.state,
+        jobs.c.stage,
+        func.coalesce(jobs.c.outcome, "").label("outcome"),
+        case((jobs.c.outcome == Outcome.ERRORED, func.coalesce(jobs.c.reason, "")), else_="").label(
+            "reason"
+        ),
+    )
+    use = [jobs.c[name] for name in ("requests", "input_tokens", "output_tokens", "cost_usd")]
+    columns = (*place, jobs.c.model, jobs.c.audit)
+    query = select(
+        *columns, func.count().label("jobs"), *(func.sum(one).label(one.name) for one in use)
+    ).group_by(*columns)
+    places: Counter[tuple[str, str, str, str]] = Counter()
+    audits: Counter[str] = Counter(dict.fromkeys(map(str, Audit), 0))
+    used: dict[str, Counter[str]] = {}
+    for row in connection.execute(query):
+        places[row.state, row.stage, row.outcome, row.reason] += row.jobs
+        used.setdefault(row.model, Counter()).update({c.name: getattr(row, c.name) for c in use})
+        if row.audit is not None:
+            audits[row.audit] += row.jobs
+    return (
+        [
+            JobCount(state=state, stage=stage, outcome=outcome, reason=reason, jobs=number)
+            for (state, stage, outcome, reason), number in places.items()
+        ],
+        [
+            ModelUse(
+                model=model,
+                requests=int(one["requests"]),
+                input_tokens=int(one["input_tokens"]),
+                output_tokens=int(one["output_tokens"]),
+                cost_usd=float(one["cost_usd"]),
+            )
+            for model, one in sorted(used.items())
+        ],
+        dict(audits),
+    )
 
 
-_GATHER: Final = text(
-    """
-    WITH gone AS (DELETE FROM figure_changes RETURNING *)
-    INSERT INTO figures (kind, key, a, b, c, d)
-    SELECT kind, key, sum(a), sum(b), sum(c), sum(d) FROM gone GROUP BY kind, key
-    ON CONFLICT (kind, key) DO UPDATE SET a = figures.a + excluded.a, b = figures.b + excluded.b,
-        c = figures.c + excluded.c, d = figures.d + excluded.d
-    """
-)
-_STORED: Final = kept_figures(f"NOT {OF_A_SWEEP}")
-
-Amounts = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class _Stored:
-    """Kept figures by what they are of."""
-
-    by_kind: Mapping[str, Sequence[tuple[Sequence[Any], Amounts]]]
-
-    @staticmethod
-    def read(connection: Connection) -> _Stored:
-        found: dict[str, list[tuple[Sequence[Any], Amounts]]] = {}
-        for row in connection.execute(_STORED):
-            amounts = float(row.a), float(row.b), float(row.c), float(row.d)
-            found.setdefault(row.kind, []).append((row.key, amounts))
-        return _Stored(found)
-
-    def of(self, kind: str) -> Sequence[tuple[Sequence[Any], Amounts]]:
-        return self.by_kind.get(kind, ())
-
-
-def _jobs(kept: _Stored) -> list[JobCount]:
-    counts: Counter[tuple[str, str, str, str]] = Counter()
-    for (state, stage, outcome, reason, _), amounts in kept.of("jobs"):
-        counts[state, stage, outcome, reason] += int(amounts[0])
+def _queues(connection: Connection) -> list[QueueDepth]:
+    waited = func.extract("epoch", events.now - func.min(jobs.c.available_at))
+    query = (
+        select(
+            jobs.c.queue,
+            func.count().label("jobs"),
+            func.greatest(waited, 0).label("oldest_s"),
+        )
+        .where(jobs.c.state == JobState.QUEUED)
+        .group_by(jobs.c.queue)
+        .order_by(jobs.c.queue)
+    )
     return [
-        JobCount(state=state, stage=stage, outcome=outcome, reason=reason, jobs=number)
-        for (state, stage, outcome, reason), number in counts.items()
+        QueueDepth(queue=row.queue, jobs=row.jobs, oldest_s=float(row.oldest_s))
+        for row in connection.execute(query)
     ]
 
 
-def _queues(connection: Connection, kept: _Stored) -> list[QueueDepth]:
-    depths: Counter[str] = Counter()
-    for (state, _, _, _, queue), amounts in kept.of("jobs"):
-        if state == JobState.QUEUED:
-            depths[queue] += int(amounts[0])
-    found = []
-    for queue, number in sorted(depths.items()):
-        oldest = select(func.min(jobs.c.available_at)).where(
-            jobs.c.state == JobState.QUEUED, jobs.c.queue == queue
-        )
-        waited = func.greatest(func.extract("epoch", events.now - oldest.scalar_subquery()), 0)
-        oldest_s = connection.execute(select(waited)).scalar()
-        if number:
-            found.append(QueueDepth(queue=queue, jobs=number, oldest_s=float(oldest_s or 0.0)))
-    return found
-
-
-def _models(kept: _Stored) -> list[ModelUse]:
-    return [
-        ModelUse(
-            model=model,
-            requests=int(requests),
-            input_tokens=int(input_tokens),
-            output_tokens=int(output_tokens),
-            cost_usd=cost_usd,
-        )
-        for (model,), (requests, input_tokens, output_tokens, cost_usd) in kept.of("models")
-    ]
-
-
-def _stages(kept: _Stored) -> list[StageTimes]:
+def _stages(connection: Connection) -> list[StageTimes]:
+    seconds = func.extract("epoch", attempts.c.ended_at - attempts.c.started_at)
+    columns = (
+        attempts.c.stage,
+        attempts.c.result,
+        func.width_bucket(
+            cast(seconds, Double), cast([*map(float, STAGE_SECONDS)], ARRAY(Double))
+        ).label("bucket"),
+    )
+    query = (
+        select(*columns, func.count().label("attempts"), func.sum(seconds).label("seconds"))
+        .where(attempts.c.ended_at.is_not(None))
+        .group_by(*columns)
+    )
     found: dict[tuple[str, str], tuple[list[int], float]] = {}
-    for (stage, result, number), (attempts, seconds, _, _) in kept.of("stages"):
-        counts, total = found.get((stage, result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
-        counts[number] += int(attempts)
-        found[stage, result] = (counts, total + seconds)
+    for row in connection.execute(query):
+        counts, total = found.get((row.stage, row.result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
+        counts[row.bucket] += row.attempts
+        found[row.stage, row.result] = (counts, total + float(row.seconds))
     return [
         StageTimes(stage=stage, result=result, counts=counts, total_s=total)
         for (stage, result), (counts, total) in sorted(found.items())
     ]
 
 
-def _by_state(kept: _Stored, kind: str, states: type[StrEnum]) -> dict[str, int]:
-    """Counts by state, also of states that nothing is in."""
-    counts = {str(state): 0 for state in states}
-    return counts | {state: int(amounts[0]) for (state,), amounts in kept.of(kind)}
-
-
-def _sweeps(connection: Connection) -> dict[str, int]:
-    query = select(sweeps.c.state, func.count().label("sweeps")).group_by(sweeps.c.state)
-    found = {row.state: row.sweeps for row in connection.execute(query)}
-    return {str(state): 0 for state in SweepState} | found
-
-
-def _running(connection: Connection) -> dict[str, int]:
-    query = (
-        select(jobs.c.queue, func.count().label("jobs"))
-        .where(jobs.c.state == JobState.RUNNING)
-        .group_by(jobs.c.queue)
-    )
-    return {row.queue: row.jobs for row in connection.execute(query)}
+def _counted(
+    connection: Connection, column: ColumnElement[str], *conditions: ColumnElement[bool]
+) -> dict[str, int]:
+    query = select(column, func.count()).where(*conditions).group_by(column)
+    return {row[0]: row[1] for row in connection.execute(query)}

@@ -27,7 +27,7 @@ UNASKED_EVERY_S: Final = 10.0
 """How often a part is asked while nobody wants to know."""
 ARTIFACTS_FRESH_S: Final = 5.0
 """A bucket takes money for each question."""
-VALUES_FRESH_S: Final = 10.0
+VALUES_FRESH_S: Final = 15.0
 """Several scrapes within this time share one reading of the service's figures."""
 
 PROBERS: Final = 2
