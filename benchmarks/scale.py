@@ -38,7 +38,7 @@ BARS = {
     "sweeps_ms": 100.0,
     "sweep_of_100000_s": 10.0,
 }
-SORTS = ("created", "finished", "indicator", "cost", "task", "model", "seed")
+SORTS = ("created", "finished", "indicator", "cost")
 FILTERS: dict[str, dict[str, Any]] = {
     "none": {},
     "queued": {"state": "queued"},

@@ -10,7 +10,7 @@ from support.jobs import attach, claim, finish, journal_entry
 
 from buildarena_backend.journal.journal import Usage
 
-SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"]
+SORTS = ["created", "finished", "indicator", "cost"]
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def ids(found: list[dict]) -> list[str]:
 
 def value(job: dict, sort: str) -> object:
     if sort == "cost":
-        return job["usage"]["cost_usd"]
+        return job["usage"]["cost_usd"] if job["state"] == "done" else None
     return job[{"created": "created_at", "finished": "finished_at"}.get(sort, sort)]
 
 
@@ -69,8 +69,6 @@ def test_every_order_is_kept_over_pages(api, jobs) -> None:
             assert values == known + [None] * (len(values) - len(known)), "what is missing is last"
             assert known == sorted(known, reverse=order == "desc")
             assert ids(pages(api, 3, sort=sort, order=order)) == ids(whole), (sort, order)
-            if sort == "cost":
-                assert whole[-1]["model"] == "agent/me", "its cost is unknown and not nothing"
 
 
 def test_filters_find_what_they_say_and_go_together(api, jobs) -> None:
@@ -103,7 +101,7 @@ def test_filters_find_what_they_say_and_go_together(api, jobs) -> None:
             for own in {job[name] for job in jobs}
         ),
     ):
-        found = pages(api, 4, sort="seed", order="asc", **params)
+        found = pages(api, 4, sort="created", order="asc", **params)
         assert {*ids(found)} == {*ids(list(filter(wanted, jobs)))}, params
 
 
@@ -156,7 +154,7 @@ def test_values_that_no_job_can_have_are_refused_with_the_choices(api, jobs) -> 
 @pytest.mark.usefixtures("jobs")
 def test_cursors_of_another_order_and_forged_ones_are_refused(api) -> None:
     cursor = api.get("/v1/jobs", params={"limit": 2, "sort": "cost"}).json()["next_cursor"]
-    for other in ({"sort": "seed"}, {"sort": "cost", "order": "asc"}, {}):
+    for other in ({"sort": "finished"}, {"sort": "cost", "order": "asc"}, {}):
         answer = api.get("/v1/jobs", params={**other, "cursor": cursor})
         assert (answer.status_code, "another order" in answer.json()["detail"]) == (422, True)
     forged = [
@@ -165,9 +163,7 @@ def test_cursors_of_another_order_and_forged_ones_are_refused(api) -> None:
             "created": (None, "2024-01-01T00:00:00", 5),
             "cost": ("NaN", "x", [1]),
             "indicator": ("1", True),
-            "seed": (2**70, 1.5, True),
-            "task": (None, 5, "a\0b"),
-            "model": ({"a": 1},),
+            "finished": (5, {"a": 1}),
         }.items()
         for wrong in all_wrong
     ]

@@ -124,7 +124,7 @@ FILTERS = {
 @pytest.mark.ci
 @pytest.mark.nightly(keep=2)
 @pytest.mark.parametrize("few", [0, 40_000])
-@pytest.mark.parametrize("by", ["created", "finished", "indicator", "cost", "task", "seed"])
+@pytest.mark.parametrize("by", ["created", "finished", "indicator", "cost"])
 def test_pages_in_every_order_hold_each_job_once(filled, monkeypatch, few, by) -> None:
     """Whether all that a filter finds are sorted, or the order's index is gone along."""
     monkeypatch.setattr("buildarena_backend.jobs.pages.MAX_SORTED", few)
@@ -137,7 +137,8 @@ def test_pages_in_every_order_hold_each_job_once(filled, monkeypatch, few, by) -
 
     def value(row) -> object:
         if by == "cost":
-            return None if row.model == "made-up/model-1" else row.cost_usd
+            is_known = row.state == "done" and row.model != "made-up/model-1"
+            return row.cost_usd if is_known else None
         return getattr(row, {"created": "created_at", "finished": "finished_at"}.get(by, by))
 
     for descending in (False, True):

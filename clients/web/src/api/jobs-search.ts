@@ -4,7 +4,7 @@ const TEXTS = [
   ...(["task", "model", "sweep", "state", "outcome", "reason", "flag"] as const),
   ...(["track", "task_version", "configuration", "text"] as const),
 ] as const;
-const SORTS = ["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"] as const;
+const SORTS = ["created", "finished", "indicator", "cost"] as const;
 
 /** What the address of a list of jobs says. */
 export type JobsSearch = Pick<JobFilters, (typeof TEXTS)[number] | "category" | "sort" | "order">;

@@ -15,13 +15,10 @@ export interface Rows {
 type Value = string | number | null;
 
 const EQUAL: Readonly<Record<string, (job: JobView) => Value>> = {
-  task: (job) => job.task,
   task_version: (job) => job.task_version,
-  model: (job) => job.model,
   configuration: (job) => job.configuration,
   track: (job) => job.track,
   state: (job) => job.state,
-  outcome: (job) => job.outcome,
   reason: (job) => job.reason,
 };
 
@@ -29,10 +26,9 @@ const SORTED: Readonly<Record<string, (job: JobView) => Value>> = {
   created: (job) => job.created_at,
   finished: (job) => job.finished_at,
   indicator: (job) => job.indicator,
-  cost: (job) => job.usage.cost_usd,
+  cost: (job) => (job.state === "done" ? job.usage.cost_usd : null),
   task: (job) => job.task,
   model: (job) => job.model,
-  seed: (job) => job.seed,
   outcome: (job) => job.outcome,
 };
 

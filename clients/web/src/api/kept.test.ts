@@ -55,7 +55,7 @@ describe("listed", () => {
     const ids = (words: string): string[] =>
       listed(more, new URLSearchParams(words), new Map([["k", new Set(["u"])]])).jobs.map((one) => one.id);
     expect(ids("category=k")).toEqual(["b"]);
-    expect(ids("sort=outcome&order=asc").at(-1)).toBe("c");
+    expect(ids("sort=cost&order=asc").at(-1)).toBe("c");
     const counted = summed(more, new URLSearchParams(""));
     expect(counted.endings).toEqual([
       { state: "done", outcome: "limit", reason: "tokens", jobs: 2 },
@@ -73,7 +73,7 @@ describe("listed", () => {
   });
 
   it("chooses by what the address says", () => {
-    expect(ids("sweep=s&sort=model")).toBe("ca");
+    expect(ids("sweep=s")).toBe("ca");
     expect(ids("sweep=nobody")).toBe("");
     expect(ids("flag=odd")).toBe("c");
     expect(ids("text=fell")).toBe("c");

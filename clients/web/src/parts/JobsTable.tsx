@@ -35,6 +35,8 @@ export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Liste
   const [own, setOwn] = useState<Sorting | null>(null);
   const jobs = onSort === undefined ? sortedRows(listed, own, VALUES) : listed;
   const head = { sorting: onSort === undefined ? own : (asked ?? null), onSort: onSort ?? setOwn };
+  // The service sorts by no words.
+  const word = onSort === undefined ? head : { sorting: null };
   const frame = useRef<HTMLDivElement>(null);
   const rows = useVirtualizer({
     count: jobs.length,
@@ -61,16 +63,16 @@ export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Liste
         <Table.Thead>
           <Table.Tr>
             <Table.Th>Job</Table.Th>
-            <SortHead name="task" {...head}>
+            <SortHead name="task" {...word}>
               Task
             </SortHead>
-            <SortHead name="model" {...head}>
+            <SortHead name="model" {...word}>
               Model
             </SortHead>
-            <SortHead name="seed" figures {...head}>
+            <SortHead name="seed" figures {...word}>
               Seed
             </SortHead>
-            <SortHead name="outcome" {...head}>
+            <SortHead name="outcome" {...word}>
               State
             </SortHead>
             <SortHead name="indicator" figures {...head}>

@@ -2,7 +2,7 @@ import { Table } from "@mantine/core";
 import { useState, type ReactNode } from "react";
 import { clicked, sortedRows, type Sorting, type Values } from "./sorting";
 
-/** The head of a column by which its table can be sorted. */
+/** The head of a column; its table can be sorted by it where that has an effect. */
 export function SortHead({
   name,
   sorting,
@@ -13,7 +13,7 @@ export function SortHead({
 }: {
   name: string;
   sorting: Sorting | null;
-  onSort: (to: Sorting) => void;
+  onSort?: (to: Sorting) => void;
   figures?: boolean;
   title?: string;
   children: ReactNode;
@@ -25,18 +25,22 @@ export function SortHead({
       aria-sort={chosen === null ? undefined : chosen.descending ? "descending" : "ascending"}
       title={title}
     >
-      <button
-        type="button"
-        className="sort-head"
-        onClick={() => {
-          onSort(clicked(sorting, name, figures));
-        }}
-      >
-        {children}
-        <span aria-hidden className="sort-mark">
-          {chosen === null ? "" : chosen.descending ? "▼" : "▲"}
-        </span>
-      </button>
+      {onSort === undefined ? (
+        children
+      ) : (
+        <button
+          type="button"
+          className="sort-head"
+          onClick={() => {
+            onSort(clicked(sorting, name, figures));
+          }}
+        >
+          {children}
+          <span aria-hidden className="sort-mark">
+            {chosen === null ? "" : chosen.descending ? "▼" : "▲"}
+          </span>
+        </button>
+      )}
     </Table.Th>
   );
 }

@@ -22,7 +22,7 @@ async function readPages(id: string, take: (page: readonly JobView[]) => void, l
   let cursor: string | undefined;
   do {
     const page = await taken(
-      client.GET("/v1/jobs", { params: { query: { sweep: id, limit: PAGE, cursor, sort: "task", order: "asc" } } }),
+      client.GET("/v1/jobs", { params: { query: { sweep: id, limit: PAGE, cursor, order: "asc" } } }),
     );
     if (!live()) return before.last_event;
     take(page.jobs);

@@ -125,20 +125,12 @@ Index(
 Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
 Index("ix_jobs_cell", jobs.c.track, jobs.c.task, jobs.c.model_hash, jobs.c.model)
 # One for each order of lists, and for what lists are narrowed down by.
-# As the server writes it back, blanks and all: the check of the migrations compares texts.
-COST_OR_NULL = text(
-    "(\nCASE\n    WHEN (model_config ->> 'provider'::text) = 'external'::text THEN NULL::numeric\n"
-    "    ELSE cost_usd\nEND)"
-)
 Index("ix_jobs_created", jobs.c.created_at, jobs.c.id)
 Index("ix_jobs_finished", jobs.c.finished_at, jobs.c.id)
 Index("ix_jobs_indicator", jobs.c.indicator, jobs.c.id)
-# What waits has cost nothing yet, and would all come before the cheapest that ended.
-Index("ix_jobs_ended_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state == JobState.DONE)
-Index("ix_jobs_open_cost", COST_OR_NULL, jobs.c.id, postgresql_where=jobs.c.state != JobState.DONE)
+Index("ix_jobs_cost", jobs.c.cost_usd, jobs.c.id, postgresql_where=jobs.c.state == JobState.DONE)
 Index("ix_jobs_task", jobs.c.task, jobs.c.id)
 Index("ix_jobs_model", jobs.c.model, jobs.c.id)
-Index("ix_jobs_seed", jobs.c.seed, jobs.c.id)
 Index("ix_jobs_outcome", jobs.c.outcome, jobs.c.id, postgresql_where=jobs.c.outcome.is_not(None))
 Index("ix_jobs_reason", jobs.c.reason, jobs.c.id, postgresql_where=jobs.c.reason.is_not(None))
 Index("ix_jobs_detail", jobs.c.id, postgresql_where=jobs.c.detail.is_not(None))

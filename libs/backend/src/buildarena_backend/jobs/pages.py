@@ -12,45 +12,47 @@ from typing import Any, Final, Literal
 from sqlalchemy import (
     ColumnElement,
     Connection,
-    Numeric,
     Row,
     Text,
     and_,
     func,
     literal_column,
+    not_,
     or_,
     select,
 )
 
 from buildarena_backend.database.rows import bound_texts
-from buildarena_backend.database.tables import COST_OR_NULL, jobs, sweep_jobs
+from buildarena_backend.database.tables import jobs, sweep_jobs
 from buildarena_backend.jobs.filters import MAX_SORTED, JobFilter, conditions_but_text, ways_to_hold
 from buildarena_backend.jobs.job import JOB_COLUMNS, Job
-from buildarena_backend.states import JobState
+from buildarena_backend.states import EXTERNAL_PROVIDER, JobState
 
-Sort = Literal["created", "finished", "indicator", "cost", "task", "model", "seed", "outcome"]
-SortValue = datetime | float | Decimal | str | int | None
+Sort = Literal["created", "finished", "indicator", "cost"]
+SortValue = datetime | float | Decimal | None
 
-# What nobody counted is no cost of 0. As the index has it, word for word.
 _COLUMNS: Final[Mapping[Sort, ColumnElement[Any]]] = MappingProxyType(
     {
         "created": jobs.c.created_at,
         "finished": jobs.c.finished_at,
         "indicator": jobs.c.indicator,
-        "cost": literal_column(COST_OR_NULL.text, Numeric(14, 6)),
-        "task": jobs.c.task,
-        "model": jobs.c.model,
-        "seed": jobs.c.seed,
-        "outcome": jobs.c.outcome,
+        "cost": jobs.c.cost_usd,
     }
 )
-ENDED_ONLY: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "outcome"})
-"""What only jobs that have ended have."""
-BEGINNING: Final = 10_000
-"""Jobs of an order that are looked through first for those with a flag: to count all that have it,
-each must be read."""
-NULLABLE: Final[frozenset[Sort]] = frozenset({"finished", "indicator", "cost", "outcome"})
-"""What a job may lack; those that do come last, in both directions."""
+# As the index of costs has it, word for word.
+_ENDED: Final = jobs.c.state == literal_column(f"'{JobState.DONE}'", Text)
+_COUNTED: Final = (
+    func.coalesce(jobs.c.model_config["provider"].as_string(), "") != EXTERNAL_PROVIDER
+)
+_LACKING: Final[Mapping[Sort, ColumnElement[bool]]] = MappingProxyType(
+    {
+        "finished": jobs.c.finished_at.is_(None),
+        "indicator": jobs.c.indicator.is_(None),
+        # What is not over has no cost yet, and what nobody counted is no cost of 0.
+        "cost": not_(and_(_ENDED, _COUNTED)),
+    }
+)
+"""Of orders by what a job may lack: that it does. Those jobs come last, in both directions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,18 +67,24 @@ class Order:
     by: Sort = "created"
     descending: bool = True
 
+    def sorted(self, *columns: ColumnElement[Any]) -> list[ColumnElement[Any]]:
+        """Columns in this direction."""
+        return [column.desc() if self.descending else column.asc() for column in columns]
+
+    def further(self, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
+        """What comes after a value."""
+        further: ColumnElement[bool] = column < value if self.descending else column > value
+        return further
+
 
 def sort_value(job: Job, by: Sort) -> SortValue:
     """What a job is sorted by."""
+    is_over = job.state == JobState.DONE
     values: dict[Sort, SortValue] = {
         "created": job.created_at,
         "finished": job.finished_at,
         "indicator": job.indicator,
-        "cost": job.cost_usd if job.usage_is_known else None,
-        "task": job.task,
-        "model": job.model,
-        "seed": job.seed,
-        "outcome": job.outcome,
+        "cost": job.cost_usd if is_over and job.usage_is_known else None,
     }
     return values[by]
 
@@ -90,9 +98,6 @@ def read_page(
 ) -> list[Row[Any]]:
     """The rows of a page.
 
-    Those that have no such figure come last, by a query of their own: so both can go along the
-    one index of the order, in either direction.
-
     Args:
         connection: Where to read.
         wanted: Which jobs.
@@ -101,122 +106,69 @@ def read_page(
         limit: Rows at most.
     """
     conditions = conditions_but_text(wanted)
-    place = _Place(order, after)
     if wanted.text is None:
-        return _read(connection, wanted, conditions, place, limit)
+        are_few = bool(conditions) and _are_few(connection, wanted, conditions)
+        return _read(connection, conditions, order, after, limit, are_few=are_few)
     # One way after another: all at once they have no index in common.
-    ids = {
-        row.id
-        for way in ways_to_hold(connection, wanted.text)
-        for row in _read(connection, wanted, [*conditions, way], place, limit)
-    }
-    return _read_few(
-        connection, [jobs.c.id == func.any(bound_texts(sorted(ids)))], order, None, limit
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """Where a page begins: behind a job, by what it is sorted by and its id, or at the front."""
-
-    order: Order
-    after: tuple[SortValue, str] | None
-
-    @property
-    def has_figure(self) -> bool:
-        """Whether jobs that have the figure are still to come."""
-        return self.after is None or self.after[0] is not None
-
-    def behind(self) -> list[ColumnElement[bool]]:
-        """What is behind it and has the figure."""
-        found: list[ColumnElement[bool]] = []
-        if self.after is not None and self.after[0] is not None:
-            found.append(_behind(self.order, *self.after))
-        if self.order.by in NULLABLE:
-            found.append(_COLUMNS[self.order.by].is_not(None))
-        return found
-
-    def rest(self) -> list[ColumnElement[bool]]:
-        """What is behind it and lacks the figure."""
-        found: list[ColumnElement[bool]] = [_COLUMNS[self.order.by].is_(None)]
-        if self.after is not None and self.after[0] is None:
-            found.append(_further(self.order, jobs.c.id, self.after[1]))
-        return found
+    ids = set[str]()
+    for way in ways_to_hold(connection, wanted.text):
+        holding = [*conditions, way]
+        are_few = _are_few(connection, wanted, holding)
+        found = _read(connection, holding, order, after, limit, are_few=are_few)
+        ids.update(row.id for row in found)
+    among = [jobs.c.id == func.any(bound_texts(sorted(ids)))]
+    return _read(connection, among, order, None, limit, are_few=True)
 
 
 def _read(
     connection: Connection,
-    wanted: JobFilter,
     conditions: Sequence[ColumnElement[bool]],
-    place: _Place,
+    order: Order,
+    after: tuple[SortValue, str] | None,
     limit: int,
+    *,
+    are_few: bool,
 ) -> list[Row[Any]]:
-    """As `read_page`, with the conditions that the filter comes to."""
-    order = place.order
-    ended = wanted.equals.get("state") in {JobState.DONE, None}
-    if order.by in ENDED_ONLY and not ended:
-        # None of them has such a figure.
-        return _read_by_id(connection, conditions, place, limit)
-    if wanted.flag is not None and place.has_figure and order.by != "cost":
-        found = _read_beginning(connection, conditions, place, limit)
-        if len(found) == limit:
-            return found
-    if conditions and _are_few(connection, wanted, conditions):
-        return _read_few(connection, conditions, order, place.after, limit)
-    found = []
-    if place.has_figure:
-        found = _read_along(connection, wanted, [*conditions, *place.behind()], order, limit)
-    if order.by in NULLABLE and len(found) < limit:
-        rest = [*conditions, *place.rest()]
-        found += _read_along(connection, wanted, rest, order, limit - len(found))
+    """The page, from conditions.
+
+    Those that lack the figure come by a query of their own: so both can go along the one index of
+    the order, in either direction.
+    """
+    column, lacking = _COLUMNS[order.by], _LACKING.get(order.by)
+    value, last = after or (None, None)
+    found: list[Row[Any]] = []
+    if after is None or value is not None:
+        having = [*conditions] if lacking is None else [*conditions, not_(lacking)]
+        if lacking is not None and order.by == "cost":
+            having = [*conditions, _ENDED, _COUNTED]
+        if after is not None:
+            same = and_(column == value, order.further(jobs.c.id, last))
+            having.append(or_(order.further(column, value), same))
+        found += _first(connection, having, order.sorted(column, jobs.c.id), limit, are_few=are_few)
+    if lacking is not None and len(found) < limit:
+        rest = [*conditions, lacking]
+        if after is not None and value is None:
+            rest.append(order.further(jobs.c.id, last))
+        left = limit - len(found)
+        found += _first(connection, rest, order.sorted(jobs.c.id), left, are_few=are_few)
     return found
 
 
-def _read_by_id(
+def _first(
     connection: Connection,
     conditions: Sequence[ColumnElement[bool]],
-    place: _Place,
+    order: Sequence[ColumnElement[Any]],
     limit: int,
-) -> list[Any]:
-    query = select(*JOB_COLUMNS).where(*conditions)
-    if place.after is not None:
-        query = query.where(_further(place.order, jobs.c.id, place.after[1]))
-    return list(connection.execute(query.order_by(*_sorted(place.order, jobs.c.id)).limit(limit)))
-
-
-def _read_beginning(
-    connection: Connection,
-    conditions: Sequence[ColumnElement[bool]],
-    place: _Place,
-    limit: int,
-) -> list[Any]:
-    """The first jobs of a page, as far as they are at the beginning of the order."""
-    order = place.order
-    columns = _sorted(order, _COLUMNS[order.by], jobs.c.id)
-    first = select(jobs.c.id).where(*place.behind()).order_by(*columns).limit(BEGINNING).subquery()
-    query = select(*JOB_COLUMNS).join(first, first.c.id == jobs.c.id).where(*conditions)
-    return list(connection.execute(query.order_by(*columns).limit(limit)))
-
-
-def _read_along(
-    connection: Connection,
-    wanted: JobFilter,
-    conditions: Sequence[ColumnElement[bool]],
-    order: Order,
-    limit: int,
-) -> list[Any]:
-    """The first jobs along an order's index."""
-    place = _COLUMNS[order.by]
-    query = select(*JOB_COLUMNS, place.label("place")).where(*conditions).limit(limit)
-    query = query.order_by(*_sorted(order, place, jobs.c.id))
-    if order.by != "cost":
-        return list(connection.execute(query))
-    # What waits has cost nothing yet: in one index, ended jobs would all lie behind it.
-    ended = jobs.c.state == literal_column(f"'{JobState.DONE}'", Text)
-    state = wanted.equals.get("state")
-    parts = [ended, ~ended] if state is None else [ended if state == JobState.DONE else ~ended]
-    rows = [row for part in parts for row in connection.execute(query.where(part))]
-    return sorted(rows, key=lambda row: (row.place or 0, row.id), reverse=order.descending)[:limit]
+    *,
+    are_few: bool,
+) -> list[Row[Any]]:
+    """The first jobs of which conditions hold; few are found before they are sorted."""
+    query = select(*JOB_COLUMNS).order_by(*order).limit(limit)
+    if not are_few:
+        return list(connection.execute(query.where(*conditions)))
+    # Were they not found first, the order's index might be gone along after all.
+    some = select(jobs.c.id).where(*conditions).offset(0).cte("some").prefix_with("MATERIALIZED")
+    return list(connection.execute(query.join(some, some.c.id == jobs.c.id)))
 
 
 def _are_few(
@@ -232,44 +184,3 @@ def _are_few(
     counted = some.limit(MAX_SORTED + 1).subquery()
     number = connection.execute(select(func.count()).select_from(counted)).scalar_one()
     return int(number) <= MAX_SORTED
-
-
-def _read_few(
-    connection: Connection,
-    conditions: Sequence[ColumnElement[bool]],
-    order: Order,
-    after: tuple[SortValue, str] | None,
-    limit: int,
-) -> list[Row[Any]]:
-    column = _COLUMNS[order.by]
-    chosen = select(jobs.c.id, column.label("place")).where(*conditions)
-    if after is not None:
-        value, id_ = after
-        behind = [and_(column.is_(None), _further(order, jobs.c.id, id_))]
-        if value is not None:
-            behind = [_behind(order, value, id_), column.is_(None)]
-        chosen = chosen.where(or_(*behind))
-    # Were it not made first, the order's index might be gone along after all.
-    some = chosen.offset(0).subquery("some")
-    place, id_order = _sorted(order, some.c.place, some.c.id)
-    first = select(some.c.id, some.c.place).order_by(place.nulls_last(), id_order).limit(limit)
-    page = first.subquery("page")
-    place, id_order = _sorted(order, page.c.place, page.c.id)
-    query = select(*JOB_COLUMNS).join(page, page.c.id == jobs.c.id)
-    return list(connection.execute(query.order_by(place.nulls_last(), id_order)))
-
-
-def _sorted(order: Order, *columns: ColumnElement[Any]) -> list[ColumnElement[Any]]:
-    return [column.desc() if order.descending else column.asc() for column in columns]
-
-
-def _behind(order: Order, value: SortValue, id_: str) -> ColumnElement[bool]:
-    column = _COLUMNS[order.by]
-    return or_(
-        _further(order, column, value), and_(column == value, _further(order, jobs.c.id, id_))
-    )
-
-
-def _further(order: Order, column: ColumnElement[Any], value: Any) -> ColumnElement[bool]:
-    further: ColumnElement[bool] = column < value if order.descending else column > value
-    return further

@@ -7,13 +7,11 @@ import binascii
 import json
 from datetime import datetime
 from decimal import Decimal
-from typing import Any, Final
+from typing import Any
 
 from buildarena_api.http.problems import ProblemError
-from buildarena_backend.jobs.pages import NULLABLE, Order, SortValue
+from buildarena_backend.jobs.pages import Order, SortValue
 from buildarena_benchmark import ValidationIssue
-
-MAX_INTEGER: Final = 2**63 - 1
 
 
 def encode(created_at: datetime, id_: str) -> str:
@@ -71,7 +69,7 @@ def _value(order: Order, plain: Any) -> SortValue:
     Raises:
         ValueError: It is of another kind.
     """
-    if plain is None and order.by in NULLABLE:
+    if plain is None and order.by != "created":
         return None
     if order.by in {"created", "finished"}:
         when = datetime.fromisoformat(plain)
@@ -83,15 +81,7 @@ def _value(order: Order, plain: Any) -> SortValue:
         if not cost.is_finite():
             raise ValueError("no amount")
         return cost
-    return _plain_value(order, plain)
-
-
-def _plain_value(order: Order, plain: Any) -> SortValue:
-    if order.by == "indicator" and isinstance(plain, float):
-        return plain
-    if order.by == "seed" and type(plain) is int and abs(plain) <= MAX_INTEGER:
-        return plain
-    if order.by in {"task", "model", "outcome"} and isinstance(plain, str) and "\0" not in plain:
+    if isinstance(plain, float):
         return plain
     raise ValueError("a value of another kind")
 
