@@ -7,8 +7,7 @@ target that needs it does after the contract has changed. A source distribution 
 from __future__ import annotations
 
 import json
-import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,7 +38,6 @@ FILTERS: Final = {
 }
 """Parameters that methods pass on, by the route that takes them."""
 PAGING: Final = {"cursor", "limit"}
-RUNNERS: Final = "/v1/runner"
 PLAIN: Final = {
     "string": "str",
     "integer": "int",
@@ -49,7 +47,6 @@ PLAIN: Final = {
     "date-time": "Timestamp",
 }
 """Python's types by the contract's formats and types."""
-WIDTH: Final = 96
 
 
 class SchemasHook(BuildHookInterface):
@@ -59,20 +56,6 @@ class SchemasHook(BuildHookInterface):
         """Called by hatchling."""
         if version != "editable":
             write_module()
-
-
-def module_text(contract: Mapping[str, Any]) -> str:
-    """The module's source.
-
-    Args:
-        contract: The OpenAPI document.
-    """
-    schemas = contract["components"]["schemas"]
-    names = sorted(_used(contract))
-    aliases = [_alias(name, schemas[name]) for name in names if "properties" not in schemas[name]]
-    classes = [_class(name, schemas[name]) for name in names if "properties" in schemas[name]]
-    filters = [_filters(name, contract) for name in FILTERS]
-    return "\n\n".join([HEAD, *aliases, *classes, *filters]) + "\n"
 
 
 def write_module() -> None:
@@ -89,64 +72,47 @@ def write_module() -> None:
         )
 
 
-def _used(contract: Mapping[str, Any]) -> set[str]:
-    """Schemas of all routes but those of runners, which have a client of their own."""
-    used: set[str] = set()
-    waiting = [
-        name
-        for path, operations in contract["paths"].items()
-        if not path.startswith(RUNNERS)
-        for name in _referred(operations)
-    ]
-    while waiting:
-        name = waiting.pop()
-        if name not in used:
-            used.add(name)
-            waiting += _referred(contract["components"]["schemas"][name])
-    return used
+def module_text(contract: Mapping[str, Any]) -> str:
+    """The module's source.
+
+    Args:
+        contract: The OpenAPI document.
+    """
+    documents = contract["components"]["schemas"] | {
+        name: {"description": description, "properties": _parameters(contract["paths"][path])}
+        for name, (path, description) in FILTERS.items()
+    }
+    # What is no class is a name for a plain type, which must be there before it is used.
+    names = sorted(documents, key=lambda name: ("properties" in documents[name], name))
+    return "\n\n".join([HEAD, *(_definition(name, documents[name]) for name in names)]) + "\n"
 
 
-def _referred(node: Any) -> Iterator[str]:
-    if isinstance(node, dict):
-        if isinstance(node.get("$ref"), str):
-            yield node["$ref"].rpartition("/")[2]
-        for value in node.values():
-            yield from _referred(value)
-    elif isinstance(node, list):
-        for value in node:
-            yield from _referred(value)
-
-
-def _class(name: str, schema: Mapping[str, Any]) -> str:
-    required = set(schema.get("required", ()))
-    fields = schema["properties"]
-    types = {key: _type(field) for key, field in fields.items()}
-    body = [
-        f"    {key}: {kind}" if key in required else f"    {key}: NotRequired[{kind}]"
-        for key, kind in types.items()
-    ]
-    docstring = _docstring(schema.get("description", ""), name, fields)
-    return "\n".join([f"class {name}(TypedDict):", docstring, "", *body])
-
-
-def _filters(name: str, contract: Mapping[str, Any]) -> str:
-    path, description = FILTERS[name]
-    fields = {
-        parameter["name"]: {
-            **parameter["schema"],
-            "description": parameter.get("description", ""),
-        }
-        for parameter in contract["paths"][path]["get"]["parameters"]
+def _parameters(operations: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        parameter["name"]: parameter["schema"] | {"description": parameter.get("description", "")}
+        for parameter in operations["get"]["parameters"]
         if parameter["in"] == "query" and parameter["name"] not in PAGING
     }
-    body = [f"    {key}: {_type(field)}" for key, field in fields.items()]
-    head = f"class {name}(TypedDict, total=False):"
-    return "\n".join([head, _docstring(description, name, fields), "", *body])
 
 
-def _alias(name: str, schema: Mapping[str, Any]) -> str:
-    text = " ".join(schema.get("description", name).partition("\n\n")[0].split())
-    return f'{name} = {_type(schema)}\n"""{_sentence(text)}"""'
+def _definition(name: str, schema: Mapping[str, Any]) -> str:
+    about = _text(schema.get("description", "").partition("Attributes:")[0] or name)
+    if "properties" not in schema:
+        return f"{name} = {_type(schema)}\n{about}"
+    lines = [f"class {name}(TypedDict):", f"    {about}", ""]
+    for key, field in schema["properties"].items():
+        kind = _type(field)
+        if key not in schema.get("required", ()):
+            kind = f"NotRequired[{kind}]"
+        lines.append(f"    {key}: {kind}")
+        if field.get("description"):
+            lines.append(f"    {_text(field['description'])}")
+    return "\n".join(lines)
+
+
+def _text(words: str) -> str:
+    """Words as a docstring."""
+    return json.dumps(" ".join(words.split()), ensure_ascii=False)
 
 
 def _type(schema: Mapping[str, Any]) -> str:
@@ -158,41 +124,18 @@ def _type(schema: Mapping[str, Any]) -> str:
     if "const" in schema or "enum" in schema:
         values = schema.get("enum", [schema.get("const")])
         return f"Literal[{', '.join(map(repr, values))}]"
-    kind = schema.get("type")
+    kind = str(schema.get("type"))
     if kind == "array":
         # JSON has no tuples: what is read is a list, whatever its length.
         return f"list[{_union(schema.get('prefixItems') or [schema['items']])}]"
     if kind == "object":
         values = schema.get("additionalProperties", True)
         return f"dict[str, {_type(values) if isinstance(values, dict) else 'Any'}]"
-    return PLAIN.get(schema.get("format", kind), PLAIN.get(str(kind), "Any"))
+    return PLAIN.get(schema.get("format", kind), PLAIN.get(kind, "Any"))
 
 
 def _union(schemas: list[Mapping[str, Any]]) -> str:
     return " | ".join(dict.fromkeys(map(_type, schemas)))
-
-
-def _docstring(description: str, name: str, fields: Mapping[str, Any]) -> str:
-    first, *others = description.strip().split("\n\n")
-    lines = [_sentence(" ".join(first.split()) or f"{name}.")]
-    for paragraph in others:
-        if not paragraph.strip().startswith("Attributes:"):
-            lines += ["", *textwrap.wrap(_sentence(" ".join(paragraph.split())), WIDTH)]
-    texts = {key: " ".join(field.get("description", "").split()) for key, field in fields.items()}
-    if any(texts.values()):
-        lines += ["", "Attributes:"]
-    for key, text in texts.items():
-        if text:
-            item = f"    {key}: {_sentence(text)}"
-            lines += textwrap.wrap(item, WIDTH, subsequent_indent=" " * 8)
-    if len(lines) == 1:
-        return f'    """{lines[0]}"""'
-    return textwrap.indent("\n".join(['"""' + lines[0], *lines[1:], '"""']), "    ")
-
-
-def _sentence(text: str) -> str:
-    text = text.replace("\\", "\\\\").replace('"""', "'''")
-    return text if text.endswith((".", "?", "!")) else f"{text}."
 
 
 if __name__ == "__main__":

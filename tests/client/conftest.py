@@ -19,8 +19,7 @@ from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_backend.process.context import Context, open_context
 from buildarena_backend.settings import Settings
 from buildarena_backend.submission.submission import Submissions
-from buildarena_client.transports.asynchronous import AsyncTransport
-from buildarena_client.transports.blocking import BlockingTransport
+from buildarena_client.transport import Transport
 
 KINDS = ("sync", "async")
 SPEC = {
@@ -65,8 +64,7 @@ def pauses(monkeypatch) -> list[float]:
     async def pause(_transport, seconds: float) -> None:
         asked.append(seconds)
 
-    for transport in (BlockingTransport, AsyncTransport):
-        monkeypatch.setattr(transport, "pause", pause)
+    monkeypatch.setattr(Transport, "pause", pause)
     return asked
 
 

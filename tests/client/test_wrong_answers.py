@@ -38,7 +38,7 @@ from buildarena_client import (
 )
 from buildarena_client.config import stored_key
 from buildarena_client.event_streams import MAX_EVENT_BYTES
-from buildarena_client.retries import BREAK_PAUSE_S, LONGEST_PAUSE_S
+from buildarena_client.transport import BREAK_PAUSE_S, LONGEST_PAUSE_S
 
 SECRET = "ba_secret-that-nobody-sees"
 JOB = "job_0a1b2c3d4e5f60718293"

@@ -1,18 +1,51 @@
-"""The synchronous client: the endpoints of the API, over a transport that blocks."""
+"""Both clients: the endpoints of the API as coroutines, and as methods that carry those out."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import AsyncGenerator, Callable, Coroutine, Generator
-from types import TracebackType
 from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
-from buildarena_client.endpoints.api import Api
+from buildarena_client.endpoints.boards import Boards
+from buildarena_client.endpoints.catalogue import Catalogue
+from buildarena_client.endpoints.jobs import Jobs
 from buildarena_client.endpoints.sending import TIMEOUT_S
+from buildarena_client.endpoints.sessions import Sessions
+from buildarena_client.endpoints.sweeps import Sweeps
 from buildarena_client.retries import RetryPolicy
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+
+class Api(Catalogue, Boards, Jobs, Sweeps, Sessions):
+    """All endpoints of the API, as coroutines."""
+
+
+class AsyncClient(Api):
+    """The API of a service: the methods of ``Client``, awaited.
+
+    Args:
+        url: Where it is, for example ``http://127.0.0.1:8321``; by default BUILDARENA_URL.
+        key: The API key; by default the one in BUILDARENA_KEY, or in the file that
+            BUILDARENA_KEY_FILE names, if any.
+        timeout_s: How long nothing may come before a request is given up.
+        retries: How long requests are sent again.
+        at_once: Requests that are open at most; further ones wait. Downloads and
+            streams are not counted.
+
+    Attributes:
+        url: Where the service is.
+
+    Raises:
+        BadArgumentError: That is not the URL of an API, or not a key.
+    """
+
+    async def __aenter__(self) -> Self:
+        return self
+
+    async def __aexit__(self, *_error: object) -> None:
+        await self.close()
 
 
 def run(coroutine: Coroutine[Any, Any, T]) -> T:
@@ -82,16 +115,7 @@ class Client:
         timeout_s: float | None = TIMEOUT_S,
         retries: RetryPolicy | None = None,
     ) -> None:
-        # Help and completion of the command line load this module, and send nothing by it.
-        from buildarena_client.transports.blocking import BlockingTransport
-
-        self._api = Api(
-            url,
-            key,
-            timeout_s=timeout_s,
-            retries=retries or RetryPolicy(),
-            transport=BlockingTransport,
-        )
+        self._api = Api(url, key, timeout_s=timeout_s, retries=retries, at_once=None)
 
     @property
     def url(self) -> str:
@@ -104,12 +128,7 @@ class Client:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
     def _run(self, coroutine: Coroutine[Any, Any, T]) -> T:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from http import HTTPStatus
 from typing import Any, Final
 
 
@@ -99,21 +98,20 @@ class ServiceFaultError(RefusedError):
 
 
 KINDS: Final[Mapping[int, type[RefusedError]]] = {
-    HTTPStatus.UNAUTHORIZED: KeyRefusedError,
-    HTTPStatus.FORBIDDEN: ForbiddenError,
-    HTTPStatus.NOT_FOUND: NotFoundError,
-    HTTPStatus.CONFLICT: ConflictError,
+    401: KeyRefusedError,
+    403: ForbiddenError,
+    404: NotFoundError,
+    409: ConflictError,
     413: TooLargeError,
     422: InvalidError,
-    HTTPStatus.TOO_MANY_REQUESTS: TooManyRequestsError,
+    429: TooManyRequestsError,
 }
-"""Errors by status; statuses whose names differ between versions of Python are numbers here."""
+"""Errors by status."""
 
 
 def kind_of(status: int) -> type[RefusedError]:
     """The error for a status."""
-    usual = ServiceFaultError if status >= HTTPStatus.INTERNAL_SERVER_ERROR else RefusedError
-    return KINDS.get(status, usual)
+    return KINDS.get(status, ServiceFaultError if status >= 500 else RefusedError)  # noqa: PLR2004
 
 
 def described(error: Mapping[str, Any]) -> str:

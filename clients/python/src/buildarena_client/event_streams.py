@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Final, NamedTuple, TypedDict
+from typing import TYPE_CHECKING, Any, Final, TypedDict
 
 from buildarena_client.errors import NotAnApiError
+
+if TYPE_CHECKING:
+    from httpx2 import ServerSentEvent
 
 MEDIA_TYPE: Final = "text/event-stream"
 MAX_EVENT_BYTES: Final = 16 << 20
@@ -32,15 +35,7 @@ class Event(TypedDict):
     data: dict[str, Any]
 
 
-class Message(NamedTuple):
-    """A server-sent event before its data are read."""
-
-    id: str
-    kind: str
-    data: str
-
-
-def event_of(message: Message) -> Event:
+def event_of(message: ServerSentEvent) -> Event:
     """The event that a message carries.
 
     Raises:
@@ -50,7 +45,7 @@ def event_of(message: Message) -> Event:
         data = json.loads(message.data)
         job, sweep, at = (data.pop(name, None) for name in ("job", "sweep", "at"))
         return Event(
-            id=int(message.id), kind=message.kind, job=job, sweep=sweep, at=str(at), data=data
+            id=int(message.id), kind=message.event, job=job, sweep=sweep, at=str(at), data=data
         )
     except (ValueError, AttributeError, TypeError) as error:
         raise no_events() from error

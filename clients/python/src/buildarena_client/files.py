@@ -4,50 +4,31 @@ from __future__ import annotations
 
 import hashlib
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import BinaryIO
 
 from buildarena_client.errors import DamagedError
 
 
-class WholeFile:
-    """A file that appears only when it is complete and has its hash.
+@contextmanager
+def whole_file(target: Path, sha256: str | None = None) -> Iterator[BinaryIO]:
+    """A file that appears only when it is complete and has its hash, if that is known.
 
-    Args:
-        target: Where.
-        sha256: The hash that its bytes must have, if it is known.
+    Raises:
+        DamagedError: It has another.
     """
-
-    def __init__(self, target: Path, sha256: str | None = None) -> None:
-        self._target = target
-        self._sha256 = sha256
-        # Two downloads of one file do not write into each other's.
-        self._partial = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.partial")
-        self._hash = hashlib.sha256()
-
-    def __enter__(self) -> Self:
-        self._file = self._partial.open("xb")
-        return self
-
-    def write(self, chunk: bytes) -> None:
-        """Writes what comes next."""
-        self._hash.update(chunk)
-        self._file.write(chunk)
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        try:
-            self._file.close()
-            if error is None:
-                _compare(self._hash.hexdigest(), self._sha256, self._target.name)
-                self._partial.replace(self._target)
-        finally:
-            self._partial.unlink(missing_ok=True)
+    # Two downloads of one file do not write into each other's.
+    partial = target.with_name(f".{target.name}.{uuid.uuid4().hex[:8]}.partial")
+    try:
+        with partial.open("x+b") as file:
+            yield file
+            file.seek(0)
+            _compare(hashlib.file_digest(file, "sha256").hexdigest(), sha256, target.name)
+        partial.replace(target)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def require_hash(data: bytes, sha256: str, name: str) -> bytes:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, Self
 
+import httpx2
 import psutil
 
 from buildarena_backend.accounts.keys import new_secret
@@ -36,11 +37,7 @@ from buildarena_cli.local import (
 )
 from buildarena_cli.local.programs import programs
 from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
-from buildarena_client.client import run
 from buildarena_client.paths import HEALTH
-from buildarena_client.requests import Request
-from buildarena_client.transport_errors import TransportError
-from buildarena_client.transports.blocking import BlockingTransport
 
 KEYS = ("admin_key", "previous_admin_key", "metrics_key")
 """Settings that are keys: no process gets them where none are asked for."""
@@ -242,22 +239,21 @@ class Stack:
         self._tell("waiting until everything answers")
         deadline = time.monotonic() + READY_WITHIN_S
         missing = "the API"
-        transport = BlockingTransport(self.url, {})
-        request = Request(method="GET", path=HEALTH, timeout_s=5)
-        while time.monotonic() < deadline:
-            self.require_running()
-            with contextlib.suppress(TransportError, ValueError):
-                health = run(transport.send(request)).json()
-                served = {f"simulate.{engine}" for engine in self._simulators}
-                bad = [
-                    check["name"]
-                    for check in health["checks"]
-                    if not check["ok"] and _concerns(check["name"], served)
-                ]
-                if not bad:
-                    return
-                missing = ", ".join(bad)
-            time.sleep(0.1)
+        with httpx2.Client(base_url=self.url, timeout=5, trust_env=False) as http:
+            while time.monotonic() < deadline:
+                self.require_running()
+                with contextlib.suppress(httpx2.TransportError, ValueError):
+                    health = http.get(HEALTH).json()
+                    served = {f"simulate.{engine}" for engine in self._simulators}
+                    bad = [
+                        check["name"]
+                        for check in health["checks"]
+                        if not check["ok"] and _concerns(check["name"], served)
+                    ]
+                    if not bad:
+                        return
+                    missing = ", ".join(bad)
+                time.sleep(0.1)
         raise CommandError(
             f"not ready within {READY_WITHIN_S:.0f} s, missing: {missing} (see {self.logs})"
         )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from buildarena_cli.client import Client, UnreachableError
 from buildarena_cli.errors import DONE, PARTIAL
 from buildarena_cli.terminal.output import is_terminal, minute_of, say
-from buildarena_client.waiting import sweep_has_stopped
+from buildarena_client.endpoints.sweeps import sweep_has_stopped
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import ForecastView, SweepView

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import AsyncGenerator, Callable
+from collections.abc import AsyncGenerator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, Unpack, cast
 
@@ -12,7 +11,6 @@ from buildarena_client.errors import BadArgumentError
 from buildarena_client.event_streams import Event
 from buildarena_client.files import require_hash
 from buildarena_client.paths import at
-from buildarena_client.waiting import POLL_S, require_time
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
@@ -114,8 +112,7 @@ class Jobs(Sender):
         Raises:
             TimedOutError: It has not within the time.
         """
-        answer = await self._when(at("jobs", job_id), lambda job: job["state"] == "done", timeout_s)
-        return cast("JobDetail", answer)
+        return cast("JobDetail", await self._when(at("jobs", job_id), _done, timeout_s))
 
     async def wait_for_verification(
         self, verification_id: str, *, timeout_s: float | None = None
@@ -126,10 +123,7 @@ class Jobs(Sender):
             TimedOutError: It is not within the time.
         """
         path = at("verifications", verification_id)
-        answer = await self._when(
-            path, lambda verification: verification["state"] == "done", timeout_s
-        )
-        return cast("VerificationView", answer)
+        return cast("VerificationView", await self._when(path, _done, timeout_s))
 
     async def transcript(self, job_id: str) -> Any:
         """All turns of a job's session, of one under way those so far."""
@@ -204,11 +198,6 @@ class Jobs(Sender):
             raise BadArgumentError(f"{job_id} has no file {name!r}; it has {has}")
         return known[name]
 
-    async def _when(self, path: str, ended: Callable[[Any], bool], timeout_s: float | None) -> Any:
-        started = time.monotonic()
-        while True:
-            document = await self.get_patiently(path)
-            if ended(document):
-                return document
-            require_time(document["id"], started, timeout_s)
-            await self._transport.pause(POLL_S)
+
+def _done(document: Any) -> bool:
+    return bool(document["state"] == "done")

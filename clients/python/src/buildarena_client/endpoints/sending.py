@@ -1,48 +1,55 @@
-"""Requests that are repeated where they may be: the base of all endpoints."""
+"""The kinds of requests that all endpoints are made of."""
 
 from __future__ import annotations
 
-import contextlib
-import os
 import time
-from collections.abc import AsyncGenerator, Mapping
+from collections.abc import AsyncGenerator, Callable, Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 from buildarena_client.config import checked_key, checked_url, stored_key
-from buildarena_client.errors import RefusedError, TimedOutError, UnreachableError
-from buildarena_client.event_streams import MEDIA_TYPE, Event, event_of
-from buildarena_client.files import WholeFile
-from buildarena_client.problems import document, next_cursor, require_success
-from buildarena_client.requests import JSON, Request, Response, json_body
-from buildarena_client.retries import RestartWatch, Retries, RetryPolicy
-from buildarena_client.transport_errors import BrokenError, SilentError, TransportError
-from buildarena_client.transports import Answer, OpenTransport
+from buildarena_client.errors import NotAnApiError, TimedOutError, UnreachableError
+from buildarena_client.event_streams import MAX_EVENT_BYTES, MEDIA_TYPE, Event, event_of
+from buildarena_client.files import whole_file
+from buildarena_client.retries import RetryPolicy
 
 TIMEOUT_S: Final = 60.0
+AT_ONCE: Final = 16
+"""Of one caller, the service has 96 requests open at most."""
 STREAM_TIMEOUT_S: Final = 60.0
 """How long a stream of events may be silent: the service sends something every fifteen seconds."""
 RESTART_POLL_S: Final = 0.5
+POLL_S: Final = 0.5
+"""Seconds between two looks at what is waited for."""
 
 
 class Sender:
-    """Sends requests to one service, with the arguments of ``AsyncClient`` through a transport."""
+    """Sends requests to one service, with the arguments of ``AsyncClient``.
+
+    Where ``at_once`` is None, its coroutines block, as ``transport.Transport`` says.
+    """
 
     def __init__(
         self,
-        url: str | None,
-        key: str | None,
+        url: str | None = None,
+        key: str | None = None,
         *,
-        timeout_s: float | None,
-        retries: RetryPolicy,
-        transport: OpenTransport,
+        timeout_s: float | None = TIMEOUT_S,
+        retries: RetryPolicy | None = None,
+        at_once: int | None = AT_ONCE,
     ) -> None:
+        # Help and completion of the command line load this module, and send nothing by it.
+        from buildarena_client.transport import Transport
+
         self.url = checked_url(url)
-        self._key = checked_key(key or stored_key())
-        self._timeout_s = timeout_s
-        self._retries = retries
-        headers = {"Authorization": f"Bearer {self._key}"} if self._key else {}
-        self._transport = transport(self.url, headers)
+        self._retries = retries or RetryPolicy()
+        self._transport = Transport(
+            self.url,
+            checked_key(key or stored_key()),
+            timeout_s=timeout_s,
+            retries=self._retries,
+            at_once=at_once,
+        )
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.url!r})"
@@ -53,7 +60,7 @@ class Sender:
 
     async def get(self, /, path: str, **params: Any) -> Any:
         """The JSON answer to a GET; parameters that are None are left out."""
-        return await self._document(self._request("GET", path, params))
+        return await self._document("GET", path, params)
 
     async def get_bytes(self, /, path: str, *, accept: str | None = None, **params: Any) -> bytes:
         """The bytes of a GET; parameters that are None are left out.
@@ -63,8 +70,8 @@ class Sender:
             accept: Media type that is wanted, where there are several.
             params: Parameters of the request.
         """
-        headers = {"Accept": accept} if accept else {}
-        return (await self._answer(self._request("GET", path, params, headers=headers))).body
+        headers = {"Accept": accept} if accept else None
+        return (await self._transport.answer("GET", path, params, headers=headers)).content
 
     async def post(
         self,
@@ -85,18 +92,14 @@ class Sender:
             headers: Further headers.
             params: Parameters of the request; those that are None are left out.
         """
-        data = json_body({} if body is None else body)
-        headers = {"Content-Type": JSON, **(headers or {})}
+        json = {} if body is None else body
         return await self._document(
-            self._request("POST", path, params, body=data, headers=headers, repeatable=repeatable)
+            "POST", path, params, json=json, headers=headers, repeatable=repeatable
         )
 
     async def put(self, path: str, body: object) -> Any:
         """The JSON answer to a PUT."""
-        headers = {"Content-Type": JSON}
-        return await self._document(
-            self._request("PUT", path, {}, body=json_body(body), headers=headers, repeatable=False)
-        )
+        return await self._document("PUT", path, {}, json=body, repeatable=False)
 
     async def upload(
         self,
@@ -117,22 +120,11 @@ class Sender:
             repeatable: Whether it may be sent again though it may have been carried out.
             params: Parameters of the request; those that are None are left out.
         """
-        with contextlib.ExitStack() as stack:
-            body: bytes | BinaryIO
-            if isinstance(source, bytes):
-                body, size = source, len(source)
-            else:
-                body = stack.enter_context(source.open("rb"))
-                size = os.fstat(body.fileno()).st_size
-            request = Request(
-                method="POST",
-                path=path,
-                params=params,
-                body=body,
-                headers={"Content-Type": media_type, "Content-Length": str(size)},
-                repeatable=repeatable,
-            )
-            return await self._document(request)
+        content = source if isinstance(source, bytes) else source.read_bytes()  # noqa: ASYNC240 - it is small
+        headers = {"Content-Type": media_type}
+        return await self._document(
+            "POST", path, params, content=content, headers=headers, repeatable=repeatable
+        )
 
     async def download(
         self, /, path: str, target: Path, *, sha256: str | None = None, **params: Any
@@ -148,10 +140,9 @@ class Sender:
         Raises:
             DamagedError: Its bytes have another hash.
         """
-        request = Request(method="GET", path=path, params=params, repeatable=True)
-        async with self._opened(request) as answer:
-            with WholeFile(target, sha256) as file:
-                async for chunk in answer.chunks():
+        async with self._transport.opened(path, params) as answer:
+            with whole_file(target, sha256) as file:
+                async for chunk in answer.aiter_raw():
                     file.write(chunk)
 
     async def pages(
@@ -166,19 +157,24 @@ class Sender:
         """
         while True:
             page = await self.get(path, cursor=cursor, **params)
-            cursor = next_cursor(page, self.url)
+            if not isinstance(page, dict) or not isinstance(page.get("next_cursor", 0), str | None):
+                raise NotAnApiError(
+                    f"{self.url} is not BuildArena: a page of a list lacks its next_cursor"
+                )
             yield page
+            cursor = page["next_cursor"]
             if cursor is None:
                 return
 
     async def get_patiently(self, path: str) -> Any:
         """As get, but waits while the service does not answer: it may be restarted."""
-        watch = RestartWatch(self._retries)
+        until: float | None = None
         while True:
             try:
                 return await self.get(path)
             except UnreachableError:
-                if watch.gives_up(now=time.monotonic()):
+                until = until or time.monotonic() + self._retries.restart_s
+                if time.monotonic() > until:
                     raise
             await self._transport.pause(RESTART_POLL_S)
 
@@ -206,95 +202,62 @@ class Sender:
 
     async def _events(self, path: str, after: int) -> AsyncGenerator[Event, None]:
         """Events as they happen, over as many connections as it takes."""
-        watch = RestartWatch(self._retries)
+        from httpx2 import EventSource
+
+        until: float | None = None
         while True:
-            request = Request(
-                method="GET",
-                path=path,
-                headers={"Accept": MEDIA_TYPE, "Last-Event-ID": str(after)},
-                repeatable=True,
-                timeout_s=STREAM_TIMEOUT_S,
-            )
+            headers = {"Accept": MEDIA_TYPE, "Last-Event-ID": str(after)}
+            stream = self._transport.opened(path, {}, headers=headers, timeout=STREAM_TIMEOUT_S)
             failure = UnreachableError(f"{self.url} ends its streams at once")
             try:
-                async with (
-                    self._opened(request) as answer,
-                    contextlib.aclosing(answer.messages()) as messages,
-                ):
+                async with stream as answer:
                     try:
-                        async for message in messages:
-                            event = event_of(message)
-                            after = event["id"]
-                            yield event
+                        async for message in EventSource(answer, MAX_EVENT_BYTES):
+                            if message.data:
+                                event = event_of(message)
+                                after = event["id"]
+                                yield event
                     finally:
-                        if answer.has_begun:
-                            watch.answered()
+                        if answer.num_bytes_downloaded:
+                            until = None
             except UnreachableError as error:
                 failure = error
-            if watch.gives_up(now=time.monotonic()):
+            until = until or time.monotonic() + self._retries.restart_s
+            if time.monotonic() > until:
                 raise failure
             await self._transport.pause(RESTART_POLL_S)
 
-    def _request(
+    async def _when(
         self,
-        method: str,
         path: str,
-        params: Mapping[str, Any],
+        ended: Callable[[Any], bool],
+        timeout_s: float | None,
         *,
-        body: bytes | None = None,
-        headers: Mapping[str, str] | None = None,
-        repeatable: bool = True,
-    ) -> Request:
-        return Request(
-            method=method,
-            path=path,
-            params=params,
-            body=body,
-            headers=headers or {},
-            repeatable=repeatable,
-            timeout_s=self._timeout_s,
-        )
+        poll_s: float = POLL_S,
+        progress: Callable[[Any], object] | None = None,
+    ) -> Any:
+        """A document once it has ended; each look at it goes to ``progress``.
 
-    async def _document(self, request: Request) -> Any:
-        return document(await self._answer(request))
-
-    async def _answer(self, request: Request) -> Response:
-        retries = Retries(request, self._retries, now=time.monotonic())
+        Raises:
+            TimedOutError: It has not within the time.
+        """
+        started = time.monotonic()
         while True:
-            try:
-                response = await self._transport.send(request)
-                pause_s = retries.pause_after(response, now=time.monotonic())
-            except TransportError as error:
-                pause_s = retries.pause_after_break() if isinstance(error, BrokenError) else None
-                if pause_s is None:
-                    raise self._unreachable(error) from error
-            else:
-                if pause_s is None:
-                    return require_success(request, response, key=self._key)
-            await self._transport.pause(pause_s)
-            request.rewind()
+            document = await self.get_patiently(path)
+            if progress is not None:
+                progress(document)
+            if ended(document):
+                return document
+            if timeout_s is not None and time.monotonic() - started > timeout_s:
+                raise TimedOutError(f"{document['id']} has not ended within {timeout_s:g} s")
+            await self._transport.pause(poll_s)
 
-    @contextlib.asynccontextmanager
-    async def _opened(self, request: Request) -> AsyncGenerator[Answer, None]:
-        """An answer to be read on, whose reading is all of it or an error; retries come before."""
-        retries = Retries(request, self._retries, now=time.monotonic())
-        while True:
-            try:
-                async with self._transport.opened(request) as answer:
-                    if 200 <= answer.status < 300:  # noqa: PLR2004 - HTTP's classes
-                        yield answer
-                        return
-                    response = await answer.read()
-            except TransportError as error:
-                raise self._unreachable(error) from error
-            pause_s = retries.pause_after(response, now=time.monotonic())
-            if pause_s is None:
-                require_success(request, response, key=self._key)
-                raise RefusedError(response.status, f"HTTP {response.status} from {response.url}")
-            await self._transport.pause(pause_s)
-
-    def _unreachable(self, error: Exception) -> UnreachableError:
-        kind = TimedOutError if isinstance(error, SilentError) else UnreachableError
-        # Untrusted input: one line, and nothing that a terminal would obey.
-        text = "".join(char if char.isprintable() else " " for char in str(error)).strip()
-        return kind(f"no BuildArena answers at {self.url} ({text})")
+    async def _document(
+        self, method: str, path: str, params: Mapping[str, Any], **more: Any
+    ) -> Any:
+        answer = await self._transport.answer(method, path, params, **more)
+        try:
+            return answer.json()
+        except (ValueError, RecursionError) as error:
+            message = f"{answer.url} is not BuildArena: it does not answer in JSON"
+            raise NotAnApiError(message) from error

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import time
 import uuid
 from collections.abc import AsyncGenerator, Callable, Mapping
-from contextlib import aclosing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from buildarena_client.endpoints.sending import Sender
+from buildarena_client.endpoints.sending import POLL_S, Sender
+from buildarena_client.errors import BadArgumentError, MissingLibraryError
 from buildarena_client.event_streams import Event
 from buildarena_client.paths import at
-from buildarena_client.specs import spec_of
-from buildarena_client.waiting import POLL_S, require_time, sweep_has_stopped
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
@@ -28,6 +25,10 @@ if TYPE_CHECKING:
 
 PAGE: Final = 100
 """Sweeps that are asked for at once, as many as the service gives."""
+STOPPED: Final = ("budget_exhausted", "paused")
+"""States of sweeps of which nothing more starts."""
+MAX_BYTES: Final = 2 * 1024 * 1024
+"""Largest file: room for the 100,000 seeds that a sweep can name."""
 
 
 class Sweeps(Sender):
@@ -66,11 +67,7 @@ class Sweeps(Sender):
         """
         headers = {"Idempotency-Key": request_key or uuid.uuid4().hex}
         answer = await self.post(
-            "/v1/sweeps",
-            spec_of(spec),
-            repeatable=True,
-            headers=headers,
-            resume=resume or None,
+            "/v1/sweeps", _fields(spec), repeatable=True, headers=headers, resume=resume or None
         )
         return cast("SweepAccepted", answer)
 
@@ -80,7 +77,7 @@ class Sweeps(Sender):
         Args:
             spec: Fields of a sweep, or the YAML file that has them.
         """
-        answer = await self.post("/v1/sweeps/estimate", spec_of(spec), repeatable=True)
+        answer = await self.post("/v1/sweeps/estimate", _fields(spec), repeatable=True)
         return cast("SweepEstimate", answer)
 
     async def pause_sweep(self, sweep_id: str) -> SweepView:
@@ -165,11 +162,49 @@ class Sweeps(Sender):
         Raises:
             TimedOutError: It has not stopped within the time.
         """
-        started = time.monotonic()
-        async with aclosing(self.watch_sweep(sweep_id, poll_s=poll_s)) as looks:
-            async for sweep in looks:
-                if progress is not None:
-                    progress(sweep)
-                if not sweep_has_stopped(sweep):
-                    require_time(sweep_id, started, timeout_s)
-        return sweep
+        answer = await self._when(
+            at("sweeps", sweep_id), sweep_has_stopped, timeout_s, poll_s=poll_s, progress=progress
+        )
+        return cast("SweepView", answer)
+
+
+def sweep_has_stopped(sweep: SweepView) -> bool:
+    """Whether nothing more will happen: every job has ended, or all others are on hold."""
+    progress = sweep["progress"]
+    moving = [name for name in progress["stages"] if not name.endswith(" on_hold")]
+    return not moving and (progress["done"] == progress["total"] or sweep["state"] in STOPPED)
+
+
+def _fields(spec: Mapping[str, Any] | Path) -> dict[str, Any]:
+    """The fields of a sweep.
+
+    Args:
+        spec: The fields, or the YAML file that has them.
+
+    Raises:
+        BadArgumentError: The file can't be read, or holds something other than a mapping.
+        MissingLibraryError: YAML can't be read without a library.
+    """
+    if isinstance(spec, Mapping):
+        return dict(spec)
+    if not isinstance(spec, Path):
+        raise BadArgumentError(
+            f"{spec!r} is not a sweep: give its fields, or the Path of the file that has them"
+        )
+    try:
+        import yaml
+    except ImportError as error:
+        raise MissingLibraryError(
+            "reading a sweep's file", library="PyYAML", extra="yaml"
+        ) from error
+    try:
+        if spec.stat().st_size > MAX_BYTES:
+            raise BadArgumentError(f"{spec} has more than {MAX_BYTES:,} bytes")
+        content = yaml.safe_load(spec.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadArgumentError(f"{spec}: {error.strerror}") from error
+    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        raise BadArgumentError(f"{spec} is not valid YAML: {error}") from error
+    if not isinstance(content, dict):
+        raise BadArgumentError(f"{spec} must be a mapping of fields, such as tasks: [support-1]")
+    return content

@@ -1,0 +1,258 @@
+"""HTTP on httpx2 for both clients, and when a request is sent again. A client loads it when made.
+
+A request that was refused as one too many (429) was not begun, so any may be sent again. After 503,
+or a connection that broke off, a change may have been made: only what may be carried out twice is
+sent again. Nothing is sent again after a time-out, which has cost long enough.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import ssl
+import time
+from collections.abc import AsyncGenerator, Mapping
+from contextlib import AbstractAsyncContextManager
+from http import HTTPStatus
+from typing import Any, Final, cast
+
+import httpx2
+
+from buildarena_client.errors import (
+    BadArgumentError,
+    ClientError,
+    KeyRefusedError,
+    TimedOutError,
+    UnavailableError,
+    UnreachableError,
+    kind_of,
+)
+from buildarena_client.event_streams import no_events
+from buildarena_client.paths import HEALTH, checked_path
+from buildarena_client.retries import RetryPolicy
+
+LONGEST_PAUSE_S: Final = 10.0
+"""How long a refused request waits at most before it is sent again, whatever the service asks."""
+BREAK_PAUSE_S: Final = 0.2
+KEEPALIVE_S: Final = 2.0
+"""How long an idle connection is kept: servers close theirs after five seconds, and a request that
+meets that moment would break off."""
+HIDDEN: Final = "[key]"
+
+
+class Transport:
+    """Sends requests to one server. No redirect is followed and no proxy used.
+
+    Args:
+        url: Where it is.
+        key: Sent with each request, and in no message.
+        timeout_s: How long nothing may come; None waits forever.
+        retries: How long requests are sent again.
+        at_once: Requests that are open at most; further ones wait. Streams are not counted. None
+            for a transport that blocks: its coroutines never suspend, so that ``client.run``
+            carries them out without an event loop, and each request has a connection of its own,
+            so that any thread may send one.
+
+    Raises:
+        BadArgumentError: The URL can't be asked.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        key: str | None,
+        *,
+        timeout_s: float | None,
+        retries: RetryPolicy,
+        at_once: int | None,
+    ) -> None:
+        self._url = url
+        self._key = key
+        self._retries = retries
+        self._blocks = at_once is None
+        headers = {"Accept-Encoding": "identity"}
+        if key:
+            headers["Authorization"] = f"Bearer {key}"
+        kept = httpx2.Limits(max_keepalive_connections=at_once or 0, keepalive_expiry=KEEPALIVE_S)
+        options: dict[str, Any] = {
+            "limits": kept,
+            "verify": ssl.create_default_context() if url.startswith("https:") else False,
+        }
+        carrier: httpx2.AsyncBaseTransport
+        if at_once is None:
+            self._slots: AbstractAsyncContextManager[object] = contextlib.nullcontext()
+            carrier = _BlockingCarrier(httpx2.HTTPTransport(**options))
+        else:
+            import asyncio  # which the command line does without
+
+            self._slots = asyncio.Semaphore(at_once)
+            carrier = httpx2.AsyncHTTPTransport(**options)
+        try:
+            # The environment's proxies and .netrc would see the key, or put another in its place.
+            self._http = httpx2.AsyncClient(
+                base_url=url, headers=headers, timeout=timeout_s, transport=carrier, trust_env=False
+            )
+        except httpx2.InvalidURL as error:
+            raise BadArgumentError(f"{url!r} is not the URL of an API: {error}") from error
+
+    async def answer(
+        self,
+        method: str,
+        path: str,
+        params: Mapping[str, Any],
+        *,
+        repeatable: bool = True,
+        **more: Any,
+    ) -> httpx2.Response:
+        """The whole answer to a request, which is a success; of health, whatever it is.
+
+        Args:
+            method: GET, POST or PUT.
+            path: Under the service's URL.
+            params: Parameters; those that are None are left out, lists are repeated.
+            repeatable: Whether it may be sent again although it may have been carried out.
+            more: ``headers``, ``content`` or ``json``, as httpx2 takes them.
+
+        Raises:
+            ClientError: There is none.
+        """
+        request = self._request(method, path, params, **more)
+        async with self._slots:
+            return await self._answered(request, repeatable=repeatable)
+
+    @contextlib.asynccontextmanager
+    async def opened(
+        self, path: str, params: Mapping[str, Any], **more: Any
+    ) -> AsyncGenerator[httpx2.Response, None]:
+        """The answer to a GET, a success, to be read on: to its end, or to a ClientError."""
+        request = self._request("GET", path, params, **more)
+        answer = await self._answered(request, repeatable=True, stream=True)
+        try:
+            yield answer
+        except httpx2.SSEError as error:
+            raise no_events() from error
+        except httpx2.RequestError as error:
+            raise self._unreachable(error) from error
+        finally:
+            await answer.aclose()
+
+    async def pause(self, seconds: float) -> None:
+        """Waits before something is asked again."""
+        if self._blocks:
+            time.sleep(seconds)  # noqa: ASYNC251 - there is no event loop
+        else:
+            import asyncio
+
+            await asyncio.sleep(seconds)
+
+    async def close(self) -> None:
+        """Closes connections that are kept."""
+        if not self._blocks:
+            await self._http.aclose()
+
+    def _request(
+        self,
+        method: str,
+        path: str,
+        params: Mapping[str, Any],
+        *,
+        headers: Mapping[str, str] | None = None,
+        **more: Any,
+    ) -> httpx2.Request:
+        for name, value in (headers or {}).items():
+            if not (value.isascii() and value.isprintable()):
+                raise BadArgumentError(f"{value!r} can't be sent as {name}: use printable ASCII")
+        url = httpx2.URL(checked_path(path))
+        if asked := {name: value for name, value in params.items() if value is not None}:
+            url = url.copy_merge_params(asked)
+        try:
+            return self._http.build_request(method, url, headers=headers, **more)
+        except (TypeError, ValueError, RecursionError) as error:
+            raise BadArgumentError(f"this can't be sent as JSON: {error}") from error
+
+    async def _answered(
+        self, request: httpx2.Request, *, repeatable: bool, stream: bool = False
+    ) -> httpx2.Response:
+        now = time.monotonic()
+        until = {HTTPStatus.TOO_MANY_REQUESTS: now + self._retries.too_many_s}
+        breaks = 0
+        if repeatable:
+            until[HTTPStatus.SERVICE_UNAVAILABLE] = now + self._retries.unavailable_s
+            breaks = self._retries.breaks
+        while True:
+            try:
+                answer = await self._http.send(request, stream=stream)
+                if answer.is_success or request.url.path.endswith(HEALTH):
+                    return answer
+                await answer.aread()
+            except httpx2.RequestError as error:
+                if not breaks or not _broke_off(error):
+                    raise self._unreachable(error) from error
+                breaks -= 1
+                pause_s = BREAK_PAUSE_S
+            else:
+                asked = answer.headers.get("Retry-After", "")
+                pause_s = min(float(asked), LONGEST_PAUSE_S) if asked.isdecimal() else float("inf")
+                if time.monotonic() + pause_s > until.get(HTTPStatus(answer.status_code), 0.0):
+                    raise _failure(answer, self._key)
+            await self.pause(pause_s)
+
+    def _unreachable(self, error: httpx2.RequestError) -> UnreachableError:
+        kind = TimedOutError if isinstance(error, httpx2.TimeoutException) else UnreachableError
+        # Untrusted input: one line, and nothing that a terminal would obey.
+        told = str(error) or type(error).__name__
+        text = "".join(char if char.isprintable() else " " for char in told).strip()
+        return kind(f"no BuildArena answers at {self._url} ({text})")
+
+
+class _BlockingCarrier(httpx2.AsyncBaseTransport):
+    """Carries a request out while it is awaited, without an event loop."""
+
+    def __init__(self, transport: httpx2.HTTPTransport) -> None:
+        self._transport = transport
+
+    async def handle_async_request(self, request: httpx2.Request) -> httpx2.Response:
+        answer = self._transport.handle_request(request)
+        answer.stream = _BlockingStream(cast("httpx2.SyncByteStream", answer.stream))
+        return answer
+
+
+class _BlockingStream(httpx2.AsyncByteStream):
+    def __init__(self, stream: httpx2.SyncByteStream) -> None:
+        self._stream = stream
+
+    async def __aiter__(self) -> AsyncGenerator[bytes, None]:
+        for chunk in self._stream:
+            yield chunk
+
+    async def aclose(self) -> None:
+        self._stream.close()
+
+
+def _broke_off(error: httpx2.RequestError) -> bool:
+    """Whether what was sent may have been carried out: there was a connection, and it is cut."""
+    cut = (httpx2.NetworkError, httpx2.RemoteProtocolError)
+    return isinstance(error, cut) and not isinstance(error, httpx2.ConnectError)
+
+
+def _failure(answer: httpx2.Response, key: str | None) -> ClientError:
+    """What a problem says, without the key, which a server may repeat."""
+    detail, errors = f"HTTP {answer.status_code} from {answer.url}", list[dict[str, Any]]()
+    text = answer.text.replace(json.dumps(key)[1:-1], HIDDEN) if key else answer.text
+    with contextlib.suppress(ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        problem = json.loads(text)
+        errors = [_issue(error) for error in problem["errors"]]
+        detail = str(problem["detail"])
+    if answer.status_code == HTTPStatus.SERVICE_UNAVAILABLE:
+        return UnavailableError(detail)
+    kind = kind_of(answer.status_code)
+    return kind(answer.status_code, detail, [] if kind is KeyRefusedError else errors)
+
+
+def _issue(error: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "field": str(error.get("field", "")),
+        "message": str(error["message"]),
+        "line": error.get("line"),
+        "choices": [str(choice) for choice in error.get("choices") or ()],
+    }
