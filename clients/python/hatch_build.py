@@ -82,9 +82,8 @@ def module_text(contract: Mapping[str, Any]) -> str:
         name: {"description": description, "properties": _parameters(contract["paths"][path])}
         for name, (path, description) in FILTERS.items()
     }
-    # What is no class is a name for a plain type, which must be there before it is used.
-    names = sorted(documents, key=lambda name: ("properties" in documents[name], name))
-    return "\n\n".join([HEAD, *(_definition(name, documents[name]) for name in names)]) + "\n"
+    classes = [_class(name, schema) for name, schema in sorted(documents.items())]
+    return "\n\n".join([HEAD, *classes]) + "\n"
 
 
 def _parameters(operations: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,11 +94,9 @@ def _parameters(operations: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _definition(name: str, schema: Mapping[str, Any]) -> str:
-    about = _text(schema.get("description", "").partition("Attributes:")[0] or name)
-    if "properties" not in schema:
-        return f"{name} = {_type(schema)}\n{about}"
-    lines = [f"class {name}(TypedDict):", f"    {about}", ""]
+def _class(name: str, schema: Mapping[str, Any]) -> str:
+    about = schema.get("description", "").partition("Attributes:")[0] or name
+    lines = [f"class {name}(TypedDict):", f"    {_text(about)}", ""]
     for key, field in schema["properties"].items():
         kind = _type(field)
         if key not in schema.get("required", ()):

@@ -361,13 +361,15 @@ def test_what_is_no_key_or_url_is_refused_unseen(make) -> None:
         assert key not in str(refused.value)
     for url in (
         *("ftp://x", "nonsense", "http://", "http://x:99999", "http://x:0", "http://["),
+        *("http://a..b", "http://\u2603.b", "http://" + "a" * 64),
         *("http://x/?a=b", "http://x/#y", "http://x/\r\n", "file:///etc/passwd", ""),
     ):
         with pytest.raises(BadArgumentError, match="is not the URL of an API"):
             make(url)
-    with pytest.raises(BadArgumentError, match="no user or password") as refused:
-        make("http://me:hush@127.0.0.1:1")
-    assert "hush" not in str(refused.value)
+    for rest in ("127.0.0.1:1", "x:99999", "[", "?"):
+        with pytest.raises(BadArgumentError, match="no user or password") as refused:
+            make(f"http://me:hush@{rest}")
+        assert "hush" not in str(refused.value)
 
 
 def read_key(environment: dict[str, str]) -> str | None:
@@ -403,7 +405,8 @@ def test_keys_stand_in_variables_or_files(tmp_path) -> None:
     assert "are both set" in read_key({"BUILDARENA_KEY": "secret", **of_file})
 
 
-def test_a_server_that_nobody_vouches_for_gets_no_key(make, tmp_path) -> None:
+@pytest.mark.parametrize("scheme", ["https", "HTTPS"])
+def test_a_server_that_nobody_vouches_for_gets_no_key(make, scheme, tmp_path) -> None:
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.load_cert_chain(self_signed(tmp_path))
     received = []
@@ -420,7 +423,7 @@ def test_a_server_that_nobody_vouches_for_gets_no_key(make, tmp_path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as listening:
         thread = threading.Thread(target=serve)
         thread.start()
-        url = f"https://127.0.0.1:{listening.getsockname()[1]}"
+        url = f"{scheme}://127.0.0.1:{listening.getsockname()[1]}"
         with pytest.raises(UnreachableError, match=r"(?i)certificate.verify"):
             make(url, SECRET).tasks()
         thread.join()

@@ -25,17 +25,16 @@ def checked_url(url: str | None) -> str:
         BadArgumentError: It is none. A password in it is not repeated.
     """
     url = url if url is not None else os.environ.get(URL_VARIABLE) or DEFAULT_URL
+    if "@" in url:
+        raise BadArgumentError("the URL of an API has no user or password in it: give the key")
     try:
         parts = urlsplit(url)
-        fault = _fault(parts.scheme, parts.hostname, parts.port)
+        host = (parts.hostname or "").encode("idna")
+        whole = parts.scheme in {"http", "https"} and host and parts.port != 0
     except ValueError as error:
         raise BadArgumentError(f"{url!r} is not the URL of an API: {error}") from error
-    if "@" in parts.netloc:
-        raise BadArgumentError("the URL of an API has no user or password in it: give the key")
-    if fault is None and (parts.query or parts.fragment or not url.isprintable() or " " in url):
-        fault = "it must end with its path"
-    if fault is not None:
-        raise BadArgumentError(f"{url!r} is not the URL of an API: {fault}")
+    if not whole or parts.query or parts.fragment or not url.isprintable() or " " in url:
+        raise BadArgumentError(f"{url!r} is not the URL of an API, such as {DEFAULT_URL}")
     return url.rstrip("/")
 
 
@@ -82,9 +81,3 @@ def stored_key(environment: Mapping[str, str] | None = None) -> str | None:
     if not secret.strip():
         raise BadArgumentError(f"{variable} names {file}, which is empty")
     return secret
-
-
-def _fault(scheme: str, host: str | None, port: int | None) -> str | None:
-    if scheme not in {"http", "https"} or not host:
-        return "it must begin with http:// or https:// and name a host"
-    return "0 is not a port" if port == 0 else None

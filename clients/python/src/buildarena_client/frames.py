@@ -30,20 +30,16 @@ from buildarena_client import schemas
 from buildarena_client.errors import BadArgumentError, MissingLibraryError
 
 Kind = Literal["pandas", "polars"]
-KINDS: Final = ("pandas", "polars")
-SCALARS: Final = {int: "int", float: "float", bool: "bool", str: "text"}
-PANDAS: Final = {
-    "time": "datetime64[us, UTC]",
-    "float": "float64",
-    "int": "int64",
-    "int?": "Int64",
-    "bool": "bool",
-    "bool?": "boolean",
-    "text": "string",
-    "json": "string",
-    "list": "object",
+SCALARS: Final = (int, float, bool, str)
+PANDAS: Final[Mapping[type, str]] = {
+    datetime: "datetime64[us, UTC]",
+    float: "float64",
+    int: "int64",
+    bool: "bool",
+    list: "object",
 }
-UNIONS: Final = (types.UnionType, Union)
+WITH_MISSING: Final = {int: "Int64", bool: "boolean"}
+"""Types of pandas where values may be missing; the others can say so themselves."""
 TASK_COLUMNS: Final = ("task", "version", "indicator", "unit", "custom")
 """What a leaderboard's row says of its task."""
 FIRST: Final = (
@@ -52,8 +48,9 @@ FIRST: Final = (
 )
 """What people read first, in this order, where rows have it; the rest is as in the contract."""
 
-Columns = dict[str, str]
-"""Types by name: time, float, int, bool, text, list, json; `?` for what may be missing."""
+Columns = dict[str, tuple[type, bool]]
+"""The type of each column, and whether values may be missing: a scalar, datetime, list for lists of
+texts, dict for documents with columns of their own, object for JSON."""
 
 
 def jobs_frame(jobs: Iterable[schemas.JobView], *, kind: Kind = "pandas") -> Any:
@@ -66,7 +63,7 @@ def jobs_frame(jobs: Iterable[schemas.JobView], *, kind: Kind = "pandas") -> Any
     Raises:
         MissingLibraryError: It is not installed.
     """
-    return _frame(jobs, schemas.JobView, kind)
+    return _made(jobs, _columns(schemas.JobView), kind)
 
 
 def sweeps_frame(sweeps: Iterable[schemas.SweepView], *, kind: Kind = "pandas") -> Any:
@@ -79,7 +76,7 @@ def sweeps_frame(sweeps: Iterable[schemas.SweepView], *, kind: Kind = "pandas") 
     Raises:
         MissingLibraryError: It is not installed.
     """
-    return _frame(sweeps, schemas.SweepView, kind)
+    return _made(sweeps, _columns(schemas.SweepView), kind)
 
 
 def results_frame(results: Iterable[schemas.Result], *, kind: Kind = "pandas") -> Any:
@@ -92,7 +89,7 @@ def results_frame(results: Iterable[schemas.Result], *, kind: Kind = "pandas") -
     Raises:
         MissingLibraryError: It is not installed.
     """
-    return _frame(results, schemas.Result, kind)
+    return _made(results, _columns(schemas.Result), kind)
 
 
 def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind = "pandas") -> Any:
@@ -107,118 +104,90 @@ def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind
         MissingLibraryError: It is not installed.
     """
     if overall:
-        return _frame(board.get("overall", []), schemas.OverallView, kind)
+        return _made(board.get("overall", []), _columns(schemas.OverallView), kind)
     rows = [
         {**{name: task[name] for name in TASK_COLUMNS}, **row}
         for task in board["tasks"]
         for row in task["rows"]
     ]
     of_task = {name: _columns(schemas.TaskBoard)[name] for name in TASK_COLUMNS}
-    return _made(rows, _as_read({**of_task, **_columns(schemas.Row)}), kind)
-
-
-def _frame(rows: Iterable[Any], row_type: Any, kind: Kind) -> Any:
-    return _made(rows, _as_read(_columns(row_type)), kind)
-
-
-def _as_read(columns: Columns) -> Columns:
-    """The columns, with those that people read first before the others."""
-    first = [name for name in FIRST if name in columns]
-    return {name: columns[name] for name in dict.fromkeys((*first, *columns))}
+    return _made(rows, of_task | _columns(schemas.Row), kind)
 
 
 def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> Any:
-    if kind not in KINDS:
-        raise BadArgumentError(f"{kind!r} is no kind of frame; choose from {', '.join(KINDS)}")
+    if kind not in get_args(Kind):
+        choices = ", ".join(get_args(Kind))
+        raise BadArgumentError(f"{kind!r} is no kind of frame; choose from {choices}")
     try:
         library = import_module(kind)
     except ImportError as error:
         raise MissingLibraryError(f"a {kind} frame", library=kind, extra=kind) from error
+    in_order = (name for name in (*FIRST, *columns) if name in columns)
+    columns = {name: columns[name] for name in in_order}
     flat = [dict(_flat(row, columns)) for row in rows]
     typed = _with_inner_columns(flat, columns)
-    data = {name: [_value(row.get(name), of) for row in flat] for name, of in typed.items()}
-    return _pandas(library, data, typed) if kind == "pandas" else _polars(library, data, typed)
+    data = {name: [_value(row.get(name), of) for row in flat] for name, (of, _) in typed.items()}
+    make = _pandas if kind == "pandas" else _polars
+    return make(library, data, typed)
 
 
 def _pandas(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> Any:
-    made = {
-        name: library.Series(values, dtype=_pandas_type(columns[name], values))
-        for name, values in data.items()
-    }
+    made = {}
+    for name, (kind, may_miss) in columns.items():
+        dtype = PANDAS.get(kind, "string")
+        # An older service may leave out what the contract requires.
+        if may_miss or None in data[name]:
+            dtype = WITH_MISSING.get(kind, dtype)
+        made[name] = library.Series(data[name], dtype=dtype)
     return library.DataFrame(made)
-
-
-def _pandas_type(kind: str, values: list[Any]) -> str:
-    # An older service may leave out what the contract requires.
-    kind = _maybe(kind) if None in values else kind
-    return PANDAS.get(kind) or PANDAS[kind.removesuffix("?")]
 
 
 def _polars(library: Any, data: Mapping[str, list[Any]], columns: Columns) -> Any:
     types_of = {
-        "time": library.Datetime("us", "UTC"),
-        "float": library.Float64,
-        "int": library.Int64,
-        "bool": library.Boolean,
-        "text": library.String,
-        "json": library.String,
-        "list": library.List(library.String),
+        datetime: library.Datetime("us", "UTC"),
+        list: library.List(library.String),
+        object: library.String,
     }
-    schema = {name: types_of[kind.removesuffix("?")] for name, kind in columns.items()}
-    return library.DataFrame(dict(data), schema=schema)
+    schema = {name: types_of.get(kind, kind) for name, (kind, _) in columns.items()}
+    return library.DataFrame(data, schema=schema)
 
 
-def _columns(row_type: Any, prefix: str = "") -> Columns:
-    """Columns of a document; those of documents in it by their path."""
+def _columns(row_type: Any, prefix: str = "", *, missing: bool = False) -> Columns:
+    """Columns of a document, which may be missing; those of documents in it by their path."""
     columns: Columns = {}
     for name, hint in get_type_hints(row_type, include_extras=True).items():
-        kind, missing = _required(hint)
+        kind, may_miss = _required(hint)
         if is_typeddict(kind):
-            # The whole document may be missing, and with it what it must have.
-            inner = _columns(kind, f"{prefix}{name}.")
-            columns |= {
-                of: _maybe(column_kind) if missing else column_kind
-                for of, column_kind in inner.items()
-            }
+            columns |= _columns(kind, f"{prefix}{name}.", missing=missing or may_miss)
         else:
-            columns[prefix + name] = _maybe(_kind(kind)) if missing else _kind(kind)
+            columns[prefix + name] = _kind(kind), missing or may_miss
     return columns
-
-
-def _maybe(kind: str) -> str:
-    return kind.removesuffix("?") + "?"
 
 
 def _required(hint: Any) -> tuple[Any, bool]:
     """A type without None, and whether it may be None or not there at all."""
     if get_origin(hint) is NotRequired:
         return _required(get_args(hint)[0])[0], True
-    if get_origin(hint) not in UNIONS:
+    if get_origin(hint) not in {types.UnionType, Union}:
         return hint, False
     kinds = [argument for argument in get_args(hint) if argument is not type(None)]
     return (kinds[0] if len(kinds) == 1 else object), len(kinds) < len(get_args(hint))
 
 
-def _kind(hint: Any) -> str:
-    if get_origin(hint) is Annotated:
-        return "time"
-    if get_origin(hint) is Literal:
-        return "text"
-    if get_origin(hint) is dict:
-        return "dict"
+def _kind(hint: Any) -> type:
+    named: dict[Any, type] = {Annotated: datetime, Literal: str, dict: dict}
     if hint == list[str]:
-        return "list"
-    return SCALARS.get(hint, "json")
+        return list
+    return named.get(get_origin(hint), hint if hint in SCALARS else object)
 
 
 def _flat(row: Mapping[str, Any], columns: Columns, prefix: str = "") -> Iterable[tuple[str, Any]]:
     """What a document holds, by path."""
     for name, value in row.items():
         path = prefix + name
-        nested = isinstance(value, Mapping) and path not in columns
-        opened = isinstance(value, Mapping) and columns.get(path, "").startswith("dict")
-        if nested or opened:
-            yield from _flat(value, {} if opened else columns, path + ".")
+        opened = columns.get(path, (dict,))[0] is dict
+        if opened and isinstance(value, Mapping):
+            yield from _flat(value, {} if path in columns else columns, path + ".")
         else:
             yield path, value
 
@@ -226,32 +195,34 @@ def _flat(row: Mapping[str, Any], columns: Columns, prefix: str = "") -> Iterabl
 def _with_inner_columns(rows: list[dict[str, Any]], columns: Columns) -> Columns:
     """The columns; those that hold documents are replaced by a column for each inner field."""
     typed: Columns = {}
-    for name, kind in columns.items():
-        if not kind.startswith("dict"):
-            typed[name] = kind
-            continue
-        inside = dict.fromkeys(key for row in rows for key in row if key.startswith(f"{name}."))
-        typed |= {key: _kind_of_values([row.get(key) for row in rows]) for key in inside}
+    for name, (kind, may_miss) in columns.items():
+        if kind is dict:
+            inside = dict.fromkeys(key for row in rows for key in row if key.startswith(f"{name}."))
+            typed |= {
+                key: (_kind_of_values([row.get(key) for row in rows]), True) for key in inside
+            }
+        else:
+            typed[name] = kind, may_miss
     return typed
 
 
-def _kind_of_values(values: list[Any]) -> str:
+def _kind_of_values(values: list[Any]) -> type:
     """The type of what the contract leaves open."""
-    kinds = {type(value) for value in values if value is not None}
-    if kinds == {int, float}:
-        kinds = {float}
-    if len(kinds) == 1 and (only := kinds.pop()) in SCALARS:
-        return SCALARS[only] + "?"
     present = [value for value in values if value is not None]
+    kinds = {type(value) for value in present}
+    if kinds == {int, float}:
+        return float
+    if len(kinds) == 1 and (only := kinds.pop()) in SCALARS:
+        return only
     texts = all(isinstance(v, list) and all(isinstance(t, str) for t in v) for v in present)
-    return "list?" if present and texts else "json?"
+    return list if present and texts else object
 
 
-def _value(value: Any, kind: str) -> Any:
+def _value(value: Any, kind: type) -> Any:
     if value is None:
         return None
-    if kind.startswith("time"):
+    if kind is datetime:
         return datetime.fromisoformat(value).astimezone(UTC)
-    if kind.startswith("json"):
+    if kind is object:
         return json.dumps(value)
-    return float(value) if kind.startswith("float") else value
+    return float(value) if kind is float else value

@@ -21,12 +21,8 @@ def at(*parts: str) -> str:
     """
     for part in parts:
         # A server takes %2F for a slash.
-        if (
-            not isinstance(part, str)
-            or part in {"", ".", ".."}
-            or "/" in part
-            or not part.isprintable()
-        ):
+        readable = isinstance(part, str) and part.isprintable()
+        if not readable or part in {"", ".", ".."} or "/" in part:
             raise BadArgumentError(f"{part!r} is not a name")
     return "/v1/" + "/".join(quote(part, safe="") for part in parts)
 

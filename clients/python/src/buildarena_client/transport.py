@@ -76,7 +76,7 @@ class Transport:
         kept = httpx2.Limits(max_keepalive_connections=at_once or 0, keepalive_expiry=KEEPALIVE_S)
         options: dict[str, Any] = {
             "limits": kept,
-            "verify": ssl.create_default_context() if url.startswith("https:") else False,
+            "verify": ssl.create_default_context() if url.lower().startswith("https:") else False,
         }
         carrier: httpx2.AsyncBaseTransport
         if at_once is None:

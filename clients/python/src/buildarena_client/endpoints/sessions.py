@@ -102,13 +102,8 @@ class Sessions(Sender):
             simulator: What simulates it; the service's default by default.
             seed: Of the trial.
         """
+        asked = {"task": task, "simulator": simulator, "seed": seed}
         answer = await self.upload(
-            "/v1/machines/trials",
-            source,
-            MACHINE_FILE,
-            repeatable=True,
-            task=task,
-            simulator=simulator,
-            seed=seed,
+            "/v1/machines/trials", source, MACHINE_FILE, repeatable=True, **asked
         )
         return cast("JobView", answer)
