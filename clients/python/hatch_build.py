@@ -83,7 +83,7 @@ def module_text(contract: Mapping[str, Any]) -> str:
         for name, (path, description) in FILTERS.items()
     }
     classes = [_class(name, schema) for name, schema in sorted(documents.items())]
-    return "\n\n".join([HEAD, *classes]) + "\n"
+    return "\n\n\n".join([HEAD.rstrip(), *classes]) + "\n"
 
 
 def _parameters(operations: Mapping[str, Any]) -> dict[str, Any]:

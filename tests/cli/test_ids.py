@@ -137,10 +137,11 @@ def test_a_jobs_files_are_fetched_whole_or_not_at_all(
     printed(url, "job", "files", job, "machine", "--out", str(tmp_path / "one"))
     assert [f.name for f in (tmp_path / "one").iterdir()] == ["machine.json"]
     assert "did you mean machine?" in run_cli(url, "job", "files", job, "machin").stderr
-    monkeypatch.setattr(Client, "get_bytes", lambda *_, **__: b"other")
+    stored = [{**file, "hash": "0" * 64} for file in Client(url).artifacts(job)]
+    monkeypatch.setattr(Client, "get", lambda *_, **__: stored)
     done = run_cli(url, "job", "files", job, "--out", str(tmp_path / "damaged"))
     assert (done.returncode, "arrived damaged" in done.stderr) == (1, True)
-    assert not (tmp_path / "damaged").exists()
+    assert list((tmp_path / "damaged").iterdir()) == []
     for name, safe in (
         ("../../etc/passwd", "_.._etc_passwd.json"),
         (".hidden", "hidden.json"),

@@ -106,6 +106,8 @@ def test_what_is_no_answer_of_an_api_is_one_sentence(make) -> None:
         (answer(302, Location="http://127.0.0.1:1/"), RefusedError, "HTTP 302"),
         (answer(500, b"<html>"), ServiceFaultError, "HTTP 500"),
         (answer(418, b"[]"), RefusedError, "HTTP 418"),
+        (answer(499), RefusedError, "HTTP 499"),
+        (answer(520), ServiceFaultError, "HTTP 520"),
         (answer(422, b'{"detail": 5, "errors": [7]}'), RefusedError, "HTTP 422"),
         (answer(422, b'{"detail": "no", "errors": null}'), RefusedError, "HTTP 422"),
     ):

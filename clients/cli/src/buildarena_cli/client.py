@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Coroutine, Iterator
 from typing import Any, TypeVar
 
@@ -18,7 +17,6 @@ from buildarena_client.retries import RetryPolicy
 T = TypeVar("T")
 RESTART_S = RetryPolicy().restart_s
 """How long a watching command waits for a service that is being restarted."""
-STATE_POLL_S = 0.3
 
 
 def at(*parts: str) -> str:
@@ -42,12 +40,6 @@ class Client(ApiClient):
     def __init__(self, url: str, key: str | None = None) -> None:
         with _in_words():
             super().__init__(url, key)
-
-    def get_in_state(self, path: str, state: str) -> Any:
-        """As get_patiently, once the answer's state is this one."""
-        while (answer := self.get_patiently(path))["state"] != state:
-            time.sleep(STATE_POLL_S)
-        return answer
 
     def _run(self, coroutine: Coroutine[Any, Any, T]) -> T:
         with _in_words():

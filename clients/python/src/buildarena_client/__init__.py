@@ -46,6 +46,7 @@ _HOMES = {
     "sweeps_frame": "frames",
     "RetryPolicy": "retries",
 }
+__all__ = sorted({*_HOMES, *filter(lambda name: name.endswith("Error"), globals())})  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:

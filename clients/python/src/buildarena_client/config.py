@@ -70,14 +70,13 @@ def stored_key(environment: Mapping[str, str] | None = None) -> str | None:
     try:
         with Path(file).open("rb") as opened:
             data = opened.read(MAX_KEY_BYTES + 1)
-        if len(data) > MAX_KEY_BYTES:
-            raise ValueError(f"it has more than {MAX_KEY_BYTES} bytes")  # noqa: TRY301 - one wording
         secret = data.decode().removesuffix("\n").removesuffix("\r")
     except UnicodeDecodeError:
         raise BadArgumentError(f"{variable} names {file}, which is not UTF-8 text") from None
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise BadArgumentError(f"{variable} names {file}: {reason}") from error
+    except OSError as error:
+        raise BadArgumentError(f"{variable} names {file}: {error.strerror}") from error
+    if len(data) > MAX_KEY_BYTES:
+        raise BadArgumentError(f"{variable} names {file}: more than {MAX_KEY_BYTES} bytes")
     if not secret.strip():
         raise BadArgumentError(f"{variable} names {file}, which is empty")
     return secret

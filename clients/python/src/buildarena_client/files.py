@@ -6,14 +6,14 @@ import hashlib
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BufferedRandom, BytesIO
 from pathlib import Path
-from typing import BinaryIO
 
 from buildarena_client.errors import DamagedError
 
 
 @contextmanager
-def whole_file(target: Path, sha256: str | None = None) -> Iterator[BinaryIO]:
+def whole_file(target: Path, sha256: str | None = None) -> Iterator[BufferedRandom]:
     """A file that appears only when it is complete and has its hash, if that is known.
 
     Raises:
@@ -25,22 +25,17 @@ def whole_file(target: Path, sha256: str | None = None) -> Iterator[BinaryIO]:
         with partial.open("x+b") as file:
             yield file
             file.seek(0)
-            _compare(hashlib.file_digest(file, "sha256").hexdigest(), sha256, target.name)
+            require_hash(file, sha256, target.name)
         partial.replace(target)
     finally:
         partial.unlink(missing_ok=True)
 
 
-def require_hash(data: bytes, sha256: str, name: str) -> bytes:
-    """Bytes that arrived as they were stored.
+def require_hash(content: BufferedRandom | BytesIO, sha256: str | None, name: str) -> None:
+    """Checks that bytes arrived as they were stored, if it is known how.
 
     Raises:
         DamagedError: They did not.
     """
-    _compare(hashlib.sha256(data).hexdigest(), sha256, name)
-    return data
-
-
-def _compare(digest: str, expected: str | None, name: str) -> None:
-    if expected is not None and digest != expected:
+    if sha256 is not None and hashlib.file_digest(content, "sha256").hexdigest() != sha256:
         raise DamagedError(f"{name} arrived damaged: its hash differs")

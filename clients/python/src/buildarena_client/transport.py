@@ -174,11 +174,10 @@ class Transport:
         self, request: httpx2.Request, *, repeatable: bool, stream: bool = False
     ) -> httpx2.Response:
         now = time.monotonic()
-        until = {HTTPStatus.TOO_MANY_REQUESTS: now + self._retries.too_many_s}
-        breaks = 0
+        until: dict[int, float] = {HTTPStatus.TOO_MANY_REQUESTS: now + self._retries.too_many_s}
         if repeatable:
             until[HTTPStatus.SERVICE_UNAVAILABLE] = now + self._retries.unavailable_s
-            breaks = self._retries.breaks
+        breaks = self._retries.breaks if repeatable else 0
         while True:
             try:
                 answer = await self._http.send(request, stream=stream)
@@ -186,14 +185,16 @@ class Transport:
                     return answer
                 await answer.aread()
             except httpx2.RequestError as error:
-                if not breaks or not _broke_off(error):
+                # There was a connection, and it is cut.
+                cut = isinstance(error, (httpx2.NetworkError, httpx2.RemoteProtocolError))
+                if not breaks or not cut or isinstance(error, httpx2.ConnectError):
                     raise self._unreachable(error) from error
                 breaks -= 1
                 pause_s = BREAK_PAUSE_S
             else:
                 asked = answer.headers.get("Retry-After", "")
                 pause_s = min(float(asked), LONGEST_PAUSE_S) if asked.isdecimal() else float("inf")
-                if time.monotonic() + pause_s > until.get(HTTPStatus(answer.status_code), 0.0):
+                if time.monotonic() + pause_s > until.get(answer.status_code, 0.0):
                     raise _failure(answer, self._key)
             await self.pause(pause_s)
 
@@ -227,12 +228,6 @@ class _BlockingStream(httpx2.AsyncByteStream):
 
     async def aclose(self) -> None:
         self._stream.close()
-
-
-def _broke_off(error: httpx2.RequestError) -> bool:
-    """Whether what was sent may have been carried out: there was a connection, and it is cut."""
-    cut = (httpx2.NetworkError, httpx2.RemoteProtocolError)
-    return isinstance(error, cut) and not isinstance(error, httpx2.ConnectError)
 
 
 def _failure(answer: httpx2.Response, key: str | None) -> ClientError:

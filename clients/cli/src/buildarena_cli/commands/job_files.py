@@ -14,8 +14,6 @@ from buildarena_cli.ids import whole_id
 from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, UrlOption
 from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import columns, print_json, print_table, say
-from buildarena_client.errors import DamagedError
-from buildarena_client.files import require_hash
 
 COLUMNS = columns(
     "file", "type", "bytes", "sha256", numeric=("bytes",), leaving=("sha256", "type", "bytes")
@@ -74,17 +72,11 @@ def _chosen(
 
 
 def _fetched(client: Client, job_id: str, file: dict[str, Any], folder: Path) -> Path:
-    body = client.get_bytes(at("jobs", job_id, "artifacts", file["name"]))
-    try:
-        require_hash(body, file["hash"], f"{file['name']} of {job_id}")
-    except DamagedError as error:
-        raise CommandError(str(error)) from error
     target = folder / file_name(file["name"], file["media_type"])
-    partial = target.with_name(target.name + ".partial")
+    path = at("jobs", job_id, "artifacts", file["name"])
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        partial.write_bytes(body)
-        partial.replace(target)
+        client.download(path, target, sha256=file["hash"])
     except OSError as error:
         raise CommandError(f"{target} can't be written: {error.strerror}") from error
     return target

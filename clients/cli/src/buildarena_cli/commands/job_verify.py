@@ -56,8 +56,7 @@ def verify(
 
 def _verify_job(client: Client, job_id: str, *, as_json: bool) -> int:
     check = client.post(at("jobs", whole_id(client, "job", job_id), "verify"), {})
-    check = client.get_in_state(at("verifications", check["id"]), "done")
-    report = check["report"]
+    report: Any = client.wait_for_verification(check["id"])["report"]
     if as_json:
         print_json(report)
     else:
@@ -74,7 +73,7 @@ def _verify_model(client: Client, body: dict[str, Any], *, as_json: bool) -> int
     differences: list[dict[str, Any]] = []
     accepted = client.post("/v1/leaderboard/verify", body)
     for id_ in _verifications(client, accepted):
-        check = client.get_in_state(at("verifications", id_), "done")
+        check: Any = client.wait_for_verification(id_)
         if not check["report"]["ok"]:
             wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
             differences.append({"job_id": check["job_id"], "checks": wrong})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import AsyncGenerator
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal, Unpack, cast
 
@@ -169,7 +170,8 @@ class Jobs(Sender):
         """
         file = await self._file(job_id, name)
         data = await self.get_bytes(at("jobs", job_id, "artifacts", name))
-        return require_hash(data, file["hash"], f"{name} of {job_id}")
+        require_hash(BytesIO(data), file["hash"], f"{name} of {job_id}")
+        return data
 
     async def download_artifact(self, job_id: str, name: str, target: Path) -> None:
         """Writes a job's artifact into a file, which is there whole, as it was kept, or not at all.
