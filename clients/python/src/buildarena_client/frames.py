@@ -67,28 +67,12 @@ def jobs_frame(jobs: Iterable[schemas.JobView], *, kind: Kind = "pandas") -> Any
 
 
 def sweeps_frame(sweeps: Iterable[schemas.SweepView], *, kind: Kind = "pandas") -> Any:
-    """A row for each sweep.
-
-    Args:
-        sweeps: As ``Client.sweeps`` gives them.
-        kind: The library whose frame it is.
-
-    Raises:
-        MissingLibraryError: It is not installed.
-    """
+    """A row for each sweep, as ``Client.sweeps`` gives them; else as ``jobs_frame``."""
     return _made(sweeps, _columns(schemas.SweepView), kind)
 
 
 def results_frame(results: Iterable[schemas.Result], *, kind: Kind = "pandas") -> Any:
-    """A row for each scored job of a sweep.
-
-    Args:
-        results: As ``Client.sweep_results`` gives them.
-        kind: The library whose frame it is.
-
-    Raises:
-        MissingLibraryError: It is not installed.
-    """
+    """A row for each result, as ``Client.sweep_results`` gives them; else as ``jobs_frame``."""
     return _made(results, _columns(schemas.Result), kind)
 
 
@@ -98,10 +82,7 @@ def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind
     Args:
         board: As ``Client.leaderboard`` gives it.
         overall: Whether the rows are those over all tasks.
-        kind: The library whose frame it is.
-
-    Raises:
-        MissingLibraryError: It is not installed.
+        kind: As in ``jobs_frame``.
     """
     if overall:
         return _made(board.get("overall", []), _columns(schemas.OverallView), kind)

@@ -161,8 +161,8 @@ class Sender:
                 raise NotAnApiError(
                     f"{self.url} is not BuildArena: a page of a list lacks its next_cursor"
                 )
-            yield page
             cursor = page["next_cursor"]
+            yield page
             if cursor is None:
                 return
 
@@ -181,15 +181,7 @@ class Sender:
     async def _listed(
         self, path: str, name: str, limit: int | None, page: int, params: Mapping[str, Any]
     ) -> AsyncGenerator[Any, None]:
-        """The documents of a list, page after page as they are needed.
-
-        Args:
-            path: The list's.
-            name: Under which each page has its documents.
-            limit: How many at most; None for all.
-            page: How many are asked for at once.
-            params: Further parameters.
-        """
+        """The documents that pages have under a name, page after page as they are needed."""
         remaining = float("inf") if limit is None else limit
         if remaining <= 0:
             return
