@@ -194,8 +194,7 @@ def measure_workers(database: Database, times: int) -> dict[str, Any]:
     return {
         "claim_ms": spread(timed(claim, times)),
         "recover_ms": spread(timed(leases.recover, 10)),
-        "waiting_queues_ms": spread(timed(waiting.queues, 10)),
-        "to_notify_ms": spread(timed(lambda: waiting.to_notify("construct", 100), 10)),
+        "waiting_queues_ms": spread(timed(lambda: waiting.queues(50), 10)),
     }
 
 

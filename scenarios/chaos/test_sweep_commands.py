@@ -91,7 +91,6 @@ def handler(context, rng: random.Random):
                     to=JobState.QUEUED,
                     connection=connection,
                     result=AttemptResult.BUDGET_EXHAUSTED,
-                    notified_at=None,
                 )
                 if not shortage.temporary:
                     store.lifecycle.exhaust(
@@ -200,7 +199,7 @@ def work_during(context, contest: Contest, seed: int) -> None:
     work = handler(context, random.Random(seed))
     runner = JobRunner(context.store.leases, work, keeper, f"w{seed}")
     while contest.lasts():
-        runner.process_next(CONSTRUCT_QUEUE, "")
+        runner.process_next(CONSTRUCT_QUEUE)
         time.sleep(0.03)
 
 

@@ -112,7 +112,7 @@ def test_a_machine_is_tried_on_no_leaderboard(api, context) -> None:
     assert job["model"].startswith("file/")
     assert api.get(f"/v1/jobs/{job['id']}/machine").status_code == 200
     assert api.get(f"/v1/jobs/{job['id']}/scene").json()["machine"] is not None
-    assert context.queues.settle()
+    context.queues.settle()
     # The reaper may have named it too.
     assert context.queues.waiting("simulate.mujoco") >= 1
     again = attempt(api, written())
@@ -155,7 +155,7 @@ def test_trials_under_way_are_bounded_for_each_key(tenants, context, monkeypatch
     assert mine.get(f"/v1/jobs/{first.json()['id']}")["outcome"] == "cancelled"
     # So does one that errored and is tried again.
     job = brought(other, 7).json()["id"]
-    lease = context.store.leases.claim("simulate.mujoco", owner="simulate@here:1", hint=job)
+    lease = context.store.leases.claim("simulate.mujoco", owner="w", only=[other.id])
     assert lease.job.id == job
     context.store.leases.give_up(lease, "no reason", reason="simulator_fault")
     assert [brought(other, seed).status_code for seed in (8, 9)] == [202, 202]

@@ -188,7 +188,7 @@ def test_troubles_of_a_sweep_are_counted_by_what_they_are(api, context, submitte
     fault = (AttemptResult.FAULT, "provider answered 503")
     lost = (AttemptResult.LOST, None)
     for number, (result, note) in enumerate((fault, fault, fault, lost)):
-        lease = claim(context, hint=None if number else other)
+        lease = claim(context, job=None if number else other)
         with context.store.database.transaction() as connection:
             context.store.leases.advance(
                 lease, to=JobState.QUEUED, connection=connection, result=result, note=note
@@ -211,7 +211,7 @@ def end(context, model: str, task: str, number: int, cost: str) -> None:
     waiting = context.store.jobs.page(limit=100, state="queued", model=model, task=task)[:number]
     assert len(waiting) == number
     for job in waiting:
-        lease = claim(context, hint=job.id)
+        lease = claim(context, job=job.id)
         finish(context, lease, columns={"cost_usd": Decimal(cost)})
 
 

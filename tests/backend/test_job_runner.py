@@ -41,7 +41,7 @@ def run(context, submissions, runner):
 
     def work(handler: Callable[..., None]):
         job, _ = submissions.submit_job(SPEC)
-        runner(handler).process_next("construct", job.id)
+        runner(handler).process_next("construct")
         return context.store.jobs.get(job.id)
 
     return work
@@ -88,7 +88,7 @@ def test_a_handler_hears_of_a_budget_that_was_given_meanwhile(
         wait_until(lambda: active.budgeted, 20, "it is heard")
         finish(active)
 
-    runner(paid_for_later).process_next("construct", "any")
+    runner(paid_for_later).process_next("construct")
     assert context.store.sweeps.progress(sweep_id).outcomes == {"unsuccessful": 1}
 
 
@@ -127,10 +127,10 @@ def test_one_message_has_several_short_jobs_done_and_none_after_a_long_one(
         finish(active)
 
     sweep = submissions.submit_sweep(SWEEP).sweep.id
-    runner(slow).process_some("construct", "")
+    runner(slow).process_some("construct")
     assert context.store.sweeps.progress(sweep).done == 1
     monkeypatch.setattr(job_runner, "SLICE_S", 60.0)  # jobs are short, however busy the machine
-    runner(finish).process_some("construct", "")
+    runner(finish).process_some("construct")
     assert context.store.sweeps.progress(sweep).done == 3
 
 

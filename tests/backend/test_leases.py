@@ -8,7 +8,7 @@ from datetime import timedelta
 from decimal import Decimal
 
 import pytest
-from sqlalchemy import Connection, event, text
+from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
 from support.jobs import (
     cancel,
@@ -57,14 +57,13 @@ def test_a_job_is_leased_to_one_worker_at_a_time(context, add) -> None:
     assert len(set(taken)) == 20
 
 
-def test_the_hinted_job_is_taken_first_and_a_recovered_one_before_it(context, add) -> None:
+def test_a_recovered_job_is_taken_before_older_ones(context, add) -> None:
     first, second, third = add(1, 2, 3)
-    assert claim(context, hint=third).job.id == third
-    lost = claim(context, hint=second)
+    assert {claim(context, job=id_).job.id for id_ in (third, second)} == {second, third}
     expire_leases(context)
     assert set(context.store.leases.recover()) == {second, third}
-    assert claim(context, hint=first).job.id in {lost.job.id, third}
-    assert claim(context, hint="job_gone").job.id in {second, third}
+    execute(context, "UPDATE jobs SET created_at = 'epoch' WHERE id = :id", {"id": first})
+    assert {claim(context).job.id, claim(context).job.id} == {second, third}
     assert claim(context).job.id == first
     assert context.store.leases.claim("construct", owner="w") is None
 
@@ -124,11 +123,12 @@ def test_heartbeats_keep_a_lease_and_say_of_lost_ones(context, add) -> None:
 
 def test_a_job_that_keeps_losing_its_workers_is_given_up_unless_it_gets_on(context, add) -> None:
     losing, going = add(1, 2)
+    execute(context, "UPDATE jobs SET created_at = 'epoch' WHERE id = :id", {"id": losing})
     leases = Leases(context.store.database, duration_s=1, max_faults=2)
     for sequence in range(4):
         if sequence < 2:
-            assert leases.claim("construct", owner="w", hint=losing).job.id == losing
-        lease = leases.claim("construct", owner="w", hint=going)
+            assert leases.claim("construct", owner="w").job.id == losing
+        lease = leases.claim("construct", owner="w")
         assert lease.job.id == going
         context.store.journal.append(lease, journal_entry(sequence))
         expire_leases(context)
@@ -147,22 +147,15 @@ def test_a_fault_waits_before_the_next_attempt_and_handing_back_is_none(context,
     lease = claim(context)
     assert context.store.leases.fault(lease, "outage", delay_s=30, reason="provider_outage")
     assert context.store.leases.claim("construct", owner="w") is None
-    assert context.store.waiting.to_notify("construct", 10) == []
+    assert context.store.waiting.queues(10) == {}
     kinds = [event.kind for event in context.store.events.after(0, job_id=job_id)]
     assert kinds[:4] == ["queued", "running", "queued", "running"]
 
 
-def test_workers_are_notified_of_waiting_jobs_once_and_of_no_more_than_asked(context, add) -> None:
+def test_queues_are_counted_up_to_a_number(context, add) -> None:
     ids = add(*range(20))
-
-    def take_nested_loops(connection: Connection) -> None:
-        for way in ("hashagg", "hashjoin", "mergejoin", "sort", "material"):
-            connection.exec_driver_sql(f"SET LOCAL enable_{way} = off")
-
-    event.listen(context.store.database.engine, "begin", take_nested_loops)
-    first, others = (context.store.waiting.to_notify("construct", most) for most in (3, 99))
-    assert (len(first), len(others)) == (3, 17)
-    assert {*first, *others} == set(ids)
+    execute(context, "UPDATE jobs SET queue = 'simulate.x' WHERE id = :id", {"id": ids[0]})
+    assert context.store.waiting.queues(5) == {"construct": 5, "simulate.x": 1}
 
 
 def owned(context: Context, add, owners: list[str | None]) -> list[str]:
@@ -182,21 +175,13 @@ def test_owners_take_turns(context, add) -> None:
     assert taken == ["", "a", "b", "c", "a", "b", "a", "a"]
 
 
-def test_a_hint_does_not_jump_the_turn_of_another_owner(context, add) -> None:
-    mine = owned(context, add, ["a", "a", "a", "b"])
-    claim = context.store.leases.claim
-    assert claim("construct", owner="w", hint=mine[2], last="b").job.id == mine[2]
-    assert claim("construct", owner="w", hint=mine[1], last="a").job.id == mine[3]
-    assert claim("construct", owner="w", hint=mine[1], last="a").job.id == mine[1]
-
-
 @pytest.mark.parametrize("faults", [0, 1])
-def test_jobs_of_full_owners_wait_whatever_names_them(context, add, faults) -> None:
-    a, b, operators = owned(context, add, ["a", "b", None])
+def test_jobs_of_full_owners_wait(context, add, faults) -> None:
+    _, b, operators = owned(context, add, ["a", "b", None])
     execute(context, "UPDATE jobs SET faults = :faults", {"faults": faults})
     claim = context.store.leases.claim
-    assert claim("construct", owner="w", hint=a, full=["a", ""]).job.id == b
-    assert claim("construct", owner="w", hint=operators, full=["a", ""]) is None
+    assert claim("construct", owner="w", full=["a", ""]).job.id == b
+    assert claim("construct", owner="w", full=["a", ""]) is None
     assert claim("construct", owner="w", full=["a"]).job.id == operators
 
 

@@ -156,7 +156,7 @@ def test_keys_of_a_provider_and_of_the_command_line_can_stand_in_files(kept, mon
         ProviderClient(entry, provider)
     monkeypatch.setenv("BUILDARENA_KEY_FILE", kept("ba_key\n"))
     own = Client("http://127.0.0.1:9")
-    assert own._api._transport._headers == {"Authorization": "Bearer ba_key"}
+    assert own._api._transport._http.headers["Authorization"] == "Bearer ba_key"
     monkeypatch.setenv("BUILDARENA_KEY", "other")
     with pytest.raises(CommandError, match="BUILDARENA_KEY and BUILDARENA_KEY_FILE are both set"):
         Client("http://127.0.0.1:9")

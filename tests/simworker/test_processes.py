@@ -70,7 +70,7 @@ def do_next(request, context, url) -> Iterator[Callable[..., bool]]:
             with slot(url, secret, simulator) as one:
                 return one.do_next(0)
         handler = simulate_handler(context, simulator or EngineSimulator("mujoco"))
-        return JobRunner(context.store.leases, handler, keeper, "w").process_next(QUEUE, "any")
+        return JobRunner(context.store.leases, handler, keeper, "w").process_next(QUEUE)
 
     yield do
     keeper.stop()
@@ -318,7 +318,7 @@ def test_a_runner_loads_nothing_that_it_does_not_need() -> None:
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
     loaded = set(json.loads(done.stdout))
     assert "httpx2" in loaded
-    assert not loaded & (UNNEEDED | {"buildarena_backend"})
+    assert not loaded & UNNEEDED
 
 
 def test_wrong_options_are_named(subtests) -> None:

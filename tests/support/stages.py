@@ -97,7 +97,7 @@ def work(
                 break
             waiting = waiting[:steps]
             steps -= len(waiting)
-            list(pool.map(lambda job: runners[job.queue].process_next(job.queue, job.id), waiting))
+            list(pool.map(lambda job: runners[job.queue].process_next(job.queue), waiting))
     keeper.stop()
 
 

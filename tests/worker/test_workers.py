@@ -234,7 +234,7 @@ def test_one_message_has_all_done_and_few_at_once(context, asked, fails) -> None
     runner = VerificationRunner(context.store.verifications, slow)
     started = time.monotonic()
     for _ in range(50):
-        runner.wake(asked[0])
+        runner.wake()
     assert time.monotonic() - started < 1, "messages wait for no verification"
     wait_until(lambda: slow.done == 30, 20, "all are done")
     assert slow.most == AT_ONCE
@@ -246,13 +246,13 @@ def test_one_message_has_all_done_and_few_at_once(context, asked, fails) -> None
 def test_it_can_be_woken_again(context, asked) -> None:
     slow = Slow()
     runner = VerificationRunner(context.store.verifications, slow)
-    runner.wake("")
+    runner.wake()
     wait_until(lambda: slow.done == 30 and runner._active == 0, 20, "all are done")
     job = context.store.verifications.get(asked[0]).job_id
     again = context.store.verifications.request([job])
     assert set(again.ids) == {job}
     assert again.ids[job] not in asked
-    runner.wake("")
+    runner.wake()
     wait_until(lambda: slow.done == 31, 20, "the new one is done")
     wait_until(lambda: runner._active == 0, 5, "its threads rest")
 

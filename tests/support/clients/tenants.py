@@ -60,7 +60,7 @@ def new_tenant(client: Client, name: str, *scopes: str) -> Tenant:
 def everything(database: Database) -> dict[str, list[str]]:
     """All rows of all tables, but for the register of workers, and for when keys were used and
     workers notified."""
-    rows = "SELECT (to_jsonb(t) - 'used_at' - 'notified_at')::text FROM {} t"
+    rows = "SELECT (to_jsonb(t) - 'used_at')::text FROM {} t"
     with database.transaction() as connection:
         return {
             table.name: sorted(connection.execute(text(rows.format(table.name))).scalars())

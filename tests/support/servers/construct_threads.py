@@ -89,7 +89,7 @@ def crew(
 
     def work() -> None:
         while not over.wait(0.05):
-            runner.process_all(CONSTRUCT_QUEUE, "any")
+            runner.process_all(CONSTRUCT_QUEUE)
 
     threads = [threading.Thread(target=work) for _ in range(shared.total)]
     for thread in threads:

@@ -17,7 +17,7 @@ from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRequest
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.active_lease import ActiveLease
-from buildarena_backend.process.notify import Notifier
+from buildarena_backend.queue.queues import Queues
 from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage, simulate_queue
 from buildarena_backend.store import Store
@@ -69,7 +69,7 @@ class ConstructHandler:
         *,
         store: Store,
         artifacts: ArtifactStore,
-        queues: Notifier,
+        queues: Queues,
         tasks: TaskCatalog,
         registry: ModelRegistry,
         clients: ModelClients,
@@ -167,7 +167,6 @@ class ConstructHandler:
                 connection=connection,
                 result=AttemptResult.BUDGET_EXHAUSTED,
                 note=shortage.detail,
-                notified_at=None,
                 detail=shortage.detail,
             )
             # Dollars that are used up keep nobody from what costs none.
@@ -207,7 +206,7 @@ class ConstructHandler:
                 connection=connection,
                 **_counts(session),
             )
-        self._queues.notify_one(queue, job.id)
+        self._queues.wake(queue)
 
     def _fail(
         self, lease: Lease, session: Session, outcome: Outcome, reason: str, detail: str
@@ -232,7 +231,7 @@ class ConstructHandler:
                 **_counts(session),
             )
         if queue is not None:
-            self._queues.notify_one(queue, lease.job.id)
+            self._queues.wake(queue)
 
     def _write_end(self, lease: Lease, session: Session, score: JobScore) -> None:
         made = self._made(session)

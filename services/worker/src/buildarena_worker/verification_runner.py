@@ -39,7 +39,7 @@ class VerificationRunner:
         self._active = 0
         self._stopping = False
 
-    def wake(self, _: str) -> None:
+    def wake(self) -> None:
         """Has waiting verifications done, unless as many as may be are being done."""
         with self._lock:
             if self._active < AT_ONCE and not self._stopping:

@@ -82,5 +82,5 @@ def request_trial(
                 raise RuntimeError(f"job {key.job_id} was opened and is not open")
             queue = submit_machine(context, lease, machine, None, connection=connection)
     if queue is not None:
-        context.queues.announce(queue, [key.job_id])
+        context.queues.wake(queue)
     return context.store.jobs.get(key.job_id), fresh

@@ -280,7 +280,7 @@ class ExternalSessions:
             done = bench.call(name, TEST, {})
             context.store.external_calls.append(lease, count, done, connection=connection)
             _, queue = request_test(context, lease, task, machine, connection=connection)
-        context.queues.announce(queue, [job_id])
+        context.queues.wake(queue)
         return context.store.jobs.get(job_id)
 
     def submit(self, job_id: str) -> Job:
@@ -299,7 +299,7 @@ class ExternalSessions:
             transcript = Transcript([turn_of_call(i, call) for i, call in enumerate(calls)])
             queue = submit_machine(context, lease, machine, transcript, connection=connection)
         if queue is not None:
-            context.queues.announce(queue, [job_id])
+            context.queues.wake(queue)
         return context.store.jobs.get(job_id)
 
     def _open_lease(self, job_id: str, connection: Any) -> Lease:

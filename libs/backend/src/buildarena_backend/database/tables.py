@@ -81,7 +81,6 @@ jobs = Table(
     Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
     time_column("lease_expires_at"),
     time_column("available_at", now=True),
-    time_column("notified_at"),
     # What it scored.
     Column("success", Boolean),
     Column("indicator", Double),
@@ -342,7 +341,6 @@ verifications = Table(
     Column("owner", Text),
     time_column("created_at", now=True),
     time_column("claimed_at"),
-    time_column("notified_at"),
     time_column("finished_at"),
 )
 # Equal verifications are one.

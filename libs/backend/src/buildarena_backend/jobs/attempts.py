@@ -177,8 +177,7 @@ _HAND_BACK = text(
         AS given (job_id, token)
     ), moved AS (
         UPDATE jobs SET
-            state = '{JobState.QUEUED}', lease_owner = NULL, lease_expires_at = NULL,
-            notified_at = NULL
+            state = '{JobState.QUEUED}', lease_owner = NULL, lease_expires_at = NULL
         FROM given
         WHERE jobs.id = given.job_id AND jobs.lease_token = given.token
             AND jobs.state = '{JobState.RUNNING}'

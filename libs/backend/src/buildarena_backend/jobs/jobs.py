@@ -165,7 +165,7 @@ class Jobs:
         Returns:
             The ids that were put on hold by this call.
         """
-        return self._revoke(ids, JobState.ON_HOLD, {"notified_at": None}, connection)
+        return self._revoke(ids, JobState.ON_HOLD, {}, connection)
 
     def _revoke(
         self, ids: Sequence[str], to: JobState, values: dict[str, Any], connection: Connection

@@ -53,7 +53,7 @@ def transition(
     rows = connection.execute(
         update(jobs)
         .where(*which, jobs.c.state.in_(sorted(allowed_from)))
-        .values(state=to, notified_at=None, **values)
+        .values(state=to, **values)
         .returning(jobs.c.id)
     )
     moved = list(rows.scalars())

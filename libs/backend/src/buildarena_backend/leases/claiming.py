@@ -1,4 +1,4 @@
-"""The statement that claims a job: a recovered one first, then the hinted, then the oldest.
+"""The statement that claims a job: a recovered one first, then the oldest.
 
 It is one statement, because every stage of every job waits for it. The distinct owners of a queue
 are found in steps along the index, one probe each, however many jobs an owner has.
@@ -58,10 +58,6 @@ CLAIM = text(
         WHERE id = COALESCE(
             (SELECT id FROM jobs WHERE {_WAITS} AND faults > 0 AND {_ROOM}
              ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED),
-            (SELECT id FROM jobs WHERE {_WAITS} AND id = CAST(:hint AS text) AND {_ROOM}
-             AND ({_OWNER} IS DISTINCT FROM CAST(:last AS text)
-                  OR NOT EXISTS (SELECT FROM turns WHERE name IS DISTINCT FROM :last))
-             FOR UPDATE SKIP LOCKED),
             (SELECT oldest.id FROM turns CROSS JOIN LATERAL (
                 SELECT id FROM jobs WHERE {_WAITS} AND {_OWNER} = turns.name AND {_ROOM}
                 ORDER BY created_at, id LIMIT 1 FOR UPDATE SKIP LOCKED
@@ -101,6 +97,12 @@ WAITING_QUEUES = text(
         SELECT (SELECT queue FROM jobs WHERE state = '{JobState.QUEUED}' AND queue > queues.name
             ORDER BY queue LIMIT 1) FROM queues WHERE queues.name IS NOT NULL
     )
-    SELECT name FROM queues WHERE name IS NOT NULL
+    SELECT name, (
+        SELECT count(*) FROM (
+            SELECT FROM jobs WHERE state = '{JobState.QUEUED}' AND queue = queues.name
+                AND available_at <= clock_timestamp() LIMIT :most
+        ) AS waiting
+    ) AS jobs
+    FROM queues WHERE name IS NOT NULL
     """  # noqa: S608 - made of our own names
 )

@@ -86,7 +86,6 @@ class Leases:
         queue: str,
         *,
         owner: str,
-        hint: str | None = None,
         full: Sequence[str] = (),
         last: str | None = None,
         only: Sequence[str] | None = None,
@@ -94,7 +93,7 @@ class Leases:
         prefix: str | None = None,
         most: int = 0,
     ) -> Lease | None:
-        """Takes a waiting job of a queue: a recovered one first, then the hinted, then the oldest.
+        """Takes a waiting job of a queue: a recovered one first, then the oldest.
 
         Owners take turns: a job of the owner that had the last turn is only taken when no other
         owner has one.
@@ -102,7 +101,6 @@ class Leases:
         Args:
             queue: Queue name.
             owner: The worker's id.
-            hint: The job that a message named.
             full: Owners whose jobs may not be taken now.
             last: The owner whose job was taken last.
             only: Owners whose jobs may be taken; None for everybody's.
@@ -119,7 +117,6 @@ class Leases:
         given = {
             "queue": queue,
             "owner": owner,
-            "hint": hint,
             "duration": self.duration,
             "full": list(full),
             "last": last,
@@ -211,7 +208,6 @@ class Leases:
             stage=stage,
             queue=queue,
             faults=0,
-            notified_at=None,
             available_at=events.now,
             **values,
         )
@@ -273,7 +269,6 @@ class Leases:
                     result=AttemptResult.FAULT,
                     note=detail,
                     faults=faults,
-                    notified_at=None,
                     available_at=events.now + timedelta(seconds=wait_s),
                     detail=detail,
                 )

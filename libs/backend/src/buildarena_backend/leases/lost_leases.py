@@ -59,7 +59,6 @@ def recover_lost(database: Database, *, max_faults: int) -> list[str]:
                 lost_requests=jobs.c.lost_requests + case((_IN_SESSION, 1), else_=0),
                 lease_owner=None,
                 lease_expires_at=None,
-                notified_at=None,
                 available_at=events.now,
             )
             .returning(jobs.c.id, jobs.c.state, jobs.c.lease_token, jobs.c.stage)

@@ -170,7 +170,6 @@ class RunnerLeases:
                 result=result,
                 note=detail,
                 faults=faults,
-                notified_at=None,
                 detail=detail + UNCONFIRMED * permanent,
             )
         return True

@@ -1,20 +1,15 @@
-"""What waits in queues, and which of it workers were notified of."""
+"""What waits in queues."""
 
 from __future__ import annotations
 
-from datetime import timedelta
+from sqlalchemy import Text, literal_column, or_, select
 
-from sqlalchemy import ColumnElement, Connection, Text, literal_column, or_, select, update
-
-from buildarena_backend import events
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.leases.claiming import WAITING_QUEUES
 from buildarena_backend.leases.lost_leases import ANY_LOST
 from buildarena_backend.states import JobState
 
-NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
-"""Workers are notified again of a queued job whose message may have been lost."""
 # The order is that of the index of waiting jobs, of which the first is enough.
 _ANY_WAITING = (
     select(jobs.c.queue)
@@ -27,7 +22,7 @@ _ANY_WAITING = (
 
 
 class WaitingJobs:
-    """Jobs that wait in queues, for whoever notifies workers of them.
+    """Jobs that wait in queues, for whoever wakes workers.
 
     Args:
         database: Where the jobs are.
@@ -36,51 +31,13 @@ class WaitingJobs:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def queues(self) -> list[str]:
-        """Names of the queues that jobs wait in."""
+    def queues(self, most: int) -> dict[str, int]:
+        """Queues that jobs wait in now, with how many, counted up to a number."""
         with self._database.statement() as connection:
-            return list(connection.execute(WAITING_QUEUES).scalars())
+            rows = connection.execute(WAITING_QUEUES, {"most": most})
+            return {row.name: row.jobs for row in rows if row.jobs}
 
     def is_quiet(self) -> bool:
         """Whether no job waits, and no lease ran out: one statement, for those who ask often."""
         with self._database.statement() as connection:
             return not connection.execute(select(or_(ANY_LOST, _ANY_WAITING))).scalar()
-
-    def to_notify(self, queue: str, limit: int) -> list[str]:
-        """Waiting jobs that no message names, oldest first; they are marked as notified.
-
-        Recovered ones come before all others.
-        """
-        found: list[str] = []
-        with self._database.transaction() as connection:
-            # Each kind has an index in its order; in one query neither would serve.
-            for kind in (jobs.c.faults > 0, jobs.c.faults == 0):
-                found += self._notified(queue, kind, limit - len(found), connection)
-        return found
-
-    def _notified(
-        self, queue: str, kind: ColumnElement[bool], limit: int, connection: Connection
-    ) -> list[str]:
-        unnotified = (
-            select(jobs.c.id)
-            .where(
-                jobs.c.state == JobState.QUEUED,
-                jobs.c.queue == queue,
-                kind,
-                jobs.c.available_at <= events.now,
-                jobs.c.notified_at.is_(None)
-                | (jobs.c.notified_at < events.now - NOTIFY_AGAIN_AFTER),
-            )
-            .order_by(jobs.c.created_at, jobs.c.id)
-            .limit(limit)
-            .with_for_update(skip_locked=True)
-        )
-        # A plain subquery may be executed once a row, and then marks more jobs than the limit.
-        chosen = unnotified.cte()
-        rows = connection.execute(
-            update(jobs)
-            .where(jobs.c.id == chosen.c.id)
-            .values(notified_at=events.now)
-            .returning(jobs.c.id)
-        )
-        return [row.id for row in rows]

@@ -56,7 +56,7 @@ class StageHandler(Protocol):
 
 
 class JobRunner:
-    """Runs a handler on the jobs that messages name.
+    """Runs a handler on the jobs that wait.
 
     Args:
         leases: Where jobs are claimed.
@@ -87,25 +87,30 @@ class JobRunner:
         """Takes no further job."""
         self._stopping = True
 
-    def process_all(self, queue: str, job_id: str) -> None:
-        """Does waiting jobs of the queue, the named one first if possible, until none is left.
+    def process_all(self, queue: str) -> None:
+        """Does waiting jobs of the queue until none is left.
 
         A slot that comes free is so taken at once, although messages that found no slot are gone.
         """
-        while self.process_next(queue, job_id):
+        while self.process_next(queue):
             pass
 
-    def process_some(self, queue: str, job_id: str) -> None:
-        """Does waiting jobs of the queue, the named one first if possible, until SLICE_S are over.
+    def process_some(self, queue: str) -> bool:
+        """Does waiting jobs of the queue until none is left, or SLICE_S are over.
 
         A message costs as much as a job's books do, so that short jobs share one.
+
+        Returns:
+            Whether more may be left.
         """
         until = time.monotonic() + SLICE_S
-        while self.process_next(queue, job_id) and time.monotonic() < until:
-            pass
+        while self.process_next(queue):
+            if time.monotonic() >= until:
+                return True
+        return False
 
-    def process_next(self, queue: str, job_id: str) -> bool:
-        """Takes one waiting job of the queue, the named one if possible, and does its stage.
+    def process_next(self, queue: str) -> bool:
+        """Takes one waiting job of the queue and does its stage.
 
         Jobs of another owner than the last one's come first, those of owners without a free slot
         wait.
@@ -113,7 +118,7 @@ class JobRunner:
         Returns:
             Whether there was one.
         """
-        lease = self._claimed(queue, job_id)
+        lease = self._claimed(queue)
         if lease is None:
             return False
         try:
@@ -123,7 +128,7 @@ class JobRunner:
                 self._slots.give_back(lease.job.owner or OPERATOR)
         return True
 
-    def _claimed(self, queue: str, job_id: str) -> Lease | None:
+    def _claimed(self, queue: str) -> Lease | None:
         # One at a time: what an owner has must not change between looking and taking.
         with self._claiming:
             if self._stopping or not self._slots.free:
@@ -132,12 +137,11 @@ class JobRunner:
                 lease = self._leases.claim(
                     queue,
                     owner=self._owner,
-                    hint=job_id,
                     full=self._slots.full(),
                     last=self._last,
                 )
             except OperationalError as error:
-                log.warning("claim_failed", job=job_id, error=str(error).splitlines()[0])
+                log.warning("claim_failed", queue=queue, error=str(error).splitlines()[0])
                 return None
             if lease is not None:
                 self._last = lease.job.owner or OPERATOR

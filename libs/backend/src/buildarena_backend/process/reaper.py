@@ -1,8 +1,7 @@
 """The reaper: recovers jobs of dead workers and notifies workers of jobs that wait unnoticed.
 
-Every worker process and the API run one in a thread. The broker lets one of them at the work each
-second, so that the others stay idle; where it is away all of them try, and a lock in the database
-lets one at a time. So no process is needed for it and none can be missing.
+Every worker process and the API run one in a thread, and a lock in the database lets one at a time
+work. So no process is needed for it and none can be missing.
 """
 
 from __future__ import annotations
@@ -13,12 +12,12 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
-from buildarena_backend.process.notify import notify_waiting
-from buildarena_backend.queue.queues import MAX_SENT, MAX_WAITING
 from buildarena_backend.states import VERIFY_QUEUE
 
 REAPER_LOCK = 0x726561706572  # "reaper"
 PERIOD_S = 1.0
+WOKEN = 50
+"""Workers of a queue that are woken in a run: those that are at work take further jobs anyway."""
 SELDOM_EVERY = 5
 """Runs after which that is done which can wait for some seconds."""
 FORGETS_EVERY = 600
@@ -37,9 +36,7 @@ class Reaper:
 
     def __init__(self, context: Context, *, period_s: float = PERIOD_S) -> None:
         self._context = context
-        self._most: dict[str, int] = {}
         self._runs = 0
-        self._period_s = period_s
         self._thread = Periodic(self._reap_safely, name="reaper", period_s=period_s)
 
     def start(self) -> None:
@@ -51,9 +48,6 @@ class Reaper:
         self._thread.stop()
 
     def _reap_safely(self) -> None:
-        # Asking the broker costs a tenth of a run; nothing rests on its answer.
-        if not self._context.queues.is_first("reaper", 0.9 * self._period_s):
-            return
         try:
             self.reap()
         except SQLAlchemyError as error:
@@ -74,8 +68,8 @@ class Reaper:
             recovered = self._context.store.leases.recover()
             if recovered:
                 log.info("recovered", jobs=recovered)
-            for queue in self._context.store.waiting.queues():
-                self._notify(queue)
+            for queue, jobs in self._context.store.waiting.queues(WOKEN).items():
+                self._context.queues.wake(queue, jobs)
             if run % SELDOM_EVERY == 0:
                 self._do_seldom()
             if run % FORGETS_EVERY == 0:
@@ -84,12 +78,5 @@ class Reaper:
     def _do_seldom(self) -> None:
         store = self._context.store
         store.external_calls.abandon_idle()
-        checks = store.verifications.to_notify(MAX_WAITING)
-        if checks:
-            self._context.queues.announce(VERIFY_QUEUE, checks)
-
-    def _notify(self, queue: str) -> None:
-        """Notifies a queue's workers; of twice as many jobs each time they have taken all."""
-        most = self._most.get(queue, MAX_WAITING)
-        waiting = notify_waiting(self._context, queue, most=most)
-        self._most[queue] = MAX_WAITING if waiting != 0 else min(2 * most, MAX_SENT)
+        if checks := store.verifications.waiting(WOKEN):
+            self._context.queues.wake(VERIFY_QUEUE, checks)

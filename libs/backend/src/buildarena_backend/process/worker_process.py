@@ -45,8 +45,8 @@ CONNECTIONS_OF_FORKS = 2
 class SideWork(Protocol):
     """What a worker does besides jobs, in threads of its own: it takes no job's slot."""
 
-    def wake(self, id_: str, /) -> None:
-        """Has what waits done, the id among it; returns at once."""
+    def wake(self) -> None:
+        """Has what waits done; returns at once."""
 
     def stop(self) -> None:
         """Begins nothing more."""
@@ -131,6 +131,15 @@ class _Runtime:
         self.report()
         self.keeper.start()
 
+    def process(self, queue: str) -> None:
+        """Does what waits in a queue; for a process of one job at a time, some of it."""
+        if queue in self.others:
+            self.others[queue].wake()
+        elif self._spec.pool == THREADS:
+            self.runner.process_all(queue)
+        elif self.runner.process_some(queue):
+            self.context.queues.wake(queue)
+
     def begin_stop(self) -> None:
         """Takes no further job, lets those at hand finish a step, and hands the rest back."""
         self.runner.stop()
@@ -178,17 +187,11 @@ def run_worker(spec: WorkerSpec, settings: Settings) -> None:
         if runtime is not None:
             runtime.begin_stop()
 
-    def process_next(queue: str, job_id: str) -> None:
-        runtime = runtimes[os.getpid()]
-        if queue in runtime.others:
-            runtime.others[queue].wake(job_id)
-        elif spec.pool == THREADS:
-            runtime.runner.process_all(queue, job_id)
-        else:
-            runtime.runner.process_some(queue, job_id)
+    def process(queue: str) -> None:
+        runtimes[os.getpid()].process(queue)
 
     callbacks = Callbacks(
-        process_next=process_next,
+        process=process,
         start=start,
         stop=stop,
         stopping=stopping,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
@@ -14,54 +13,8 @@ PROBE_S = 1.0
 log = structlog.get_logger(__name__)
 
 
-class CircuitBreaker:
-    """Says whether a server may be asked.
-
-    Args:
-        probe: Asks the server something small; returns whether it answers. It is called from a
-            thread that lives only while the breaker is open.
-        period_s: Seconds before each probe.
-    """
-
-    def __init__(self, probe: Callable[[], bool], *, period_s: float = PROBE_S) -> None:
-        self._probe = probe
-        self._period_s = period_s
-        self._lock = threading.Lock()
-        self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    @property
-    def is_open(self) -> bool:
-        """Whether the server failed and has not answered since."""
-        return self._thread is not None
-
-    def failed(self) -> None:
-        """Notes a failure: nobody asks from now on."""
-        with self._lock:
-            if self._thread is None and not self._stop.is_set():
-                self._thread = threading.Thread(target=self._watch, name="probe", daemon=True)
-                self._thread.start()
-
-    def close(self) -> None:
-        """Ends the probes."""
-        self._stop.set()
-        thread = self._thread
-        if thread is not None and thread is not threading.current_thread():
-            thread.join(timeout=2 * self._period_s)
-
-    def _watch(self) -> None:
-        while not self._stop.wait(self._period_s):
-            try:
-                if self._probe():
-                    break
-            except Exception:
-                # A breaker without its thread would stay open forever.
-                log.exception("probe_failed")
-        self._thread = None
-
-
 class AsyncCircuitBreaker:
-    """As CircuitBreaker, for the coroutines of one event loop.
+    """Says to the coroutines of one event loop whether a server may be asked.
 
     Args:
         probe: Asks the server something small; returns whether it answers. It is awaited in a task

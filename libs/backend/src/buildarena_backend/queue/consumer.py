@@ -27,7 +27,7 @@ class Callbacks:
     """What a consumer calls.
 
     Attributes:
-        process_next: For each message, with its queue and job id.
+        process: For each message, with its queue.
         start: At the start of each process that works on messages.
         stop: At its end.
         stopping: Once in each process that works on messages, from a thread, when the consumer is
@@ -35,7 +35,7 @@ class Callbacks:
         ready: Once, when messages are received.
     """
 
-    process_next: Callable[[str, str], None]
+    process: Callable[[str], None]
     start: Callable[[], None]
     stop: Callable[[], None]
     stopping: Callable[[], None]
@@ -82,7 +82,7 @@ def consume(
         The process' exit code.
     """
     app = queues.app
-    app.task(name=PROCESS_NEXT)(callbacks.process_next)
+    app.task(name=PROCESS_NEXT)(callbacks.process)
     watchdog = ConsumerWatchdog(queues, names)
     children = _Children() if pool == FORKING_POOL else None
 

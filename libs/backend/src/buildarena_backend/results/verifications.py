@@ -170,29 +170,11 @@ class Verifications:
             raise UnknownIdError("verification", verification_id)
         return value_of(Verification, row)
 
-    def to_notify(self, limit: int) -> list[str]:
-        """Waiting or abandoned verifications that no message names; they are marked."""
-        unnotified = (
-            select(verifications.c.id)
-            .where(
-                _claimable(),
-                verifications.c.notified_at.is_(None)
-                | (verifications.c.notified_at < events.now - NOTIFY_AGAIN_AFTER),
-            )
-            .order_by(verifications.c.created_at)
-            .limit(limit)
-            .with_for_update(skip_locked=True)
-        )
-        # A plain subquery may be executed once a row, and then marks more than the limit.
-        chosen = unnotified.cte()
-        with self._database.transaction() as connection:
-            rows = connection.execute(
-                update(verifications)
-                .where(verifications.c.id == chosen.c.id)
-                .values(notified_at=events.now)
-                .returning(verifications.c.id)
-            )
-            return [row.id for row in rows]
+    def waiting(self, most: int) -> int:
+        """How many wait or were abandoned, counted up to a number."""
+        some = select(verifications.c.id).where(_claimable()).limit(most).subquery()
+        with self._database.statement() as connection:
+            return int(connection.execute(select(func.count()).select_from(some)).scalar_one())
 
 
 def _claimable() -> ColumnElement[bool]:

@@ -15,7 +15,6 @@ from buildarena_backend.errors import SubmissionError
 from buildarena_backend.ids import content_hash, new_id
 from buildarena_backend.jobs.job import Job, JobKey, NewJob, configuration_hash
 from buildarena_backend.process.context import Context
-from buildarena_backend.process.notify import notify_waiting
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.submission.estimates import SweepEstimate, estimate
 from buildarena_backend.sweeps.claims import add_claim
@@ -81,7 +80,7 @@ class Submissions:
         with self._context.store.lifecycle.submission() as connection:
             added = self._context.store.jobs.add(own, connection=connection)
             add_claim(own[0].key.job_id, owner, connection=connection)
-        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        self._context.queues.wake(CONSTRUCT_QUEUE)
         return self._context.store.jobs.get(new[0].key.job_id), added > 0
 
     def submit_sweep(
@@ -131,7 +130,7 @@ class Submissions:
                     store.budgets.set(sweep.id, limits, connection=connection)
                 added = store.jobs.add(own, connection=connection)
                 store.sweeps.add(sweep, job_ids, connection=connection)
-        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        self._context.queues.wake(CONSTRUCT_QUEUE, len(new))
         return Submitted(
             sweep=store.sweeps.get(before or sweep.id),
             jobs=len(new),
@@ -148,7 +147,7 @@ class Submissions:
         """
         limits = None if budget is None else budget.as_limits()
         self._context.store.lifecycle.resume(sweep_id, limits)
-        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        self._context.queues.wake(CONSTRUCT_QUEUE)
 
     def set_budget(self, sweep_id: str, budget: Budget) -> None:
         """Gives a sweep another budget; one whose budget was used up goes on.
@@ -158,7 +157,7 @@ class Submissions:
             TransitionError: It is cancelled.
         """
         self._context.store.lifecycle.set_budget(sweep_id, budget.as_limits())
-        notify_waiting(self._context, CONSTRUCT_QUEUE)
+        self._context.queues.wake(CONSTRUCT_QUEUE)
 
     def estimate(self, spec: SweepSpec) -> SweepEstimate:
         """What a sweep would use, without storing anything.

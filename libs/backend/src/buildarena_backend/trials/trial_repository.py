@@ -20,7 +20,7 @@ from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
-from buildarena_backend.process.notify import Notifier
+from buildarena_backend.queue.queues import Queues
 from buildarena_backend.results.audits import is_unproved, runner_key
 from buildarena_backend.states import CONSTRUCT_QUEUE, EXTERNAL_QUEUE, Stage
 from buildarena_backend.store import Store
@@ -84,7 +84,7 @@ class TrialRepository:
         *,
         store: Store,
         artifacts: ArtifactStore,
-        queues: Notifier,
+        queues: Queues,
         tasks: TaskCatalog,
         audited_shares: Mapping[str, float],
     ) -> None:
@@ -232,7 +232,7 @@ class TrialRepository:
                     lease, stage=Stage.CONSTRUCT, queue=CONSTRUCT_QUEUE, connection=connection
                 )
         if queue is not None:
-            self._queues.notify_one(queue, job.id)
+            self._queues.wake(queue)
 
     def _put(self, files: Mapping[str, File]) -> dict[str, ArtifactInfo]:
         return {

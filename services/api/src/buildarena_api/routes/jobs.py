@@ -32,7 +32,6 @@ from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
 from buildarena_backend.process.context import Context
-from buildarena_backend.process.notify import notify_waiting
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -169,7 +168,7 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
             f"only errored jobs and refuted trials of runners are retried; job {job_id} is {state}",
         )
     job = context.store.jobs.get(job_id)
-    notify_waiting(context, job.queue)
+    context.queues.wake(job.queue)
     return JobView.of(job)
 
 

@@ -17,7 +17,6 @@ from buildarena_backend.accounts.keys import ApiKey
 from buildarena_backend.catalog.specs import Budget, Title
 from buildarena_backend.errors import SubmissionError
 from buildarena_backend.process.context import Context
-from buildarena_backend.process.notify import notify_waiting
 from buildarena_backend.settings import SimulatorName
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.trials.known_simulators import simulator_issues
@@ -194,7 +193,7 @@ def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
     with context.store.lifecycle.command() as connection:
         context.store.budgets.set(key_id, body.as_limits(), connection=connection)
         context.store.lifecycle.release_single_jobs(key_id, connection=connection)
-    notify_waiting(context, CONSTRUCT_QUEUE)
+    context.queues.wake(CONSTRUCT_QUEUE)
     return _view(context, key)
 
 

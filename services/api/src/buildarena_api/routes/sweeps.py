@@ -28,7 +28,6 @@ from buildarena_api.schemas import (
 )
 from buildarena_backend.catalog.specs import Budget, SweepSpec
 from buildarena_backend.process.context import Context
-from buildarena_backend.process.notify import notify_waiting
 from buildarena_backend.states import CONSTRUCT_QUEUE, SweepState
 from buildarena_backend.submission.submission import spec_hash
 from buildarena_backend.sweeps.sweeps import Sweep, SweepProgress
@@ -177,7 +176,7 @@ def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepV
     """
     _require_owner(context, caller, sweep_id)
     context.store.lifecycle.retry(sweep_id)
-    notify_waiting(context, CONSTRUCT_QUEUE)
+    context.queues.wake(CONSTRUCT_QUEUE)
     return _view(context, context.store.sweeps.get(sweep_id))
 
 

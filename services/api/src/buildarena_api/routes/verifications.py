@@ -73,7 +73,7 @@ def request_verifications(context: Context, job_ids: Sequence[str], caller: Call
             headers={"Retry-After": str(RETRY_S)},
         )
     # Any message makes a worker do all that wait.
-    context.queues.announce(VERIFY_QUEUE, list(requested.ids.values())[:1])
+    context.queues.wake(VERIFY_QUEUE)
     return requested
 
 
