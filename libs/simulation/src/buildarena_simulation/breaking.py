@@ -1,35 +1,26 @@
 """Breaking: the worst joint over its strength gives way, one per evaluation."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
-from buildarena_simulation.bearing import BearingMeter
-from buildarena_simulation.constants import BLOW_FILTER_S, GRAVITY
-from buildarena_simulation.engines.base import CargoPose, Engine, World
+from buildarena_simulation.acting import Acted, Interval, Surrounded
+from buildarena_simulation.constants import BLOW_FILTER_S, GRAVITY, LOAD_FILTER_S
+from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.holding import Holding
-from buildarena_simulation.landing import Landing, landing_of
-from buildarena_simulation.resting import FaceFinder
+from buildarena_simulation.landing import Landing
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import (
-    ContactForces,
-    EvenSharing,
-    PointForces,
-    together,
-)
 from buildarena_simulation.structure.loads import JointLoads, LoadModel
 from buildarena_simulation.structure.model import (
     JOINT_KINDS,
     BoolArray,
     FloatArray,
     IntArray,
+    Members,
     Structure,
 )
-from buildarena_simulation.structure.motion import Motion, rope_ends
-from buildarena_simulation.structure.supports import EdgeSupports
-from buildarena_simulation.structure.vectors import turned
+from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.trajectory import Break, Event, JointPeak
 
 _CALM: Final = 0.5
@@ -53,36 +44,31 @@ class BreakingModel:
         world: The machine and what is around it.
         clusters: Its clusters at the start.
         motion: Their motion at the start.
-        interval_s: Time between two evaluations, seconds.
+        holding: What blocks hold; None where none can.
 
     Attributes:
-        holding: What blocks hold; None where none can.
         landing: How the cargo lands on the machine; None if it does not, or if something broke.
+        bearing: What bears the machine, and what it bears; see `Acted`.
+        on_blocks: What ground and terrain exert on each block; see `Acted`.
     """
 
     def __init__(
-        self, world: World, clusters: Clusters, motion: Motion, *, interval_s: float
+        self, world: World, clusters: Clusters, motion: Motion, holding: Holding | None
     ) -> None:
         structure = self._structure = world.structure
-        self._field, self._gravity = world.field, world.gravity
-        self._faces, self._has_cargo = FaceFinder(world), world.cargo is not None
-        self.bearing = BearingMeter(structure, len(world.terrain), gravity=world.gravity)
+        self.clusters, self.motion, self._holding = clusters, motion, holding
+        self._around = Surrounded(world, holding)
+        self._around.enter(structure, clusters)
         self._loads = LoadModel(structure, clusters, motion, gravity=world.even_gravity)
-        self._enter(clusters)
-        self._interval_s, self._unseen_s, self._calm = interval_s, 0.0, False
-        self._peaks = np.zeros((3, len(structure.members)))
-        self._loads_now = np.zeros(len(structure.members) + len(structure.ropes))
-        self._loads_since: FloatArray | None = None
         self._rope_holds = np.ones(len(structure.ropes), dtype=bool)
-        self._rope_peaks = np.zeros(len(structure.ropes))
-        self.motion = motion
-        self.breaks: list[Break] = []
-        self.events: list[Event] = []
-        self.holding: Holding | None = None
+        self._unseen_s, self._calm = 0.0, False
+        self._borne = self._peaks = np.zeros((3, len(structure.members) + len(structure.ropes)))
+        self._since: FloatArray | None = None
+        self.bearing = np.zeros(len(world.terrain) + 2 + len(structure.wheels))
+        self.on_blocks = np.zeros(len(structure))
         self.landing: Landing | None = None
-        self._landed: Landing | None = None
-        self._cargo_before: CargoPose | None = None
-        self._cargo_mass, self._machine_mass = 0.0, float(structure.masses.sum())
+        self.breaks: list[Break] = []
+        self._events: list[Event] = []
 
     def blow(self, wind: FloatArray) -> None:
         """Says what accelerates masses from now on beside even gravity; see `LoadModel.wind`."""
@@ -100,23 +86,15 @@ class BreakingModel:
             engine: The engine, which is given new bodies.
             structure: The same machine with other masses.
         """
-        self._structure, before = structure, self.clusters
-        after = find_clusters(structure, self._loads.holds)
-        self.motion = self.motion.after_break(before, after)
+        self._structure = structure
         self._loads.weigh(structure)
-        self._enter(after)
-        engine.enter(after, self.motion)
-        self._loads.rebuild(after, self.motion)
+        self._enter(engine, find_clusters(structure, self.holds))
 
     def follow(
         self,
         engine: Engine,
         motion: Motion,
-        thrusts: FloatArray,
-        *,
-        time_s: float,
-        cargo_mass: float | None,
-        cargo_before: CargoPose | None = None,
+        interval: Interval,
         repeat_finer: Callable[[], Motion] | None = None,
     ) -> None:
         """Evaluates the loads after one interval and breaks what is overloaded.
@@ -124,77 +102,39 @@ class BreakingModel:
         Args:
             engine: The engine, which is given new bodies if the machine falls apart.
             motion: The clusters' motion now.
-            thrusts: (C,) recoil of each cannon during the interval, mass·unit/s².
-            time_s: Time now, seconds.
-            cargo_mass: Mass of the cargo now.
-            cargo_before: The cargo at the start of the interval.
+            interval: What it began with.
             repeat_finer: Repeats the interval in finer steps and says how the clusters move then;
                 None where it cannot be repeated.
         """
-        self.motion, self.landing, self._landed = motion, None, self.landing
-        self._cargo_before, self._cargo_mass = cargo_before, cargo_mass or 0.0
-        self._unseen_s += self._interval_s
-        if self._calm and not engine.struck and self._landed is None:
+        self.motion, self.landing = motion, None
+        self._unseen_s += interval.length_s
+        if self._calm and not engine.struck and interval.landing is None:
             self._calm = False
             return
         filters = self._loads.filters()
-        loads, tensions = self._evaluated(engine, thrusts)
-        if repeat_finer is not None and self._is_blow(loads, tensions):
+        acted, borne = self._evaluated(engine, interval)
+        if repeat_finer is not None and _is_blow(self._borne, borne):
             self._loads.put_back(filters)
             self.motion = repeat_finer()
-            loads, tensions = self._evaluated(engine, thrusts)
+            acted, borne = self._evaluated(engine, interval)
             engine.enter(self.clusters, self.motion)
-        self._unseen_s = 0.0
-        self._calm = bool(loads.ratio.max(initial=0.0) < _CALM) and not engine.struck
-        for peak, seen in zip(self._peaks, (loads.force, loads.moment, loads.ratio), strict=True):
-            np.maximum(peak, seen, out=peak)
-        self._follow_loads(loads.ratio, tensions)
-        self._break_ropes(engine, tensions, time_s, cargo_mass)
-        if not len(loads.ratio):
-            return
-        worst = int(np.argmax(loads.ratio))
-        if loads.ratio[worst] > 1.0:
-            for broken in self._giving_way(loads.ratio, worst):
-                self._log(
-                    self._structure.members.names[broken],
-                    JOINT_KINDS[self._structure.members.kind[broken]],
-                    float(loads.ratio[broken]),
-                    (time_s, cargo_mass),
-                )
-                self._loads.holds[broken] = False
+        self.landing, self.bearing, self.on_blocks = acted.landing, acted.bearing, acted.on_blocks
+        self._unseen_s, self._borne = 0.0, borne
+        self._peaks = np.maximum(self._peaks, borne)
+        self._since = borne[2] if self._since is None else np.maximum(self._since, borne[2])
+        count = len(self.holds)
+        self._calm = bool(borne[2, :count].max(initial=0.0) < _CALM) and not engine.struck
+        for rope in (self._rope_holds & (borne[2, count:] > 1.0)).nonzero()[0]:
+            self._rope_holds[rope] = False
+            engine.drop_rope(int(rope))
+            self._log(count + int(rope), interval)
+        giving_way = giving_way_together(borne[2, :count], self._structure.members)
+        if giving_way:
+            for member in giving_way:
+                self._log(member, interval)
+            self.holds[giving_way] = False
             self.landing = None
             self._fall_apart(engine)
-
-    def _evaluated(self, engine: Engine, thrusts: FloatArray) -> tuple[JointLoads, FloatArray]:
-        """Loads of the joints, and tensions of the ropes."""
-        tensions = engine.rope_tensions()
-        forces = self._forces(engine, thrusts, tensions)
-        # An impact is reported for one interval only, whatever was left out before.
-        seen_s = self._interval_s if engine.struck else self._unseen_s
-        loads = self._loads.evaluate(
-            forces,
-            self.motion,
-            elapsed_s=self._unseen_s,
-            seen_s=seen_s,
-            **self._blow(),
-        )
-        return loads, tensions
-
-    def _blow(self) -> dict[str, float]:
-        """How the loads of the last interval count, if the cargo landed in it."""
-        if self.landing is None or not self.landing.counts:
-            return {}
-        return {"filter_s": BLOW_FILTER_S, "fading": self.landing.fading}
-
-    def _is_blow(self, loads: JointLoads, tensions: FloatArray) -> bool:
-        """Whether a joint or rope would break by a load that has risen all at once."""
-        now = self._shares(loads.ratio, tensions)
-        return bool((now > np.maximum(1.0, _BLOW * self._loads_now)).any())
-
-    def _shares(self, ratio: FloatArray, tensions: FloatArray) -> FloatArray:
-        """Share of its strength that each joint and rope bears."""
-        ropes = np.maximum(tensions, 0.0) / GRAVITY / self._structure.ropes.limit
-        return np.concatenate([ratio, ropes])
 
     def let_go(self, engine: Engine, members: IntArray, *, time_s: float) -> BoolArray:
         """Opens joints that are made to let go; no break.
@@ -207,174 +147,125 @@ class BreakingModel:
         Returns:
             (D,) which of them held until now.
         """
-        held = self._loads.holds[members]
-        self._loads.holds[members] = False
+        held = self.holds[members]
+        self.holds[members] = False
         for member in members[held]:
             joint = self._structure.members.names[member]
-            self.events.append(Event(time_s=round(time_s, 6), what="decoupled", joint=joint))
+            self._events.append(Event(time_s=round(time_s, 6), what="decoupled", joint=joint))
         if held.any():
             self._fall_apart(engine)
         return held
 
     def all_events(self) -> tuple[Event, ...]:
         """Releases and grabs so far, in order of time."""
-        holds = [] if self.holding is None else self.holding.events
-        return tuple(sorted([*self.events, *holds], key=lambda event: event.time_s))
-
-    def _giving_way(self, ratio: FloatArray, worst: int) -> list[int]:
-        """The worst joint and, where it is a connector, those that overload its face with it.
-
-        One after the other, a stack of connectors would outlast its strength by its number.
-        """
-        member, _, face = self._structure.members.ends.T
-        mates = member[np.isin(face, face[member == worst])]
-        tied = mates[ratio[mates] >= ratio[worst] * (1.0 - 1e-6)]
-        return [worst, *(int(mate) for mate in np.unique(tied) if mate != worst)]
+        holds = [] if self._holding is None else self._holding.events
+        return tuple(sorted([*self._events, *holds], key=lambda event: event.time_s))
 
     def taken_loads(self) -> FloatArray:
         """The largest share of its strength that each joint and rope bore since the last call.
 
         Where all evaluations since were left out, what it was found to bear last.
         """
-        seen, self._loads_since = self._loads_since, None
-        return self._loads_now if seen is None else seen
-
-    def _follow_loads(self, ratio: FloatArray, tensions: FloatArray) -> None:
-        now = self._loads_now = self._shares(ratio, tensions)
-        self._loads_since = now if self._loads_since is None else np.maximum(self._loads_since, now)
+        seen, self._since = self._since, None
+        return self._borne[2] if seen is None else seen
 
     def peaks(self) -> tuple[JointPeak, ...]:
         """The largest load of every joint and rope so far."""
-        members, ropes = self._structure.members, self._structure.ropes
-        joints = [
+        return tuple(
             JointPeak(
                 joint=name,
-                kind=JOINT_KINDS[kind],
-                force=round(float(force), 3),
-                moment=round(float(moment), 3),
-                ratio=round(float(ratio), 5),
+                kind=kind,
+                force=round(force, 3),
+                moment=round(moment, 3),
+                ratio=round(ratio, 5),
             )
-            for name, kind, (force, moment, ratio) in zip(
-                members.names, members.kind, self._peaks.T, strict=True
+            for (name, kind), (force, moment, ratio) in zip(
+                _joints(self._structure), self._peaks.T.tolist(), strict=True
             )
-        ]
-        winches = [
-            JointPeak(
-                joint=name,
-                kind="rope",
-                force=round(float(tension), 3),
-                moment=0.0,
-                ratio=round(float(tension / limit), 5),
-            )
-            for name, tension, limit in zip(ropes.names, self._rope_peaks, ropes.limit, strict=True)
-        ]
-        return (*joints, *winches)
-
-    def _forces(self, engine: Engine, thrusts: FloatArray, tensions: FloatArray) -> PointForces:
-        """Contacts, thrust and ropes together, each where the structure takes it."""
-        clusters, motion = self.clusters, self.motion
-        cargo = engine.cargo() if self._has_cargo else None
-        faces = self._faces.find(clusters, motion, cargo)
-        contacts = faces.joined_to(self._contacts(engine, cargo), clusters.cluster_of)
-        others = [self._pushes(thrusts)] if len(thrusts) else []
-        if len(tensions):
-            others.append(self._pulls(tensions))
-        if self.holding is not None:
-            others.append(self.holding.forces(clusters, motion))
-        if self._field is not None:
-            others.append(self._field.taken(clusters, motion))
-        settled = self._supports.settled(
-            contacts,
-            self._sharing.shared(contacts),
-            corners=faces.corners,
-            structure=self._loads,
-            motion=motion,
-            others=others,
-        )
-        self.bearing.read(settled.other, settled.surface, settled.forces)
-        if self.holding is not None:
-            self.bearing.add_held(*self.holding.lifts())
-        return together([settled.forces, *others])
-
-    def _contacts(self, engine: Engine, cargo: CargoPose | None) -> ContactForces:
-        """The engine's contacts, with what the cargo's bounce adds to them."""
-        contacts, before = engine.contacts(), self._cargo_before
-        if before is None or cargo is None:
-            return contacts
-        self.landing = landing_of(
-            contacts,
-            before,
-            cargo,
-            so_far=self._landed,
-            mass=self._cargo_mass,
-            machine_mass=self._machine_mass,
-            gravity=self._gravity,
-            interval_s=self._interval_s,
-        )
-        if self.landing is None or not self.landing.counts:
-            return contacts
-        return replace(contacts, force=self.landing.stress * contacts.force)
-
-    def _pushes(self, thrusts: FloatArray) -> PointForces:
-        structure, motion = self._structure, self.motion
-        cannons = structure.cannons
-        c = self.clusters.cluster_of[cannons]
-        turn = motion.rotation[c]
-        return PointForces(
-            block=cannons,
-            point=motion.position[c] + turned(turn, structure.thrust_points),
-            force=-thrusts[:, None] * turned(turn, structure.directions[cannons]),
         )
 
-    def _pulls(self, tensions: FloatArray) -> PointForces:
-        ropes = self._structure.ropes
-        start, end = rope_ends(self._structure, self.clusters, self.motion)
-        pull = end - start
-        pull *= (tensions / np.maximum(np.linalg.norm(pull, axis=1), 1e-9))[:, None]
-        return PointForces(
-            block=np.concatenate([ropes.first, ropes.second]),
-            point=np.concatenate([start, end]),
-            force=np.concatenate([pull, -pull]),
+    def _evaluated(self, engine: Engine, interval: Interval) -> tuple[Acted, FloatArray]:
+        """What acted in the interval, and what each joint and rope bears of it."""
+        tensions = engine.rope_tensions()
+        acted = self._around.acted(engine, interval, self.motion, tensions, self._loads)
+        landing = acted.landing if acted.landing is not None and acted.landing.counts else None
+        loads = self._loads.evaluate(
+            acted.forces,
+            self.motion,
+            elapsed_s=self._unseen_s,
+            # An impact is reported for one interval only, whatever was left out before.
+            seen_s=interval.length_s if engine.struck else self._unseen_s,
+            filter_s=LOAD_FILTER_S if landing is None else BLOW_FILTER_S,
+            fading=1.0 if landing is None else landing.fading,
         )
+        return acted, _borne(loads, tensions, self._structure.ropes.limit)
 
-    def _break_ropes(
-        self, engine: Engine, tensions: FloatArray, time_s: float, cargo_mass: float | None
-    ) -> None:
-        ropes = self._structure.ropes
-        pull = tensions / GRAVITY
-        self._rope_peaks = np.maximum(self._rope_peaks, pull)
-        for r in (self._rope_holds & (pull > ropes.limit)).nonzero()[0]:
-            self._rope_holds[r] = False
-            engine.drop_rope(int(r))
-            self._log(ropes.names[r], "rope", float(pull[r] / ropes.limit[r]), (time_s, cargo_mass))
-
-    def _log(self, joint: str, kind: str, ratio: float, when: tuple[float, float | None]) -> None:
-        time_s, cargo_mass = when
+    def _log(self, joint: int, interval: Interval) -> None:
+        mass = interval.cargo_mass
+        name, kind = _joints(self._structure)[joint]
         self.breaks.append(
             Break(
-                time_s=round(time_s, 6),
-                joint=joint,
+                time_s=round(interval.end_s, 6),
+                joint=name,
                 kind=kind,
-                ratio=round(ratio, 5),
-                cargo_mass=None if cargo_mass is None else round(cargo_mass, 6),
+                ratio=round(float(self._borne[2, joint]), 5),
+                cargo_mass=None if mass is None else round(mass, 6),
             )
-        )
-
-    def _enter(self, clusters: Clusters) -> None:
-        self.clusters = clusters
-        self._sharing = EvenSharing(clusters.cluster_of)
-        self._supports = EdgeSupports(
-            self._structure.centers_of_mass, clusters.cluster_of, gravity=GRAVITY
         )
 
     def _fall_apart(self, engine: Engine) -> None:
-        before = self.clusters
-        after = find_clusters(self._structure, self._loads.holds)
-        if not _same(before, after):
-            self.motion = self.motion.after_break(before, after)
-            self._enter(after)
-            engine.enter(after, self.motion)
+        after = find_clusters(self._structure, self.holds)
+        if _same(self.clusters, after):
+            self._loads.rebuild(after, self.motion)
+        else:
+            self._enter(engine, after)
+
+    def _enter(self, engine: Engine, after: Clusters) -> None:
+        self.motion = self.motion.after_break(self.clusters, after)
+        self.clusters = after
+        self._around.enter(self._structure, after)
+        engine.enter(after, self.motion)
         self._loads.rebuild(after, self.motion)
+
+
+def giving_way_together(ratio: FloatArray, members: Members) -> list[int]:
+    """The worst joint over its strength and, if a connector, those that overload its face with it.
+
+    One after the other, a stack of connectors would outlast its strength by its number.
+
+    Args:
+        ratio: (M,) share of its strength that each joint bears.
+        members: The joints.
+
+    Returns:
+        Their numbers, the worst first; none where all are strong enough.
+    """
+    if not (ratio > 1.0).any():
+        return []
+    worst = int(np.argmax(ratio))
+    member, _, face = members.ends.T
+    mates = member[np.isin(face, face[member == worst])]
+    tied = mates[ratio[mates] >= ratio[worst] * (1.0 - 1e-6)]
+    return [worst, *(int(mate) for mate in np.unique(tied) if mate != worst)]
+
+
+def _borne(loads: JointLoads, tensions: FloatArray, limits: FloatArray) -> FloatArray:
+    """(3, M + R) force, moment and share of its strength that each joint and each rope bears."""
+    pulls = np.maximum(tensions, 0.0) / GRAVITY
+    ropes = np.array([pulls, np.zeros(len(pulls)), pulls / limits])
+    return np.concatenate([[loads.force, loads.moment, loads.ratio], ropes], axis=1)
+
+
+def _is_blow(before: FloatArray, now: FloatArray) -> bool:
+    """Whether a joint or rope would break by a load that has risen all at once; see `_borne`."""
+    return bool((now[2] > np.maximum(1.0, _BLOW * before[2])).any())
+
+
+def _joints(structure: Structure) -> list[tuple[str, str]]:
+    """Name and kind of each joint, then of each rope."""
+    members = structure.members
+    joints = [(name, JOINT_KINDS[k]) for name, k in zip(members.names, members.kind, strict=True)]
+    return [*joints, *((rope, "rope") for rope in structure.ropes.names)]
 
 
 def _same(before: Clusters, after: Clusters) -> bool:

@@ -16,6 +16,7 @@ from buildarena_simulation.structure.model import BoolArray, FloatArray, Structu
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import turned
 from buildarena_simulation.trajectory import (
+    Bearing,
     Piloting,
     Setting,
     Trajectory,
@@ -118,6 +119,18 @@ class Recorder:
             rows.append(np.tile(component.astype(np.int16), (len(motions), 1)))
         return np.concatenate(rows)
 
+    def _bearing_of_samples(self) -> Bearing:
+        wheels = self._structure.wheels
+        rows = np.round(np.array(self._bearing) * 256.0).astype(np.float32) / np.float32(256.0)
+        cargo = rows.shape[1] - len(wheels) - 1
+        return Bearing(
+            ground=rows[:, 0].copy(),
+            terrain=rows[:, 1:cargo].copy(),
+            cargo=rows[:, cargo].copy(),
+            wheels=rows[:, cargo + 1 :].copy(),
+            wheel_ids=tuple(self._structure.block_ids[i] for i in wheels),
+        )
+
     def _poses(self, first: int = 0) -> tuple[FloatArray, FloatArray]:
         """Positions (T, N, 3) and quaternions (T, N, 4) of the tracked blocks, world frame.
 
@@ -166,9 +179,7 @@ class Recorder:
             cannon_ids=tuple(structure.block_ids[i] for i in structure.cannons),
             heated=self._heated[recorded],
             pieces=self._pieces(),
-            bearing=breaking.bearing.series(
-                np.array(self._bearing), tuple(structure.block_ids[i] for i in structure.wheels)
-            ),
+            bearing=self._bearing_of_samples(),
             joint_peaks=breaking.peaks(),
             joint_loads=rounded_loads(np.array(self._loads)),
             breaks=tuple(breaking.breaks),

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from buildarena_simulation.acting import Interval
 from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import Levels, Steady, recoil
@@ -65,9 +66,9 @@ class Trial:
         motion = motion_at(start, clusters)
         engine.enter(clusters, motion)
         self._interval_s = engine.time_step_s * engine.steps_per_evaluation
-        self.breaking = BreakingModel(world, clusters, motion, interval_s=self._interval_s)
-        if any(part.module.grip for part in structure.parts):
-            self.breaking.holding = Holding(world)
+        grips = any(part.module.grip for part in structure.parts)
+        self._holding = Holding(world) if grips else None
+        self.breaking = BreakingModel(world, clusters, motion, self._holding)
         self.recorder = Recorder(structure, scenario)
         self.has_blown_up = False
         self._per_sample = round(1 / (SAMPLE_RATE_HZ * engine.time_step_s))
@@ -142,7 +143,7 @@ class Trial:
             clusters=breaking.clusters,
             motion=breaking.motion,
             cargo=self._engine.cargo() if self._scenario.cargo else None,
-            on_blocks=breaking.bearing.on_blocks,
+            on_blocks=breaking.on_blocks,
             fuel_s=self._planner.tank.left_s,
         )
 
@@ -164,7 +165,7 @@ class Trial:
         field.commands = schedule.at(row, kicks)
         if self._tanks is not None:
             field.commands = self._burn(self._tanks, field.commands)
-        holding, breaking = self.breaking.holding, self.breaking
+        holding, breaking = self._holding, self.breaking
         if holding is not None and not self.has_blown_up:
             cargo = self._engine.cargo() if self._scenario.cargo else None
             if holding.update(
@@ -209,7 +210,7 @@ class Trial:
             self.has_blown_up = True
             self.breaking.motion = motion
             return
-        holding = self.breaking.holding
+        holding = self._holding
         slipped = holding is not None and holding.follow(
             engine, time_s=time_s + self._interval_s, interval_s=self._interval_s
         )
@@ -224,15 +225,15 @@ class Trial:
                 holding.read(engine)
             return engine.motion()
 
-        self.breaking.follow(
-            engine,
-            motion,
-            thrusts,
-            time_s=time_s + self._interval_s,
+        interval = Interval(
+            end_s=time_s + self._interval_s,
+            length_s=self._interval_s,
+            thrusts=thrusts,
+            cargo=place,
             cargo_mass=mass,
-            cargo_before=place,
-            repeat_finer=None if slipped else repeat_finer,
+            landing=self.breaking.landing,
         )
+        self.breaking.follow(engine, motion, interval, None if slipped else repeat_finer)
         if slipped and holding is not None:
             self._hold(holding)
         landing = self.breaking.landing
@@ -258,6 +259,6 @@ class Trial:
             self.breaking.clusters,
             self._engine.cargo() if cargo else None,
             cargo.mass_at(time_s) if cargo else None,
-            bearing=self.breaking.bearing.now,
+            bearing=self.breaking.bearing,
             loads=self.breaking.taken_loads(),
         )
