@@ -1,11 +1,16 @@
-"""Reads JSON values that people wrote into typed structs; errors name the place."""
+"""Reads JSON values that people wrote into typed structs; errors name the place.
+
+msgspec reads. Where it refuses, the value and its form are walked side by side to the first place
+where they part, which says what may stand there and what does.
+"""
 
 from __future__ import annotations
 
-import re
 import sys
 import threading
-from typing import TYPE_CHECKING, Annotated, NoReturn, TypeVar
+from collections.abc import Iterable, Mapping
+from types import NoneType
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
 
 import msgspec
 from msgspec import Meta, inspect
@@ -21,22 +26,22 @@ Positive = Annotated[float, Meta(gt=0.0, le=_LARGEST)]
 Point = tuple[Finite, Finite, Finite]
 Name = Annotated[str, Meta(max_length=60)]
 
-_KINDS = {
-    "float": "a number",
-    "int": "a whole number",
-    "str": "a text",
-    "bool": "true or false",
-    "array": "a list",
-    "object": "an object",
+_KINDS: Mapping[type[inspect.Type], tuple[str, tuple[type, ...]]] = {
+    inspect.BoolType: ("true or false", (bool,)),
+    inspect.IntType: ("a whole number", (int,)),
+    inspect.CustomType: ("a whole number", (int, float)),
+    inspect.FloatType: ("a number", (int, float)),
+    inspect.StrType: ("a text", (str,)),
+    inspect.EnumType: ("a text", (str,)),
+    inspect.TupleType: ("a list", (list, tuple)),
+    inspect.VarTupleType: ("a list", (list, tuple)),
+    inspect.ListType: ("a list", (list, tuple)),
+    inspect.DictType: ("an object", (Mapping,)),
+    inspect.StructType: ("an object", (Mapping,)),
+    inspect.NoneType: ("null", (NoneType,)),
+    inspect.AnyType: ("anything", (object,)),
 }
-_BOUNDS = {
-    r" > ([\d.e+]+)": r" above \1",
-    r" of length <= (\d+)": r" of at most \1 characters",
-    r" >= ([\d.e+]+)": r" of at least \1",
-    r" <= ([\d.e+]+)": r" of at most \1",
-    r"(\d)\.0$": r"\1",
-}
-_STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")
+"""What messages call the values of a form, and how Python has them."""
 _Read = TypeVar("_Read")
 _FIRST = threading.Lock()
 """msgspec lays a struct's form out when it is first read; two threads at once crash there."""
@@ -64,22 +69,22 @@ def read(value: object, kind: type[_Read], *, where: str, error: type[GeometryEr
         where: what messages call the value.
         error: what is raised where it has another form.
     """
-    _lay_out(kind)
+    with _FIRST:
+        if kind not in _laid_out:
+            msgspec.json.Decoder(kind, dec_hook=_whole)
+            _laid_out.add(kind)
     try:
         return msgspec.convert(value, kind, dec_hook=_whole)
     except UnicodeError as problem:
         raise error(f"{where}: expected texts without lone surrogates") from problem
-    except (msgspec.ValidationError, ValueError, OverflowError) as problem:
-        text, _, place = str(problem).partition(" - at `")
-        if place.startswith("key`"):
-            text = "Expected `object` whose keys are texts"
-        place = place.rstrip("`").rpartition("`")[2]
-        raise error(_explained(text, place, value, kind, where)) from problem
+    except (msgspec.ValidationError, ValueError) as problem:
+        fault = _fault(value, inspect.type_info(kind)) or f": {problem}"
+        raise error(where + fault) from problem
 
 
 def refuse(place: str, expected: str, value: object) -> NoReturn:
     """Raises that a place, such as `joint.axis`, should hold what is expected."""
-    raise MisfitError(f".{place}: expected {expected}, found {shown(value)}")
+    raise MisfitError(f".{place}{_unlike(expected, value)}")
 
 
 def shown(value: object) -> str:
@@ -88,82 +93,112 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONGEST_QUOTE else text[: _LONGEST_QUOTE - 3] + "..."
 
 
-def _lay_out(kind: object) -> None:
-    with _FIRST:
-        if kind not in _laid_out:
-            msgspec.json.Decoder(kind, dec_hook=_whole)
-            _laid_out.add(kind)
-
-
-def _whole(kind: type, value: object) -> object:
+def _whole(kind: type, value: Any) -> object:
     if kind is not Whole:
         raise NotImplementedError(kind)
-    if isinstance(value, float) and value.is_integer():
-        value = int(value)
-    if not isinstance(value, int) or isinstance(value, bool):
-        raise TypeError("Expected `int`")
-    if value < 0:
-        raise ValueError("Expected `int` >= 0")
+    if not isinstance(value, int | float) or isinstance(value, bool) or value % 1 or value < 0:
+        raise ValueError(value)
     return Whole(value)
 
 
-def _explained(text: str, place: str, value: object, kind: type, where: str) -> str:
-    """What msgspec complains about, with the place, the valid choices and what was found."""
-    held, form = value, inspect.type_info(kind)
-    for field, index in _STEP.findall(place):
-        held, form = _inside(held, field or index), _form_inside(form, field, index)
-    where += place.removeprefix("$")
-    if text.startswith("."):
-        return where + text
-    name = text.split("`")[1] if "`" in text else ""
-    if text.startswith("Object contains unknown field"):
-        return f"{where}: there is no field {name!r}; the fields are {', '.join(_choices(form))}"
-    if text.startswith("Object missing required field"):
-        return f"{where}: {name} is missing"
-    if text.startswith("Invalid"):
-        expected = f"one of {', '.join(_choices(form))}"
-    elif "out of range" in text or "+308" in text:
-        expected = "a finite number"
-    else:
-        expected = text.removeprefix("Expected ").partition(", got")[0]
-        expected = re.sub(r"`(.*?)`", lambda kinds: _named(kinds[1]), expected)
-        for bound, words in _BOUNDS.items():
-            expected = re.sub(bound, words, expected)
-    return f"{where}: expected {expected}, found {shown(held)}"
+def _unlike(expected: str, value: object) -> str:
+    return f": expected {expected}, found {shown(value)}"
 
 
-def _named(kinds: str) -> str:
-    return " or ".join(_KINDS.get(kind, kind) for kind in kinds.split(" | "))
+def _fault(value: Any, form: Any) -> str:
+    """The first thing that keeps a value from a form, after its place; "" if nothing does."""
+    forms: tuple[Any, ...] = form.types if isinstance(form, inspect.UnionType) else (form,)
+    suiting = [one for one in forms if _is_of(value, _kind(one))]
+    if not suiting:
+        kinds = {_kind(one) for one in forms}
+        named = dict.fromkeys(words for kind, (words, _) in _KINDS.items() if kind in kinds)
+        return _unlike(" or ".join(named), value)
+    if tag := getattr(suiting[0], "tag_field", None):
+        if tag not in value:
+            return f": {tag} is missing"
+        tagged = [one for one in suiting if one.tag == value[tag]]
+        if not tagged:
+            return f".{tag}{_unlike(_one_of(one.tag for one in suiting), value[tag])}"
+        suiting = tagged
+    return _fault_within(value, suiting[0])
 
 
-def _inside(value: object, step: str) -> object:
-    if isinstance(value, dict):
-        return value.get(step, value)
-    return value[int(step)] if isinstance(value, list | tuple) else value
+def _kind(form: inspect.Type) -> type[inspect.Type]:
+    if isinstance(form, inspect.LiteralType):
+        return inspect.StrType if isinstance(form.values[0], str) else inspect.IntType
+    return type(form)
 
 
-def _form_inside(form: inspect.Type, field: str, index: str) -> inspect.Type:
-    """The type of a struct's field or of a list's entry."""
-    for kind in form.types if isinstance(form, inspect.UnionType) else (form,):
-        if isinstance(kind, inspect.StructType):
-            forms = {known.encode_name: known.type for known in kind.fields}
-            # A tag is no field: its choices are those of the union.
-            return forms.get(field, form)
-        if isinstance(kind, inspect.TupleType):
-            return kind.item_types[int(index)]
-        if isinstance(kind, inspect.VarTupleType | inspect.ListType):
-            return kind.item_type
-    return form
+def _is_of(value: object, kind: type[inspect.Type]) -> bool:
+    types = _KINDS[kind][1]
+    # To Python true is a number.
+    return isinstance(value, types) and (not isinstance(value, bool) or int not in types)
 
 
-def _choices(form: inspect.Type) -> list[str]:
-    """What may be written at a place: literals, tags, or the fields of an object."""
-    if isinstance(form, inspect.UnionType):
-        tags = [str(kind.tag) for kind in form.types if isinstance(kind, inspect.StructType)]
-        return tags if len(tags) > 1 else [text for kind in form.types for text in _choices(kind)]
-    if isinstance(form, inspect.StructType):
-        tag = [form.tag_field] if form.tag_field else []
-        return [*tag, *(field.encode_name for field in form.fields)]
-    if isinstance(form, inspect.EnumType):
-        return [str(choice.value) for choice in form.cls]
-    return list(map(str, form.values)) if isinstance(form, inspect.LiteralType) else []
+def _one_of(choices: Iterable[object]) -> str:
+    return f"one of {', '.join(map(str, choices))}"
+
+
+def _fault_within(value: Any, form: Any) -> str:
+    """The same of a value that is of the form's kind."""
+    match form:
+        case inspect.StructType():
+            return _fault_of_object(value, form)
+        case inspect.DictType():
+            if not all(isinstance(key, str) for key in value):
+                return _unlike("an object whose keys are texts", value)
+            steps = [(f".{key}", entry, form.value_type) for key, entry in value.items()]
+        case inspect.TupleType():
+            if len(value) != len(form.item_types):
+                return _unlike(f"a list of length {len(form.item_types)}", value)
+            pairs = zip(value, form.item_types, strict=True)
+            steps = [(f"[{index}]", entry, item) for index, (entry, item) in enumerate(pairs)]
+        case inspect.VarTupleType() | inspect.ListType():
+            steps = [(f"[{index}]", entry, form.item_type) for index, entry in enumerate(value)]
+        case _:
+            expected = _expected(value, form)
+            return _unlike(expected, value) if expected else ""
+    faults = ((place, _fault(entry, inner)) for place, entry, inner in steps)
+    return next((place + fault for place, fault in faults if fault), "")
+
+
+def _fault_of_object(value: Mapping[Any, object], form: inspect.StructType) -> str:
+    fields = {field.encode_name: field for field in form.fields}
+    for name, entry in value.items():
+        if not isinstance(name, str):
+            return _unlike("an object whose keys are texts", value)
+        if name in fields:
+            if fault := _fault(entry, fields[name].type):
+                return f".{name}{fault}"
+        elif form.forbid_unknown_fields and name != form.tag_field:
+            known = ", ".join([*([form.tag_field] if form.tag_field else []), *fields])
+            return f": there is no field {name!r}; the fields are {known}"
+    for name, field in fields.items():
+        if field.required and name not in value:
+            return f": {name} is missing"
+    try:
+        msgspec.convert(value, form.cls, dec_hook=_whole)
+    except msgspec.ValidationError as problem:
+        # Whether fields that are good by themselves fit together, the struct says.
+        return str(problem.__cause__) if isinstance(problem.__cause__, MisfitError) else ""
+    return ""
+
+
+def _expected(value: Any, form: Any) -> str:  # noqa: PLR0911  each bound has its words
+    """What a value should be that is of the form's kind and breaks its bounds; "" if none."""
+    match form:
+        case inspect.LiteralType(values=choices) if value not in choices:
+            return _one_of(choices)
+        case inspect.EnumType(cls=choices) if value not in list(choices):
+            return _one_of(choices)
+        case inspect.StrType(max_length=int(most)) if len(value) > most:
+            return f"a text of at most {most} characters"
+        case inspect.CustomType() if value % 1 or value < 0:
+            return "a whole number" + ("" if value % 1 else " of at least 0")
+        case inspect.FloatType(gt=float(least)) if not value > least:
+            return f"a number above {least:g}"
+        case inspect.FloatType(ge=float(least)) if not value >= least:
+            return "a finite number" if least == -_LARGEST else f"a number of at least {least:g}"
+        case inspect.FloatType(le=float(most)) if not value <= most:
+            return "a finite number" if most == _LARGEST else f"a number of at most {most:g}"
+    return ""
