@@ -5,15 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from buildarena_geometry.dialects import dialect, dialects
 from buildarena_geometry.errors import GeometryError
 from buildarena_geometry.vectors.sequences import parse, run_sequences
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -8,14 +8,11 @@ has its x axis the other way round. The starting block's frame has the world's a
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.modules.module import Module
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Quaternion, Vector, multiply, positive
-
-if TYPE_CHECKING:
-    from buildarena_geometry.blocks import Block, Connector
-    from buildarena_geometry.modules.module import Module
 
 # Our block axes in swapped components: x mirrored and the last two swapped is this half turn.
 _BLOCK_FROM_SWAPPED: Quaternion = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Amount, Form, Positive
 from buildarena_geometry.rotations import Vector, add, scaled
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
 FaceRef = tuple[str, str]  # block id, face label
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.outcomes import AttemptedBlock
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from buildarena_geometry.blocks import Block
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import MachineState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

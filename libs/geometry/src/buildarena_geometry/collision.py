@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
 
 import fcl
 import numpy as np
 
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
 from buildarena_geometry.poses import Pose
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-
-    from buildarena_geometry.blocks import Block
 
 TOUCHING = 1e-6  # units; solids that reach into each other less than this touch, which is allowed
 _ALL_CONTACTS = 1_000_000  # FCL's broadphase stops at so many contacts: more than any machine has

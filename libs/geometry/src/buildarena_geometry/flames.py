@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from numpy.typing import NDArray
-
-    from buildarena_geometry.blocks import Block
-    from buildarena_geometry.modules.module import Sphere
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.blocks import Block
+from buildarena_geometry.modules.module import Sphere
+from buildarena_geometry.state import MachineState
 
 _CONTACT = 1e-9  # units; rounding must not part spheres that just touch
 

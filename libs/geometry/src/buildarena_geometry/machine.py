@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
 from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.collision import CollisionWorld, Overlap, unwanted
 from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
@@ -17,20 +22,11 @@ from buildarena_geometry.feedback.words import listing, number
 from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controller, json_value
 from buildarena_geometry.measures import bounds, center_of_mass
 from buildarena_geometry.modules.catalogue import load_catalogue
+from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
 from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
-from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import MachineState, SubStructure
 from buildarena_geometry.tools import action_named, tool_definitions
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
-    from buildarena_geometry.modules.module import Catalogue
-    from buildarena_geometry.state import SubStructure
 
 _DIGITS = 1e-6  # hundredths that a depth may be above a round figure and not be rounded up
 _OFFERED = tuple(tool.name for tool in tool_definitions())  # what every builder has

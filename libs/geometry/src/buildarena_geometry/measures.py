@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.modules.solids import Ball, Box, Solid
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from buildarena_geometry.blocks import Block
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import MachineState
 
 
 def center_of_mass(state: MachineState) -> NDArray[np.float64]:

@@ -7,10 +7,11 @@ one body does not move; joints that close a loop of bodies lock it, unless they 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, takewhile
-from typing import TYPE_CHECKING
 
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.modules.joints import (
     MESH_COSINE,
     MESH_SLACK,
@@ -18,14 +19,8 @@ from buildarena_geometry.modules.joints import (
     MovingJoint,
 )
 from buildarena_geometry.modules.solids import Cylinder
-from buildarena_geometry.rotations import add, cross, dot, scaled, subtract
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from buildarena_geometry.blocks import Block
-    from buildarena_geometry.rotations import Vector
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.rotations import Vector, add, cross, dot, scaled, subtract
+from buildarena_geometry.state import MachineState
 
 FLUSH_TOLERANCE = 0.05
 """A far end that comes so near another block's face is joined to it, units."""

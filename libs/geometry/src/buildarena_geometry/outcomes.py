@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from buildarena_geometry.rotations import Quaternion, Vector
+from buildarena_geometry.rotations import Quaternion, Vector
 
 
 class RefusalClass(StrEnum):

@@ -7,10 +7,11 @@ at three numbers a time Python's own arithmetic is faster than an array's.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from buildarena_geometry.rotations import (
     NO_ROTATION,
@@ -25,11 +26,6 @@ from buildarena_geometry.rotations import (
     rotate,
     rotation_rows,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import ArrayLike, NDArray
 
 
 @dataclass(frozen=True, slots=True, init=False)

@@ -10,13 +10,12 @@ import sys
 import threading
 from collections.abc import Iterable, Mapping
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar
 
 import msgspec
 from msgspec import Meta, inspect
 
-if TYPE_CHECKING:
-    from buildarena_geometry.errors import GeometryError
+from buildarena_geometry.errors import GeometryError
 
 _LARGEST = sys.float_info.max
 _LONGEST_QUOTE = 60  # characters; one line of a terminal

@@ -7,20 +7,15 @@ construction, and feedback can be put into words long after the machine has move
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from buildarena_geometry.blocks import Block, Connector, FaceRef, Joint, KeyPress
+from buildarena_geometry.modules.module import Catalogue
+from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Form
-from buildarena_geometry.rotations import distance, subtract
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
-    from collections.abc import Set as AbstractSet
-
-    from buildarena_geometry.modules.module import Catalogue
-    from buildarena_geometry.poses import Pose
-    from buildarena_geometry.rotations import Vector
+from buildarena_geometry.rotations import Vector, distance, subtract
 
 
 class SubStructure(Form, frozen=True, kw_only=True):

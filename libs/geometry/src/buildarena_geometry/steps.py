@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from buildarena_geometry.outcomes import Refused
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from buildarena_geometry.blocks import Block, Connector, KeyPress
-    from buildarena_geometry.machine import Machine
-    from buildarena_geometry.outcomes import Outcome
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.blocks import Block, Connector, KeyPress
+from buildarena_geometry.machine import Machine
+from buildarena_geometry.outcomes import Outcome, Refused
+from buildarena_geometry.state import MachineState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,8 +7,9 @@ agree with what the actions do.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from buildarena_geometry.actions import (
@@ -16,6 +17,7 @@ from buildarena_geometry.actions import (
     build,
     catalogue,
     control,
+    program,
     query,
     refine,
     remove,
@@ -182,60 +184,29 @@ def _parse_docstring(text: str) -> tuple[str, dict[str, str]]:
     return " ".join(head.split()), about
 
 
+def _proposers(module: ModuleType) -> Iterator[Callable[..., Change]]:
+    """The actions of a module: what is public there and proposes a change."""
+    for function in filter(inspect.isfunction, vars(module).values()):
+        if function.__annotations__.get("return") is Change and not function.__name__.startswith(
+            "_"
+        ):
+            yield function
+
+
+_MODULES: Mapping[str, tuple[ModuleType, ...]] = {
+    "build": (build, remove),
+    "refine": (refine,),
+    "assemble": (assemble,),
+    "control": (control,),
+    "query": (query,),
+    LOOKUP: (catalogue,),
+    PROGRAM: (program,),
+}
 ACTIONS: Mapping[str, Action] = {
     propose.__name__: _action(propose, group)
-    for group, proposers in (
-        (
-            "build",
-            (
-                build.start,
-                build.attach_block_to,
-                build.connect_blocks,
-                remove.remove_block,
-                remove.reset,
-            ),
-        ),
-        ("refine", (refine.twist_block, refine.shift_block, refine.flip_spin)),
-        (
-            "assemble",
-            (
-                assemble.add_machine,
-                assemble.shift_machine,
-                assemble.rotate_machine,
-                assemble.remove_machine,
-            ),
-        ),
-        (
-            "control",
-            (
-                control.change_control_key,
-                control.add_control_key,
-                control.add_control_sequence,
-                control.remove_control_sequence,
-                control.reset_control_sequence,
-            ),
-        ),
-        (
-            "query",
-            (
-                query.get_machine_summary,
-                query.get_block_details,
-                query.review_powered_blocks,
-                query.review_control_config,
-                query.review_control_sequence,
-            ),
-        ),
-        (
-            LOOKUP,
-            (
-                catalogue.list_module_categories,
-                catalogue.list_modules,
-                catalogue.describe_module,
-            ),
-        ),
-        (PROGRAM, (control.set_controller,)),
-    )
-    for propose in proposers
+    for group, modules in _MODULES.items()
+    for module in modules
+    for propose in _proposers(module)
 }
 _NAMES = CaselessNames(ACTIONS)
 

@@ -15,7 +15,6 @@ from buildarena_geometry.modules.parameters import (
     Name,
     Number,
     Presses,
-    ProgramText,
     RefusalError,
     shown,
 )
@@ -111,17 +110,6 @@ def reset_control_sequence(state: MachineState) -> Change:
     """Removes every key press from the control sequence; key bindings stay."""
     after = replace(state, control_sequence=())
     return Change(after=after, render=lambda: words.control_sequence(after))
-
-
-def set_controller(state: MachineState, program: ProgramText) -> Change:
-    """Has a program act in place of the control sequence.
-
-    Args:
-        program: Lua that defines control(t, sense); an empty text leaves the control sequence.
-    """
-    require_started(state)
-    after = replace(state, controller=program)
-    return Change(after=after, render=lambda: words.controller(after))
 
 
 def _bind(state: MachineState, block_id: str, written: str, key: str, *, keep: bool) -> Change:

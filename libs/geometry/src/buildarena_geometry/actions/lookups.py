@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
 
+from buildarena_geometry.blocks import Block, Connector
 from buildarena_geometry.feedback.state import heading
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.parameters import RefusalError, shown
 from buildarena_geometry.outcomes import Cause
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from buildarena_geometry.blocks import Block, Connector
-    from buildarena_geometry.modules.module import Module
-    from buildarena_geometry.state import MachineState, SubStructure
+from buildarena_geometry.state import MachineState, SubStructure
 
 _MAX_NAMED = 12  # a refusal names so many choices and counts the rest
 _NEAREST = 5  # of more choices, so many that are most like what was written

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import structs
 
-from buildarena_geometry.modules.module import Catalogue
+from buildarena_geometry.blocks import Block
+from buildarena_geometry.machine import Machine
+from buildarena_geometry.modules.module import Catalogue, Module
 from buildarena_geometry.modules.sets import module_set
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from buildarena_geometry.blocks import Block
-    from buildarena_geometry.machine import Machine
-    from buildarena_geometry.modules.module import Module
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, overload
+from typing import Any, overload
 
+from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.outcomes import RefusalClass
 from buildarena_geometry.reading import Form
-
-if TYPE_CHECKING:
-    from buildarena_geometry.modules.module import Catalogue
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import MachineState
 
 
 class ActionRecord(Form, frozen=True, kw_only=True):

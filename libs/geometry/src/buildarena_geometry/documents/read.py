@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from msgspec import Meta
 
@@ -15,17 +16,13 @@ from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.json_values import check_controller
 from buildarena_geometry.keys import KEYS
+from buildarena_geometry.modules.module import Catalogue, Module
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, LONGEST_TEXT
 from buildarena_geometry.modules.sets import module_set, modules_of_action, smallest_set
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Finite, Form, MisfitError, Point, Whole, read, refuse
 from buildarena_geometry.rotations import SHORTEST_QUATERNION
 from buildarena_geometry.state import MachineState, SubStructure
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Mapping
-
-    from buildarena_geometry.modules.module import Catalogue, Module
 
 Text = Annotated[str, Meta(max_length=LONGEST_TEXT)]
 

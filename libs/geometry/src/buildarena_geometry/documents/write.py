@@ -7,11 +7,10 @@ was written, bit for bit. `controller` is there only where it has one.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from buildarena_geometry.blocks import Block, Connector
-    from buildarena_geometry.documents.log import LoggedState
+from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.documents.log import LoggedState
 
 DOCUMENT_VERSION = 1
 

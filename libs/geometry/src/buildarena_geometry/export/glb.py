@@ -7,24 +7,19 @@ from __future__ import annotations
 
 import json
 import struct
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from buildarena_geometry.blocks import Connector
 from buildarena_geometry.export.meshes import COLOURS, CONNECTOR_RADIUS, normal, polygons
-from buildarena_geometry.modules.solids import Cylinder
+from buildarena_geometry.machine import Machine
+from buildarena_geometry.modules.module import Module
+from buildarena_geometry.modules.solids import Cylinder, Solid
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-
-    from buildarena_geometry.blocks import Connector
-    from buildarena_geometry.machine import Machine
-    from buildarena_geometry.modules.module import Module
-    from buildarena_geometry.modules.solids import Solid
 
 _MAGIC, _VERSION = 0x46546C67, 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942

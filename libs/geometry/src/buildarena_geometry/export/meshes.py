@@ -5,14 +5,11 @@ from __future__ import annotations
 import math
 from functools import cache
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_geometry.modules.solids import Ball, Box, Solid
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 ROUND_SIDES = 24
 BALL_RINGS = 8  # from pole to pole

@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 from xml.sax.saxutils import escape
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_geometry.blocks import Block
 from buildarena_geometry.export.meshes import COLOURS, ROUND_SIDES, normal, polygons
+from buildarena_geometry.machine import Machine
+from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.solids import Box
 from buildarena_geometry.poses import Pose
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from buildarena_geometry.machine import Machine
-    from buildarena_geometry.modules.module import Module
 
 _LIGHT = np.array([0.35, -0.5, 0.79])  # where the light comes from, world frame, unit length
 PICTURE = 200.0  # pixels that the longest side of a module takes where no view is given

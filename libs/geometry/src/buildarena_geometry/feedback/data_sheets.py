@@ -7,16 +7,12 @@ and z points away from that face. Forces are in mass·g, moments in mass·g·uni
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from buildarena_geometry.feedback.words import number, plain, point
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from buildarena_geometry.modules.forces import Altitude, Push, Spring, Wing
-    from buildarena_geometry.modules.joints import Drive, MovingJoint
-    from buildarena_geometry.modules.module import Module, Motor, Physics
+from buildarena_geometry.modules.forces import Altitude, Push, Spring, Wing
+from buildarena_geometry.modules.joints import Drive, MovingJoint
+from buildarena_geometry.modules.module import Module, Motor, Physics
 
 FRAME = (
     "Places and directions in a data line are [x, y, z] from where the module touches the face it "

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 from buildarena_geometry.feedback.words import listing
-from buildarena_geometry.mobility import mobility
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from buildarena_geometry.mobility import Mobility
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.mobility import Mobility, mobility
+from buildarena_geometry.state import MachineState
 
 
 def facts(moving: Mobility, block_id: str) -> Iterator[str]:

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterator
 
 from buildarena_geometry.feedback.data_sheets import data_sheet
 from buildarena_geometry.feedback.words import counted, plain, point
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-
-    from buildarena_geometry.modules.module import Catalogue, Module
+from buildarena_geometry.modules.module import Catalogue, Module
 
 OTHER = "other"  # the category of modules that name none
 

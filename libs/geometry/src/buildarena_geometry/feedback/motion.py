@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.feedback.words import caption, rolling
-from buildarena_geometry.rotations import cross, scaled
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from buildarena_geometry.blocks import Block
-    from buildarena_geometry.modules.joints import Drive, MovingJoint
-    from buildarena_geometry.rotations import Vector
+from buildarena_geometry.modules.joints import Drive, MovingJoint
+from buildarena_geometry.rotations import Vector, cross, scaled
 
 _ALONG = 0.9999  # cosine; an axis nearer to the block's own than this is that axis
 

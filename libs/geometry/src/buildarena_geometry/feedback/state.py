@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from buildarena_geometry.blocks import JOINT_REACH
+from buildarena_geometry.blocks import JOINT_REACH, Block, Connector, Joint
 from buildarena_geometry.feedback import mobility as joints_in_words
 from buildarena_geometry.feedback.motion import motions
 from buildarena_geometry.feedback.words import (
@@ -19,13 +19,8 @@ from buildarena_geometry.feedback.words import (
 )
 from buildarena_geometry.flames import heating
 from buildarena_geometry.mobility import Mobility, mobility
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from buildarena_geometry.blocks import Block, Connector, Joint
-    from buildarena_geometry.rotations import Vector
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.rotations import Vector
+from buildarena_geometry.state import MachineState
 
 
 @dataclass(frozen=True, slots=True)

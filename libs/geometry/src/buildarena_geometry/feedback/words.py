@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
-from buildarena_geometry.rotations import cross
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from buildarena_geometry.rotations import Vector
+from buildarena_geometry.rotations import Vector, cross
 
 DOWN = (0.0, 0.0, -1.0)
 AXIS_TOLERANCE_DEG = 1e-6  # nearer than this to an axis of the world, a direction is that axis

@@ -13,10 +13,11 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from msgspec import Meta, field
 
@@ -43,9 +44,6 @@ from buildarena_geometry.reading import (
     refuse,
 )
 from buildarena_geometry.rotations import dot, from_axes
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
 
 CATALOGUE_VERSION = 1
 CONFIDENCES = ("known", "community", "chosen", "unknown")

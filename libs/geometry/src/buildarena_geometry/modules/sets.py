@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import TYPE_CHECKING
 
 from buildarena_geometry.modules.catalogue import basic_modules, extended_modules
-from buildarena_geometry.modules.module import Catalogue
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-
-    from buildarena_geometry.modules.module import Module
+from buildarena_geometry.modules.module import Catalogue, Module
 
 MODULE_SETS = ("basic", "workshop", "all")
 

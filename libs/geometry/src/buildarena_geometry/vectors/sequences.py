@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import gzip
 import zlib
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from msgspec import Struct
 
@@ -12,15 +13,10 @@ from buildarena_geometry.dialects import Dialect
 from buildarena_geometry.errors import SequenceError
 from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.machine import Machine
-from buildarena_geometry.outcomes import Cause, Refused
+from buildarena_geometry.modules.module import Catalogue
+from buildarena_geometry.outcomes import Cause, Outcome, Refused
 from buildarena_geometry.reading import read
 from buildarena_geometry.vectors.state import kind_of, state_entry
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from buildarena_geometry.modules.module import Catalogue
-    from buildarena_geometry.outcomes import Outcome
 
 _GZIP_MAGIC = b"\x1f\x8b"
 

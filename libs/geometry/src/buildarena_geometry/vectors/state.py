@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from buildarena_geometry.besiege_components import besiege_point, besiege_rotation, besiege_span
+from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.dialects import Dialect
-from buildarena_geometry.outcomes import Cause, Refused
+from buildarena_geometry.outcomes import Cause, Outcome, Refused
 from buildarena_geometry.rotations import scaled
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from buildarena_geometry.blocks import Block, Connector, FaceRef
-    from buildarena_geometry.outcomes import Outcome
-    from buildarena_geometry.state import MachineState
+from buildarena_geometry.state import MachineState
 
 # The vectors have no name of their own for these.
 _KIND_OF_CAUSE = {
