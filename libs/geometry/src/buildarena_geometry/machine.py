@@ -46,10 +46,7 @@ class Machine:
     __slots__ = ("_available", "_records", "_state", "_world")
 
     def __init__(
-        self,
-        *,
-        catalogue: Catalogue | None = None,
-        available: Mapping[str, Machine] | None = None,
+        self, *, catalogue: Catalogue | None = None, available: Mapping[str, Machine] | None = None
     ) -> None:
         """An empty machine.
 

@@ -12,12 +12,7 @@ from dataclasses import dataclass, field
 from itertools import combinations, takewhile
 
 from buildarena_geometry.blocks import Block
-from buildarena_geometry.modules.joints import (
-    MESH_COSINE,
-    MESH_SLACK,
-    MOVING_JOINTS,
-    MovingJoint,
-)
+from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK, MOVING_JOINTS, MovingJoint
 from buildarena_geometry.modules.solids import Cylinder
 from buildarena_geometry.rotations import Vector, add, cross, dot, scaled, subtract
 from buildarena_geometry.state import MachineState

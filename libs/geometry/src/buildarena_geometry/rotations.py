@@ -31,11 +31,7 @@ def rotate(quaternion: Quaternion, vector: Vector) -> Vector:
     a, b, c = vector
     # v + w t + q x t, where t = 2 q x v and x is the vector product
     t, u, v = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return (
-        a + w * t + y * v - z * u,
-        b + w * u + z * t - x * v,
-        c + w * v + x * u - y * t,
-    )
+    return (a + w * t + y * v - z * u, b + w * u + z * t - x * v, c + w * v + x * u - y * t)
 
 
 def about_axis(axis: Vector, angle_deg: float) -> Quaternion:

@@ -53,9 +53,7 @@ def start(
     )
     after = replace(state, blocks={block.id: block}, next_id=state.next_id + 1)
     return Change(
-        after=after,
-        placed=(block.id,),
-        render=lambda: f"Started. {words.placement(after, block)}",
+        after=after, placed=(block.id,), render=lambda: f"Started. {words.placement(after, block)}"
     )
 
 
@@ -155,9 +153,7 @@ def connect_blocks(
     )
     link = replace(link, span=span_in(pose, link))
     after = replace(
-        state,
-        connectors={**state.connectors, link.id: link},
-        next_id=state.next_id + 1,
+        state, connectors={**state.connectors, link.id: link}, next_id=state.next_id + 1
     )
     return Change(
         after=after,

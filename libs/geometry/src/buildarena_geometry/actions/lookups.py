@@ -57,8 +57,7 @@ def powered(state: MachineState, block_id: str, written: str) -> tuple[Block | C
     if not actions:
         keyed = named(other.id for other in state.powered())
         raise RefusalError(
-            Cause.NO_LOCOMOTION,
-            f"{heading(target)} takes no keys. Blocks that do: {keyed}.",
+            Cause.NO_LOCOMOTION, f"{heading(target)} takes no keys. Blocks that do: {keyed}."
         )
     action = CaselessNames(actions).find(written)
     if action is None:

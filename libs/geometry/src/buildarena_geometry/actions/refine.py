@@ -26,8 +26,7 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
     target = part(state, block_id)
     if target.module.kind == "start":
         raise RefusalError(
-            Cause.START_BLOCK,
-            f"{words.heading(target)} sits on no face and can't be twisted.",
+            Cause.START_BLOCK, f"{words.heading(target)} sits on no face and can't be twisted."
         )
     turn = about_axis(_seat_normal(state, target), -angle)
     how = f"by {plain(angle)}°"
@@ -69,8 +68,7 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     if isinstance(target, Connector) or not target.module.spins:
         wheels = listing(block.id for block in state.blocks.values() if block.module.spins)
         raise RefusalError(
-            Cause.NOT_SPINNING,
-            f"{words.heading(target)} does not spin. Blocks that do: {wheels}.",
+            Cause.NOT_SPINNING, f"{words.heading(target)} does not spin. Blocks that do: {wheels}."
         )
     block = replace(target, flipped=not target.flipped)
     after = state.with_blocks(block)

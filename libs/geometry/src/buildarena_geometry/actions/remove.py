@@ -25,8 +25,7 @@ def remove_block(state: MachineState, block_id: BlockId) -> Change:
         return _removal(state, after, gone, ())
     if gone.module.kind == "start":
         raise RefusalError(
-            Cause.START_BLOCK,
-            f"{words.heading(gone)} can't be removed; reset starts anew.",
+            Cause.START_BLOCK, f"{words.heading(gone)} can't be removed; reset starts anew."
         )
     after, links = without(state, [gone])
     return _removal(state, after, gone, links)

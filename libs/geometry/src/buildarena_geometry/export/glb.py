@@ -73,12 +73,7 @@ class _Scene:
 
     def add_node(self, name: str, mesh: int, pose: Pose) -> None:
         w, x, y, z = pose.wxyz
-        node = {
-            "name": name,
-            "mesh": mesh,
-            "translation": list(pose.xyz),
-            "rotation": [x, y, z, w],
-        }
+        node = {"name": name, "mesh": mesh, "translation": list(pose.xyz), "rotation": [x, y, z, w]}
         self._json["nodes"][0]["children"].append(len(self._json["nodes"]))
         self._json["nodes"].append(node)
 

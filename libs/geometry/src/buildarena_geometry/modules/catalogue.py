@@ -34,15 +34,7 @@ from buildarena_geometry.modules.module import (
     Sphere,
 )
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.reading import (
-    Form,
-    MisfitError,
-    Name,
-    Point,
-    Whole,
-    read,
-    refuse,
-)
+from buildarena_geometry.reading import Form, MisfitError, Name, Point, Whole, read, refuse
 from buildarena_geometry.rotations import dot, from_axes
 
 CATALOGUE_VERSION = 1

@@ -19,16 +19,7 @@ from buildarena_geometry.reading import Amount, Finite, Form, Name, Point, Posit
 from buildarena_geometry.rotations import ORIGIN, Vector, distance
 
 Kind = Literal[
-    "start",
-    "block",
-    "joint",
-    "wheel",
-    "flight",
-    "cannon",
-    "torch",
-    "device",
-    "connector",
-    "cargo",
+    "start", "block", "joint", "wheel", "flight", "cannon", "torch", "device", "connector", "cargo"
 ]
 ATTACHABLE_KINDS = ("block", "joint", "wheel", "flight", "cannon", "torch", "device")
 JointType = Literal[

@@ -13,10 +13,7 @@ from buildarena_geometry.rotations import scaled
 from buildarena_geometry.state import MachineState
 
 # The vectors have no name of their own for these.
-_KIND_OF_CAUSE = {
-    Cause.EXCESS_CONNECTION: "too_close",
-    Cause.UNKNOWN_ACTION: "bad_action",
-}
+_KIND_OF_CAUSE = {Cause.EXCESS_CONNECTION: "too_close", Cause.UNKNOWN_ACTION: "bad_action"}
 
 
 def kind_of(outcome: Outcome, kinds: Mapping[str, str] | None = None) -> str:
