@@ -6,14 +6,13 @@ from buildarena_geometry import kernels as kernels  # before numpy
 from importlib.metadata import version
 
 from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
-from buildarena_geometry.documents.log import ActionLog, ActionRecord
 from buildarena_geometry.documents.write import DOCUMENT_VERSION
 from buildarena_geometry.errors import CatalogueError, DocumentError, GeometryError, SequenceError
 from buildarena_geometry.feedback import FEEDBACK_VERSION
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine import Machine, replay
 from buildarena_geometry.modules.catalogue import load_catalogue
-from buildarena_geometry.modules.module import Catalogue, Face, Landmark, Module
+from buildarena_geometry.modules.module import Catalogue, Module
 from buildarena_geometry.modules.sets import (
     MODULE_SETS,
     catalogue_of,
@@ -31,7 +30,7 @@ from buildarena_geometry.outcomes import (
     Refused,
 )
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.steps import Difference, Step, step
+from buildarena_geometry.steps import Difference, step
 from buildarena_geometry.tools import (
     GROUPS,
     LOOKUP,
@@ -52,8 +51,6 @@ __all__ = [
     "MODULE_SETS",
     "PROGRAM",
     "Accepted",
-    "ActionLog",
-    "ActionRecord",
     "AttemptedBlock",
     "Ball",
     "Block",
@@ -65,11 +62,9 @@ __all__ = [
     "Cylinder",
     "Difference",
     "DocumentError",
-    "Face",
     "GeometryError",
     "Joint",
     "KeyPress",
-    "Landmark",
     "Machine",
     "Module",
     "Outcome",
@@ -77,7 +72,6 @@ __all__ = [
     "RefusalClass",
     "Refused",
     "SequenceError",
-    "Step",
     "ToolDefinition",
     "__version__",
     "catalogue_of",

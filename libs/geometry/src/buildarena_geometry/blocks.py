@@ -147,6 +147,11 @@ class Connector:
     note: str = ""
 
     @property
+    def ends(self) -> tuple[str, str]:
+        """Ids of the blocks that it begins and ends on."""
+        return (self.start[0], self.end[0])
+
+    @property
     def start_point(self) -> NDArray[np.float64]:
         """(3,) the present centre of the start face, world frame, units."""
         return _array(self.start_xyz)

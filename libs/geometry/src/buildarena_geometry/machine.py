@@ -17,7 +17,7 @@ from buildarena_geometry.collision import CollisionWorld, Overlap, unwanted
 from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
-from buildarena_geometry.feedback.mobility import consequences
+from buildarena_geometry.feedback.joints import consequences
 from buildarena_geometry.feedback.words import listing, number
 from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controller, json_value
 from buildarena_geometry.measures import bounds, center_of_mass

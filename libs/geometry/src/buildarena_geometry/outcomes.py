@@ -63,31 +63,22 @@ class Cause(StrEnum):
     NO_SUCH_MACHINE = "no_such_machine"
 
 
-CLASS_OF_CAUSE = {
+_CLASS_OF_CAUSE = {
     Cause.NOT_STARTED: RefusalClass.INITIALIZATION_ABSENT,
     Cause.ALREADY_STARTED: RefusalClass.MULTIPLE_INITIALIZATION,
     Cause.UNKNOWN_MODULE: RefusalClass.MODULE_RESTRICTION,
     Cause.UNKNOWN_CONNECTOR: RefusalClass.MODULE_RESTRICTION,
-    Cause.CONNECTOR_MISUSE: RefusalClass.CONNECTOR_MISUSE,
     Cause.BASIC_AS_CONNECTOR: RefusalClass.CONNECTOR_MISUSE,
     Cause.NO_SUCH_BLOCK: RefusalClass.BLOCK_PRESENCE,
     Cause.START_BLOCK: RefusalClass.BLOCK_PRESENCE,
     Cause.NO_SUCH_FACE: RefusalClass.FACE_PRESENCE,
     Cause.NO_FACES: RefusalClass.FACE_PRESENCE,
-    Cause.FACE_OCCUPIED: RefusalClass.FACE_OCCUPIED,
-    Cause.EXCESS_CONNECTION: RefusalClass.EXCESS_CONNECTION,
-    Cause.TOO_CLOSE: RefusalClass.TOO_CLOSE,
     Cause.NOT_SPINNING: RefusalClass.SPIN_CAPABILITY,
-    Cause.OVERLAP: RefusalClass.OVERLAP,
-    Cause.BAD_KEY: RefusalClass.BAD_KEY,
     Cause.NO_LOCOMOTION: RefusalClass.UNKNOWN_ACTION,
     Cause.BAD_ACTION: RefusalClass.UNKNOWN_ACTION,
-    Cause.UNKNOWN_ACTION: RefusalClass.UNKNOWN_ACTION,
-    Cause.BAD_INDEX: RefusalClass.BAD_INDEX,
-    Cause.OUT_OF_RANGE: RefusalClass.OUT_OF_RANGE,
-    Cause.MALFORMED_ARGUMENTS: RefusalClass.MALFORMED_ARGUMENTS,
     Cause.NO_SUCH_MACHINE: RefusalClass.UNKNOWN_SUB_STRUCTURE,
 }
+"""The class of a cause; the other causes have a class of their own name."""
 
 
 class Accepted:
@@ -159,7 +150,7 @@ class Refused:
     @property
     def reason(self) -> RefusalClass:
         """The class results are counted by."""
-        return CLASS_OF_CAUSE[self.cause]
+        return _CLASS_OF_CAUSE.get(self.cause) or RefusalClass(self.cause.value)
 
 
 Outcome = Accepted | Refused

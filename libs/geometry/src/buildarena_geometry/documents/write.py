@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import msgspec
+
 from buildarena_geometry.blocks import Block, Connector
 from buildarena_geometry.documents.log import LoggedState
 
@@ -29,14 +31,8 @@ def machine_document(machine: LoggedState) -> dict[str, Any]:
             for joint in state.joints()
         ],
         "connectors": [_connector_entry(link) for link in state.connectors.values()],
-        "control_sequence": [
-            {"time_s": press.time_s, "key": press.key, "hold_for_s": press.hold_for_s}
-            for press in state.control_sequence
-        ],
-        "structures": [
-            {"letter": structure.letter, "source": structure.source, "root": structure.root}
-            for structure in state.structures.values()
-        ],
+        "control_sequence": [msgspec.to_builtins(press) for press in state.control_sequence],
+        "structures": [msgspec.to_builtins(part) for part in state.structures.values()],
         "structures_made": state.structures_made,
         "next_id": state.next_id,
         "available": {

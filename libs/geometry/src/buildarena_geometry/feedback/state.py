@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from buildarena_geometry.blocks import JOINT_REACH, Block, Connector, Joint
-from buildarena_geometry.feedback import mobility as joints_in_words
-from buildarena_geometry.feedback.motion import motions
+from buildarena_geometry.feedback.joints import couplings, motions
 from buildarena_geometry.feedback.words import (
     caption,
     counted,
@@ -19,7 +18,7 @@ from buildarena_geometry.feedback.words import (
 )
 from buildarena_geometry.flames import heating
 from buildarena_geometry.mobility import Mobility, mobility
-from buildarena_geometry.rotations import Vector
+from buildarena_geometry.modules.module import Landmark
 from buildarena_geometry.state import MachineState
 
 
@@ -97,7 +96,7 @@ def free_faces(state: MachineState, block: Block) -> str:
 
 def idle(link: Connector) -> str:
     """A further sentence on a connector that begins and ends on one block; "" for others."""
-    if link.start[0] != link.end[0]:
+    if len(set(link.ends)) > 1:
         return ""
     return f" Both faces are block {link.start[0]}'s, so it joins and strengthens nothing."
 
@@ -106,10 +105,11 @@ def faces(state: MachineState, block: Block) -> str:
     """The faces of a block: where they are, which way they look, what sits on them."""
     if not block.module.faces:
         return "No faces."
-    rendered = []
-    for face in block.module.faces:
-        place = f"{face_name(block, face.label)} {point(block.face_center(face.label), 3)}"
-        rendered.append(place + _use_of_face(state, block, face.label))
+    rendered = (
+        f"{face_name(block, label)} {point(block.face_center(label), 3)}"
+        f"{_use_of_face(state, block, label)}"
+        for label in block.module.face_of_label
+    )
     return f"Faces: {'; '.join(rendered)}."
 
 
@@ -126,7 +126,7 @@ def block_details(state: MachineState, block: Block) -> str:
     bound = [f"{action} {listing(keys)}" for action, keys in block.bindings.items()]
     if bound:
         lines.append(f"Keys: {'; '.join(bound)}.")
-    links = [link.id for link in state.connectors.values() if block.id in _ends(link)]
+    links = [link.id for link in state.connectors.values() if block.id in link.ends]
     if links:
         lines.append(f"Connectors: {listing(links)}.")
     return "\n".join(lines)
@@ -137,23 +137,21 @@ def summary(state: MachineState) -> str:
     if not state.started:
         return "Nothing is built yet."
     parts = counted(len(state.blocks) + len(state.connectors), "part")
-    lines = [f"{parts}, mass {plain(state.mass)}, cost {state.cost}."]
-    lines.extend(
-        f"Sub-structure {structure.letter}: {structure.source}."
-        for structure in state.structures.values()
-    )
-    lines.extend(block_lines(state, state.blocks.values()))
-    lines.extend(connector_line(link) for link in state.connectors.values())
-    lines.extend(detached(state, state.joints()))
+    lines = [
+        f"{parts}, mass {plain(state.mass)}, cost {state.cost}.",
+        *(f"Sub-structure {part.letter}: {part.source}." for part in state.structures.values()),
+        *block_lines(state, state.blocks.values()),
+        *map(connector_line, state.connectors.values()),
+        *detached(state, state.joints()),
+    ]
     return "\n".join(lines)
 
 
 def detached(state: MachineState, joints: Iterable[Joint]) -> list[str]:
     """A sentence about the blocks without a path to the first one, if there are any."""
     loose = state.detached(joints)
-    if not loose:
-        return []
-    return [f"Not connected to block {next(iter(state.blocks))}: {listing(loose)}."]
+    first = next(iter(state.blocks), "")
+    return [f"Not connected to block {first}: {listing(loose)}."] if loose else []
 
 
 def controller(state: MachineState) -> str:
@@ -188,8 +186,8 @@ def control_config(state: MachineState) -> str:
 
 def powered_blocks(state: MachineState) -> str:
     """The blocks and connectors that take keys, where they are and what they do."""
-    lines = list(block_lines(state, (block for block in state.blocks.values() if block.bindings)))
-    lines.extend(connector_line(link) for link in state.connectors.values() if link.bindings)
+    lines = block_lines(state, (block for block in state.blocks.values() if block.bindings))
+    lines += [connector_line(link) for link in state.connectors.values() if link.bindings]
     return "\n".join(lines) or "No block is powered."
 
 
@@ -227,14 +225,16 @@ def losses(before: MachineState, after: MachineState) -> list[str]:
 def cooled(before: MachineState, after: MachineState) -> list[str]:
     """Sentences about the cannons that a flame reached before an action and not after it."""
     now = heating(after)
-    rendered = []
-    for cannon, torches in heating(before).items():
-        lost = [torch for torch in torches if cannon in now and torch not in now[cannon]]
-        if lost:
-            rendered.append(
-                f"{heading(after.blocks[cannon])} is no longer heated by {listing(lost)}."
-            )
-    return rendered
+    lost = {
+        cannon: [torch for torch in torches if torch not in now[cannon]]
+        for cannon, torches in heating(before).items()
+        if cannon in now
+    }
+    return [
+        f"{heading(after.blocks[cannon])} is no longer heated by {listing(torches)}."
+        for cannon, torches in lost.items()
+        if torches
+    ]
 
 
 def _press_lines(state: MachineState) -> list[str]:
@@ -249,12 +249,14 @@ def _relations(state: MachineState) -> _Relations:
 
 
 def _place_line(state: MachineState, block: Block, relations: _Relations) -> str:
-    facts = [f"{block.id} {block.module.name}"]
-    facts.extend(_seat(block, state.joint(block)))
-    facts.append(f"at {point(block.center_xyz)}")
-    facts.extend(_use(block))
-    facts.extend(_heat(block, relations.heat))
-    facts.extend(joints_in_words.facts(relations.moving, block.id))
+    facts = [
+        f"{block.id} {block.module.name}",
+        *_seat(block, state.joint(block)),
+        f"at {point(block.center_xyz)}",
+        *_use(block),
+        *_heat(block, relations.heat),
+        *couplings(relations.moving, block.id),
+    ]
     return ", ".join(facts)
 
 
@@ -283,37 +285,30 @@ def _gap(joint: Joint) -> str:
     return f"{apart} off {joint.base}/{joint.face}; {verdict}"
 
 
-def _use(block: Block) -> list[str]:
+def _use(block: Block) -> Iterable[str]:
     if block.module.motor is not None:
         forward = rolling(block.axis_xyz, clockwise=block.forward_is_clockwise)
-        return [f"centre {point(block.body_center_xyz)}", forward + _flipped(block)]
+        flipped = " (flipped)" if block.flipped else ""
+        return [f"centre {point(block.body_center_xyz)}", forward + flipped]
     towards = block.pointing_xyz
     if towards is None:
         return motions(block)
-    marks = [
-        _landmark(mark.name, block.landmark(mark.along), mark.radius)
-        for mark in block.module.landmarks
-    ]
+    marks = [_landmark(block, mark) for mark in block.module.landmarks]
     return [f"points {caption(towards)}", *marks]
 
 
-def _heat(block: Block, heat: Mapping[str, tuple[str, ...]]) -> list[str]:
-    facts = []
+def _landmark(block: Block, mark: Landmark) -> str:
+    radius = "" if mark.radius is None else f" radius {plain(mark.radius)}"
+    return f"{mark.name} {point(block.landmark(mark.along))}{radius}"
+
+
+def _heat(block: Block, heat: Mapping[str, tuple[str, ...]]) -> Iterator[str]:
     if block.id in heat:
         torches = heat[block.id]
-        facts.append(f"heated by {listing(torches)}" if torches else "not heated")
+        yield f"heated by {listing(torches)}" if torches else "not heated"
     if block.module.flames:
         cannons = [cannon for cannon, torches in heat.items() if block.id in torches]
-        facts.append(f"heats {', '.join(cannons) or 'nothing'}")
-    return facts
-
-
-def _flipped(block: Block) -> str:
-    return " (flipped)" if block.flipped else ""
-
-
-def _landmark(name: str, place: Vector, radius: float | None) -> str:
-    return f"{name} {point(place)}" + ("" if radius is None else f" radius {plain(radius)}")
+        yield f"heats {', '.join(cannons) or 'nothing'}"
 
 
 def _use_of_face(state: MachineState, block: Block, label: str) -> str:
@@ -323,10 +318,6 @@ def _use_of_face(state: MachineState, block: Block, label: str) -> str:
     if block.mount is not None and label == block.module.root_face:
         return f" sits on {block.mount[0]}/{block.mount[1]}"
     return ""
-
-
-def _ends(link: Connector) -> tuple[str, str]:
-    return (link.start[0], link.end[0])
 
 
 def _note(note: str) -> str:

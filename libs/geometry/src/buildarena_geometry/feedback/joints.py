@@ -1,0 +1,124 @@
+"""How blocks move on their seats, what meshes and what is locked, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from buildarena_geometry.blocks import Block
+from buildarena_geometry.feedback.words import caption, listing, rolling
+from buildarena_geometry.mobility import Mobility, mobility
+from buildarena_geometry.modules.joints import Drive, MovingJoint
+from buildarena_geometry.rotations import Vector, cross, dot, scaled
+from buildarena_geometry.state import MachineState
+
+_ALONG = 0.9999  # cosine; an axis nearer to the block's own than this is that axis
+
+
+def motions(block: Block) -> Iterator[str]:
+    """What a builder must know of where a block's free axis, wing or fan points.
+
+    Wheels with a motor and modules that point say so in words of their own.
+    """
+    module = block.module
+    wing, push, flywheel = module.wing, module.push, module.flywheel
+    if module.joint is not None and module.physics is not None:
+        yield from _joint(block, module.physics.joint_type, module.joint)
+    if wing is not None:
+        towards = caption(block.world_from_block.direction(wing.normal))
+        yield f"open to {towards}" if wing.one_sided else f"flat side faces {towards}"
+    if push is not None:
+        yield f"{push.action} pushes it {caption(block.world_from_block.direction(push.direction))}"
+    if flywheel is not None:
+        about = caption(block.world_from_block.direction(flywheel.axis))
+        yield f"{flywheel.left} turns it counterclockwise about {about}"
+
+
+def couplings(moving: Mobility, block_id: str) -> Iterator[str]:
+    """What a block's line says of its teeth and its joint."""
+    if block_id in moving.meshes:
+        yield f"meshes with {listing(moving.meshes[block_id])}"
+    if block_id in moving.locks:
+        yield _locked(moving, block_id)
+
+
+def consequences(
+    before: MachineState, after: MachineState, shown: tuple[str, ...] = ()
+) -> Iterator[str]:
+    """Sentences on the joints that an action locked or freed and the cogs that it put together.
+
+    Args:
+        before: the state before the action.
+        after: the state after it.
+        shown: ids of blocks whose own lines tell of themselves.
+    """
+    was, now = mobility(before), mobility(after)
+    for block in now.locks:
+        if block not in was.locks and block not in shown:
+            yield f"{_named(after, block)} is {_locked(now, block)}."
+    for block in was.locks:
+        if block not in now.locks and block in after.blocks:
+            yield f"{_named(after, block)} can move again."
+    for cog, others in _new(was.meshes, now.meshes):
+        apart = [other for other in others if other not in shown and cog not in shown]
+        if apart:
+            yield f"{_named(after, cog)} meshes with {listing(apart)}."
+    for cog, others in _new(now.meshes, was.meshes):
+        if cog in after.blocks:
+            yield f"{_named(after, cog)} no longer meshes with {listing(others)}."
+
+
+def _joint(block: Block, seat: str, joint: MovingJoint) -> Iterator[str]:
+    axis = block.world_from_block.direction(joint.axis)
+    if seat == "ball":
+        yield "turns freely every way"
+    elif seat == "constant_velocity":
+        yield f"bends freely, shaft {caption(axis)}"
+    elif seat == "slider":
+        action = None if joint.drive is None else joint.drive.forward
+        yield f"{action} moves it {caption(axis)}" if action else f"slides along {caption(axis)}"
+    elif joint.drive is None:
+        limited = joint.limits is not None
+        yield f"swings about {caption(axis)}" if limited else f"turns freely about {caption(axis)}"
+    else:
+        yield _driven(block, axis, joint.drive, rolls=seat == "axle")
+
+
+def _driven(block: Block, axis: Vector, drive: Drive, *, rolls: bool) -> str:
+    """What a drive does with a block that turns."""
+    clockwise = (drive.forward_sense == "clockwise") != block.flipped
+    flipped = " (flipped)" if block.flipped else ""
+    if rolls:
+        return rolling(axis, clockwise=clockwise) + flipped
+    away = block.axis_xyz
+    if dot(axis, away) > _ALONG:
+        sense = "clockwise" if clockwise else "counterclockwise"
+        does = f"{drive.forward} turns it" if drive.forward else "always turns"
+        return f"{does} {sense} seen from outside{flipped}"
+    # Counterclockwise about its pin takes the far end this way.
+    side = scaled(cross(axis, away), -1.0 if clockwise else 1.0)
+    return f"{drive.forward} swings its far end {caption(side)}{flipped}"
+
+
+def _new(
+    before: Mapping[str, tuple[str, ...]], after: Mapping[str, tuple[str, ...]]
+) -> Iterator[tuple[str, list[str]]]:
+    """What is in the one and not in the other; each pair once."""
+    seen: set[frozenset[str]] = set()
+    for cog, others in after.items():
+        new = [
+            other
+            for other in others
+            if other not in before.get(cog, ()) and frozenset((cog, other)) not in seen
+        ]
+        seen.update(frozenset((cog, other)) for other in new)
+        if new:
+            yield cog, new
+
+
+def _locked(moving: Mobility, block_id: str) -> str:
+    holding = moving.locks[block_id]
+    return f"locked by {listing(holding)}" if holding else "locked"
+
+
+def _named(state: MachineState, block_id: str) -> str:
+    return f"Block {block_id} ({state.blocks[block_id].module.name})"
