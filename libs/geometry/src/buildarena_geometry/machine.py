@@ -20,11 +20,10 @@ from buildarena_geometry.documents.write import machine_document
 from buildarena_geometry.feedback.joints import consequences
 from buildarena_geometry.feedback.words import listing, number
 from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controller, json_value
-from buildarena_geometry.measures import bounds, center_of_mass
 from buildarena_geometry.modules.catalogue import load_catalogue
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER, RefusalError, shown
-from buildarena_geometry.outcomes import Accepted, Cause, Outcome, Refused
+from buildarena_geometry.outcomes import Accepted, Cause, Outcome
 from buildarena_geometry.state import MachineState, SubStructure
 from buildarena_geometry.tools import action_named, tool_definitions
 
@@ -76,12 +75,7 @@ class Machine:
         try:
             outcome: Outcome = self._carry_out(self._propose(name, arguments))
         except RefusalError as refusal:
-            outcome = Refused(
-                cause=refusal.cause,
-                text=refusal.text,
-                overlaps=refusal.overlaps,
-                attempted=refusal.attempted,
-            )
+            outcome = refusal.outcome
         self._record(name, arguments, outcome)
         return outcome
 
@@ -123,16 +117,7 @@ class Machine:
         """Whether both are the same machine; how they were built does not matter."""
         if not isinstance(other, Machine):
             return NotImplemented
-        mine, theirs = self._state, other._state
-        return (
-            list(mine.blocks.items()) == list(theirs.blocks.items())
-            and list(mine.connectors.items()) == list(theirs.connectors.items())
-            and mine.control_sequence == theirs.control_sequence
-            and mine.controller == theirs.controller
-            and mine.next_id == theirs.next_id
-            and mine.structures == theirs.structures
-            and mine.structures_made == theirs.structures_made
-        )
+        return _compared(self._state) == _compared(other._state)
 
     __hash__ = None  # type: ignore[assignment]  # it changes
 
@@ -241,7 +226,7 @@ class Machine:
         Raises:
             ValueError: the machine is empty.
         """
-        return center_of_mass(self._state)
+        return self._state.center_of_mass
 
     @property
     def bounds(self) -> NDArray[np.float64]:
@@ -250,7 +235,7 @@ class Machine:
         Raises:
             ValueError: the machine is empty.
         """
-        return bounds(self._state)
+        return self._state.bounds
 
     @property
     def detached(self) -> tuple[str, ...]:
@@ -331,6 +316,12 @@ def replay(log: ActionLog) -> Machine:
     for record in log:
         machine.act(record.name, record.arguments)
     return machine
+
+
+def _compared(state: MachineState) -> tuple[object, ...]:
+    """What makes two machines the same: all but their catalogues and what they may be made of."""
+    presses = (state.control_sequence, state.controller)
+    return (state.parts, state.structures, state.structures_made, state.next_id, presses)
 
 
 def _require_reach(blocks: Sequence[Block]) -> None:

@@ -7,9 +7,11 @@ one body does not move; joints that close a loop of bodies lock it, unless they 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, takewhile
+from itertools import combinations
+from typing import NamedTuple
 
 from buildarena_geometry.blocks import Block
 from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK, MOVING_JOINTS, MovingJoint
@@ -38,19 +40,12 @@ class Mobility:
     locks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class _Edge:
-    """What holds two blocks together.
+class _Edge(NamedTuple):
+    """What holds two blocks together."""
 
-    Attributes:
-        first: id of the base.
-        second: id of the block that sits on it, or of a connector's other end.
-        by: what is named as holding them; "" for an ordinary attachment.
-    """
-
-    first: str
-    second: str
-    by: str = ""
+    first: str  # id of the base
+    second: str  # id of the block that sits on it, or of a connector's other end
+    by: str = ""  # what is named as holding them; "" for an ordinary attachment
 
 
 def mobility(state: MachineState) -> Mobility:
@@ -87,7 +82,7 @@ def _edges(state: MachineState) -> tuple[list[_Edge], list[_Edge]]:
         if joint.holds and part.module.rope_mount is None and not part.module.is_loose:
             (joints if _moves(part) else rigid).append(_Edge(joint.base, joint.part))
     rigid += [
-        _Edge(link.start[0], link.end[0], link.id)
+        _Edge(*link.ends, link.id)
         for link in state.connectors.values()
         if link.module.link == "rigid"
     ]
@@ -197,14 +192,14 @@ def _labels(blocks: Iterable[str], edges: Iterable[_Edge]) -> dict[str, str]:
 
 def _holding(rigid: Sequence[_Edge], joint: _Edge) -> tuple[str, ...]:
     """What is named on the shortest rigid way from one side of a joint to the other."""
-    neighbours: dict[str, list[tuple[str, str]]] = {}
-    for edge in rigid:
-        neighbours.setdefault(edge.first, []).append((edge.second, edge.by))
-        neighbours.setdefault(edge.second, []).append((edge.first, edge.by))
+    neighbours = defaultdict[str, list[tuple[str, str]]](list)
+    for first, second, by in rigid:
+        neighbours[first].append((second, by))
+        neighbours[second].append((first, by))
     came: dict[str, tuple[str, str]] = {joint.first: ("", "")}
     waiting = [joint.first]
     for current in waiting:
-        for other, by in neighbours.get(current, ()):
+        for other, by in neighbours[current]:
             if other not in came:
                 came[other] = (current, by)
                 waiting.append(other)
@@ -219,7 +214,10 @@ def _closed_loops(
     state: MachineState, label: Mapping[str, str], free: Sequence[_Edge]
 ) -> dict[str, tuple[str, ...]]:
     """The joints of loops that cannot move, with the others of their loop."""
-    up = _trees(_masses(state, label), label, free)
+    mass = dict.fromkeys(label.values(), 0.0)
+    for block in state.blocks.values():
+        mass[label[block.id]] += block.module.mass
+    up = _trees(mass, label, free)
     tree = {edge for _, edge in up.values()}
     locked: dict[str, tuple[str, ...]] = {}
     for edge in free:
@@ -232,14 +230,6 @@ def _closed_loops(
         for block in loop:
             locked.setdefault(block, tuple(other for other in loop if other != block))
     return locked
-
-
-def _masses(state: MachineState, label: Mapping[str, str]) -> dict[str, float]:
-    """The mass of each rigid body."""
-    mass: dict[str, float] = {}
-    for block in state.blocks.values():
-        mass[label[block.id]] = mass.get(label[block.id], 0.0) + block.module.mass
-    return mass
 
 
 def _trees(
@@ -264,20 +254,20 @@ def _trees(
 
 def _path(up: Mapping[str, tuple[str, _Edge]], a: str, b: str) -> list[_Edge]:
     """The joints of the tree between two bodies."""
-    ways = [list(_upwards(up, body)) for body in (a, b)]
-    met = {body for body, _ in ways[1]}
-    meeting = next(body for body, _ in ways[0] if body in met)
-    steps = (takewhile(lambda step: step[0] != meeting, way) for way in ways)
-    return [edge for way in steps for _, edge in way if edge is not None]
+    ways = [_upwards(up, body) for body in (a, b)]
+    # From the root on, the two ways are one until they part.
+    while ways[0] and ways[1] and ways[0][-1] is ways[1][-1]:
+        del ways[0][-1], ways[1][-1]
+    return [*ways[0], *ways[1]]
 
 
-def _upwards(up: Mapping[str, tuple[str, _Edge]], body: str) -> Iterator[tuple[str, _Edge | None]]:
-    """A body and those above it, each with the joint that it hangs by."""
+def _upwards(up: Mapping[str, tuple[str, _Edge]], body: str) -> list[_Edge]:
+    """The joints by which a body and those above it hang."""
+    way = []
     while body in up:
-        above, edge = up[body]
-        yield body, edge
-        body = above
-    yield body, None
+        body, edge = up[body]
+        way.append(edge)
+    return way
 
 
 def _collinear(state: MachineState, edge: _Edge, other: _Edge) -> bool:

@@ -11,8 +11,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from buildarena_geometry.blocks import Block, Connector, FaceRef, Joint, KeyPress
 from buildarena_geometry.modules.module import Catalogue
+from buildarena_geometry.modules.solids import Ball, Box, Solid
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Form
 from buildarena_geometry.rotations import Vector, distance, subtract
@@ -95,6 +99,36 @@ class MachineState:
         """Besiege's price of all blocks and connectors."""
         return sum(part.module.cost for part in self.parts)
 
+    @property
+    def center_of_mass(self) -> NDArray[np.float64]:
+        """(3,) world frame, units; blocks count at their centers, connectors at their middles.
+
+        Raises:
+            ValueError: the machine is empty.
+        """
+        if not self.started:
+            raise ValueError("an empty machine has no center of mass")
+        points = [block.center for block in self.blocks.values()]
+        points += [(link.start_point + link.end_point) / 2 for link in self.connectors.values()]
+        masses = [part.module.mass for part in self.parts]
+        center: NDArray[np.float64] = np.average(np.array(points), axis=0, weights=masses)
+        return center
+
+    @property
+    def bounds(self) -> NDArray[np.float64]:
+        """(2, 3) smallest and largest coordinates of the blocks' bodies, world frame, units.
+
+        Raises:
+            ValueError: the machine is empty.
+        """
+        if not self.started:
+            raise ValueError("an empty machine has no bounds")
+        blocks = self.blocks.values()
+        extents = np.array(
+            [_extent(block, solid) for block in blocks for solid in block.module.body]
+        )
+        return np.array([extents[:, 0].min(axis=0), extents[:, 1].max(axis=0)])
+
     def is_occupied(self, block: Block, label: str) -> bool:
         """Whether a face of the block is in use by an attachment, its own or another block's."""
         if (block.id, label) in self.occupants:
@@ -145,7 +179,7 @@ class MachineState:
             return ()
         neighbours: dict[str, list[str]] = {block: [] for block in self.blocks}
         held = [(joint.base, joint.part) for joint in joints if joint.holds]
-        tied = [(link.start[0], link.end[0]) for link in self.connectors.values()]
+        tied = [link.ends for link in self.connectors.values()]
         for left, right in (*held, *tied):
             neighbours[left].append(right)
             neighbours[right].append(left)
@@ -169,8 +203,7 @@ class MachineState:
 
     def powered(self) -> tuple[Block | Connector, ...]:
         """The blocks, then the connectors, that take keys."""
-        parts: tuple[Block | Connector, ...] = (*self.blocks.values(), *self.connectors.values())
-        return tuple(part for part in parts if part.module.actions)
+        return tuple(part for part in self.parts if part.module.actions)
 
     def with_blocks(self, *changed: Block) -> MachineState:
         """The state in which these blocks are new or different, and connectors on them follow."""
@@ -189,9 +222,7 @@ def follow(
         blocks: after the move.
         moved: ids of the blocks that moved.
     """
-    touched = [
-        link for link in connectors.values() if link.start[0] in moved or link.end[0] in moved
-    ]
+    touched = [link for link in connectors.values() if not moved.isdisjoint(link.ends)]
     if not touched:
         return connectors
     followed = dict(connectors)
@@ -219,3 +250,19 @@ def span_in(world_from_connector: Pose, link: Connector) -> Vector:
     """From a connector's start to its end, in the given frame, units."""
     across = subtract(link.end_xyz, link.start_xyz)
     return world_from_connector.inverse().direction(across)
+
+
+def _extent(block: Block, solid: Solid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Smallest and largest coordinates of one solid, world frame."""
+    rotation = block.world_from_block.rotation
+    if isinstance(solid, Box):
+        middle = block.world_from_block.apply(solid.center)
+        reach = np.abs(rotation) @ (np.array(solid.size) / 2)
+        return middle - reach, middle + reach
+    if isinstance(solid, Ball):
+        middle = block.world_from_block.apply(solid.center)
+        return middle - solid.radius, middle + solid.radius
+    ends = block.world_from_block.apply([solid.base, solid.top])
+    axis = (ends[1] - ends[0]) / solid.length
+    reach = solid.radius * np.sqrt(np.clip(1 - axis**2, 0, None))
+    return ends.min(axis=0) - reach, ends.max(axis=0) + reach

@@ -59,9 +59,7 @@ def without(state: MachineState, gone: list[Block]) -> tuple[MachineState, tuple
                 blocks[child.id] = replace(child, mount=None, lost_mount=child.mount)
         for face in block.module.faces:
             occupants.pop((block.id, face.label), None)
-    links = tuple(
-        link.id for link in state.connectors.values() if link.start[0] in ids or link.end[0] in ids
-    )
+    links = tuple(link.id for link in state.connectors.values() if not ids.isdisjoint(link.ends))
     connectors = {key: link for key, link in state.connectors.items() if key not in links}
     return replace(state, blocks=blocks, occupants=occupants, connectors=connectors), links
 

@@ -114,8 +114,7 @@ def read_machine(
     except MisfitError as misfit:
         raise DocumentError(f"{where}{misfit}") from None
     if catalogue is None:
-        used = _used(state.blocks, state.connectors, available, entries.log)
-        state = replace(state, catalogue=smallest_set(used))
+        state = replace(state, catalogue=smallest_set(_used(state, entries.log)))
     return LoggedState(state=state, records=entries.log, available=available)
 
 
@@ -124,7 +123,10 @@ def _state(
 ) -> MachineState:
     if document.version != DOCUMENT_VERSION:
         refuse("version", f"version {DOCUMENT_VERSION}", document.version)
-    _check_controller(document)
+    try:
+        check_controller(document.controller or "")
+    except ValueError as error:
+        raise MisfitError(f".controller: {error}") from None
     blocks = _read_blocks(document.blocks, catalogue)
     structures = {structure.letter: structure for structure in document.structures}
     for index, structure in enumerate(document.structures):
@@ -150,24 +152,10 @@ def _state(
     )
 
 
-def _check_controller(document: _Document) -> None:
-    try:
-        check_controller(document.controller or "")
-    except ValueError as error:
-        raise MisfitError(f".controller: {error}") from None
-
-
-def _used(
-    blocks: Mapping[str, Block],
-    connectors: Mapping[str, Connector],
-    available: Mapping[str, LoggedState],
-    records: Iterable[ActionRecord],
-) -> Iterator[str]:
+def _used(state: MachineState, records: Iterable[ActionRecord]) -> Iterator[str]:
     """The modules that a machine is made of, was made of, and may be assembled from."""
-    yield from (block.module.name for block in blocks.values())
-    yield from (link.module.name for link in connectors.values())
-    for machine in available.values():
-        yield from (part.module.name for part in machine.state.parts)
+    for machine in (state, *state.available.values()):
+        yield from (part.module.name for part in machine.parts)
     for record in records:
         if record.reason is None and isinstance(record.arguments, dict):
             yield from (module.name for module in modules_of_action(record.arguments))
@@ -202,16 +190,23 @@ def _block(entry: _BlockEntry, module: Module, place: str) -> Block:
     if entry.flipped and not module.spins:
         refuse(f"{place}.flipped", f"false: a {module.name} does not spin", entry.flipped)
     return Block(
-        id=entry.id,
-        module=module,
+        **_shared(entry, module, place),
         world_from_block=entry.pose,
         mount=entry.mount,
         lost_mount=entry.lost_mount,
         flipped=bool(entry.flipped),
-        bindings=_bindings(entry, module, place),
-        structure=entry.structure or "",
-        note=entry.note or "",
     )
+
+
+def _shared(entry: _Entry, module: Module, place: str) -> dict[str, Any]:
+    """The fields that blocks and connectors share."""
+    return {
+        "id": entry.id,
+        "module": module,
+        "bindings": _bindings(entry, module, place),
+        "structure": entry.structure or "",
+        "note": entry.note or "",
+    }
 
 
 def _bindings(entry: _Entry, module: Module, place: str) -> dict[str, tuple[str, ...]]:
@@ -236,19 +231,14 @@ def _read_connectors(
         _check_choice(f"{place}.module", entry.module, catalogue.connectors)
         if entry.id in connectors or entry.id in blocks:
             raise MisfitError(f".{place}.id: a part {entry.id!r} exists already")
-        module = catalogue[entry.module]
         connectors[entry.id] = Connector(
-            id=entry.id,
-            module=module,
+            **_shared(entry, catalogue[entry.module], place),
             start=start,
             end=end,
             start_xyz=blocks[start[0]].face_center(start[1]),
             end_xyz=blocks[end[0]].face_center(end[1]),
             world_from_connector=entry.pose,
             span=entry.span,
-            bindings=_bindings(entry, module, place),
-            structure=entry.structure or "",
-            note=entry.note or "",
         )
     return connectors
 

@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_geometry.blocks import Connector
 from buildarena_geometry.export.meshes import COLOURS, CONNECTOR_RADIUS, normal, polygons
 from buildarena_geometry.machine import Machine
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.solids import Cylinder, Solid
 from buildarena_geometry.poses import Pose
-from buildarena_geometry.rotations import ORIGIN
+from buildarena_geometry.rotations import ORIGIN, Vector
 
 _MAGIC, _VERSION = 0x46546C67, 2
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _FLOAT, _VERTEX_BUFFER = 5126, 34962
+_LISTS = ("meshes", "materials", "accessors", "bufferViews")
 _Y_UP_FROM_Z_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  # glTF's y points up; quaternion (x, y, z, w)
 
 
@@ -37,18 +37,17 @@ def machine_glb(machine: Machine) -> bytes:
     for block in machine.blocks.values():
         scene.add_node(block.id, scene.module_mesh(block.module), block.world_from_block)
     for link in machine.connectors.values():
-        scene.add_node(link.id, scene.add_mesh(link.module, [_rod(link)]), Pose())
+        scene.add_node(
+            link.id, scene.add_mesh(link.module, [_rod(link.start_xyz, link.end_xyz)]), Pose()
+        )
     return scene.packed()
 
 
 def module_glb(module: Module) -> bytes:
     """A module as a GLB file, its root point at the origin; a connector as a rod of length 1."""
     scene = _Scene()
-    if module.body:
-        scene.add_node(module.name, scene.module_mesh(module), Pose())
-    else:
-        rod = Cylinder(radius=CONNECTOR_RADIUS, base=ORIGIN, top=(0.0, 0.0, 1.0))
-        scene.add_node(module.name, scene.add_mesh(module, [rod]), Pose())
+    solids = module.body or (_rod(ORIGIN, (0.0, 0.0, 1.0)),)
+    scene.add_node(module.name, scene.add_mesh(module, solids), Pose())
     return scene.packed()
 
 
@@ -65,17 +64,13 @@ class _Scene:
             "scene": 0,
             "scenes": [{"nodes": [0]}],
             "nodes": [root],
-            "meshes": [],
-            "materials": [],
-            "accessors": [],
-            "bufferViews": [],
+            **{kind: [] for kind in _LISTS},
         }
 
     def add_node(self, name: str, mesh: int, pose: Pose) -> None:
         w, x, y, z = pose.wxyz
         node = {"name": name, "mesh": mesh, "translation": list(pose.xyz), "rotation": [x, y, z, w]}
-        self._json["nodes"][0]["children"].append(len(self._json["nodes"]))
-        self._json["nodes"].append(node)
+        self._json["nodes"][0]["children"].append(self._add("nodes", node))
 
     def module_mesh(self, module: Module) -> int:
         """The index of a module's mesh, which all its blocks share."""
@@ -87,19 +82,16 @@ class _Scene:
         """Adds solids in a module's colour, and returns their mesh's index."""
         corners = _triangles(solids)
         normals = np.repeat([normal(triangle) for triangle in corners.reshape(-1, 3, 3)], 3, axis=0)
-        primitive = {
-            "attributes": {"POSITION": self._accessor(corners), "NORMAL": self._accessor(normals)},
-            "material": self._material(module),
-        }
-        self._json["meshes"].append({"name": module.name, "primitives": [primitive]})
-        return len(self._json["meshes"]) - 1
+        attributes = {"POSITION": self._accessor(corners), "NORMAL": self._accessor(normals)}
+        primitive = {"attributes": attributes, "material": self._material(module)}
+        return self._add("meshes", {"name": module.name, "primitives": [primitive]})
 
     def packed(self) -> bytes:
         """The file: a header, a JSON chunk and a binary chunk, each padded to four bytes."""
         self._json["buffers"] = [{"byteLength": len(self._binary)}]
         if not self._json["meshes"]:
             # The specification forbids empty lists and buffers.
-            for name in ("meshes", "materials", "accessors", "bufferViews", "buffers"):
+            for name in (*_LISTS, "buffers"):
                 del self._json[name]
             del self._json["nodes"][0]["children"]
         text = json.dumps(self._json, separators=(",", ":")).encode()
@@ -109,38 +101,34 @@ class _Scene:
             chunks += struct.pack("<II", len(self._binary), _BINARY_CHUNK) + bytes(self._binary)
         return struct.pack("<III", _MAGIC, _VERSION, 12 + len(chunks)) + chunks
 
+    def _add(self, kind: str, entry: dict[str, Any]) -> int:
+        """Adds an entry to one of the document's lists, and returns its index there."""
+        self._json[kind].append(entry)
+        return len(self._json[kind]) - 1
+
     def _accessor(self, vectors: NDArray[np.float64]) -> int:
         data = vectors.astype("<f4")
-        view = {
-            "buffer": 0,
-            "byteOffset": len(self._binary),
-            "byteLength": data.nbytes,
-            "target": _VERTEX_BUFFER,
-        }
+        place = {"byteOffset": len(self._binary), "byteLength": data.nbytes}
         self._binary += data.tobytes()
-        self._json["bufferViews"].append(view)
+        view = self._add("bufferViews", {"buffer": 0, **place, "target": _VERTEX_BUFFER})
         accessor = {
-            "bufferView": len(self._json["bufferViews"]) - 1,
+            "bufferView": view,
             "componentType": _FLOAT,
             "count": len(data),
             "type": "VEC3",
             "min": data.min(axis=0).tolist(),
             "max": data.max(axis=0).tolist(),
         }
-        self._json["accessors"].append(accessor)
-        return len(self._json["accessors"]) - 1
+        return self._add("accessors", accessor)
 
     def _material(self, module: Module) -> int:
-        if module.kind not in self._materials:
-            surface = {
-                "baseColorFactor": [*COLOURS[module.kind], 1.0],
-                "metallicFactor": 0.0,
-                "roughnessFactor": 0.8,
-            }
-            material = {"name": module.kind, "pbrMetallicRoughness": surface}
-            self._json["materials"].append(material)
-            self._materials[module.kind] = len(self._json["materials"]) - 1
-        return self._materials[module.kind]
+        kind = module.kind
+        if kind not in self._materials:
+            colour = [*COLOURS[kind], 1.0]
+            surface = {"baseColorFactor": colour, "metallicFactor": 0.0, "roughnessFactor": 0.8}
+            material = {"name": kind, "pbrMetallicRoughness": surface}
+            self._materials[kind] = self._add("materials", material)
+        return self._materials[kind]
 
 
 def _triangles(solids: Iterable[Solid]) -> NDArray[np.float64]:
@@ -154,6 +142,6 @@ def _triangles(solids: Iterable[Solid]) -> NDArray[np.float64]:
     return np.concatenate(fans)
 
 
-def _rod(link: Connector) -> Cylinder:
-    """A connector as a thin rod from end to end, world frame."""
-    return Cylinder(radius=CONNECTOR_RADIUS, base=link.start_xyz, top=link.end_xyz)
+def _rod(start: Vector, end: Vector) -> Cylinder:
+    """A connector as a thin rod from end to end."""
+    return Cylinder(radius=CONNECTOR_RADIUS, base=start, top=end)

@@ -102,13 +102,8 @@ class _Drawing:
     def __init__(self, view: View) -> None:
         azimuth, elevation = math.radians(view.azimuth_deg), math.radians(view.elevation_deg)
         right = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
-        self._towards_eye = np.array(
-            [
-                math.sin(azimuth) * math.cos(elevation),
-                -math.cos(azimuth) * math.cos(elevation),
-                math.sin(elevation),
-            ]
-        )
+        level = np.array([math.sin(azimuth), -math.cos(azimuth), 0.0]) * math.cos(elevation)
+        self._towards_eye = level + np.array([0.0, 0.0, math.sin(elevation)])
         self._axes = np.array([right, np.cross(self._towards_eye, right)])
         self._view = view
         self._shapes: list[tuple[float, str]] = []

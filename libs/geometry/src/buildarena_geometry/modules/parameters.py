@@ -14,7 +14,7 @@ from typing import Annotated, Any, TypeGuard
 
 from buildarena_geometry.json_values import LARGEST_INTEGER, check_controller, is_storable
 from buildarena_geometry.keys import KEYS
-from buildarena_geometry.outcomes import AttemptedBlock, Cause
+from buildarena_geometry.outcomes import AttemptedBlock, Cause, Refused
 from buildarena_geometry.rotations import Vector
 
 LARGEST_NUMBER = (
@@ -27,7 +27,7 @@ JsonSchema = dict[str, Any]
 
 
 class RefusalError(Exception):
-    """Stops an action from inside; the dispatcher turns it into a `Refused`."""
+    """Stops an action from inside; the dispatcher returns its outcome."""
 
     def __init__(
         self,
@@ -38,10 +38,7 @@ class RefusalError(Exception):
     ) -> None:
         """Takes what was wrong and what a model shall read about it; see `Refused`."""
         super().__init__(text)
-        self.cause = cause
-        self.text = text
-        self.overlaps = overlaps
-        self.attempted = attempted
+        self.outcome = Refused(cause=cause, text=text, overlaps=overlaps, attempted=attempted)
 
 
 @dataclass(frozen=True, slots=True)
