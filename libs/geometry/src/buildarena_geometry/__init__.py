@@ -5,82 +5,44 @@ from buildarena_geometry import kernels as kernels  # before numpy
 # isort: split
 from importlib.metadata import version
 
-from buildarena_geometry.blocks import Block, Connector, Joint, KeyPress
-from buildarena_geometry.documents.write import DOCUMENT_VERSION
-from buildarena_geometry.errors import CatalogueError, DocumentError, GeometryError, SequenceError
-from buildarena_geometry.feedback import FEEDBACK_VERSION
-from buildarena_geometry.keys import KEYS
-from buildarena_geometry.machine import Machine, replay
-from buildarena_geometry.modules.catalogue import load_catalogue
-from buildarena_geometry.modules.module import Catalogue, Module
-from buildarena_geometry.modules.sets import (
-    MODULE_SETS,
-    catalogue_of,
-    module_set,
-    modules_named,
-    simulated_modules,
-)
-from buildarena_geometry.modules.solids import Ball, Box, Cylinder
-from buildarena_geometry.outcomes import (
-    Accepted,
-    AttemptedBlock,
-    Cause,
-    Outcome,
-    RefusalClass,
-    Refused,
-)
-from buildarena_geometry.poses import Pose
-from buildarena_geometry.steps import Difference, step
-from buildarena_geometry.tools import (
-    GROUPS,
-    LOOKUP,
-    PROGRAM,
-    ToolDefinition,
-    object_schema,
-    tool_definitions,
-)
+from buildarena_geometry.blocks import Block as Block
+from buildarena_geometry.blocks import Connector as Connector
+from buildarena_geometry.blocks import Joint as Joint
+from buildarena_geometry.blocks import KeyPress as KeyPress
+from buildarena_geometry.documents.write import DOCUMENT_VERSION as DOCUMENT_VERSION
+from buildarena_geometry.errors import CatalogueError as CatalogueError
+from buildarena_geometry.errors import DocumentError as DocumentError
+from buildarena_geometry.errors import GeometryError as GeometryError
+from buildarena_geometry.errors import SequenceError as SequenceError
+from buildarena_geometry.feedback import FEEDBACK_VERSION as FEEDBACK_VERSION
+from buildarena_geometry.keys import KEYS as KEYS
+from buildarena_geometry.machine import Machine as Machine
+from buildarena_geometry.machine import replay as replay
+from buildarena_geometry.modules.catalogue import load_catalogue as load_catalogue
+from buildarena_geometry.modules.module import Catalogue as Catalogue
+from buildarena_geometry.modules.module import Module as Module
+from buildarena_geometry.modules.parameters import object_schema as object_schema
+from buildarena_geometry.modules.sets import MODULE_SETS as MODULE_SETS
+from buildarena_geometry.modules.sets import catalogue_of as catalogue_of
+from buildarena_geometry.modules.sets import module_set as module_set
+from buildarena_geometry.modules.sets import modules_named as modules_named
+from buildarena_geometry.modules.sets import simulated_modules as simulated_modules
+from buildarena_geometry.modules.solids import Ball as Ball
+from buildarena_geometry.modules.solids import Box as Box
+from buildarena_geometry.modules.solids import Cylinder as Cylinder
+from buildarena_geometry.outcomes import Accepted as Accepted
+from buildarena_geometry.outcomes import AttemptedBlock as AttemptedBlock
+from buildarena_geometry.outcomes import Cause as Cause
+from buildarena_geometry.outcomes import Outcome as Outcome
+from buildarena_geometry.outcomes import RefusalClass as RefusalClass
+from buildarena_geometry.outcomes import Refused as Refused
+from buildarena_geometry.poses import Pose as Pose
+from buildarena_geometry.steps import Difference as Difference
+from buildarena_geometry.steps import step as step
+from buildarena_geometry.tools import GROUPS as GROUPS
+from buildarena_geometry.tools import LOOKUP as LOOKUP
+from buildarena_geometry.tools import PROGRAM as PROGRAM
+from buildarena_geometry.tools import ToolDefinition as ToolDefinition
+from buildarena_geometry.tools import tool_definitions as tool_definitions
 
 __version__ = version("buildarena-geometry")
-
-__all__ = [
-    "DOCUMENT_VERSION",
-    "FEEDBACK_VERSION",
-    "GROUPS",
-    "KEYS",
-    "LOOKUP",
-    "MODULE_SETS",
-    "PROGRAM",
-    "Accepted",
-    "AttemptedBlock",
-    "Ball",
-    "Block",
-    "Box",
-    "Catalogue",
-    "CatalogueError",
-    "Cause",
-    "Connector",
-    "Cylinder",
-    "Difference",
-    "DocumentError",
-    "GeometryError",
-    "Joint",
-    "KeyPress",
-    "Machine",
-    "Module",
-    "Outcome",
-    "Pose",
-    "RefusalClass",
-    "Refused",
-    "SequenceError",
-    "ToolDefinition",
-    "__version__",
-    "catalogue_of",
-    "load_catalogue",
-    "module_set",
-    "modules_named",
-    "object_schema",
-    "replay",
-    "simulated_modules",
-    "step",
-    "tool_definitions",
-]

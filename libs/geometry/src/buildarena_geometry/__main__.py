@@ -27,19 +27,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     replay = commands.add_parser("replay", help="builds machines from action sequences")
     replay.add_argument("file", help="JSON, plain or gzip; - reads standard input")
     replay.add_argument("--states", choices=("all", "last"), default="all")
-    replay.add_argument(
-        "--dialect",
-        choices=tuple(dialects()),
-        default="1.0",
-        help="the interface whose names and labels the sequences use",
-    )
+    about = "the interface whose names and labels the sequences use"
+    replay.add_argument("--dialect", choices=tuple(dialects()), default="1.0", help=about)
     options = parser.parse_args(arguments)
     try:
         content = parse(_read(options.file))
-        speaking = dialect(options.dialect)
-        for result in run_sequences(
-            content, every_state=options.states == "all", speaking=speaking
-        ):
+        speaking, every_state = dialect(options.dialect), options.states == "all"
+        for result in run_sequences(content, every_state=every_state, speaking=speaking):
             print(json.dumps(result, allow_nan=False))  # noqa: T201  the command's output
     except (GeometryError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)  # noqa: T201  the command's message

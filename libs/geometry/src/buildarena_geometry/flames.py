@@ -49,11 +49,11 @@ def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
     bodies = [(cannon.id, cannon, sphere) for cannon in cannons for sphere in _body(cannon)]
     fires = [(torch.id, torch, flame) for torch in torches for flame in torch.module.flames]
     touching = flames_touch(*_spheres(bodies), *_spheres(fires))
-    heated: dict[str, dict[str, None]] = {cannon.id: {} for cannon in cannons}
-    for row, column in np.argwhere(touching):
-        heated[bodies[row][0]][fires[column][0]] = None
-    order = {torch.id: place for place, torch in enumerate(torches)}
-    return {cannon: tuple(sorted(by, key=order.__getitem__)) for cannon, by in heated.items()}
+    pairs = {(bodies[row][0], fires[column][0]) for row, column in np.argwhere(touching)}
+    return {
+        cannon.id: tuple(torch.id for torch in torches if (cannon.id, torch.id) in pairs)
+        for cannon in cannons
+    }
 
 
 def heatable(block: Block) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 LARGEST_INTEGER = 2**63 - 1  # databases and other languages read no larger one back
 MAX_CONTROLLER_BYTES = 64 * 1024
@@ -83,9 +84,7 @@ def _number(number: bool | float | None) -> object:
     return number
 
 
-def _container(
-    value: Mapping[object, object] | list[object] | tuple[object, ...], depth: int, longest: int
-) -> object:
+def _container(value: Any, depth: int, longest: int) -> object:
     if not isinstance(value, Mapping):
         return [json_value(entry, depth=depth, longest=longest) for entry in value]
     entries: dict[str, object] = {}

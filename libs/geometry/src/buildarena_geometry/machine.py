@@ -266,10 +266,8 @@ class Machine:
     def _propose(self, name: object, arguments: object) -> Change:
         action = action_named(name) if isinstance(name, str) else None
         if action is None:
-            raise RefusalError(
-                Cause.UNKNOWN_ACTION,
-                f"There is no action {shown(name)}. Actions: {listing(_OFFERED)}.",
-            )
+            text = f"There is no action {shown(name)}. Actions: {listing(_OFFERED)}."
+            raise RefusalError(Cause.UNKNOWN_ACTION, text)
         return action.propose(self._state, **action.read(arguments))
 
     def _carry_out(self, change: Change) -> Accepted:

@@ -45,16 +45,15 @@ def machine_of(content: object, *, where: str, version: str | None = None) -> Ma
         except _ActionRefusedError as refused:
             refusals.append((refused.accepted, name, refused))
     _, name, furthest = max(refusals, key=lambda refusal: refusal[0])
-    raise DocumentError(
-        f"{furthest}; read as dialect {name}, of {', '.join(dialects())}"
-    ) from furthest
+    read_as = f"read as dialect {name}, of {', '.join(dialects())}"
+    raise DocumentError(f"{furthest}; {read_as}") from furthest
 
 
 def machine_bytes(machine: Machine) -> bytes:
     """A machine's document in one spelling, so that equal ones share a hash: UTF-8 JSON."""
-    return json.dumps(
-        machine.to_document(), ensure_ascii=False, sort_keys=True, separators=(",", ":")
-    ).encode()
+    document = machine.to_document()
+    text = json.dumps(document, ensure_ascii=False, sort_keys=True, separators=(",", ":"))
+    return text.encode()
 
 
 class _ActionRefusedError(DocumentError):
@@ -90,8 +89,6 @@ def _built(
             arguments = speaking.ours(arguments, machine)
         outcome = machine.act(name, arguments)
         if not outcome.ok:
-            raise _ActionRefusedError(
-                f"{where}: action {number}, {name}, is refused: {outcome.text}",
-                accepted + number - 1,
-            )
+            problem = f"{where}: action {number}, {name}, is refused: {outcome.text}"
+            raise _ActionRefusedError(problem, accepted + number - 1)
     return machine

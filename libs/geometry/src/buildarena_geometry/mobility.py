@@ -215,8 +215,8 @@ def _closed_loops(
 ) -> dict[str, tuple[str, ...]]:
     """The joints of loops that cannot move, with the others of their loop."""
     mass = dict.fromkeys(label.values(), 0.0)
-    for block in state.blocks.values():
-        mass[label[block.id]] += block.module.mass
+    for part in state.blocks.values():
+        mass[label[part.id]] += part.module.mass
     up = _trees(mass, label, free)
     tree = {edge for _, edge in up.values()}
     locked: dict[str, tuple[str, ...]] = {}

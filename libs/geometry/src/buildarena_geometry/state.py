@@ -205,6 +205,10 @@ class MachineState:
         """The blocks, then the connectors, that take keys."""
         return tuple(part for part in self.parts if part.module.actions)
 
+    def with_connector(self, link: Connector) -> MachineState:
+        """The state in which this connector is new or different."""
+        return replace(self, connectors={**self.connectors, link.id: link})
+
     def with_blocks(self, *changed: Block) -> MachineState:
         """The state in which these blocks are new or different, and connectors on them follow."""
         blocks = {**self.blocks, **{block.id: block for block in changed}}
@@ -243,13 +247,13 @@ def moved_connector(link: Connector, motion: Pose) -> Connector:
         motion: the motion, world frame.
     """
     pose = motion @ link.world_from_connector
-    return replace(link, world_from_connector=pose, span=span_in(pose, link))
+    span = span_in(pose, link.start_xyz, link.end_xyz)
+    return replace(link, world_from_connector=pose, span=span)
 
 
-def span_in(world_from_connector: Pose, link: Connector) -> Vector:
-    """From a connector's start to its end, in the given frame, units."""
-    across = subtract(link.end_xyz, link.start_xyz)
-    return world_from_connector.inverse().direction(across)
+def span_in(world_from_connector: Pose, start: Vector, end: Vector) -> Vector:
+    """From a connector's start to its end in the given frame, units; both are in the world's."""
+    return world_from_connector.inverse().direction(subtract(end, start))
 
 
 def _extent(block: Block, solid: Solid) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

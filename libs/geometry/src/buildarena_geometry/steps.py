@@ -60,40 +60,27 @@ def _difference(before: MachineState, after: MachineState, changed: Sequence[str
         after: the state that it left.
         changed: ids that it named; connectors that only followed blocks are not among them.
     """
-    ids = dict.fromkeys(changed)
-    blocks = [(before.blocks.get(key), after.blocks[key]) for key in ids if key in after.blocks]
-    links = [] if before.connectors is after.connectors else _changed_links(before, after)
-    pressed = after.control_sequence
+    ids, pressed = dict.fromkeys(changed), after.control_sequence
+    old = {part.id: part for part in before.parts}
+    new = {part.id: part for part in after.parts}
+    # Connectors may have followed blocks without being named.
+    touched = [key for key in ids if key in after.blocks]
+    touched += [key for key, link in after.connectors.items() if link is not old.get(key)]
+    pairs = [(old.get(key), new[key]) for key in touched]
     return Difference(
-        added=(
-            *(now for was, now in blocks if was is None),
-            *(now for was, now in links if was is None),
-        ),
-        moved=(
-            *(now for was, now in blocks if was and was.world_from_block != now.world_from_block),
-            *(now for was, now in links if was and _place(was) != _place(now)),
-        ),
-        rebound=(
-            *(now for was, now in blocks if was and _use(was) != _use(now)),
-            *(now for was, now in links if was and was.bindings != now.bindings),
-        ),
-        removed=tuple(
-            key for key in ids if key not in after.blocks and key not in after.connectors
-        ),
+        added=tuple(now for was, now in pairs if was is None),
+        moved=tuple(now for was, now in pairs if was and _place(was) != _place(now)),
+        rebound=tuple(now for was, now in pairs if was and _use(was) != _use(now)),
+        removed=tuple(key for key in ids if key not in new),
         control_sequence=None if before.control_sequence == pressed else pressed,
     )
 
 
-def _changed_links(
-    before: MachineState, after: MachineState
-) -> list[tuple[Connector | None, Connector]]:
-    pairs = ((before.connectors.get(key), now) for key, now in after.connectors.items())
-    return [(was, now) for was, now in pairs if was is not now]
+def _place(part: Block | Connector) -> tuple[object, ...]:
+    if isinstance(part, Connector):
+        return (part.start_xyz, part.end_xyz, part.world_from_connector)
+    return (part.world_from_block,)
 
 
-def _place(link: Connector) -> tuple[object, ...]:
-    return (link.start_xyz, link.end_xyz, link.world_from_connector)
-
-
-def _use(block: Block) -> tuple[object, ...]:
-    return (block.bindings, block.flipped)
+def _use(part: Block | Connector) -> tuple[object, ...]:
+    return (part.bindings, isinstance(part, Block) and part.flipped)

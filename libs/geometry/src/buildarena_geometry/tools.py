@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 from buildarena_geometry.actions import (
     assemble,
@@ -25,8 +25,13 @@ from buildarena_geometry.actions import (
 from buildarena_geometry.changes import Change
 from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.names import CaselessNames
-from buildarena_geometry.modules.parameters import JsonSchema, Parameter, RefusalError, shown
-from buildarena_geometry.outcomes import Cause
+from buildarena_geometry.modules.parameters import (
+    JsonSchema,
+    Parameter,
+    malformed,
+    object_schema,
+    shown,
+)
 
 GROUPS = ("build", "refine", "assemble", "control", "query")
 """What every builder has."""
@@ -84,26 +89,19 @@ class Action:
         Raises:
             RefusalError: they are not an object, one is missing or unknown, or one has a bad value.
         """
-        name = self.definition.name
-        if arguments is None:
-            arguments = {}
-        if not isinstance(arguments, Mapping):
-            raise RefusalError(
-                Cause.MALFORMED_ARGUMENTS,
-                f"{name} takes an object of arguments, not {shown(arguments)}.",
-            )
+        name, given = self.definition.name, {} if arguments is None else arguments
+        if not isinstance(given, Mapping):
+            raise malformed(f"{name} takes an object of arguments, not {shown(given)}.")
         takes = f"{name} takes: {listing(self.readers)}."
-        for argument in arguments:
+        for argument in given:
             if not isinstance(argument, str) or argument not in self.readers:
-                raise RefusalError(
-                    Cause.MALFORMED_ARGUMENTS, f"There is no argument {shown(argument)}. {takes}"
-                )
-        missing = [argument for argument in self.required if argument not in arguments]
+                raise malformed(f"There is no argument {shown(argument)}. {takes}")
+        missing = [argument for argument in self.required if argument not in given]
         if missing:
-            raise RefusalError(Cause.MALFORMED_ARGUMENTS, f"Missing: {listing(missing)}. {takes}")
+            raise malformed(f"Missing: {listing(missing)}. {takes}")
         return {
             argument: self.readers[argument].read(argument, value)
-            for argument, value in arguments.items()
+            for argument, value in given.items()
             if value is not None or argument in self.required
         }
 
@@ -125,22 +123,8 @@ def tool_definitions(groups: Iterable[str] = GROUPS) -> tuple[ToolDefinition, ..
         if group not in ALL_GROUPS:
             known = ", ".join(ALL_GROUPS)
             raise ValueError(f"there is no group {group!r}; the groups are {known}")
-    return tuple(
-        action.definition
-        for group in wanted
-        for action in ACTIONS.values()
-        if action.definition.group == group
-    )
-
-
-def object_schema(properties: Mapping[str, Any], required: Iterable[str] = ()) -> JsonSchema:
-    """The JSON schema of an object with these properties and no others."""
-    return {
-        "type": "object",
-        "properties": dict(properties),
-        "required": list(required),
-        "additionalProperties": False,
-    }
+    definitions = [action.definition for action in ACTIONS.values()]
+    return tuple(tool for group in wanted for tool in definitions if tool.group == group)
 
 
 def _action(propose: Callable[..., Change], group: str) -> Action:
@@ -162,12 +146,8 @@ def _action(propose: Callable[..., Change], group: str) -> Action:
 
 
 def _parameter(hint: object) -> Parameter:
-    if get_origin(hint) is not Annotated:
-        raise TypeError(
-            f"{hint} is not one of the annotations in buildarena_geometry.modules.parameters"
-        )
-    parameter = get_args(hint)[1]
-    assert isinstance(parameter, Parameter)  # noqa: S101  guards the developer who adds an action
+    """What an argument is annotated with; see `buildarena_geometry.modules.parameters`."""
+    (parameter,) = (note for note in get_args(hint) if isinstance(note, Parameter))
     return parameter
 
 

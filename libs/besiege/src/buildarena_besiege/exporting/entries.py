@@ -55,7 +55,7 @@ def key_lists(module: Module, keys: Mapping[str, Sequence[str]]) -> list[Entry]:
 
 def connector_entries(machine: Machine, link: Connector) -> list[Entry]:
     """The four entries of a brace or winch: its ends as they are now, in its own frame."""
-    across = span_in(link.world_from_connector, link)
+    across = span_in(link.world_from_connector, link.start_xyz, link.end_xyz)
     return [
         ("Vector3", "start-position", (0.0, 0.0, 0.0)),
         ("Vector3", "end-position", besiege_offset(across)),

@@ -42,18 +42,13 @@ def add_machine(
     source = state.available.get(machine_id)
     if source is None or not source.started:
         problem = "is empty" if source is not None else "does not exist"
-        raise RefusalError(
-            Cause.NO_SUCH_MACHINE,
-            f"Machine {shown(machine_id)} {problem}. Machines: {named(state.available)}.",
-        )
+        text = f"Machine {shown(machine_id)} {problem}. Machines: {named(state.available)}."
+        raise RefusalError(Cause.NO_SUCH_MACHINE, text)
     letter = sub_structure_letter(state.structures_made)
     root = next(iter(source.blocks.values()))
     motion = turn_about(root.center_xyz, turned(init_rotation)).shifted(init_shift)
     blocks = [_copy_block(block, letter, motion) for block in source.blocks.values()]
-    structures = {
-        **state.structures,
-        letter: SubStructure(letter=letter, source=machine_id, root=f"{letter}_{root.id}"),
-    }
+    added = SubStructure(letter=letter, source=machine_id, root=f"{letter}_{root.id}")
     all_blocks = {**state.blocks, **{block.id: block for block in blocks}}
     links = [_copy_connector(link, letter, motion) for link in source.connectors.values()]
     connectors = {**state.connectors, **{link.id: link for link in links}}
@@ -62,7 +57,7 @@ def add_machine(
         blocks=all_blocks,
         connectors=follow(connectors, all_blocks, {block.id for block in blocks}),
         occupants={**state.occupants, **_copy_occupants(source, letter)},
-        structures=structures,
+        structures={**state.structures, letter: added},
         structures_made=state.structures_made + 1,
     )
     return Change(
@@ -109,9 +104,7 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
     removed = structure(state, machine_index)
     gone = state.members(removed.letter)
     remaining, links = without(state, gone)
-    others = {
-        letter: other for letter, other in state.structures.items() if letter != removed.letter
-    }
+    others = {key: other for key, other in state.structures.items() if key != removed.letter}
     after = replace(remaining, structures=others)
     return Change(
         after=after,
@@ -163,8 +156,8 @@ def _moved(
     return "\n".join([sentence, *lines, *words.losses(before, after)])
 
 
-def _renamed(face: FaceRef | None, letter: str) -> FaceRef | None:
-    return None if face is None else (f"{letter}_{face[0]}", face[1])
+def _renamed(face: FaceRef, letter: str) -> FaceRef:
+    return (f"{letter}_{face[0]}", face[1])
 
 
 def _copy_block(block: Block, letter: str, motion: Pose) -> Block:
@@ -172,8 +165,8 @@ def _copy_block(block: Block, letter: str, motion: Pose) -> Block:
         block,
         id=f"{letter}_{block.id}",
         world_from_block=motion @ block.world_from_block,
-        mount=_renamed(block.mount, letter),
-        lost_mount=_renamed(block.lost_mount, letter),
+        mount=block.mount and _renamed(block.mount, letter),
+        lost_mount=block.lost_mount and _renamed(block.lost_mount, letter),
         structure=letter,
     )
 
@@ -182,15 +175,13 @@ def _copy_connector(link: Connector, letter: str, motion: Pose) -> Connector:
     return replace(
         link,
         id=f"{letter}_{link.id}",
-        start=(f"{letter}_{link.start[0]}", link.start[1]),
-        end=(f"{letter}_{link.end[0]}", link.end[1]),
+        start=_renamed(link.start, letter),
+        end=_renamed(link.end, letter),
         world_from_connector=motion @ link.world_from_connector,
         structure=letter,
     )
 
 
 def _copy_occupants(source: MachineState, letter: str) -> dict[FaceRef, str]:
-    return {
-        (f"{letter}_{base}", label): f"{letter}_{child}"
-        for (base, label), child in source.occupants.items()
-    }
+    occupants = source.occupants.items()
+    return {_renamed(face, letter): f"{letter}_{child}" for face, child in occupants}

@@ -14,6 +14,7 @@ from buildarena_geometry.blocks import Block, Connector, seated
 from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import listing
+from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.parameters import BlockId, Name, Note, RefusalError, Triple, shown
 from buildarena_geometry.outcomes import Cause
 from buildarena_geometry.poses import Pose
@@ -39,18 +40,13 @@ def start(
         note: What this machine is, in your words.
     """
     if state.is_assembly:
-        raise RefusalError(
-            Cause.UNKNOWN_ACTION,
-            f"An assembly begins with add_machine. Machines: {listing(state.available)}.",
-        )
+        text = f"An assembly begins with add_machine. Machines: {listing(state.available)}."
+        raise RefusalError(Cause.UNKNOWN_ACTION, text)
     if state.started:
-        raise RefusalError(
-            Cause.ALREADY_STARTED, "The machine has its starting block, block 1; reset starts anew."
-        )
+        text = "The machine has its starting block, block 1; reset starts anew."
+        raise RefusalError(Cause.ALREADY_STARTED, text)
     pose = Pose(position=init_shift, quaternion=turned(init_rotation))
-    block = _new_block(
-        state, Block(id="", module=state.catalogue.start, world_from_block=pose), note
-    )
+    block = _new_block(state, state.catalogue.start, pose, note)
     after = replace(state, blocks={block.id: block}, next_id=state.next_id + 1)
     return Change(
         after=after, placed=(block.id,), render=lambda: f"Started. {words.placement(after, block)}"
@@ -73,21 +69,11 @@ def attach_block_to(
     base = part(state, base_block)
     if isinstance(base, Connector) or face not in base.module.face_of_label:
         free = words.free_faces(state, base) if isinstance(base, Block) else "none"
-        raise RefusalError(
-            Cause.NO_SUCH_FACE,
-            f"{words.heading(base)} has no face {shown(face)}. Its free faces: {free}.",
-        )
-    block = _new_block(
-        state,
-        Block(
-            id="",
-            module=module,
-            world_from_block=seated(base.world_from_face(face), module),
-            mount=(base.id, face),
-            structure=base.structure,
-        ),
-        note,
-    )
+        text = f"{words.heading(base)} has no face {shown(face)}. Its free faces: {free}."
+        raise RefusalError(Cause.NO_SUCH_FACE, text)
+    pose = seated(base.world_from_face(face), module)
+    block = _new_block(state, module, pose, note)
+    block = replace(block, mount=(base.id, face), structure=base.structure)
     if state.is_occupied(base, face):
         raise RefusalError(
             Cause.FACE_OCCUPIED,
@@ -132,9 +118,7 @@ def connect_blocks(
     require_started(state)
     module = connector_module(state, connector)
     parts = (part(state, block_a), part(state, block_b))
-    start_block, end_block = (
-        _with_face(block, label) for block, label in zip(parts, (face_a, face_b), strict=True)
-    )
+    start_block, end_block = _with_face(parts[0], face_a), _with_face(parts[1], face_b)
     start_xyz, end_xyz = start_block.face_center(face_a), end_block.face_center(face_b)
     _check_distance((start_block, face_a), (end_block, face_b), dist(start_xyz, end_xyz))
     pose = start_block.world_from_face(face_a)
@@ -146,15 +130,12 @@ def connect_blocks(
         start_xyz=start_xyz,
         end_xyz=end_xyz,
         world_from_connector=pose,
-        span=ORIGIN,
+        span=span_in(pose, start_xyz, end_xyz),
         bindings=dict.fromkeys(module.actions, ()),
         structure=start_block.structure,
         note=note,
     )
-    link = replace(link, span=span_in(pose, link))
-    after = replace(
-        state, connectors={**state.connectors, link.id: link}, next_id=state.next_id + 1
-    )
+    after = replace(state.with_connector(link), next_id=state.next_id + 1)
     return Change(
         after=after,
         touched=(link.id,),
@@ -162,9 +143,14 @@ def connect_blocks(
     )
 
 
-def _new_block(state: MachineState, block: Block, note: str) -> Block:
-    bindings: dict[str, tuple[str, ...]] = dict.fromkeys(block.module.actions, ())
-    return replace(block, id=str(state.next_id), bindings=bindings, note=note)
+def _new_block(state: MachineState, module: Module, pose: Pose, note: str) -> Block:
+    return Block(
+        id=str(state.next_id),
+        module=module,
+        world_from_block=pose,
+        bindings=dict.fromkeys(module.actions, ()),
+        note=note,
+    )
 
 
 def _with_face(part: Block | Connector, label: str) -> Block:
@@ -185,14 +171,10 @@ def _check_distance(left: tuple[Block, str], right: tuple[Block, str], distance:
     (a, face_a), (b, face_b) = left, right
     pair = f"{a.id}/{face_a} and {b.id}/{face_b}"
     if _sits_on(a, face_a, b, face_b) or _sits_on(b, face_b, a, face_a):
-        raise RefusalError(
-            Cause.EXCESS_CONNECTION,
-            f"{pair} are attached to each other already. Connect other faces to reinforce them.",
-        )
-    raise RefusalError(
-        Cause.TOO_CLOSE,
-        f"{pair} are at the same place. A connector needs faces at least {CLOSEST_FACES} apart.",
-    )
+        text = f"{pair} are attached to each other already. Connect other faces to reinforce them."
+        raise RefusalError(Cause.EXCESS_CONNECTION, text)
+    text = f"{pair} are at the same place. A connector needs faces at least {CLOSEST_FACES} apart."
+    raise RefusalError(Cause.TOO_CLOSE, text)
 
 
 def _sits_on(part_block: Block, part_face: str, base: Block, base_face: str) -> bool:

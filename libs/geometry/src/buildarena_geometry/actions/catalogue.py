@@ -25,10 +25,8 @@ def list_modules(state: MachineState, category: Name) -> Change:
     categories = words.modules_of_category(state.catalogue)
     name = CaselessNames(categories).find(category)
     if name is None:
-        raise RefusalError(
-            Cause.UNKNOWN_MODULE,
-            f"There is no category {shown(category)}. Categories: {listing(categories)}.",
-        )
+        text = f"There is no category {shown(category)}. Categories: {listing(categories)}."
+        raise RefusalError(Cause.UNKNOWN_MODULE, text)
     return Change(after=state, render=lambda: words.category_text(state.catalogue, name))
 
 
@@ -55,8 +53,6 @@ def _described(state: MachineState, name: str) -> Module:
     module = state.catalogue.named(name)
     if module is None or module.kind == "cargo":
         known = [other.name for other in state.catalogue.values() if other.kind != "cargo"]
-        raise RefusalError(
-            Cause.UNKNOWN_MODULE,
-            f"There is no module {shown(name)}. Modules: {nearest(name, known)}.",
-        )
+        text = f"There is no module {shown(name)}. Modules: {nearest(name, known)}."
+        raise RefusalError(Cause.UNKNOWN_MODULE, text)
     return module

@@ -65,22 +65,11 @@ def add_control_sequence(
 
 
 def _press(bound: tuple[str, ...], time: float, key: str, hold_for: float) -> KeyPress:
-    """A key press that can be played.
-
-    Args:
-        bound: the keys that some action has.
-        time: seconds.
-        key: its name.
-        hold_for: seconds.
-
-    Raises:
-        RefusalError: no action has the key, or a number is out of range.
-    """
+    """A key press that can be played, by one of the keys that some action has."""
     if key not in bound:
         problem = "no action has this key" if key in KEYS else "there is no such key"
-        raise RefusalError(
-            Cause.BAD_KEY, f"{shown(key)}: {problem}. Keys in use: {listing(bound)}."
-        )
+        text = f"{shown(key)}: {problem}. Keys in use: {listing(bound)}."
+        raise RefusalError(Cause.BAD_KEY, text)
     if time < 0 or hold_for <= 0:
         raise RefusalError(
             Cause.OUT_OF_RANGE,
@@ -99,9 +88,8 @@ def remove_control_sequence(state: MachineState, index: Index) -> Change:
     presses = state.control_sequence
     if not 0 <= index < len(presses):
         choices = f"0 to {len(presses) - 1}" if presses else "none"
-        raise RefusalError(
-            Cause.BAD_INDEX, f"There is no entry {shown(index)}. Entries: {choices}."
-        )
+        text = f"There is no entry {shown(index)}. Entries: {choices}."
+        raise RefusalError(Cause.BAD_INDEX, text)
     after = replace(state, control_sequence=(*presses[:index], *presses[index + 1 :]))
     return Change(after=after, render=lambda: f"Removed.\n{words.control_sequence(after)}")
 
@@ -119,13 +107,11 @@ def _bind(state: MachineState, block_id: str, written: str, key: str, *, keep: b
     target, action = powered(state, block_id, written)
     had = target.bindings.get(action, ()) if keep else ()
     keys = had if key in had else (*had, key)
-    bindings = {**target.bindings, action: keys}
-    if isinstance(target, Connector):
-        links = {**state.connectors, target.id: replace(target, bindings=bindings)}
-        after = replace(state, connectors=links)
+    bound = replace(target, bindings={**target.bindings, action: keys})
+    if isinstance(bound, Connector):
+        after = state.with_connector(bound)
     else:
-        bound = replace(target, bindings=bindings)
-        after = replace(state, blocks={**state.blocks, target.id: bound})
+        after = replace(state, blocks={**state.blocks, bound.id: bound})
     return Change(
         after=after,
         touched=(target.id,),

@@ -40,9 +40,8 @@ def part(state: MachineState, part_id: str) -> Block | Connector:
     match = state.blocks.get(part_id) or state.connectors.get(part_id)
     if match is None:
         ids = named([*state.blocks, *state.connectors])
-        raise RefusalError(
-            Cause.NO_SUCH_BLOCK, f"There is no block {shown(part_id)}. Blocks: {ids}."
-        )
+        text = f"There is no block {shown(part_id)}. Blocks: {ids}."
+        raise RefusalError(Cause.NO_SUCH_BLOCK, text)
     return match
 
 
@@ -56,15 +55,12 @@ def powered(state: MachineState, block_id: str, written: str) -> tuple[Block | C
     actions = target.module.actions
     if not actions:
         keyed = named(other.id for other in state.powered())
-        raise RefusalError(
-            Cause.NO_LOCOMOTION, f"{heading(target)} takes no keys. Blocks that do: {keyed}."
-        )
+        text = f"{heading(target)} takes no keys. Blocks that do: {keyed}."
+        raise RefusalError(Cause.NO_LOCOMOTION, text)
     action = CaselessNames(actions).find(written)
     if action is None:
-        raise RefusalError(
-            Cause.BAD_ACTION,
-            f"{heading(target)} has no action {shown(written)}; its actions: {listing(actions)}.",
-        )
+        text = f"{heading(target)} has no action {shown(written)}; its actions: {listing(actions)}."
+        raise RefusalError(Cause.BAD_ACTION, text)
     return target, action
 
 
@@ -76,15 +72,12 @@ def attachable_module(state: MachineState, name: str) -> Module:
     """
     module = state.catalogue.named(name)
     if module is not None and module.kind == "connector":
-        raise RefusalError(
-            Cause.CONNECTOR_MISUSE,
-            f"A {module.name} joins two faces and can't be attached to one; use connect_blocks.",
-        )
+        text = f"A {module.name} joins two faces and can't be attached to one; use connect_blocks."
+        raise RefusalError(Cause.CONNECTOR_MISUSE, text)
     if module is None or not module.attachable:
         choices = nearest(name, state.catalogue.attachable)
-        raise RefusalError(
-            Cause.UNKNOWN_MODULE, f"{shown(name)} can't be attached. Modules: {choices}."
-        )
+        text = f"{shown(name)} can't be attached. Modules: {choices}."
+        raise RefusalError(Cause.UNKNOWN_MODULE, text)
     return module
 
 
@@ -111,9 +104,8 @@ def structure(state: MachineState, letter: str) -> SubStructure:
     match = state.structures.get(letter)
     if match is None:
         there = f"Sub-structures: {named(state.structures)}."
-        raise RefusalError(
-            Cause.NO_SUCH_MACHINE, f"There is no sub-structure {shown(letter)}. {there}"
-        )
+        text = f"There is no sub-structure {shown(letter)}. {there}"
+        raise RefusalError(Cause.NO_SUCH_MACHINE, text)
     return match
 
 

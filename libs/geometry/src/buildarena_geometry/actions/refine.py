@@ -25,9 +25,8 @@ def twist_block(state: MachineState, block_id: BlockId, angle: Number) -> Change
     """
     target = part(state, block_id)
     if target.module.kind == "start":
-        raise RefusalError(
-            Cause.START_BLOCK, f"{words.heading(target)} sits on no face and can't be twisted."
-        )
+        text = f"{words.heading(target)} sits on no face and can't be twisted."
+        raise RefusalError(Cause.START_BLOCK, text)
     turn = about_axis(_seat_normal(state, target), -angle)
     how = f"by {plain(angle)}°"
     if isinstance(target, Connector):
@@ -67,9 +66,8 @@ def flip_spin(state: MachineState, block_id: BlockId) -> Change:
     target = part(state, block_id)
     if isinstance(target, Connector) or not target.module.spins:
         wheels = listing(block.id for block in state.blocks.values() if block.module.spins)
-        raise RefusalError(
-            Cause.NOT_SPINNING, f"{words.heading(target)} does not spin. Blocks that do: {wheels}."
-        )
+        text = f"{words.heading(target)} does not spin. Blocks that do: {wheels}."
+        raise RefusalError(Cause.NOT_SPINNING, text)
     block = replace(target, flipped=not target.flipped)
     after = state.with_blocks(block)
     return Change(
@@ -106,7 +104,7 @@ def _move(state: MachineState, block: Block, pose: Pose, how: str, *, turned: bo
 
 def _move_connector(state: MachineState, link: Connector, pose: Pose, how: str) -> Change:
     moved = replace(link, world_from_connector=pose)
-    after = replace(state, connectors={**state.connectors, link.id: moved})
+    after = state.with_connector(moved)
     return Change(
         after=after,
         touched=(link.id,),

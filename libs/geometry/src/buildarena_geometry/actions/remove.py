@@ -24,9 +24,8 @@ def remove_block(state: MachineState, block_id: BlockId) -> Change:
         after = replace(state, connectors=connectors)
         return _removal(state, after, gone, ())
     if gone.module.kind == "start":
-        raise RefusalError(
-            Cause.START_BLOCK, f"{words.heading(gone)} can't be removed; reset starts anew."
-        )
+        text = f"{words.heading(gone)} can't be removed; reset starts anew."
+        raise RefusalError(Cause.START_BLOCK, text)
     after, links = without(state, [gone])
     return _removal(state, after, gone, links)
 

@@ -52,9 +52,8 @@ class Dialect:
                 spoken[argument] = self.modules.get(name, name)
         for block, face in (("base_block", "face"), ("block_a", "face_a"), ("block_b", "face_b")):
             if face in spoken:
-                spoken[face] = self._our_face(
-                    machine.blocks.get(str(spoken.get(block))), spoken[face]
-                )
+                base = machine.blocks.get(str(spoken.get(block)))
+                spoken[face] = self._our_face(base, spoken[face])
         return spoken
 
     def _our_face(self, block: Block | None, label: Any) -> Any:
@@ -108,6 +107,5 @@ def _spoken(module: Module, definition: Mapping[str, Any]) -> Module:
         replace(face, label=f"{definition['faces']}{index}")
         for index, face in enumerate(module.faces)
     )
-    return structs.replace(
-        module, name=definition["names"].get(module.name, module.name), faces=faces, **values
-    )
+    name = definition["names"].get(module.name, module.name)
+    return structs.replace(module, name=name, faces=faces, **values)

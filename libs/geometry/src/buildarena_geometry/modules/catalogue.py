@@ -120,15 +120,7 @@ def load_catalogue(*files: str | Path) -> Catalogue:
     """
     modules = basic_modules()
     for file in files:
-        modules = (*modules, *_read_file(Path(file), basic_modules()))
-    names: set[str] = set()
-    for module in modules:
-        if module.name in names:
-            raise CatalogueError(f"{module.name}: a module of this name exists already")
-        names.add(module.name)
-    starts = [module.name for module in modules if module.kind == "start"]
-    if len(starts) != 1:
-        raise CatalogueError(f"a catalogue has one starting block, not {', '.join(starts)}")
+        modules += _read_file(Path(file), basic_modules())
     return Catalogue(modules)
 
 

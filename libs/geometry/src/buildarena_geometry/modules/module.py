@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 from msgspec.structs import force_setattr
 
+from buildarena_geometry.errors import CatalogueError
 from buildarena_geometry.modules.forces import Forces
 from buildarena_geometry.modules.joints import Gear, MovingJoint, Sense
 from buildarena_geometry.modules.names import CaselessNames
@@ -302,13 +303,18 @@ class Catalogue(Mapping[str, Module]):
         """Takes modules with distinct names, exactly one of them a starting block.
 
         Raises:
-            ValueError: two modules of one name, or not exactly one starting block.
+            CatalogueError: two modules of one name, or not exactly one starting block.
         """
-        self._modules = {module.name: module for module in modules}
+        self._modules: dict[str, Module] = {}
+        for module in modules:
+            if module.name in self._modules:
+                raise CatalogueError(f"{module.name}: a module of this name exists already")
+            self._modules[module.name] = module
         self._names = CaselessNames(self._modules)
         starts = [module for module in modules if module.kind == "start"]
-        if len(self._modules) != len(modules) or len(starts) != 1:
-            raise ValueError("a catalogue holds distinct names and exactly one starting block")
+        if len(starts) != 1:
+            names = ", ".join(start.name for start in starts) or "none"
+            raise CatalogueError(f"a catalogue has one starting block, not {names}")
         self.start = starts[0]
         self.data_sheets = data_sheets
         self._with_data_sheets: Catalogue | None = None

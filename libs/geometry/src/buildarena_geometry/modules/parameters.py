@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeGuard
 
@@ -54,6 +54,16 @@ class Parameter:
     read: Callable[[str, object], Any]
 
 
+def object_schema(properties: Mapping[str, Any], required: Iterable[str] = ()) -> JsonSchema:
+    """The JSON schema of an object with these properties and no others."""
+    return {
+        "type": "object",
+        "properties": dict(properties),
+        "required": list(required),
+        "additionalProperties": False,
+    }
+
+
 def shown(value: object) -> str:
     """A value as a message quotes it: short whatever it is, and never an error itself."""
     if isinstance(value, str):
@@ -70,9 +80,13 @@ def shown(value: object) -> str:
     return "an object"
 
 
-def _malformed(name: str, expected: str, value: object) -> RefusalError:
-    text = f"{name} must be {expected}, not {shown(value)}."
+def malformed(text: str) -> RefusalError:
+    """A refusal of arguments that have another form than the action takes."""
     return RefusalError(Cause.MALFORMED_ARGUMENTS, text)
+
+
+def _malformed(name: str, expected: str, value: object) -> RefusalError:
+    return malformed(f"{name} must be {expected}, not {shown(value)}.")
 
 
 def _is_integer(value: object) -> TypeGuard[int]:
@@ -102,7 +116,7 @@ def _read_program(name: str, value: object) -> str:
     try:
         check_controller(value)
     except ValueError as error:
-        raise RefusalError(Cause.MALFORMED_ARGUMENTS, f"{name}: {error}.") from None
+        raise malformed(f"{name}: {error}.") from None
     return value
 
 
@@ -150,34 +164,19 @@ def _read_press(name: str, value: object) -> tuple[float, str, float]:
     )
 
 
-_PRESSES_SCHEMA: JsonSchema = {
-    "type": "array",
-    "items": {
-        "type": "object",
-        "properties": {
-            "time": {"type": "number"},
-            "key": {"type": "string", "enum": list(KEYS)},
-            "hold_for": {"type": "number"},
-        },
-        "required": list(_PRESS_ARGUMENTS),
-        "additionalProperties": False,
-    },
-    "maxItems": MAX_PRESSES,
-}
-_VECTOR_SCHEMA: JsonSchema = {
-    "type": "array",
-    "items": {"type": "number"},
-    "minItems": 3,
-    "maxItems": 3,
-}
+_KEY: JsonSchema = {"type": "string", "enum": list(KEYS)}
+_NUMBER: JsonSchema = {"type": "number"}
+_PRESS = object_schema({"time": _NUMBER, "key": _KEY, "hold_for": _NUMBER}, _PRESS_ARGUMENTS)
+_PRESSES: JsonSchema = {"type": "array", "items": _PRESS, "maxItems": MAX_PRESSES}
+_VECTOR: JsonSchema = {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}
 
 # Whole numbers are read too; the schema says text because not every provider takes two types.
 BlockId = Annotated[str, Parameter({"type": "string"}, _read_id)]
 Name = Annotated[str, Parameter({"type": "string"}, _read_text)]
-Key = Annotated[str, Parameter({"type": "string", "enum": list(KEYS)}, _read_text)]
+Key = Annotated[str, Parameter(_KEY, _read_text)]
 Note = Annotated[str, Parameter({"type": "string", "maxLength": LONGEST_TEXT}, _read_note)]
 ProgramText = Annotated[str, Parameter({"type": "string"}, _read_program)]
-Number = Annotated[float, Parameter({"type": "number"}, _read_number)]
+Number = Annotated[float, Parameter(_NUMBER, _read_number)]
 Index = Annotated[int, Parameter({"type": "integer"}, _read_index)]
-Presses = Annotated[tuple[tuple[float, str, float], ...], Parameter(_PRESSES_SCHEMA, _read_presses)]
-Triple = Annotated[Vector, Parameter(_VECTOR_SCHEMA, _read_vector)]
+Presses = Annotated[tuple[tuple[float, str, float], ...], Parameter(_PRESSES, _read_presses)]
+Triple = Annotated[Vector, Parameter(_VECTOR, _read_vector)]

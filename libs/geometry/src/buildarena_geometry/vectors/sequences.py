@@ -42,18 +42,15 @@ def run_sequences(
     Raises:
         SequenceError: the content has another form.
     """
-    words = Dialect() if speaking is None else speaking
-    catalogue = words.catalogue if catalogue is None else catalogue
+    words = speaking or Dialect()
     for sequence in _sequences(content):
-        run = _prepare(sequence, catalogue)
+        run = _prepare(sequence, catalogue or words.catalogue)
         done: list[dict[str, Any]] = []
-        for step in sequence.steps:
+        for number, step in enumerate(sequence.steps, start=1):
             outcome = run.act(step)
             done.append({"ok": outcome.ok, "kind": kind_of(outcome, words.kinds)})
-            if every_state:
-                done[-1]["state"] = run.state(words)
-        if done and not every_state:
-            done[-1]["state"] = run.state(words)
+            if every_state or number == len(sequence.steps):
+                done[-1]["state"] = state_entry(run.machine.state, run.order, words)
         yield {"seed": sequence.seed, "steps": done}
 
 
@@ -102,9 +99,6 @@ class _Run:
         self._put_in_order(step.op, step.params, outcome)
         return outcome
 
-    def state(self, words: Dialect) -> dict[str, Any]:
-        return state_entry(self.machine.state, self.order, words)
-
     def _put_in_order(self, name: object, arguments: object, outcome: Outcome) -> None:
         parts = [part.id for part in self.machine.state.parts]
         there, known = set(parts), set(self.order)
@@ -126,22 +120,19 @@ def _sequences(content: object) -> Iterator[_Sequence]:
     """The sequences of a file: several, one, or the steps of one."""
     if isinstance(content, dict):
         yield read(content, _Sequence, where="input", error=SequenceError)
-    elif isinstance(content, list) and content and all(map(_is_sequence, content)):
-        for index, entry in enumerate(content):
+        return
+    entries = content if isinstance(content, list) else []
+    if entries and all(isinstance(entry, dict) and "steps" in entry for entry in entries):
+        for index, entry in enumerate(entries):
             yield read(entry, _Sequence, where=f"input[{index}]", error=SequenceError)
     else:
         steps = read(content, tuple[_Step, ...], where="input", error=SequenceError)
         yield _Sequence(steps=steps)
 
 
-def _is_sequence(entry: object) -> bool:
-    return isinstance(entry, dict) and "steps" in entry
-
-
 def _prepare(sequence: _Sequence, catalogue: Catalogue | None) -> _Run:
-    sources: dict[str, _Run] = {}
+    sources = {name: _Run(catalogue, {}) for name in sequence.sub_machines}
     for name, actions in sequence.sub_machines.items():
-        sources[name] = _Run(catalogue, {})
         for action in actions:
             sources[name].act(action)
     return _Run(catalogue, sources)

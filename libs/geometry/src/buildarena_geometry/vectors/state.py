@@ -26,7 +26,7 @@ def kind_of(outcome: Outcome, kinds: Mapping[str, str] | None = None) -> str:
     if not isinstance(outcome, Refused):
         return "ok"
     kind = _KIND_OF_CAUSE.get(outcome.cause, outcome.cause.value)
-    return (kinds or {}).get(kind, kind)
+    return kind if kinds is None else kinds.get(kind, kind)
 
 
 def state_entry(
@@ -70,14 +70,15 @@ def _block_entry(state: MachineState, block: Block, words: Dialect) -> dict[str,
         "quat": list(besiege_rotation(block)),
         "flipped": block.flipped,
     }
+    free = state.free_faces(block)
     if block.module.faces:
         entry["faces"] = {
-            face.label: {
-                "c": list(block.face_center(face.label)),
-                "n": list(block.face_normal(face.label)),
-                "att": not state.is_occupied(block, face.label),
+            label: {
+                "c": list(block.face_center(label)),
+                "n": list(block.face_normal(label)),
+                "att": label in free,
             }
-            for face in block.module.faces
+            for label in block.module.face_of_label
         }
     if block.mount is not None:
         entry["root_face"] = _seat(block, block.mount)
