@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_geometry.modules.module import Module
-from buildarena_geometry.poses import Pose
+from buildarena_geometry.poses import Pose, read_only
 from buildarena_geometry.reading import Amount, Form, Positive
 from buildarena_geometry.rotations import Vector, add, scaled
 
@@ -48,7 +48,7 @@ class Block:
     @property
     def center(self) -> NDArray[np.float64]:
         """(3,) the position shown to models, world frame, units."""
-        return _array(self.center_xyz)
+        return read_only(self.center_xyz)
 
     @property
     def center_xyz(self) -> Vector:
@@ -65,7 +65,7 @@ class Block:
     def pointing(self) -> NDArray[np.float64] | None:
         """(3,) the way a cannon or torch points, world frame, unit length; None for the others."""
         towards = self.pointing_xyz
-        return None if towards is None else _array(towards)
+        return None if towards is None else read_only(towards)
 
     @property
     def pointing_xyz(self) -> Vector | None:
@@ -154,12 +154,12 @@ class Connector:
     @property
     def start_point(self) -> NDArray[np.float64]:
         """(3,) the present centre of the start face, world frame, units."""
-        return _array(self.start_xyz)
+        return read_only(self.start_xyz)
 
     @property
     def end_point(self) -> NDArray[np.float64]:
         """(3,) the present centre of the end face, world frame, units."""
-        return _array(self.end_xyz)
+        return read_only(self.end_xyz)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -185,7 +185,7 @@ class Joint:
     @property
     def point(self) -> NDArray[np.float64]:
         """(3,) where it acts: where the part touches its face, world frame, units."""
-        return _array(self.part_xyz)
+        return read_only(self.part_xyz)
 
     @property
     def holds(self) -> bool:
@@ -212,9 +212,3 @@ def seated(world_from_face: Pose, module: Module) -> Pose:
     if not module.root_offset:
         return world_from_face
     return world_from_face @ Pose(position=(0.0, 0.0, module.root_offset))
-
-
-def _array(vector: Vector) -> NDArray[np.float64]:
-    array = np.array(vector, np.float64)
-    array.flags.writeable = False
-    return array

@@ -71,12 +71,8 @@ class CollisionWorld:
                 for other, depth in self._touched_by(solid, block.world_from_block):
                     if other not in moving:
                         depths[other] = max(depth, depths.get(other, 0.0))
-            if depths:
-                overlaps.extend(
-                    Overlap(block.id, other, depths[other])
-                    for other in self._objects
-                    if other in depths
-                )
+            touched = [other for other in self._objects if other in depths] if depths else ()
+            overlaps += [Overlap(block.id, other, depths[other]) for other in touched]
         return overlaps
 
     def place(self, blocks: Iterable[Block]) -> None:
@@ -141,15 +137,13 @@ def unwanted(overlaps: Iterable[Overlap], blocks: Mapping[str, Block]) -> list[O
     return [
         overlap
         for overlap in overlaps
-        if not (
-            _reaches_into(blocks[overlap.block], overlap.other)
-            or _reaches_into(blocks[overlap.other], overlap.block)
-        )
+        if not _reaches_into(blocks[overlap.block], blocks[overlap.other])
+        and not _reaches_into(blocks[overlap.other], blocks[overlap.block])
     ]
 
 
-def _reaches_into(block: Block, other: str) -> bool:
-    return block.module.overlaps_base and block.mount is not None and block.mount[0] == other
+def _reaches_into(block: Block, other: Block) -> bool:
+    return block.module.overlaps_base and block.mount is not None and block.mount[0] == other.id
 
 
 def _geometry(solid: Solid) -> fcl.CollisionGeometry:

@@ -72,17 +72,17 @@ class Pose:
     @property
     def position(self) -> NDArray[np.float64]:
         """(3,) read-only, the origin of the inner frame in the outer one, units."""
-        return _read_only(self.xyz)
+        return read_only(self.xyz)
 
     @property
     def quaternion(self) -> NDArray[np.float64]:
         """(4,) read-only, the rotation as a unit quaternion (w, x, y, z)."""
-        return _read_only(self.wxyz)
+        return read_only(self.wxyz)
 
     @property
     def rotation(self) -> NDArray[np.float64]:
         """(3, 3) read-only, the rotation matrix: the inner axes, outer frame, as columns."""
-        return _read_only(rotation_rows(self.wxyz))
+        return read_only(rotation_rows(self.wxyz))
 
     def __matmul__(self, inner: Pose) -> Pose:
         """Chains two poses: `a_from_b @ b_from_c` is `a_from_c`."""
@@ -138,7 +138,8 @@ def _pose(xyz: Vector, wxyz: Quaternion) -> Pose:
     return pose
 
 
-def _read_only(values: ArrayLike) -> NDArray[np.float64]:
+def read_only(values: ArrayLike) -> NDArray[np.float64]:
+    """The values as an array that nobody can change."""
     array = np.array(values, np.float64)
     array.flags.writeable = False
     return array

@@ -126,6 +126,4 @@ def named(choices: Iterable[str]) -> str:
     """The first of some choices, and how many more there are."""
     names = list(choices)
     more = len(names) - _MAX_NAMED
-    if more <= 0:
-        return listing(names)
-    return f"{listing(names[:_MAX_NAMED])} and {more} more"
+    return listing(names[:_MAX_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -100,12 +100,10 @@ def read_machine(
     """
     known = module_set("all") if catalogue is None else catalogue
     entries = read(document, _Document, where=where, error=DocumentError)
-    available = {
-        name: read_machine(
-            inner, catalogue=catalogue, where=f"{where}.available.{name}", overlaps=overlaps
-        )
-        for name, inner in entries.available.items()
-    }
+    available: dict[str, LoggedState] = {}
+    for name, inner in entries.available.items():
+        place = f"{where}.available.{name}"
+        available[name] = read_machine(inner, catalogue=catalogue, where=place, overlaps=overlaps)
     try:
         state = _state(entries, known, {name: held.state for name, held in available.items()})
         _check_whole(state)
@@ -162,9 +160,8 @@ def _used(state: MachineState, records: Iterable[ActionRecord]) -> Iterator[str]
 
 
 def _read_blocks(entries: Iterable[_BlockEntry], catalogue: Catalogue) -> dict[str, Block]:
-    placeable = [
-        name for name, kind in catalogue.items() if kind.kind not in ("connector", "cargo")
-    ]
+    unplaced = ("connector", "cargo")
+    placeable = [name for name, module in catalogue.items() if module.kind not in unplaced]
     blocks: dict[str, Block] = {}
     used: set[FaceRef] = set()
     for index, entry in enumerate(entries):
@@ -251,9 +248,8 @@ def _check_whole(state: MachineState) -> None:
     starts = [block for block in state.blocks.values() if block.module.kind == "start"]
     wanted = len(state.structures) if state.available else min(1, len(state.blocks))
     if len(starts) != wanted or (starts and next(iter(state.blocks)) != starts[0].id):
-        raise MisfitError(
-            f".blocks: expected {wanted} starting block, at its head, found {len(starts)}"
-        )
+        expected = f"expected {wanted} starting block, at its head"
+        raise MisfitError(f".blocks: {expected}, found {len(starts)}")
     for block in state.blocks.values():
         if block.structure != "" and block.structure not in state.structures:
             raise MisfitError(f".blocks: block {block.id} is of an unknown sub-structure")
@@ -275,9 +271,8 @@ def _check_face(face: FaceRef, blocks: Mapping[str, Block], place: str) -> None:
         raise MisfitError(f".{place}: there is no block {block_id!r} before it")
     labels = blocks[block_id].module.face_of_label
     if label not in labels:
-        raise MisfitError(
-            f".{place}: block {block_id} has no face {label!r}; its faces: {listing(labels)}"
-        )
+        known = f"its faces: {listing(labels)}"
+        raise MisfitError(f".{place}: block {block_id} has no face {label!r}; {known}")
 
 
 def _check_choice(place: str, value: str, choices: Collection[str]) -> None:

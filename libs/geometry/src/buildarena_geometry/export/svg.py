@@ -119,8 +119,9 @@ class _Drawing:
                 self._add_polygon(corners, block.module.kind, edged=edged)
         if self._view.ids:
             self._write(block.center, block.id, "id")
-        if block.id in self._view.face_labels:
-            self._label_faces(block, free_faces)
+        for label in free_faces if block.id in self._view.face_labels else ():
+            if np.array(block.face_normal(label)) @ self._towards_eye > 0:
+                self._write(np.array(block.face_center(label)), label, "face")
         if block.id in self._view.frames:
             pose = block.world_from_block
             for axis, (_, _, colour) in zip(pose.rotation.T, _AXES, strict=True):
@@ -136,7 +137,7 @@ class _Drawing:
     def text(self) -> str:
         if self._view.compass:
             self._add_compass()
-        points = np.array(self._points) if self._points else np.zeros((1, 2))
+        points = np.array(self._points or [np.zeros(2)])
         (left, top), (right, bottom) = points.min(axis=0) - 24, points.max(axis=0) + 24
         shapes = [shape for _, shape in sorted(self._shapes, key=lambda entry: entry[0])]
         box = f"{left:.0f} {top:.0f} {right - left:.0f} {bottom - top:.0f}"
@@ -160,16 +161,11 @@ class _Drawing:
         depth = round(float(corners.mean(axis=0) @ self._towards_eye), _DIGITS)
         colour = f"#{red:02x}{green:02x}{blue:02x}"
         edge = "#2b2b2b" if edged else colour
-        shape = f'<polygon points="{points}" fill="{colour}" stroke="{edge}"/>'
-        self._shapes.append((depth, shape))
-
-    def _label_faces(self, block: Block, labels: list[str]) -> None:
-        for label in labels:
-            if np.array(block.face_normal(label)) @ self._towards_eye > 0:
-                self._write(np.array(block.face_center(label)), label, "face")
+        polygon = f'<polygon points="{points}" fill="{colour}" stroke="{edge}"/>'
+        self._shapes.append((depth, polygon))
 
     def _add_compass(self) -> None:
-        flat = np.array(self._points) if self._points else np.zeros((1, 2))
+        flat = np.array(self._points or [np.zeros(2)])
         left, bottom = flat[:, 0].min() - 40, flat[:, 1].max()
         for name, axis, colour in _AXES:
             across, up = self._axes @ np.array(axis) * 46

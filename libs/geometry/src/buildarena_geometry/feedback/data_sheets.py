@@ -30,11 +30,9 @@ def data_sheet(module: Module, usual: Physics | None) -> str:
     Returns:
         Facts with semicolons between them; "" if there is nothing to say.
     """
-    facts = [*_motion(module), *_forces(module), *_body(module, usual)]
-    faces = [f"{face.label} {point(face.center)}" for face in module.faces]
-    if faces:
-        facts.append(f"faces {' '.join(faces)}")
-    return "; ".join(facts)
+    places = " ".join(f"{face.label} {point(face.center)}" for face in module.faces)
+    faces = [f"faces {places}"] if places else []
+    return "; ".join([*_motion(module), *_forces(module), *_body(module, usual), *faces])
 
 
 def _motion(module: Module) -> Iterator[str]:
@@ -57,11 +55,9 @@ def _motion(module: Module) -> Iterator[str]:
 
 
 def _motor(motor: Motor) -> str:
-    torque = plain(motor.torque)
-    return (
-        f"turns at {plain(motor.speed_rpm)} rpm ({number(motor.speed)} rad/s, after about "
-        f"{number(3.0 / motor.lag_per_s)} s), torque and brake up to {torque}"
-    )
+    reached = f"{number(motor.speed)} rad/s, after about {number(3.0 / motor.lag_per_s)} s"
+    torque = f"torque and brake up to {plain(motor.torque)}"
+    return f"turns at {plain(motor.speed_rpm)} rpm ({reached}), {torque}"
 
 
 def _joint(module: Module, joint_type: str, joint: MovingJoint) -> Iterator[str]:
@@ -122,10 +118,8 @@ def _forces(module: Module) -> Iterator[str]:
     if push is not None:
         yield from _push(push)
     if thrust is not None:
-        yield (
-            f"pushes with {plain(thrust.cold)} cold and {plain(thrust.heated)} heated, against the "
-            "way it points"
-        )
+        pushes = f"{plain(thrust.cold)} cold and {plain(thrust.heated)} heated"
+        yield f"pushes with {pushes}, against the way it points"
     if module.wing is not None:
         yield _wing(module.wing)
     if module.lift is not None:
@@ -138,10 +132,8 @@ def _forces(module: Module) -> Iterator[str]:
         yield f"lets go with an impulse of {plain(module.decouple.impulse)} mass·units/s each way"
     yield from _in_space(module)
     if grip is not None:
-        yield (
-            f"holds what comes within {plain(grip.reach)} of its far end, ready from the start; "
-            f"slips at a force of {plain(grip.force)} or a moment of {plain(grip.moment)}"
-        )
+        yield f"holds what comes within {plain(grip.reach)} of its far end, ready from the start"
+        yield f"slips at a force of {plain(grip.force)} or a moment of {plain(grip.moment)}"
 
 
 def _push(push: Push) -> Iterator[str]:
@@ -152,10 +144,8 @@ def _push(push: Push) -> Iterator[str]:
     if push.fuel:
         yield f"burns {plain(push.fuel)} of fuel a second at full push"
     if push.steady_speed is not None:
-        yield (
-            f"steadies: pushes by asked - u / {plain(push.steady_speed)} within -1 and 1, u the "
-            "speed along that way at which it turns about the centre of mass"
-        )
+        speed = "u the speed along that way at which it turns about the centre of mass"
+        yield f"steadies: pushes by asked - u / {plain(push.steady_speed)} within -1 and 1, {speed}"
 
 
 def _in_space(module: Module) -> Iterator[str]:
@@ -174,10 +164,8 @@ def _in_space(module: Module) -> Iterator[str]:
         )
     if brake is not None:
         opens = "once opened" if brake.opens == "once" else "while no key is held"
-        yield (
-            f"air brakes it by {plain(brake.coefficient)}·v·min(|v|, {plain(brake.cap_speed)}), in "
-            f"mass·units/s², {opens}"
-        )
+        force = f"{plain(brake.coefficient)}·v·min(|v|, {plain(brake.cap_speed)})"
+        yield f"air brakes it by {force}, in mass·units/s², {opens}"
 
 
 def _wing(wing: Wing) -> str:
@@ -186,10 +174,8 @@ def _wing(wing: Wing) -> str:
     flow = "n" if not wing.pitch_deg else "s"
     turned = "" if flow == "n" else f", s = {point(wing.flow, 3)}"
     only = f", only while v·{flow} > 0" if wing.one_sided else ""
-    return (
-        f"air pushes it by -{plain(wing.coefficient)}·(v·{flow}){grown} along n, in "
-        f"mass·units/s², n = {point(wing.normal)}{turned}{only}"
-    )
+    force = f"air pushes it by -{plain(wing.coefficient)}·(v·{flow}){grown} along n"
+    return f"{force}, in mass·units/s², n = {point(wing.normal)}{turned}{only}"
 
 
 def _altitude(held: Altitude) -> str:

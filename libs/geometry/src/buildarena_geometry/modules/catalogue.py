@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -27,7 +27,6 @@ from buildarena_geometry.modules.joints import checked_joint
 from buildarena_geometry.modules.module import (
     Catalogue,
     Face,
-    Landmark,
     Link,
     Module,
     ModuleFields,
@@ -72,6 +71,12 @@ class FaceEntry(Form, frozen=True, kw_only=True):
         _check_direction("x_axis", self.x_axis)
         if abs(dot(self.normal, self.x_axis)) > _TOLERANCE:
             refuse("x_axis", "a direction perpendicular to the normal", self.x_axis)
+
+    @property
+    def face(self) -> Face:
+        """The face."""
+        turn = from_axes(self.x_axis, self.normal)
+        return Face(label=self.label, block_from_face=Pose(position=self.center, quaternion=turn))
 
 
 class BesiegeDatum(Form, frozen=True, kw_only=True):
@@ -156,9 +161,8 @@ def read_modules(
     """
     file = read(content, ModuleFile, where=where, error=CatalogueError)
     if file.version != CATALOGUE_VERSION:
-        raise CatalogueError(
-            f"{where}.version: expected version {CATALOGUE_VERSION}, found {file.version}"
-        )
+        expected = f"expected version {CATALOGUE_VERSION}"
+        raise CatalogueError(f"{where}.version: {expected}, found {file.version}")
     usual_of: dict[str, Module] = {module.kind: module for module in reversed(basic)}
     return tuple(
         _module(entry, f"{where}.modules[{index}]", usual_of)
@@ -182,14 +186,12 @@ def _parse_yaml(text: str, file: Path) -> object:
     try:
         import yaml
     except ImportError as error:
-        raise CatalogueError(
-            f"{file}: is not JSON; for other YAML install buildarena-geometry[yaml]"
-        ) from error
+        wanted = "for other YAML install buildarena-geometry[yaml]"
+        raise CatalogueError(f"{file}: is not JSON; {wanted}") from error
     try:
-        content: object = yaml.safe_load(text)
+        return yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise CatalogueError(f"{file}: is not YAML: {error}") from error
-    return content
 
 
 def _module(content: object, where: str, usual_of: Mapping[str, Module]) -> Module:
@@ -229,11 +231,16 @@ def _made(entry: ModuleEntry, usual: Module | None) -> Module:
     elif entry.motor is None and usual is not None:
         shared["motor"] = usual.motor
     besiege = entry.besiege
+    flames = tuple(
+        Sphere(along=mark.along, radius=mark.radius)
+        for mark in entry.landmarks
+        if mark.heats and mark.radius is not None
+    )
     return Module(
         **shared,
         cost=entry.cost,
-        faces=tuple(map(_face, entry.faces)),
-        flames=tuple(_flames(entry.landmarks)) or (usual.flames if usual else ()),
+        faces=tuple(face.face for face in entry.faces),
+        flames=flames or (usual.flames if usual else ()),
         link=entry.link or "rigid",
         besiege_id=besiege.id,
         besiege_data=tuple((datum.type, datum.key, datum.value) for datum in besiege.data),
@@ -241,26 +248,13 @@ def _made(entry: ModuleEntry, usual: Module | None) -> Module:
     )
 
 
-def _face(entry: FaceEntry) -> Face:
-    pose = Pose(position=entry.center, quaternion=from_axes(entry.x_axis, entry.normal))
-    return Face(label=entry.label, block_from_face=pose)
-
-
-def _flames(landmarks: tuple[Landmark, ...]) -> Iterator[Sphere]:
-    for mark in landmarks:
-        if mark.heats and mark.radius is not None:
-            yield Sphere(along=mark.along, radius=mark.radius)
-
-
 def _check_entry(entry: ModuleEntry) -> None:
     """Refuses entries whose fields are good one by one and make no sense together."""
     for place in _DIRECTIONS:
-        direction = _at(entry, place)
-        if direction is not None:
+        if (direction := _at(entry, place)) is not None:
             _check_direction(place, direction)
     for place in _ACTIONS:
-        action = _at(entry, place)
-        if action is not None and action not in entry.actions:
+        if (action := _at(entry, place)) is not None and action not in entry.actions:
             refuse(place, f"one of {', '.join(entry.actions)}", action)
     _check_names(entry)
     check_forces(entry, kind=entry.kind, mass=entry.mass, link=entry.link)

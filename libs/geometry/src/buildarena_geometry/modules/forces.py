@@ -293,11 +293,8 @@ def check_forces(forces: Forces, *, kind: str, mass: float, link: str | None) ->
     for name in FORCE_FIELDS:
         force = getattr(forces, name)
         if force is not None and (kind == "connector") != (name == "spring"):
-            expected = (
-                f"no {name}: a connector has no force but a spring's,"
-                " and only connectors have a spring"
-            )
-            refuse(name, expected, force)
+            only = "a connector has no force but a spring's, and only connectors have a spring"
+            refuse(name, f"no {name}: {only}", force)
     if (forces.spring is not None) != (link == "spring"):
         expected = "a spring with the link spring, and none with another link"
         refuse("spring", expected, forces.spring)

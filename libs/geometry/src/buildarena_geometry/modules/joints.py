@@ -115,19 +115,13 @@ def checked_joint(joint: MovingJoint, joint_type: str | None) -> MovingJoint:
     sprung = bool(joint.stiffness or joint.damping)
     if joint.drive is not None:
         if joint_type not in _DRIVEN or sprung or joint.friction:
-            refuse(
-                "joint.drive",
-                f"no drive: it moves one of the joint types {', '.join(_DRIVEN)}"
-                " without a spring, a damper or friction",
-                joint.drive,
-            )
+            moved = f"it moves one of the joint types {', '.join(_DRIVEN)}"
+            alone = f"no drive: {moved} without a spring, a damper or friction"
+            refuse("joint.drive", alone, joint.drive)
         _check_drive(joint.drive, joint_type)
     if sprung and (joint_type not in ("hinge", "slider") or joint.friction):
-        refuse(
-            "joint",
-            "no spring and no damper: only a hinge or slider without friction has them",
-            joint_type,
-        )
+        only = "only a hinge or slider without friction has them"
+        refuse("joint", f"no spring and no damper: {only}", joint_type)
     if joint.limits is not None:
         _check_limits(joint.limits, joint_type)
     return joint if joint_type == "slider" else _in_radians(joint)

@@ -6,15 +6,15 @@ from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Form, Point, Positive, refuse
 from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
 
+_CORNERS = {"lowest": "from", "highest": "to"}
+_ENDS = {"base": "from", "top": "to"}  # what module files call the fields
 
-class Box(
-    Form,
-    frozen=True,
-    kw_only=True,
-    tag_field="shape",
-    tag="box",
-    rename={"lowest": "from", "highest": "to"},
-):
+
+class _Shape(Form, frozen=True, kw_only=True, tag_field="shape"):
+    """A solid, which module files name by its shape."""
+
+
+class Box(_Shape, frozen=True, kw_only=True, tag="box", rename=_CORNERS):
     """A box with its edges along the block's axes.
 
     Attributes:
@@ -42,14 +42,7 @@ class Box(
         return (x - a, y - b, z - c)
 
 
-class Cylinder(
-    Form,
-    frozen=True,
-    kw_only=True,
-    tag_field="shape",
-    tag="cylinder",
-    rename={"base": "from", "top": "to"},
-):
+class Cylinder(_Shape, frozen=True, kw_only=True, tag="cylinder", rename=_ENDS):
     """A right circular cylinder.
 
     Attributes:
@@ -90,7 +83,7 @@ class Cylinder(
         return Pose(position=self.center, quaternion=turn)
 
 
-class Ball(Form, frozen=True, kw_only=True, tag_field="shape", tag="sphere"):
+class Ball(_Shape, frozen=True, kw_only=True, tag="sphere"):
     """A solid sphere.
 
     Attributes:
