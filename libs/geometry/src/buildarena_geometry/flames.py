@@ -42,7 +42,7 @@ def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
         For each block that a flame can heat, in the order of the blocks, the ids of the blocks
         whose flames touch it.
     """
-    cannons = [block for block in state.blocks.values() if heatable(block)]
+    cannons = [block for block in state.blocks.values() if _body(block)]
     torches = [block for block in state.blocks.values() if block.module.flames]
     if not cannons or not torches:
         return {cannon.id: () for cannon in cannons}
@@ -54,11 +54,6 @@ def heating(state: MachineState) -> Mapping[str, tuple[str, ...]]:
         cannon.id: tuple(torch.id for torch in torches if (cannon.id, torch.id) in pairs)
         for cannon in cannons
     }
-
-
-def heatable(block: Block) -> bool:
-    """Whether a flame can heat the block."""
-    return bool(_body(block))
 
 
 def _body(block: Block) -> tuple[Sphere, ...]:

@@ -18,6 +18,7 @@ from buildarena_geometry.documents.log import ActionLog, ActionRecord, LoggedSta
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.documents.write import machine_document
 from buildarena_geometry.feedback.joints import consequences
+from buildarena_geometry.feedback.state import title
 from buildarena_geometry.feedback.words import listing, number
 from buildarena_geometry.json_values import MAX_CONTROLLER_BYTES, check_controller, json_value
 from buildarena_geometry.modules.catalogue import load_catalogue
@@ -343,21 +344,16 @@ def _rendered(before: MachineState, change: Change) -> str:
 
 
 def _overlap(change: Change, overlaps: list[Overlap]) -> RefusalError:
-    pairs = [(overlap.block, overlap.other) for overlap in overlaps]
+    blocks = change.after.blocks
     if len(change.placed) == 1:
-        named = listing(
-            f"{_block(change.after, overlap.other)} by {_depth(overlap)}" for overlap in overlaps
-        )
+        named = listing(f"{title(blocks[o.other])} by {_depth(o)}" for o in overlaps)
         text = f"{change.attempt} would overlap {named}."
     else:
         named = "; ".join(f"{o.block} and {o.other} by {_depth(o)}" for o in overlaps)
         text = f"{change.attempt} would make blocks overlap: {named}."
-    tried = attempted(change.after.blocks[block_id] for block_id in change.placed)
-    return RefusalError(Cause.OVERLAP, text, tuple(pairs), tried)
-
-
-def _block(state: MachineState, block_id: str) -> str:
-    return f"block {block_id} ({state.blocks[block_id].module.name})"
+    pairs = tuple((overlap.block, overlap.other) for overlap in overlaps)
+    tried = attempted(blocks[block_id] for block_id in change.placed)
+    return RefusalError(Cause.OVERLAP, text, pairs, tried)
 
 
 def _depth(overlap: Overlap) -> str:

@@ -53,7 +53,7 @@ def mobility(state: MachineState) -> Mobility:
     if not any(_moves(block) for block in state.blocks.values()):
         return Mobility()
     rigid, joints = _edges(state)
-    meshes = _touching_cogs(state)
+    meshes = [way for pair in _touching_cogs(state) for way in (pair, pair[::-1])]
     locks: dict[str, tuple[str, ...]] = {}
     while True:
         label = _labels(state.blocks, rigid)
@@ -68,9 +68,12 @@ def mobility(state: MachineState) -> Mobility:
         rigid += [_Edge(e.first, e.second, e.second) for e in free if e.second in newly_locked]
 
 
+def _joint_type(block: Block) -> str | None:
+    return None if block.module.physics is None else block.module.physics.joint_type
+
+
 def _moves(block: Block) -> bool:
-    physics = block.module.physics
-    return physics is not None and physics.joint_type in MOVING_JOINTS
+    return _joint_type(block) in MOVING_JOINTS
 
 
 def _edges(state: MachineState) -> tuple[list[_Edge], list[_Edge]]:
@@ -127,8 +130,7 @@ def _shape(block: Block) -> tuple[Vector, tuple[Vector, Vector, Vector]]:
     """The middle of a block's first solid and that solid's axes, world frame."""
     solid, pose = block.module.body[0], block.world_from_block
     turned = pose @ solid.block_from_axis if isinstance(solid, Cylinder) else pose
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    x, y, z = (turned.direction(axis) for axis in axes)
+    x, y, z = map(turned.direction, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
     return pose.point(solid.center), (x, y, z)
 
 
@@ -141,14 +143,13 @@ def _half(block: Block) -> Vector:
     return (x / 2, y / 2, z / 2)
 
 
-def _touching_cogs(state: MachineState) -> list[tuple[str, str]]:
+def _touching_cogs(state: MachineState) -> Iterator[tuple[str, str]]:
     """Cogs with parallel axes, beside each other, whose pitch circles touch."""
     cogs = [
         (block, block.module.gear.pitch_radius, *_shape(block))
         for block in state.blocks.values()
         if block.module.gear is not None
     ]
-    pairs = []
     for (a, radius_a, center_a, _), (b, radius_b, center_b, _) in combinations(cogs, 2):
         axis = _axis(a)
         apart = subtract(center_b, center_a)
@@ -159,8 +160,7 @@ def _touching_cogs(state: MachineState) -> list[tuple[str, str]]:
             and abs(dot(axis, _axis(b))) >= MESH_COSINE
             and abs(along) < _half(a)[2] + _half(b)[2] - MESH_SLACK
         ):
-            pairs.append((a.id, b.id))
-    return pairs
+            yield a.id, b.id
 
 
 def _axis(block: Block) -> Vector:
@@ -271,40 +271,32 @@ def _upwards(up: Mapping[str, tuple[str, _Edge]], body: str) -> list[_Edge]:
 
 
 def _collinear(state: MachineState, edge: _Edge, other: _Edge) -> bool:
-    blocks = [state.blocks[edge.second], state.blocks[other.second]]
-    if any(b.module.physics is None or b.module.physics.joint_type not in _TURNING for b in blocks):
+    one, two = state.blocks[edge.second], state.blocks[other.second]
+    if not (_joint_type(one) in _TURNING and _joint_type(two) in _TURNING):
         return False
-    first, second = map(_axis, blocks)
-    apart = subtract(_pivot(blocks[1]), _pivot(blocks[0]))
-    return (
-        math.hypot(*cross(first, second)) < _COLLINEAR
-        and math.hypot(*cross(first, apart)) < _COLLINEAR
-    )
+    along = (_axis(two), subtract(_pivot(two), _pivot(one)))
+    return all(math.hypot(*cross(_axis(one), line)) < _COLLINEAR for line in along)
 
 
 def _held_teeth(
     label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
     """Cogs that mesh with one which is fast to what they are mounted on."""
-    seat = {edge.second: edge for edge in free}
-    held: dict[str, tuple[str, ...]] = {}
-    for pair in meshes:
-        for cog, other in (pair, pair[::-1]):
-            if cog in seat and other not in seat and label[seat[cog].first] == label[other]:
-                held[cog] = (other,)
-    return held
+    body = {edge.second: label[edge.first] for edge in free}  # that a cog turns on
+    return {
+        cog: (other,)
+        for cog, other in meshes
+        if cog in body and other not in body and body[cog] == label[other]
+    }
 
 
 def _driving(
     label: Mapping[str, str], free: Sequence[_Edge], meshes: Iterable[tuple[str, str]]
 ) -> dict[str, tuple[str, ...]]:
     """The meshes of cogs that turn on one body."""
-    seat = {edge.second: edge for edge in free}
+    body = {edge.second: label[edge.first] for edge in free}  # that a cog turns on
     driving: dict[str, tuple[str, ...]] = {}
-    for pair in meshes:
-        if all(cog in seat for cog in pair) and (
-            label[seat[pair[0]].first] == label[seat[pair[1]].first]
-        ):
-            for cog, other in (pair, pair[::-1]):
-                driving[cog] = (*driving.get(cog, ()), other)
+    for cog, other in meshes:
+        if cog in body and body[cog] == body.get(other):
+            driving[cog] = (*driving.get(cog, ()), other)
     return driving

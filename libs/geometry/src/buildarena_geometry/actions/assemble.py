@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 from buildarena_geometry.actions.lookups import named, structure
-from buildarena_geometry.actions.motions import turn_about, turned
 from buildarena_geometry.actions.remove import removal_sentences, without
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.changes import Change
@@ -11,7 +10,7 @@ from buildarena_geometry.feedback import state as words
 from buildarena_geometry.feedback.words import counted, listing, point
 from buildarena_geometry.modules.parameters import Name, RefusalError, Triple, shown
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.poses import Pose
+from buildarena_geometry.poses import Pose, turn_about, turned
 from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.state import (
     MachineState,

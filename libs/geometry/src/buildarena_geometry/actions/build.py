@@ -9,7 +9,6 @@ from buildarena_geometry.actions.lookups import (
     part,
     require_started,
 )
-from buildarena_geometry.actions.motions import turned
 from buildarena_geometry.blocks import Block, Connector, seated
 from buildarena_geometry.changes import Change, attempted
 from buildarena_geometry.feedback import state as words
@@ -17,7 +16,7 @@ from buildarena_geometry.feedback.words import listing
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.modules.parameters import BlockId, Name, Note, RefusalError, Triple, shown
 from buildarena_geometry.outcomes import Cause
-from buildarena_geometry.poses import Pose
+from buildarena_geometry.poses import Pose, turned
 from buildarena_geometry.rotations import ORIGIN
 from buildarena_geometry.state import MachineState, span_in
 

@@ -37,15 +37,11 @@ def describe_module(state: MachineState, module: Name) -> Change:
         module: Name of the module, or several names with commas between them.
     """
     names = [name for name in module.split(",") if name.strip()] or [module]
-    modules = {
-        described.name: described
-        for described in (_described(state, name.strip()) for name in names)
-    }
+    found = [_described(state, name.strip()) for name in names]
+    modules = {one.name: one for one in found}.values()
     return Change(
         after=state,
-        render=lambda: "\n\n".join(
-            words.module_text(described, state.catalogue) for described in modules.values()
-        ),
+        render=lambda: "\n\n".join(words.module_text(one, state.catalogue) for one in modules),
     )
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, overload
+from typing import Any
 
 from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.outcomes import RefusalClass
@@ -48,7 +48,7 @@ class LoggedState:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ActionLog(Sequence[ActionRecord]):
+class ActionLog:
     """The actions of one machine in order, with all it takes to do them again.
 
     Attributes:
@@ -61,11 +61,7 @@ class ActionLog(Sequence[ActionRecord]):
     catalogue: Catalogue = field(repr=False)
     available: Mapping[str, LoggedState] = field(repr=False, default_factory=dict)
 
-    @overload
-    def __getitem__(self, index: int) -> ActionRecord: ...
-    @overload
-    def __getitem__(self, index: slice) -> tuple[ActionRecord, ...]: ...
-    def __getitem__(self, index: int | slice) -> ActionRecord | tuple[ActionRecord, ...]:
+    def __getitem__(self, index: int) -> ActionRecord:
         return self.records[index]
 
     def __len__(self) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Literal
 
 from msgspec import Meta, field
@@ -297,8 +298,6 @@ class Catalogue(Mapping[str, Module]):
         data_sheets: whether builders read each module's numbers, not its description alone.
     """
 
-    __slots__ = ("_modules", "_names", "_with_data_sheets", "data_sheets", "start")
-
     def __init__(self, modules: tuple[Module, ...], *, data_sheets: bool = False) -> None:
         """Takes modules with distinct names, exactly one of them a starting block.
 
@@ -317,15 +316,14 @@ class Catalogue(Mapping[str, Module]):
             raise CatalogueError(f"a catalogue has one starting block, not {names}")
         self.start = starts[0]
         self.data_sheets = data_sheets
-        self._with_data_sheets: Catalogue | None = None
 
     def with_data_sheets(self) -> Catalogue:
         """The same modules, told with their numbers; always the same object."""
-        if self.data_sheets:
-            return self
-        if self._with_data_sheets is None:
-            self._with_data_sheets = Catalogue(tuple(self._modules.values()), data_sheets=True)
-        return self._with_data_sheets
+        return self if self.data_sheets else self._with_data_sheets
+
+    @cached_property
+    def _with_data_sheets(self) -> Catalogue:
+        return Catalogue(tuple(self._modules.values()), data_sheets=True)
 
     def __getitem__(self, name: str) -> Module:
         return self._modules[name]

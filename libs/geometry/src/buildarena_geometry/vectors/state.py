@@ -9,7 +9,7 @@ from buildarena_geometry.besiege_components import besiege_point, besiege_rotati
 from buildarena_geometry.blocks import Block, Connector, FaceRef
 from buildarena_geometry.dialects import Dialect
 from buildarena_geometry.outcomes import Cause, Outcome, Refused
-from buildarena_geometry.rotations import scaled
+from buildarena_geometry.rotations import Vector, scaled
 from buildarena_geometry.state import MachineState
 
 # The vectors have no name of their own for these.
@@ -59,17 +59,7 @@ def state_entry(
 
 
 def _block_entry(state: MachineState, block: Block, words: Dialect) -> dict[str, Any]:
-    center = list(block.center_xyz)
-    entry: dict[str, Any] = {
-        "id": block.id,
-        "name": block.module.name,
-        "pos": list(block.world_from_block.xyz),
-        "virtual": list(besiege_point(block.world_from_block.xyz)),
-        "center": center,
-        "center_follow": center,
-        "quat": list(besiege_rotation(block)),
-        "flipped": block.flipped,
-    }
+    entry = _part_entry(block, block.world_from_block.xyz, block.center_xyz, flipped=block.flipped)
     free = state.free_faces(block)
     if block.module.faces:
         entry["faces"] = {
@@ -95,18 +85,26 @@ def _block_entry(state: MachineState, block: Block, words: Dialect) -> dict[str,
     return entry
 
 
-def _connector_entry(link: Connector, shift: float) -> dict[str, Any]:
-    root = list(link.world_from_connector.xyz)
-    shown = list(link.world_from_connector.point((0.0, 0.0, shift))) if shift else root
+def _part_entry(
+    part: Block | Connector, root: Vector, shown: Vector, *, flipped: bool
+) -> dict[str, Any]:
     return {
-        "id": link.id,
-        "name": link.module.name,
-        "pos": root,
-        "virtual": list(besiege_point(link.world_from_connector.xyz)),
-        "center": shown,
-        "center_follow": shown,
-        "quat": list(besiege_rotation(link)),
-        "flipped": False,
+        "id": part.id,
+        "name": part.module.name,
+        "pos": list(root),
+        "virtual": list(besiege_point(root)),
+        "center": list(shown),
+        "center_follow": list(shown),
+        "quat": list(besiege_rotation(part)),
+        "flipped": flipped,
+    }
+
+
+def _connector_entry(link: Connector, shift: float) -> dict[str, Any]:
+    root = link.world_from_connector.xyz
+    shown = link.world_from_connector.point((0.0, 0.0, shift)) if shift else root
+    return {
+        **_part_entry(link, root, shown, flipped=False),
         "connector": {
             "start": _seat(link, link.start),
             "end": _seat(link, link.end),
