@@ -24,14 +24,7 @@ from msgspec import Meta, field
 from buildarena_geometry.errors import CatalogueError
 from buildarena_geometry.modules.forces import check_forces
 from buildarena_geometry.modules.joints import checked_joint
-from buildarena_geometry.modules.module import (
-    Catalogue,
-    Face,
-    Link,
-    Module,
-    ModuleFields,
-    Sphere,
-)
+from buildarena_geometry.modules.module import Catalogue, Face, Link, Module, ModuleFields, Sphere
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Form, MisfitError, Name, Point, Whole, read, refuse
 from buildarena_geometry.rotations import dot, from_axes
