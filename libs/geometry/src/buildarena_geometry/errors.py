@@ -1,7 +1,5 @@
 """What the library raises: a caller's faults only. What a model does wrong is a `Refused` value."""
 
-from __future__ import annotations
-
 
 class GeometryError(ValueError):
     """Base of everything the library raises."""

@@ -327,11 +327,8 @@ def _require_reach(blocks: Sequence[Block]) -> None:
     """Refuses blocks so far out that coordinates lose the digits overlaps are judged by."""
     for block in blocks:
         if max(map(abs, block.world_from_block.xyz)) > LARGEST_NUMBER:
-            raise RefusalError(
-                Cause.OUT_OF_RANGE,
-                f"Block {block.id} would lie farther out than {LARGEST_NUMBER:.0f}.",
-                attempted=attempted(blocks),
-            )
+            text = f"Block {block.id} would lie farther out than {LARGEST_NUMBER:.0f}."
+            raise RefusalError(Cause.OUT_OF_RANGE, text, attempted=attempted(blocks))
 
 
 def _rendered(before: MachineState, change: Change) -> str:

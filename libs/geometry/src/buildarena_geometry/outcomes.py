@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal
+from functools import cached_property
+from typing import ClassVar, Literal
 
 from buildarena_geometry.rotations import Quaternion, Vector
 
@@ -88,22 +89,17 @@ class Accepted:
         changed: ids of the blocks and connectors that are new, different or gone.
     """
 
-    __slots__ = ("_render", "_text", "changed")
-
     ok: Literal[True] = True
 
     def __init__(self, *, changed: tuple[str, ...], render: Callable[[], str]) -> None:
         """Keeps how to render the feedback: wording it costs more than the action."""
         self.changed = changed
         self._render = render
-        self._text: str | None = None
 
-    @property
+    @cached_property
     def text(self) -> str:
         """What a model reads, about the machine as it was when the action ended."""
-        if self._text is None:
-            self._text = self._render()
-        return self._text
+        return self._render()
 
     def __repr__(self) -> str:
         return f"Accepted({self.text!r})"
@@ -137,15 +133,12 @@ class Refused:
         attempted: the blocks where they would have been; empty when that is not known.
     """
 
+    ok: ClassVar[Literal[False]] = False
+
     cause: Cause
     text: str
     overlaps: tuple[tuple[str, str], ...] = ()
     attempted: tuple[AttemptedBlock, ...] = ()
-
-    @property
-    def ok(self) -> Literal[False]:
-        """False: it was refused."""
-        return False
 
     @property
     def reason(self) -> RefusalClass:

@@ -34,7 +34,6 @@ _KINDS: Mapping[type[inspect.Type], tuple[str, tuple[type, ...]]] = {
     inspect.EnumType: ("a text", (str,)),
     inspect.TupleType: ("a list", (list, tuple)),
     inspect.VarTupleType: ("a list", (list, tuple)),
-    inspect.ListType: ("a list", (list, tuple)),
     inspect.DictType: ("an object", (Mapping,)),
     inspect.StructType: ("an object", (Mapping,)),
     inspect.NoneType: ("null", (NoneType,)),
@@ -152,7 +151,7 @@ def _fault_within(value: Any, form: Any) -> str:
                 return _unlike(f"a list of length {len(form.item_types)}", value)
             pairs = zip(value, form.item_types, strict=True)
             steps = [(f"[{index}]", entry, item) for index, (entry, item) in enumerate(pairs)]
-        case inspect.VarTupleType() | inspect.ListType():
+        case inspect.VarTupleType():
             steps = [(f"[{index}]", entry, form.item_type) for index, entry in enumerate(value)]
         case _:
             expected = _expected(value, form)

@@ -133,8 +133,3 @@ def cross(left: Vector, right: Vector) -> Vector:
     a, b, c = left
     x, y, z = right
     return (b * z - c * y, c * x - a * z, a * y - b * x)
-
-
-def distance(left: Vector, right: Vector) -> float:
-    """How far two points are apart, units."""
-    return math.dist(left, right)

@@ -19,7 +19,7 @@ from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.solids import Ball, Box, Solid
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Form
-from buildarena_geometry.rotations import Vector, distance, subtract
+from buildarena_geometry.rotations import Vector, subtract
 
 
 class SubStructure(Form, frozen=True, kw_only=True):
@@ -137,9 +137,8 @@ class MachineState:
 
     def free_faces(self, block: Block) -> list[str]:
         """The labels of a block's faces that take another block."""
-        return [
-            face.label for face in block.module.faces if not self.is_occupied(block, face.label)
-        ]
+        labels = block.module.face_of_label
+        return [label for label in labels if not self.is_occupied(block, label)]
 
     def children(self, block: Block) -> list[Block]:
         """The blocks that sit on a block."""
@@ -159,7 +158,7 @@ class MachineState:
             face=label,
             part_xyz=root,
             base_xyz=face,
-            offset=distance(root, face),
+            offset=math.dist(root, face),
         )
 
     def joints(self) -> Iterator[Joint]:

@@ -5,6 +5,7 @@ It is used only if all of it fits the blocks of the file.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any, Final
 
 from buildarena_besiege.exporting.header import HEADER_VERSION, MARK, places_digest
@@ -13,7 +14,6 @@ from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import read_json
-from buildarena_geometry.rotations import distance
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,7 +116,7 @@ def _check_ends(link: Connector, part: Part) -> None:
     ends = (part.pose.point(part.start), part.pose.point(part.end))
     described = (link.start_xyz, link.end_xyz)
     if any(
-        distance(end, described_end) > _SAME_PLACE
+        math.dist(end, described_end) > _SAME_PLACE
         for end, described_end in zip(ends, described, strict=True)
     ):
         raise HeaderError(f"{link.module.name} {link.id} joins other faces in the file")

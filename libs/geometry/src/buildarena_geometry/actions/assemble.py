@@ -105,13 +105,12 @@ def remove_machine(state: MachineState, machine_index: Name) -> Change:
     remaining, links = without(state, gone)
     others = {key: other for key, other in state.structures.items() if key != removed.letter}
     after = replace(remaining, structures=others)
-    return Change(
-        after=after,
-        removed=(*(block.id for block in gone), *links),
-        render=lambda: " ".join(
-            [f"Removed sub-structure {removed.letter}.", *removal_sentences(state, after, links)]
-        ),
-    )
+
+    def render() -> str:
+        sentences = removal_sentences(state, after, links)
+        return " ".join([f"Removed sub-structure {removed.letter}.", *sentences])
+
+    return Change(after=after, removed=(*(block.id for block in gone), *links), render=render)
 
 
 def _motion(

@@ -74,12 +74,9 @@ def attach_block_to(
     block = _new_block(state, module, pose, note)
     block = replace(block, mount=(base.id, face), structure=base.structure)
     if state.is_occupied(base, face):
-        raise RefusalError(
-            Cause.FACE_OCCUPIED,
-            f"Face {words.face_name(base, face)} of {words.title(base)} is taken. "
-            f"Its free faces: {words.free_faces(state, base)}.",
-            attempted=attempted([block]),
-        )
+        taken = f"Face {words.face_name(base, face)} of {words.title(base)} is taken"
+        text = f"{taken}. Its free faces: {words.free_faces(state, base)}."
+        raise RefusalError(Cause.FACE_OCCUPIED, text, attempted=attempted([block]))
     after = replace(
         state,
         blocks={**state.blocks, block.id: block},
@@ -156,11 +153,9 @@ def _with_face(part: Block | Connector, label: str) -> Block:
     if isinstance(part, Connector) or not part.module.faces:
         raise RefusalError(Cause.NO_FACES, f"{words.heading(part)} has no faces to connect.")
     if label not in part.module.face_of_label:
-        raise RefusalError(
-            Cause.NO_SUCH_FACE,
-            f"{words.heading(part)} has no face {shown(label)}. "
-            f"Its faces: {words.named_faces(part, part.module.face_of_label)}.",
-        )
+        known = words.named_faces(part, part.module.face_of_label)
+        text = f"{words.heading(part)} has no face {shown(label)}. Its faces: {known}."
+        raise RefusalError(Cause.NO_SUCH_FACE, text)
     return part
 
 

@@ -71,11 +71,9 @@ def _press(bound: tuple[str, ...], time: float, key: str, hold_for: float) -> Ke
         text = f"{shown(key)}: {problem}. Keys in use: {listing(bound)}."
         raise RefusalError(Cause.BAD_KEY, text)
     if time < 0 or hold_for <= 0:
-        raise RefusalError(
-            Cause.OUT_OF_RANGE,
-            f"time must be at least 0 and hold_for more than 0, "
-            f"not {shown(time)} and {shown(hold_for)}.",
-        )
+        needed = "time must be at least 0 and hold_for more than 0"
+        text = f"{needed}, not {shown(time)} and {shown(hold_for)}."
+        raise RefusalError(Cause.OUT_OF_RANGE, text)
     return KeyPress(time_s=time, key=key, hold_for_s=hold_for)
 
 

@@ -44,11 +44,9 @@ def shift_block(state: MachineState, block_id: BlockId, shift_real: Triple) -> C
     """
     target = part(state, block_id)
     if max(map(abs, shift_real)) > LARGEST_SHIFT:
-        raise RefusalError(
-            Cause.OUT_OF_RANGE,
-            f"One call shifts by at most {LARGEST_SHIFT} in each direction, "
-            f"not {point(shift_real)}.",
-        )
+        most = f"at most {LARGEST_SHIFT} in each direction"
+        text = f"One call shifts by {most}, not {point(shift_real)}."
+        raise RefusalError(Cause.OUT_OF_RANGE, text)
     moved = f"by {point(shift_real)}"
     if isinstance(target, Connector):
         pose = target.world_from_connector.shifted(shift_real)

@@ -67,21 +67,14 @@ def removal_sentences(
     before: MachineState, after: MachineState, links: tuple[str, ...]
 ) -> list[str]:
     """Sentences about what a removal took along, what hangs in the air, and what went cold."""
-    sentences = []
-    if links:
-        sentences.append(f"Connectors that ended on it went too: {listing(links)}.")
-    sentences.extend(words.detached(after, after.joints()))
-    sentences.extend(words.cooled(before, after))
-    return sentences
+    went = [f"Connectors that ended on it went too: {listing(links)}."] if links else []
+    return [*went, *words.detached(after, after.joints()), *words.cooled(before, after)]
 
 
 def _removal(
     before: MachineState, after: MachineState, gone: Block | Connector, links: tuple[str, ...]
 ) -> Change:
-    return Change(
-        after=after,
-        removed=(gone.id, *links),
-        render=lambda: " ".join(
-            [f"Removed {words.title(gone)}.", *removal_sentences(before, after, links)]
-        ),
-    )
+    def render() -> str:
+        return " ".join([f"Removed {words.title(gone)}.", *removal_sentences(before, after, links)])
+
+    return Change(after=after, removed=(gone.id, *links), render=render)

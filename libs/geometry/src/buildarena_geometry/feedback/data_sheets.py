@@ -193,10 +193,10 @@ def _spring(spring: Spring) -> str:
             f"; {spring.contract} shortens its rest length to {plain(spring.shortest)} of the "
             f"built one, by {plain(spring.rate)} built lengths/s"
         )
-    return (
-        f"pulls {plain(spring.stiffness)} per unit beyond its rest length, pushes when shorter, "
-        f"damper {plain(spring.damping)} per unit/s{shortens}; gives way at {plain(spring.limit)}"
-    )
+    pulls = f"pulls {plain(spring.stiffness)} per unit beyond its rest length"
+    damper = f"damper {plain(spring.damping)} per unit/s"
+    limit = f"gives way at {plain(spring.limit)}"
+    return f"{pulls}, pushes when shorter, {damper}{shortens}; {limit}"
 
 
 def _body(module: Module, usual: Physics | None) -> Iterator[str]:

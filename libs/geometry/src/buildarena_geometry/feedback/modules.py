@@ -20,9 +20,8 @@ def modules_text(catalogue: Catalogue, names: Collection[str] | None = None) -> 
         catalogue: the modules.
         names: only these, and the starting block; all that can be built by default.
     """
-    return "\n".join(
-        f"- {_module_lines(module, catalogue)}" for module in _chosen(catalogue, names)
-    )
+    chosen = _chosen(catalogue, names)
+    return "\n".join(f"- {_module_lines(module, catalogue)}" for module in chosen)
 
 
 def modules_in_short(catalogue: Catalogue, names: Collection[str] | None = None) -> str:
@@ -42,19 +41,15 @@ def modules_in_short(catalogue: Catalogue, names: Collection[str] | None = None)
 def lookup_text(catalogue: Catalogue) -> str:
     """What builders read who look modules up, in place of the modules."""
     count = sum(module.kind not in ("start", "cargo") for module in catalogue.values())
-    return (
-        f"{counted(count, 'module')} may be used. Look up what you need: list_modules names those "
-        "of a category, describe_module tells all about one or several.\n"
-        f"{categories_text(catalogue)}"
-    )
+    how = "list_modules names those of a category, describe_module tells all about one or several"
+    used = f"{counted(count, 'module')} may be used. Look up what you need: {how}."
+    return f"{used}\n{categories_text(catalogue)}"
 
 
 def categories_text(catalogue: Catalogue) -> str:
     """The categories, with how many modules each has."""
-    sizes = ", ".join(
-        f"{name} ({len(modules)})" for name, modules in modules_of_category(catalogue).items()
-    )
-    return f"Categories: {sizes}."
+    categories = modules_of_category(catalogue).items()
+    return f"Categories: {', '.join(f'{name} ({len(modules)})' for name, modules in categories)}."
 
 
 def category_text(catalogue: Catalogue, category: str) -> str:

@@ -72,11 +72,9 @@ def place_line(state: MachineState, block: Block) -> str:
 
 def connector_line(link: Connector) -> str:
     """A connector in one line."""
-    (start, start_face), (end, end_face) = link.start, link.end
-    return (
-        f"{link.id} {link.module.name}, {start}/{start_face} {point(link.start_xyz)} to "
-        f"{end}/{end_face} {point(link.end_xyz)}{_note(link.note)}"
-    )
+    start = f"{link.start[0]}/{link.start[1]} {point(link.start_xyz)}"
+    end = f"{link.end[0]}/{link.end[1]} {point(link.end_xyz)}"
+    return f"{link.id} {link.module.name}, {start} to {end}{_note(link.note)}"
 
 
 def named_faces(block: Block, labels: Iterable[str]) -> str:
@@ -123,9 +121,8 @@ def placement(state: MachineState, block: Block) -> str:
 def block_details(state: MachineState, block: Block) -> str:
     """Everything a model can ask about one block."""
     lines = [f"{block_line(state, block)}.", faces(state, block)]
-    bound = [f"{action} {listing(keys)}" for action, keys in block.bindings.items()]
-    if bound:
-        lines.append(f"Keys: {'; '.join(bound)}.")
+    if block.bindings:
+        lines.append(f"Keys: {_bound(block)}.")
     links = [link.id for link in state.connectors.values() if block.id in link.ends]
     if links:
         lines.append(f"Connectors: {listing(links)}.")
@@ -176,11 +173,7 @@ def added_presses(state: MachineState, count: int) -> str:
 
 def control_config(state: MachineState) -> str:
     """Which key does what, block by block."""
-    lines = [
-        f"{part.id} {part.module.name}: "
-        + "; ".join(f"{action} {listing(keys)}" for action, keys in part.bindings.items())
-        for part in state.powered()
-    ]
+    lines = [f"{part.id} {part.module.name}: {_bound(part)}" for part in state.powered()]
     return "\n".join(lines) or "No block takes a key."
 
 
@@ -235,6 +228,10 @@ def cooled(before: MachineState, after: MachineState) -> list[str]:
         for cannon, torches in lost.items()
         if torches
     ]
+
+
+def _bound(part: Block | Connector) -> str:
+    return "; ".join(f"{action} {listing(keys)}" for action, keys in part.bindings.items())
 
 
 def _press_lines(state: MachineState) -> list[str]:

@@ -101,7 +101,7 @@ class ModuleFile(Form, frozen=True, kw_only=True):
     """A module file."""
 
     version: Whole
-    modules: list[Any]
+    modules: tuple[Any, ...]
 
 
 def load_catalogue(*files: str | Path) -> Catalogue:

@@ -18,7 +18,7 @@ from buildarena_geometry.modules.names import CaselessNames
 from buildarena_geometry.modules.solids import Solid
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Amount, Finite, Form, Name, Point, Positive, refuse
-from buildarena_geometry.rotations import ORIGIN, Vector, distance
+from buildarena_geometry.rotations import ORIGIN, Vector
 
 Kind = Literal[
     "start", "block", "joint", "wheel", "flight", "cannon", "torch", "device", "connector", "cargo"
@@ -361,7 +361,7 @@ def _mount_face(faces: tuple[Face, ...], root_offset: float) -> str | None:
     touched = (0.0, 0.0, -root_offset)
     facing = [face for face in faces if face.normal[2] < _FACING]
     for face in facing:
-        flush = distance(face.center, touched) < FLUSH_TOLERANCE
+        flush = math.dist(face.center, touched) < FLUSH_TOLERANCE
         if flush and face.normal[2] < FLUSH_TOLERANCE - 1:
             return face.label
     return min(facing, key=lambda face: face.center[2]).label if facing else None

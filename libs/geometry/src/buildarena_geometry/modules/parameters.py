@@ -17,9 +17,8 @@ from buildarena_geometry.keys import KEYS
 from buildarena_geometry.outcomes import AttemptedBlock, Cause, Refused
 from buildarena_geometry.rotations import Vector
 
-LARGEST_NUMBER = (
-    1e6  # units, degrees or seconds; far beyond any machine, well within a float's digits
-)
+LARGEST_NUMBER = 1e6
+"""Units, degrees or seconds; far beyond any machine, well within a float's digits."""
 LONGEST_TEXT = 500  # characters of a note or a name
 MAX_PRESSES = 100  # key presses beside the first that one call adds
 _LONGEST_QUOTE = 40  # characters of what a message quotes

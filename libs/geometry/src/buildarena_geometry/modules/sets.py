@@ -32,11 +32,9 @@ def module_set(name: str) -> Catalogue:
     if name == "basic":
         return Catalogue(basic_modules())
     built = [module for module in basic_modules() if module.kind != "cargo"]
-    further = [
-        extended
-        for extended in extended_modules()
-        if name == "all" or (extended.simulated and not extended.by_name)
-    ]
+    further = extended_modules()
+    if name == "workshop":
+        further = tuple(one for one in further if one.simulated and not one.by_name)
     return Catalogue((*built, *further))
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.reading import Form, Point, Positive, refuse
-from buildarena_geometry.rotations import ORIGIN, Vector, distance, from_axes
+from buildarena_geometry.rotations import ORIGIN, Vector, from_axes
 
 _CORNERS = {"lowest": "from", "highest": "to"}
 _ENDS = {"base": "from", "top": "to"}  # what module files call the fields
@@ -63,7 +65,7 @@ class Cylinder(_Shape, frozen=True, kw_only=True, tag="cylinder", rename=_ENDS):
     @property
     def length(self) -> float:
         """Distance between its ends, units."""
-        return distance(self.base, self.top)
+        return math.dist(self.base, self.top)
 
     @property
     def center(self) -> Vector:
@@ -77,7 +79,7 @@ class Cylinder(_Shape, frozen=True, kw_only=True, tag="cylinder", rename=_ENDS):
         x, y, z = (scale * (end - start) for start, end in zip(self.base, self.top, strict=True))
         # Any x axis will do: a cylinder looks the same all round.
         across = (0.0, -z, y) if abs(x) < max(abs(y), abs(z)) else (-y, x, 0.0)
-        norm = distance(across, ORIGIN)
+        norm = math.dist(across, ORIGIN)
         x_axis = (across[0] / norm, across[1] / norm, across[2] / norm)
         turn = from_axes(x_axis, (x, y, z))
         return Pose(position=self.center, quaternion=turn)
