@@ -1,13 +1,20 @@
 """JSON texts and values, read within bounds."""
 
 import json
+import math
+import re
 import subprocess
 import sys
+from typing import Any
 
 import pytest
 
+from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import MAX_DEPTH, TooDeepError, is_too_deep, read_json
 from buildarena_geometry.json_values import levels
+from buildarena_geometry.modules.solids import Ball, Box
+from buildarena_geometry.reading import Amount, Finite, Name, Point, Whole, read
+from buildarena_geometry.rotations import ORIGIN
 
 
 def test_brackets_in_texts_are_no_depth(subtests) -> None:
@@ -44,6 +51,29 @@ def test_what_is_no_json_is_a_value_error(subtests) -> None:
     for text in ["", "{", b"\xff", '{"a"}', "[1,]"]:
         with subtests.test(text=text), pytest.raises(ValueError):
             read_json(text)
+
+
+def test_a_misfit_is_told_by_its_place_and_by_what_may_stand_there(subtests) -> None:
+    for form, value, told in [
+        (list[Any], {}, "it: expected a list, found {}"),
+        (list[Amount], [1, -1], "it[1]: expected a number of at least 0, found -1"),
+        (Finite, True, "it: expected a number, found True"),
+        (Point, [0, 0, math.inf], "it[2]: expected a finite number, found inf"),
+        (Whole, 2.5, "it: expected a whole number, found 2.5"),
+        (Whole, -1, "it: expected a whole number of at least 0, found -1"),
+        (Name | None, 3, "it: expected a text or null, found 3"),
+        (dict[str, tuple[str, ...]], {"keys": ["A", 4]}, "it.keys[1]: expected a text, found 4"),
+        (dict[str, str], {4: "A"}, "it: expected an object whose keys are texts, found {4: 'A'}"),
+        (Box | Ball, {"radius": 1}, "it: shape is missing"),
+        (Box | Ball, {"shape": 1}, "it.shape: expected one of box, sphere, found 1"),
+        (Box | Ball, {"shape": "sphere", "x": 1}, "no field 'x'; the fields are shape, radius"),
+        (Box, {"shape": "box", "from": ORIGIN, "to": ORIGIN}, "it.to: expected three numbers"),
+    ]:
+        with (
+            subtests.test(form=form, value=value),
+            pytest.raises(DocumentError, match=re.escape(told)),
+        ):
+            read(value, form, where="it", error=DocumentError)
 
 
 DEEP = {"a": 1, "b": {"c": (2, 3)}}

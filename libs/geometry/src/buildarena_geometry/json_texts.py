@@ -4,8 +4,6 @@ Python's reader goes as deep as its stack does. Whatever runs there, such as the
 that the garbage collector finds, fails for want of room; so the depth is looked at before.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from typing import Any

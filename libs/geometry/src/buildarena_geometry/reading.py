@@ -34,6 +34,7 @@ _KINDS: Mapping[type[inspect.Type], tuple[str, tuple[type, ...]]] = {
     inspect.EnumType: ("a text", (str,)),
     inspect.TupleType: ("a list", (list, tuple)),
     inspect.VarTupleType: ("a list", (list, tuple)),
+    inspect.ListType: ("a list", (list, tuple)),
     inspect.DictType: ("an object", (Mapping,)),
     inspect.StructType: ("an object", (Mapping,)),
     inspect.NoneType: ("null", (NoneType,)),
@@ -151,7 +152,7 @@ def _fault_within(value: Any, form: Any) -> str:
                 return _unlike(f"a list of length {len(form.item_types)}", value)
             pairs = zip(value, form.item_types, strict=True)
             steps = [(f"[{index}]", entry, item) for index, (entry, item) in enumerate(pairs)]
-        case inspect.VarTupleType():
+        case inspect.VarTupleType() | inspect.ListType():
             steps = [(f"[{index}]", entry, form.item_type) for index, entry in enumerate(value)]
         case _:
             expected = _expected(value, form)

@@ -1,7 +1,5 @@
 """Numbers, directions and turning in words."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 
