@@ -84,6 +84,7 @@ def test_requests_stay_quick_beside_a_stopped_broker_and_jobs_flow_again(
                 job = {**JOB, "seed": 2 + number}
                 answers.append(client.post("/v1/jobs", json=job).status_code)
                 times.append(time.monotonic() - started)
+
             def says_so() -> bool:
                 started = time.monotonic()
                 checks = client.get("/v1/health").json()["checks"]
