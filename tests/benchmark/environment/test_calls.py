@@ -20,7 +20,7 @@ from buildarena_benchmark.environment import (
     read_call,
 )
 from buildarena_benchmark.environment.choices import reference_of
-from buildarena_benchmark.environment.trials.trial_pool import task_from, text_of
+from buildarena_benchmark.environment.trials.trial_pool import WrittenTask
 from buildarena_benchmark.families.given import edits_between
 from buildarena_simulation import SimulationError
 
@@ -192,7 +192,7 @@ def test_a_drawn_task_comes_through_text_as_it_is() -> None:
     known = builtin_tasks()[REPAIR]
     own = replace(known, name="own-repair")
     for task in (known, known.drawn(7), own, own.drawn(8), builtin_tasks()["support-1"]):
-        again = task_from(text_of(task))
+        again = WrittenTask.of(task).read()
         assert (again.name, again.seed, again.beginning) == (task.name, task.seed, task.beginning)
-    assert parse_task(text_of(own), origin="x").version == known.version
+    assert parse_task(WrittenTask.of(own).text, origin="x").version == known.version
     assert reference_of(known.drawn(7)) == reference_of(known)

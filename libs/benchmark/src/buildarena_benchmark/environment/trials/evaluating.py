@@ -14,8 +14,7 @@ from buildarena_benchmark.environment.trials.trial_pool import (
     LONGEST_TRIAL_S,
     Evaluation,
     TrialPool,
-    task_from,
-    text_of,
+    WrittenTask,
 )
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE
@@ -59,7 +58,7 @@ class Evaluator:
         self.task = chosen_task(task)
         self.simulator = checked_simulator(simulator)
         self.seed = seed
-        task_from(text_of(self.task))
+        WrittenTask.of(self.task).read()
         self._pool = TrialPool(
             processes, timeout_s=timeout_s, trajectories=trajectories, whole=whole
         )

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from queue import SimpleQueue
-from typing import Any, Final, Self
+from typing import Any, Final, NamedTuple, Self
 
 from buildarena_benchmark import Task, builtin_tasks, parse_task
 from buildarena_benchmark.environment.choices import is_builtin
@@ -46,14 +46,48 @@ class Evaluation:
     error: str = ""
 
 
+class WrittenTask(NamedTuple):
+    """A task as another process can read it.
+
+    Attributes:
+        text: Its name if it is a built-in one, otherwise its file.
+        seed: Of the job that it was drawn for; None where nothing is drawn.
+    """
+
+    text: str
+    seed: int | None
+
+    @classmethod
+    def of(cls, task: Task) -> WrittenTask:
+        """What a task is written as."""
+        text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
+        return cls(text, task.seed if task.seed or task.unknowns is not None else None)
+
+    def read(self) -> Task:
+        """The task.
+
+        Raises:
+            TaskError: It is not one that a file could describe.
+        """
+        return _read_task(self)
+
+
+@lru_cache(maxsize=TASKS_READ)
+def _read_task(written: WrittenTask) -> Task:
+    known = builtin_tasks().get(written.text)
+    # YAML, which tasks are written in, contains JSON.
+    task = parse_task(written.text, origin="task") if known is None else known
+    return task if written.seed is None else task.drawn(written.seed)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Question:
     """What a process is asked, in documents: a task and a machine have parts that no pipe takes.
 
-    See `TrialPool.submit` and `text_of`; without `scored`, only a simulation is asked for.
+    See `TrialPool.submit`; without `scored`, only a simulation is asked for.
     """
 
-    task: str
+    task: WrittenTask
     machine: str
     simulator: str
     seed: int | None = None
@@ -140,7 +174,7 @@ class TrialPool:
             ProcessEndedError: The engine ended its process.
         """
         question = _Question(
-            task=text_of(task),
+            task=WrittenTask.of(task),
             machine=json.dumps(machine.to_document()),
             simulator=simulator,
             scored=False,
@@ -169,7 +203,7 @@ class TrialPool:
             seed: As for `Environment`.
         """
         question = _Question(
-            task=text_of(task),
+            task=WrittenTask.of(task),
             machine=document,
             simulator=simulator,
             seed=seed,
@@ -231,30 +265,6 @@ class TrialPool:
         return Evaluation(trial=Trial.from_document(answer["trial"], trajectory))
 
 
-_SEED: Final = "\n# seed "
-"""Stands in no task's JSON, which has one line."""
-
-
-def text_of(task: Task) -> str:
-    """A task as text: its name if it is a built-in one, otherwise its file; what draws it after."""
-    text = task.name if is_builtin(task) else json.dumps(dict(task.as_document()))
-    drawn = task.seed or task.unknowns is not None
-    return f"{text}{_SEED}{task.seed}" if drawn else text
-
-
-@lru_cache(maxsize=TASKS_READ)
-def task_from(text: str) -> Task:
-    """The task of `text_of`; YAML, which tasks are written in, contains JSON.
-
-    Raises:
-        TaskError: The task is not one that a file could describe.
-    """
-    written, _, seed = text.partition(_SEED)
-    known = builtin_tasks().get(written)
-    task = parse_task(written, origin="task") if known is None else known
-    return task.drawn(int(seed)) if seed else task
-
-
 def _require_before(until: float) -> None:
     if time.monotonic() > until:
         raise TimeoutError
@@ -267,7 +277,7 @@ def _answering() -> Callable[[Any], Any]:
 
 
 def _answered(question: _Question) -> Any:
-    task = task_from(question.task)
+    task = question.task.read()
     if not question.scored:
         return _simulated(task, question)
     try:
