@@ -210,17 +210,6 @@ def test_what_is_known_of_leases_goes_an_hour_after_their_end(context, add) -> N
     assert context.store.leases.recover() == [running.job.id]
 
 
-def test_leases_of_the_release_before_and_of_this_one_end_by_their_own_column(context, add) -> None:
-    add(1, 2)
-    claim(context), claim(context)
-    distant = "SELECT min(lease_expires_at) - now() > interval '1 hour' FROM jobs"
-    assert scalar(context, distant), "the release before leaves leases of this one alone"
-    execute(context, "DELETE FROM leases")
-    assert context.store.leases.recover() == []
-    execute(context, "UPDATE jobs SET lease_expires_at = now() - interval '1 s' WHERE seed = 1")
-    assert len(context.store.leases.recover()) == 1
-
-
 def test_a_job_with_the_same_key_is_the_same_job_also_when_it_is_added_at_once(
     context, new_job
 ) -> None:

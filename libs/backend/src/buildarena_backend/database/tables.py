@@ -79,7 +79,6 @@ jobs = Table(
     Column("faults", Integer, nullable=False, server_default=text("0")),
     Column("lease_owner", Text),
     Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
-    time_column("lease_expires_at"),
     time_column("available_at", now=True),
     # What it scored.
     Column("success", Boolean),
@@ -121,7 +120,7 @@ Index(
     jobs.c.queue,
     postgresql_where=(jobs.c.state == JobState.QUEUED) & (jobs.c.faults > 0),
 )
-Index("ix_jobs_leased", jobs.c.lease_expires_at, postgresql_where=jobs.c.state == JobState.RUNNING)
+Index("ix_jobs_running", jobs.c.id, postgresql_where=jobs.c.state == JobState.RUNNING)
 Index("ix_jobs_cell", jobs.c.track, jobs.c.task, jobs.c.model_hash, jobs.c.model)
 # One for each order of lists, and for what lists are narrowed down by.
 Index("ix_jobs_created", jobs.c.created_at, jobs.c.id)

@@ -116,7 +116,7 @@ def end_attempts(
 _MOVE = f"""
     WITH moved AS (
         UPDATE jobs SET
-            state = :to_state, lease_owner = NULL, lease_expires_at = NULL{{settings}}
+            state = :to_state, lease_owner = NULL{{settings}}
         WHERE id = :of_job AND lease_token = :of_token AND state = '{JobState.RUNNING}'
         RETURNING id
     ), released AS (
@@ -177,7 +177,7 @@ _HAND_BACK = text(
         AS given (job_id, token)
     ), moved AS (
         UPDATE jobs SET
-            state = '{JobState.QUEUED}', lease_owner = NULL, lease_expires_at = NULL
+            state = '{JobState.QUEUED}', lease_owner = NULL
         FROM given
         WHERE jobs.id = given.job_id AND jobs.lease_token = given.token
             AND jobs.state = '{JobState.RUNNING}'

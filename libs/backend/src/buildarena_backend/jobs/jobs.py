@@ -177,7 +177,6 @@ class Jobs:
             .values(
                 state=to,
                 lease_owner=None,
-                lease_expires_at=None,
                 lease_token=jobs.c.lease_token + 1,
                 **values,
             )

@@ -14,14 +14,12 @@ from buildarena_backend.jobs.attempts import Ending, end_attempts
 from buildarena_backend.leases.misses import MIN_KEYS, MISSED_BEFORE, RUNNER
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage
 
-# Jobs that a program of 1.0.0rc1 claimed have no row of their own.
-EXPIRES_AT: Final = func.coalesce(
+EXPIRES_AT: Final = (
     select(expiries.c.expires_at)
     .where(expiries.c.job_id == jobs.c.id, expiries.c.token == jobs.c.lease_token)
-    .scalar_subquery(),
-    jobs.c.lease_expires_at,
+    .scalar_subquery()
 )
-"""When the lease of a running job ends."""
+"""When the lease of a running job ends; null of a session of an external agent, which has none."""
 _LOST = select(jobs.c.id).where(jobs.c.state == JobState.RUNNING, events.now > EXPIRES_AT)
 ANY_LOST: Final = _LOST.exists()
 # A session has one request open at most, whose reply is lost with its process.
@@ -58,7 +56,6 @@ def recover_lost(database: Database, *, max_faults: int) -> list[str]:
                 faults=faults,
                 lost_requests=jobs.c.lost_requests + case((_IN_SESSION, 1), else_=0),
                 lease_owner=None,
-                lease_expires_at=None,
                 available_at=events.now,
             )
             .returning(jobs.c.id, jobs.c.state, jobs.c.lease_token, jobs.c.stage)
