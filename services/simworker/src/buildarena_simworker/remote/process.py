@@ -218,10 +218,17 @@ def serve(options: RunnerOptions) -> None:
     end_with_parent()
     runner = Runner(options)
 
+    # A handler may interrupt whoever holds an event's lock: it only writes, and a thread stops.
+    reads, writes = os.pipe()
+
     def asked(number: int, _: object) -> None:
-        log.info("asked_to_stop", signal=signal.Signals(number).name)
+        os.write(writes, bytes([number]))
+
+    def stop() -> None:
+        log.info("asked_to_stop", signal=signal.Signals(os.read(reads, 1)[0]).name)
         runner.stop()
 
+    threading.Thread(target=stop, name="stopping", daemon=True).start()
     for name in ("SIGTERM", "SIGINT", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), asked)
