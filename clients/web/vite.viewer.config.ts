@@ -8,7 +8,7 @@ export default defineConfig({
   // The pages it stands in are given it whole; nothing else is asked for.
   publicDir: false,
   build: {
-    outDir: here("../buildarena/src/buildarena/viewer"),
+    outDir: here("../cli/src/buildarena/viewer"),
     emptyOutDir: true,
     target: "es2022",
     chunkSizeWarningLimit: 1500,

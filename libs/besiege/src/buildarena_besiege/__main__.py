@@ -5,17 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from buildarena_besiege.any_file import read_any_machine
 from buildarena_besiege.normal import normal_form
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from buildarena_geometry import Machine
+from buildarena_geometry import Machine
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 from msgspec import structs
 
@@ -13,9 +14,6 @@ from buildarena_geometry.json_texts import read_json
 from buildarena_geometry.keys import KEYS
 from buildarena_geometry.machine_files import machine_of
 from buildarena_geometry.reading import read, shown
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _LEADING: Final = b" \t\r\n\x00"
 _PUBLISHED_FIELDS: Final = {"time": "time_s", "hold_for": "hold_for_s"}

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, TypeVar
+from typing import Final, TypeVar
 
 from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.keys import KEYS, KEYS_IN_WORDS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from buildarena_geometry import KeyPress, Machine
-    from buildarena_simulation.scenario import Control
+from buildarena_simulation.scenario import Control
 
 Moment = TypeVar("Moment", int, float)
 

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from buildarena_geometry.modules.module import Module
+from buildarena_geometry.modules.module import Module
 
 START, CARGO = 0, 35
 

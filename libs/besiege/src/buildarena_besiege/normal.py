@@ -6,22 +6,18 @@ place, and the script's text is left out.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable
+from typing import Any, Final
 
 from buildarena_besiege.errors import MachineNotPlayableError
-from buildarena_besiege.exporting.machine_file import BSG_VERSION, global_entries
+from buildarena_besiege.exporting.entries import Entry, Value
+from buildarena_besiege.exporting.machine_file import BSG_VERSION, BlockRecord, global_entries
 from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.run import prepared_machine, refusal_of
+from buildarena_geometry import Machine
+from buildarena_geometry.rotations import Quaternion
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import SpanPlacement
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from buildarena_besiege.exporting.entries import Entry, Value
-    from buildarena_besiege.exporting.machine_file import BlockRecord
-    from buildarena_geometry import Machine
-    from buildarena_geometry.rotations import Quaternion
-    from buildarena_simulation import Scenario
 
 LEVELS: Final = {1: "soft", 2: "medium", 3: "hard"}
 """What the golden files call a task's levels."""

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_besiege.importing.machine import ImportedMachine
 from buildarena_besiege.names import key_entries
+from buildarena_geometry import Machine
+from buildarena_geometry.blocks import Block
 from buildarena_geometry.feedback.words import caption
 from buildarena_geometry.keys import KEYS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from buildarena_besiege.importing.machine import ImportedMachine
-    from buildarena_geometry import Machine
-    from buildarena_geometry.blocks import Block
 
 
 def with_own_keys(imported: ImportedMachine) -> tuple[Machine, Mapping[str, str]]:

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point
 from buildarena_geometry.blocks import Block
 from buildarena_geometry.rotations import NO_ROTATION, Quaternion, Vector
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import SpanPlacement
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario
 
 START_HEIGHT: Final = 5.0
 """Height of a machine's origin where "set ground" puts it on the floor afterwards, units."""

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import re
 import uuid
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 from urllib.parse import quote
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.header import header_lines
 from buildarena_besiege.exporting.level import level_file
-from buildarena_besiege.exporting.machine_file import CargoBox, Guids, block_records, machine_text
+from buildarena_besiege.exporting.machine_file import (
+    BlockRecord,
+    CargoBox,
+    Guids,
+    block_records,
+    machine_text,
+)
 from buildarena_besiege.exporting.pilot import pilot_lua
 from buildarena_besiege.exporting.probes import level_probes, ray_start
 from buildarena_besiege.exporting.script import (
@@ -33,15 +40,10 @@ from buildarena_besiege.keys import (
 from buildarena_besiege.names import CARGO_ID
 from buildarena_besiege.placement import AS_BUILT, GlobalPose, cargo_root, global_pose
 from buildarena_besiege.tracking import begin_fields, tracked_blocks
+from buildarena_geometry import KeyPress, Machine
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import GRAVITY, MAX_PARTS
 from buildarena_simulation.scenario import GroundPlacement, ReleasedPlacement, SpanPlacement
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from buildarena_besiege.exporting.machine_file import BlockRecord
-    from buildarena_geometry import KeyPress, Machine
-    from buildarena_simulation import Scenario
 
 _NAME: Final = re.compile(r"[a-z0-9_-]{1,100}")
 _LONGEST_RUN_ID: Final = 200

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from buildarena_besiege.placement import cargo_root, global_pose
+from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point, besiege_turn
 from buildarena_geometry.poses import Pose
+from buildarena_simulation import Scenario
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.placement import Start, start_of
 from buildarena_simulation.scenario import SpanPlacement
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario
 
 
 def game_start(machine: Machine, scenario: Scenario) -> Start:

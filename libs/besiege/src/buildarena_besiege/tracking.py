@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import zlib
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_besiege.errors import MachineNotPlayableError
+from buildarena_geometry import Machine
+from buildarena_geometry.blocks import Block
+from buildarena_simulation import Scenario
 from buildarena_simulation.scenario import SpanPlacement
 
 LINE_VERSION: Final = 2
 """Of the lines that a script prints; from 2 on they report the level that is open."""
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_geometry.blocks import Block
-    from buildarena_simulation import Scenario
 
 
 def tracked_blocks(machine: Machine, scenario: Scenario) -> tuple[str, ...]:

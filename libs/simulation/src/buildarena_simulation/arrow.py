@@ -6,12 +6,11 @@ in the schema's metadata under the key `buildarena.trajectory`, as in the Parque
 """
 
 import io
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+import pyarrow as pa
 
 from buildarena_simulation.errors import TrajectoryFormatError
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 MEDIA_TYPE: Final = "application/vnd.apache.arrow.stream"
 SERIES: Final = ("time_s", "cargo_mass")

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 from buildarena_besiege.names import key_entries
+from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_frame, besiege_offset
+from buildarena_geometry.blocks import Block, Connector, FaceRef
+from buildarena_geometry.modules.module import Module
+from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Vector
 from buildarena_geometry.state import span_in
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from buildarena_geometry import Machine
-    from buildarena_geometry.blocks import Block, Connector, FaceRef
-    from buildarena_geometry.modules.module import Module
-    from buildarena_geometry.poses import Pose
 
 Value = str | int | float | bool | Vector | tuple[str, ...]
 Entry = tuple[str, str, Value]

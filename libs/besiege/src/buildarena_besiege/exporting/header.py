@@ -9,17 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
 
-from buildarena_geometry.blocks import Block
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from buildarena_besiege.exporting.machine_file import BlockRecord
-    from buildarena_geometry import KeyPress, Machine
-    from buildarena_geometry.blocks import Connector
-    from buildarena_geometry.rotations import Quaternion, Vector
+from buildarena_besiege.exporting.machine_file import BlockRecord
+from buildarena_geometry import KeyPress, Machine
+from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.rotations import Quaternion, Vector
 
 MARK: Final = "buildarena machine "
 HEADER_VERSION: Final = 1

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from typing import Final
 
 from buildarena_geometry.besiege_components import besiege_point, besiege_turn
-from buildarena_geometry.rotations import NO_ROTATION, about_axis, rotate
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from buildarena_geometry.rotations import Quaternion, Vector
-    from buildarena_simulation import Scenario
-    from buildarena_simulation.scenario import TerrainBox
+from buildarena_geometry.rotations import NO_ROTATION, Quaternion, Vector, about_axis, rotate
+from buildarena_simulation import Scenario
+from buildarena_simulation.scenario import TerrainBox
 
 BOX_PREFAB: Final = 7000
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import html
 import math
 import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.entries import (
@@ -18,16 +19,11 @@ from buildarena_besiege.exporting.entries import (
 )
 from buildarena_besiege.names import CARGO, CARGO_ID, type_name
 from buildarena_besiege.placement import UPRIGHT_CARGO, GlobalPose
+from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point, besiege_rotation
-from buildarena_geometry.blocks import Block
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from buildarena_geometry import Machine
-    from buildarena_geometry.blocks import Connector
-    from buildarena_geometry.modules.module import Module
-    from buildarena_geometry.rotations import Quaternion, Vector
+from buildarena_geometry.blocks import Block, Connector
+from buildarena_geometry.modules.module import Module
+from buildarena_geometry.rotations import Quaternion, Vector
 
 BSG_VERSION: Final = "1.4"
 _INDENT: Final = "    "

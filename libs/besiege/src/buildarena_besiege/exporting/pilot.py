@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.lua_texts import lua_text
+from buildarena_besiege.exporting.machine_file import BlockRecord
 from buildarena_besiege.keys import UPDATES_PER_S, channel_keys
 from buildarena_besiege.names import CARGO_ID
+from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point
-from buildarena_geometry.rotations import rotate
+from buildarena_geometry.rotations import Vector, rotate
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.controllers.pilot import ProgramPilot
 from buildarena_simulation.controllers.program import (
@@ -26,17 +30,8 @@ from buildarena_simulation.controllers.program import (
 )
 from buildarena_simulation.controllers.senses import forwards, place_of
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
-from buildarena_simulation.structure.model import ShapeKind
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping, Sequence
-
-    from buildarena_besiege.exporting.machine_file import BlockRecord
-    from buildarena_geometry import Machine
-    from buildarena_geometry.rotations import Vector
-    from buildarena_simulation import Scenario
-    from buildarena_simulation.offered import SenseKind
-    from buildarena_simulation.structure.model import FloatArray, Structure
+from buildarena_simulation.offered import SenseKind
+from buildarena_simulation.structure.model import FloatArray, ShapeKind, Structure
 
 NUMBERS_PER_LINE: Final = 24
 """So that no line about senses and answers is too long for the log window."""

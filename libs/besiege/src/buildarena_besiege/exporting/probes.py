@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from buildarena_simulation import Scenario
-    from buildarena_simulation.scenario import TerrainBox
+from buildarena_simulation import Scenario
+from buildarena_simulation.scenario import TerrainBox
 
 MAX_PROBES: Final = 40
 """So that the line that reports them is no longer than a sample's."""

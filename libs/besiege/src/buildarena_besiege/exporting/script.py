@@ -7,18 +7,14 @@ dot; with a colon the table itself would become the first argument.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_besiege.check_sums import FACTOR, MODULUS
 from buildarena_besiege.exporting.lua_texts import lua_text
-from buildarena_besiege.keys import UPDATES_PER_S
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from buildarena_besiege.keys import Edge
-    from buildarena_simulation.scenario import Cargo
+from buildarena_besiege.keys import UPDATES_PER_S, Edge
+from buildarena_simulation.scenario import Cargo
 
 SAMPLE_EVERY: Final = 4
 """Updates from one sample to the next: 25 samples a second."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_besiege.errors import MachineFileError
 from buildarena_besiege.game_keys import is_game_key
@@ -18,14 +19,9 @@ from buildarena_besiege.importing.xml_file import (
 from buildarena_besiege.names import CARGO, SETTINGS, key_entries
 from buildarena_geometry.besiege_components import besiege_offset, pose_from_besiege
 from buildarena_geometry.keys import KEYS
-from buildarena_geometry.rotations import ORIGIN
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from buildarena_geometry.modules.module import Catalogue, Module
-    from buildarena_geometry.poses import Pose
-    from buildarena_geometry.rotations import Vector
+from buildarena_geometry.modules.module import Catalogue, Module
+from buildarena_geometry.poses import Pose
+from buildarena_geometry.rotations import ORIGIN, Vector
 
 CARGO_LEFT_OUT: Final = "a cargo is the task's: left out"
 _SCRIPTING: Final = ("bmt-lua_module", "bmt-lua_ref_key")

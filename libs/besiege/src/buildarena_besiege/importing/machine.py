@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from buildarena_besiege.errors import MachineFileError
 from buildarena_besiege.importing.blocks import (
@@ -27,18 +28,14 @@ from buildarena_besiege.importing.seats import Faces, Seat, ends_of, faces_of, m
 from buildarena_besiege.importing.xml_file import FileMachine, parse_file, shown
 from buildarena_besiege.names import CARGO, MACHINE_SETTINGS, key_entries
 from buildarena_geometry import Machine, module_set
+from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.keys import KEYS
+from buildarena_geometry.modules.module import Catalogue
 from buildarena_geometry.modules.sets import smallest_set
 from buildarena_geometry.rotations import subtract
 from buildarena_geometry.state import sub_structure_letter
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from buildarena_geometry.documents.log import LoggedState
-    from buildarena_geometry.modules.module import Catalogue
 
 _VERSIONS = ("1.3", "1.4")
 _NO_SCRIPT = "the Lua script is not ours: what it does, and the keys it presses, are not read"

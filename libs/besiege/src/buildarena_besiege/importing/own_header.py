@@ -6,23 +6,19 @@ It is used only if all of it fits the blocks of the file.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import Any, Final
 
 from buildarena_besiege.exporting.header import HEADER_VERSION, MARK, places_digest
+from buildarena_besiege.importing.blocks import Part
+from buildarena_besiege.importing.xml_file import FileMachine
 from buildarena_besiege.keys import HELD_KEY
+from buildarena_geometry.blocks import Connector
 from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.documents.read import read_machine
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import read_json
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from buildarena_besiege.importing.blocks import Part
-    from buildarena_besiege.importing.xml_file import FileMachine
-    from buildarena_geometry.blocks import Connector
-    from buildarena_geometry.modules.module import Catalogue
-
+from buildarena_geometry.modules.module import Catalogue
 
 _SAME_PLACE: Final = 1e-3  # units
 

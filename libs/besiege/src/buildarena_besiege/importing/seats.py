@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_besiege.exporting.entries import end_rotation
+from buildarena_besiege.importing.blocks import Part
 from buildarena_geometry.blocks import JOINT_REACH
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
-    from buildarena_besiege.importing.blocks import Part
-    from buildarena_geometry.rotations import Vector
+from buildarena_geometry.rotations import Vector
 
 _TOUCHING: Final = 1e-3  # units; a root so near to a face's centre sits on it
 _ALIGNED: Final = 0.9995  # cosine; a block's axis is the normal of the face it sits on

@@ -9,22 +9,24 @@ from __future__ import annotations
 import io
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
+from xml.etree.ElementTree import Element
 
 import defusedxml.ElementTree as SafeTree
 from defusedxml import DefusedXmlException
 
 from buildarena_besiege.errors import MachineFileError
 from buildarena_geometry.modules.parameters import LARGEST_NUMBER
-from buildarena_geometry.rotations import NO_ROTATION, ORIGIN, SHORTEST_QUATERNION
+from buildarena_geometry.rotations import (
+    NO_ROTATION,
+    ORIGIN,
+    SHORTEST_QUATERNION,
+    Quaternion,
+    Vector,
+)
 from buildarena_simulation.constants import MAX_PARTS
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from xml.etree.ElementTree import Element
-
-    from buildarena_geometry.rotations import Quaternion, Vector
 
 MAX_BYTES: Final = 8 * 1024 * 1024
 """Largest file that is read; one of 2,000 blocks has 2 MiB."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Final
+from collections.abc import Mapping
+from typing import Final
 from urllib.parse import unquote
 
 from buildarena_besiege.keys import UPDATES_PER_S
 from buildarena_besiege.logs.log_lines import LONGEST_LINE, Line, World, line_of
 from buildarena_besiege.run import marked
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 _LINE_ENDS: Final = re.compile(r"\r\n|\r|\n")
 _BEGINNINGS: Final = re.compile(r"ba,([A-Za-z0-9_.~%-]{1,200}),b,")

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.starts import game_start
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
 from buildarena_simulation.errors import MachineNotSimulable
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario
 
 SLACK: Final = 0.5
 """How far from where it should start a block may be at the first sample, besides what it may have

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Iterator
+from typing import Final
 
-from buildarena_besiege.exporting.probes import level_probes
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from buildarena_besiege.exporting.probes import Probe
-    from buildarena_besiege.logs.log_lines import World
-    from buildarena_simulation import Scenario
+from buildarena_besiege.exporting.probes import Probe, level_probes
+from buildarena_besiege.logs.log_lines import World
+from buildarena_simulation import Scenario
 
 GROUND_TOLERANCE: Final = 0.25
 """How uneven the ground itself may be, units."""

@@ -19,12 +19,10 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_besiege.check_sums import check_sum
-
-if TYPE_CHECKING:
-    from buildarena_geometry.rotations import Vector
+from buildarena_geometry.rotations import Vector
 
 LONGEST_LINE: Final = 2000
 """Characters; a line with eight blocks far away from the origin has fewer than 500."""

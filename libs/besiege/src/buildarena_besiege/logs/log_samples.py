@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_besiege.errors import LogIncompleteError
 from buildarena_besiege.exporting.script import BLOCKS_PER_LINE, SAMPLE_EVERY
 from buildarena_besiege.keys import UPDATES_PER_S
+from buildarena_besiege.logs.game_log import GameLog
 from buildarena_besiege.logs.level_check import level_finding
+from buildarena_besiege.logs.log_lines import Line
 from buildarena_besiege.tracking import LINE_VERSION, run_digest
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from buildarena_besiege.logs.game_log import GameLog
-    from buildarena_besiege.logs.log_lines import Line
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario
-    from buildarena_simulation.trajectory import Setting
+from buildarena_simulation.trajectory import Setting
 
 READABLE: Final = (1, LINE_VERSION)
 """Versions of the lines that are read; those of the first do not say which level was open."""

@@ -6,19 +6,16 @@ as one, so three of them that are not in a line determine the machine's rotation
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from buildarena_geometry.rotations import multiply
+from buildarena_geometry import Machine
+from buildarena_geometry.rotations import Quaternion, multiply
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Floats = NDArray[np.float64]
 
-    from buildarena_geometry import Machine
-    from buildarena_geometry.rotations import Quaternion
-
-    Floats = NDArray[np.float64]
 
 MIN_WIDTH: Final = 0.5
 """Blocks nearer to one line than this give no rotation about it, units (root of summed squares)."""

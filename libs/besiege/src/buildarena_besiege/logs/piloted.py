@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_besiege.errors import LogIncompleteError
 from buildarena_besiege.exporting.pilot import pilot_of
 from buildarena_besiege.keys import UPDATES_PER_S
+from buildarena_besiege.logs.game_log import GameLog
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from buildarena_besiege.logs.game_log import GameLog
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario
-    from buildarena_simulation.controllers.pilot import ProgramPilot
+from buildarena_simulation.controllers.pilot import ProgramPilot
 
 ALIKE: Final = 1.001e-6
 """By how much an answer in the log may miss that of the program here: its last decimal."""

@@ -13,9 +13,10 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +33,11 @@ from buildarena_besiege.logs.resampling import (
 from buildarena_besiege.logs.rows import Row, RowFormat, learnt_format, lines_of
 from buildarena_besiege.logs.trajectories import Samples, made_trajectory
 from buildarena_besiege.names import CARGO_ID
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.control import reaching
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario, Trajectory
-    from buildarena_simulation.scenario import Cargo
+from buildarena_simulation.scenario import Cargo
 
 EARLY_END_S: Final = 1.0
 """A published run ends by the wall clock, so by the script's own time it may end early, seconds."""

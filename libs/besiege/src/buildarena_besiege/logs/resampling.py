@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_besiege.errors import LogIncompleteError
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 def sample_instants(last_s: float) -> NDArray[np.float64]:

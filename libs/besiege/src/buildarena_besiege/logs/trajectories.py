@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_besiege.keys import cannons
+from buildarena_besiege.logs.game_log import GameLog
 from buildarena_besiege.logs.late_start import proved_start
 from buildarena_besiege.logs.log_samples import (
     filled,
@@ -28,9 +31,11 @@ from buildarena_besiege.logs.orientation import (
 from buildarena_besiege.logs.piloted import piloted_again
 from buildarena_besiege.placement import global_pose
 from buildarena_besiege.tracking import tracked_blocks
+from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_turn
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Quaternion
+from buildarena_simulation import Scenario
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.trajectory import (
     Piloting,
@@ -39,15 +44,6 @@ from buildarena_simulation.trajectory import (
     rounded_positions,
     rounded_quaternions,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from buildarena_besiege.logs.game_log import GameLog
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario
 
 ENGINE: Final = "besiege"
 READING_VERSION: Final = "1"

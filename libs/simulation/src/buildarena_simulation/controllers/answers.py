@@ -2,13 +2,11 @@
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from buildarena_simulation.control import Bindings, channel
 from buildarena_simulation.errors import ControllerFailed
-
-if TYPE_CHECKING:
-    from buildarena_simulation.structure.model import Structure
+from buildarena_simulation.structure.model import Structure
 
 _NEAR: Final = 3
 

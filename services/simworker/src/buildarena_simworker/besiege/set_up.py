@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from buildarena_simworker.besiege.errors import NotSetUpError
 from buildarena_simworker.besiege.installed import installed
 from buildarena_simworker.besiege.screen.calibration import load_calibration
+from buildarena_simworker.besiege.screen.window import WindowDesktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
-
-if TYPE_CHECKING:
-    from buildarena_simworker.besiege.screen.window import WindowDesktop
 
 
 def make_desktop(settings: BesiegeSettings) -> tuple[WindowDesktop, Mapping[str, Any]]:

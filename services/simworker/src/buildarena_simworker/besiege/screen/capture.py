@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from PIL.Image import Image
 
 from buildarena_simworker.besiege.errors import ScreenError
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
-
-    from buildarena_simworker.besiege.screen.window_types import Area
+from buildarena_simworker.besiege.screen.window_types import Area
 
 _VISIBLE: Final = 16
 """Shades of grey, of 256, by which a pixel must change to count."""

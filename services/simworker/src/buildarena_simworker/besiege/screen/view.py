@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from PIL.Image import Image
 
 from buildarena_simworker.besiege.errors import GameGoneError
 from buildarena_simworker.besiege.screen.calibration import Calibration
 from buildarena_simworker.besiege.screen.capture import difference, is_black, picture
 from buildarena_simworker.besiege.screen.window_types import Area, Windows
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 CHANGED: Final = 0.02
 """Share of a patch that looks different after something was opened or closed there."""

@@ -7,7 +7,9 @@ the pixels near what was clicked, the log.
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import TYPE_CHECKING, Final
+from typing import Final
+
+from PIL.Image import Image
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import GameLog, GameRun, level_file, level_finding, trajectory_of
@@ -36,9 +38,6 @@ from buildarena_simworker.besiege.screen.view import View
 from buildarena_simworker.besiege.screen.window_types import Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.besiege.traces import Traces
-
-if TYPE_CHECKING:
-    from PIL.Image import Image
 
 LIKE_EMPTY: Final = 0.35
 """A window is empty again when it differs from an empty one by less than this share of what a
