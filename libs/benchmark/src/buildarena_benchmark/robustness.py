@@ -2,16 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from buildarena_benchmark.constraints import broken_constraint
-from buildarena_benchmark.scores import failed_score, score
+from buildarena_benchmark.scores import Score, failed_score, score
+from buildarena_benchmark.tasks.task import Task
+from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Play, simulate_many
-
-if TYPE_CHECKING:
-    from buildarena_benchmark.scores import Score
-    from buildarena_benchmark.tasks.task import Task
-    from buildarena_geometry import Machine
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -3,18 +3,14 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from buildarena_benchmark.scorers.measures.stability import is_unstable
 from buildarena_benchmark.scorers.registry import known_scorers
 from buildarena_benchmark.scorers.scorer import UNSTABLE, Metric
-from buildarena_simulation import world_of
-
-if TYPE_CHECKING:
-    from buildarena_benchmark.tasks.task import Task
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
-    from buildarena_simulation.trial import Decision
+from buildarena_benchmark.tasks.task import Task
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory, world_of
+from buildarena_simulation.trial import Decision
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

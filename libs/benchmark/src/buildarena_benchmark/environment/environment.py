@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.environment.briefing import (
@@ -37,11 +37,8 @@ from buildarena_benchmark.environment.trials.trials import (
     try_machine,
 )
 from buildarena_benchmark.environment.workbench import Workbench
-from buildarena_geometry import Accepted, Cause, Machine, Refused, ToolDefinition
+from buildarena_geometry import Accepted, Cause, Machine, Outcome, Refused, ToolDefinition
 from buildarena_simulation import DEFAULT_ENGINE
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Outcome
 
 LAST: Final = "That ends the episode."
 AGAIN: Final = "After each trial but the last you read what was measured and may build on."

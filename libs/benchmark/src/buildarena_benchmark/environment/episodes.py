@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-from buildarena_geometry import ToolDefinition
-
-if TYPE_CHECKING:
-    from buildarena_benchmark.environment.trials.trials import Trial
-    from buildarena_geometry import Outcome
+from buildarena_benchmark.environment.trials.trials import Trial
+from buildarena_geometry import Outcome, ToolDefinition
 
 DEFAULT_STEPS: Final = 2000
 """Steps that an episode may have unless it is given another limit."""

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from buildarena_benchmark import Task, too_much_changed
-from buildarena_geometry import Cause, Machine, Refused
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Outcome
+from buildarena_geometry import Cause, Machine, Outcome, Refused
 
 
 def acting(task: Task, machine: Machine) -> Callable[[object, Any], Outcome]:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
 from buildarena_benchmark.environment.errors import SnapshotError
 from buildarena_benchmark.environment.trials.trials import Trial
 from buildarena_geometry import DocumentError, Machine
-
-if TYPE_CHECKING:
-    from buildarena_geometry.documents.log import LoggedState
+from buildarena_geometry.documents.log import LoggedState
 
 SNAPSHOT_VERSION: Final = 1
 

@@ -6,19 +6,16 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import Any, Final, Self
 
+from buildarena_benchmark import Task
 from buildarena_benchmark.environment.errors import NothingToSubmitError
 from buildarena_benchmark.environment.given import acting
 from buildarena_benchmark.environment.tools import ASSEMBLY, LOOKUPS, TEST_CONTROLLER
 from buildarena_benchmark.environment.trials.programs import asked, program_tool, refused_program
-from buildarena_geometry import Cause, Machine, Refused
+from buildarena_geometry import Catalogue, Cause, Machine, Outcome, Refused
+from buildarena_geometry.documents.log import LoggedState
 from buildarena_geometry.modules.names import CaselessNames
-
-if TYPE_CHECKING:
-    from buildarena_benchmark import Task
-    from buildarena_geometry import Catalogue, Outcome
-    from buildarena_geometry.documents.log import LoggedState
 
 NAME: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 """What a machine may be called."""

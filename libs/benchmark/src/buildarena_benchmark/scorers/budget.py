@@ -1,7 +1,7 @@
 """Budget: how light a bridge is that carries the stated load to the end."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +9,8 @@ from numpy.typing import NDArray
 from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers import support
 from buildarena_benchmark.scorers.scorer import START_TOO_HIGH, Scorer, Verdict, rounded
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 
 class BudgetScoring(Document):

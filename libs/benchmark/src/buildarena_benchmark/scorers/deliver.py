@@ -1,6 +1,6 @@
 """Delivery: a ball that lies on the road is brought over a line, pushed or carried."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -22,13 +22,10 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
-    from buildarena_simulation.scenario import Gate
+from buildarena_simulation.scenario import Gate
 
 LET_GO: Final = Flag(
     name="let_go",

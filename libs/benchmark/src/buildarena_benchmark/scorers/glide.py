@@ -1,6 +1,6 @@
 """Glide: how far a machine that is released in the air flies, and how gently it lands."""
 
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -17,12 +17,9 @@ from buildarena_benchmark.scorers.scorer import (
     Verdict,
     rounded,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.scenario import ReleasedPlacement
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 
 class GlideScoring(Document):

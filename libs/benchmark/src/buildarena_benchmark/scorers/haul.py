@@ -1,6 +1,7 @@
 """Haul: how heavy a cargo, which grows heavier, is when a machine raises it."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,6 +12,7 @@ from buildarena_benchmark.scorers.measures.commands import motor_presses, presse
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scorers.measures.flight import NOT_AIRBORNE
 from buildarena_benchmark.scorers.measures.gears import gear_turn_deg
+from buildarena_benchmark.scorers.measures.series import Series
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     CAME_APART,
@@ -26,14 +28,8 @@ from buildarena_benchmark.scorers.scorer import (
     undriven,
 )
 from buildarena_benchmark.scorers.winch import NOT_GEARED, NOT_STANDING
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from buildarena_benchmark.scorers.measures.series import Series
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 _SETTLED: Final = 13
 """So many samples after it begins, forces summed over half a second are those of the lift."""

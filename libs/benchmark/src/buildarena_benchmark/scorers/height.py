@@ -1,6 +1,6 @@
 """Lift, levels 2 and 3: how high a rocket rises."""
 
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -11,12 +11,8 @@ from buildarena_benchmark.scorers.measures.outline import lowest_points
 from buildarena_benchmark.scorers.measures.series import speeds, starting_block
 from buildarena_benchmark.scorers.scorer import Deciding, Flag, Metric, Scorer, Verdict, rounded
 from buildarena_benchmark.scorers.thrust import thrust_to_weight
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
-
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 _TAKEN_OFF: Final = 1.0
 """A rocket has taken off when its starting block is so far above its start, units."""

@@ -1,6 +1,7 @@
 """Heights: how long a machine holds one height after the other in the air, with its cargo."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from collections.abc import Sequence
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,14 +26,9 @@ from buildarena_benchmark.scorers.scorer import (
     raised,
     rounded,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 Run = tuple[int, int]
 """First sample, and the one after the last."""

@@ -1,6 +1,6 @@
 """Hover: how long a machine holds its height in the air with its cargo."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -25,12 +25,9 @@ from buildarena_benchmark.scorers.scorer import (
     raised,
     rounded,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 
 class HoverScoring(FlightScoring):

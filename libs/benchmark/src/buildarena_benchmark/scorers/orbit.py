@@ -1,7 +1,7 @@
 """Orbit: how fast a machine flies round a planet, and how near to its start it comes down again."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -26,12 +26,9 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 _NEAR: Final = 2.0
 """A machine comes down once a block's centre is so near the ground, units: a large tank's half."""

@@ -1,6 +1,6 @@
 """Pick and place: how near to a mark a cargo is put down, perhaps beyond a wall."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -29,12 +29,9 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 _NEAREST: Final = 0.1
 """Nearer to the mark usually counts no more, units: the cargo's place is drawn as finely."""

@@ -1,6 +1,6 @@
 """Regained: how much of a whole car's straight drive a repaired one has."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -18,11 +18,8 @@ from buildarena_benchmark.scorers.scorer import (
     undriven,
 )
 from buildarena_benchmark.scorers.transport import DRIVE_NOT_MEASURED
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 
 class RegainedScoring(Document):

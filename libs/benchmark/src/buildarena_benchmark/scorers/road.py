@@ -1,6 +1,6 @@
 """Rough road: how far, and how gently, a cargo is driven over bumps."""
 
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -27,12 +27,9 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 _MOVING: Final = 0.5
 """Slower machines count as waiting, units/s: that makes no ride gentler."""

@@ -1,7 +1,7 @@
 """Slalom: gates passed in order by a vehicle that keeps its wheels."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -22,11 +22,8 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 
 class SlalomScoring(Document):

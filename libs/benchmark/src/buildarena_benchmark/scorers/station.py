@@ -1,6 +1,6 @@
 """Station: how much of a time a machine in the air keeps to a mark."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -20,11 +20,8 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 
 class StationScoring(Document):

@@ -1,7 +1,7 @@
 """Support: how heavy a cargo a bridge carries before it falls into the gap."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,12 +28,8 @@ from buildarena_benchmark.scorers.scorer import (
     raised,
     rounded,
 )
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
-
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 DOES_NOT_SPAN: Final = Flag(
     name="does_not_span",

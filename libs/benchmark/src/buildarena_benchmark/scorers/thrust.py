@@ -1,7 +1,7 @@
 """Lift, level 1: thrust over weight."""
 
 import math
-from typing import TYPE_CHECKING, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 
@@ -9,12 +9,9 @@ from buildarena_benchmark.fields import Document, Threshold
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start, mass_of
 from buildarena_benchmark.scorers.measures.series import gravity_of
 from buildarena_benchmark.scorers.scorer import Deciding, Metric, Scorer, Verdict, rounded
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 _WARM_UP_S = 1.0
 _HEATED_SHARE = 0.5

@@ -1,6 +1,7 @@
 """Tour: how near to several marks, one after the other, a vehicle stops, and how soon."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from collections.abc import Callable
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -21,14 +22,9 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
 
 
 class TourScoring(Document):

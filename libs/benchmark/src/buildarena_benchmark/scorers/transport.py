@@ -1,7 +1,7 @@
 """Transport: how far a vehicle, or a cargo on it, is moved over the ground."""
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -23,11 +23,8 @@ from buildarena_benchmark.scorers.scorer import (
     raised,
     rounded,
 )
-from buildarena_simulation import Scenario
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 
 _SETTLED_S = 2.0
 """Secondary metrics count from here on: cargo and wheels need a moment to settle."""

@@ -1,6 +1,6 @@
 """Winch: how high a cargo is raised, and held when no key is pressed."""
 
-from typing import TYPE_CHECKING, Annotated, Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -11,6 +11,7 @@ from buildarena_benchmark.scorers.measures.carrying import bears_cargo, stands
 from buildarena_benchmark.scorers.measures.commands import motor_presses, presses_of
 from buildarena_benchmark.scorers.measures.components import Mask, joined_to_start
 from buildarena_benchmark.scorers.measures.gears import gear_turn_deg
+from buildarena_benchmark.scorers.measures.series import Series
 from buildarena_benchmark.scorers.measures.unmeasured import unmeasured
 from buildarena_benchmark.scorers.scorer import (
     CAME_APART,
@@ -24,14 +25,9 @@ from buildarena_benchmark.scorers.scorer import (
     rounded,
     undriven,
 )
-from buildarena_simulation import Scenario
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
-
-if TYPE_CHECKING:
-    from buildarena_benchmark.scorers.measures.series import Series
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
-
 
 NOT_STANDING: Final = Flag(
     name="not_standing",

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
+from buildarena_benchmark import Task
 from buildarena_benchmark.environment.errors import CallError
 from buildarena_benchmark.environment.tools import SET_CONTROLLER, TEST_CONTROLLER
-from buildarena_geometry import Accepted, Cause, Machine, Refused
+from buildarena_geometry import Accepted, Cause, Machine, Outcome, Refused
 from buildarena_geometry.modules.names import CaselessNames
 from buildarena_simulation import ControllerFailed, MachineNotSimulable
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.rehearsal import MAX_TICKS, Answered, rehearsed
-
-if TYPE_CHECKING:
-    from buildarena_benchmark import Task
-    from buildarena_geometry import Outcome
 
 _READ_S: Final = 0.02
 """Processor time for which a program may keep others waiting while it is read."""

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterator
 
+from buildarena_benchmark import Task
+from buildarena_geometry import Catalogue, Module
 from buildarena_geometry.blocks import JOINT_REACH
 from buildarena_geometry.feedback.data_sheets import FRAME
 from buildarena_geometry.feedback.words import number, plain
 from buildarena_geometry.modules.joints import MESH_COSINE, MESH_SLACK
 from buildarena_simulation import constants
 from buildarena_simulation.constants import JOINT_STRENGTH, JointKind
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-
-    from buildarena_benchmark import Task
-    from buildarena_geometry import Catalogue, Module
 
 _ARM = 4.0
 """Length of the lever that the paragraph reckons through, units."""

@@ -1,15 +1,13 @@
 """Two wheels on one axle: whether they are, how it turns, and what stands above it."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.components import Mask, center_of
 from buildarena_benchmark.scorers.measures.series import Series, rotations
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
 
 _WHEELS: Final = 2
 _EAST: Final = np.array([1.0, 0.0, 0.0])

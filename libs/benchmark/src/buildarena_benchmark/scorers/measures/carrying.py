@@ -1,15 +1,13 @@
 """What holds the cargo, and what holds the machine: forces over the last moments."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_benchmark.scorers.measures.components import Mask, masses_of
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
 
 _HALF_A_SECOND: Final = 12
 """Samples over which forces are judged: what hops is borne all the same."""

@@ -1,16 +1,13 @@
 """Which keys were pressed in a trial, and what they asked of the motors."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.components import Mask
+from buildarena_geometry import Block, KeyPress, Machine
+from buildarena_simulation import Trajectory
 from buildarena_simulation.control import PRESSES, channel, held_during, read_presses
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Block, KeyPress, Machine
-    from buildarena_simulation import Trajectory
 
 
 def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPress]":

@@ -1,16 +1,14 @@
 """Whether a machine that nothing drives has more energy than it was released with."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.commands import keys_of, presses_of
 from buildarena_benchmark.scorers.measures.components import masses_of_blocks
 from buildarena_benchmark.scorers.measures.series import Series, lifted, release_speed
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Block, Machine
-    from buildarena_simulation import Scenario, Trajectory
+from buildarena_geometry import Block, Machine
+from buildarena_simulation import Scenario, Trajectory
 
 SHARE: Final = 0.05
 """By which share of its energy at the release a machine may have more: engines are not exact."""

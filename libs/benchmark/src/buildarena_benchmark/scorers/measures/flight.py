@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,8 @@ from buildarena_benchmark.scorers.measures.components import Mask, joined_to_sta
 from buildarena_benchmark.scorers.measures.outline import lowest_points
 from buildarena_benchmark.scorers.measures.series import starting_block, tilt_deg
 from buildarena_benchmark.scorers.scorer import NOT_CARRIED, Flag
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
 
 _BORNE_SHARE: Final = 0.8
 _BORNE_SAMPLES: Final = 25

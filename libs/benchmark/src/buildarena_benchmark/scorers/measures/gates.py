@@ -1,13 +1,9 @@
 """When a path crosses a gate's line."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.series import Series
-
-if TYPE_CHECKING:
-    from buildarena_simulation.scenario import Gate
+from buildarena_simulation.scenario import Gate
 
 
 def ahead_of(gate: "Gate") -> Series:

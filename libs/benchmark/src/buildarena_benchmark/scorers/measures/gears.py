@@ -1,21 +1,18 @@
 """Whether a train of gears raised the cargo: what lies between the base and what holds it."""
 
 from collections.abc import Collection, Iterator
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.series import rotations, starting_block
+from buildarena_geometry import Machine
 from buildarena_geometry.modules.joints import MOVING_JOINTS
+from buildarena_simulation import Trajectory
 from buildarena_simulation.constants import JointKind
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.clusters import connected_components, find_clusters
-from buildarena_simulation.structure.model import JOINT_KINDS
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
-    from buildarena_simulation.structure.model import Structure
+from buildarena_simulation.structure.model import JOINT_KINDS, Structure
 
 LARGE_RADIUS: Final = 1.5
 """Smallest pitch radius of a large gear wheel, units."""

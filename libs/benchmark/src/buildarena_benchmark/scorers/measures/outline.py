@@ -1,17 +1,12 @@
 """Where a machine's bodies reach to, as it moves."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.components import Mask
 from buildarena_benchmark.scorers.measures.series import Series, rotations
-from buildarena_geometry.modules.solids import Ball, Cylinder
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Block, Machine
-    from buildarena_geometry.modules.solids import Solid
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Block, Machine
+from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
+from buildarena_simulation import Trajectory
 
 
 def lowest_points(machine: "Machine", trajectory: "Trajectory", members: Mask) -> Series:

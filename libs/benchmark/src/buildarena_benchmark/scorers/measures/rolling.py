@@ -1,7 +1,7 @@
 """How far wheels have carried a machine: what their turning on the ground explains."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +9,9 @@ from numpy.typing import NDArray
 from buildarena_benchmark.scorers.measures.commands import held, presses_of
 from buildarena_benchmark.scorers.measures.components import Mask
 from buildarena_benchmark.scorers.measures.series import gravity_of
+from buildarena_geometry import Block, KeyPress, Machine
 from buildarena_geometry.modules.solids import Cylinder
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Block, KeyPress, Machine
-    from buildarena_simulation import Trajectory
+from buildarena_simulation import Trajectory
 
 SLACK: Final = 0.5
 """Distance that counts without wheels, units: a machine rocks, and its parts give."""

@@ -1,16 +1,12 @@
 """Series read from a trajectory that several scorers need."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import ReleasedPlacement
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario, Trajectory
 
 Series = NDArray[np.float64]
 

@@ -1,7 +1,7 @@
 """Whether a bridge spans: how long it carries the cargo, and where the load goes meanwhile."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 from buildarena_benchmark.scorers.measures.components import groups_of, spans_of
 from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_benchmark.scorers.measures.series import gravity_of
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.scenario import SpanPlacement, TerrainBox
 from buildarena_simulation.terrain import shape_of
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario, Trajectory
 
 MAX_ON_FLOOR: Final = 0.1
 """Largest share of the vertical force that the gap's floor may bear."""

@@ -1,18 +1,14 @@
 """Tells a rollout that blew up from one that merely went badly."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.energy import gains_energy
 from buildarena_benchmark.scorers.measures.series import Series, lifted, release_speed
 from buildarena_benchmark.scorers.scorer import Deciding
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Scenario, Trajectory
-    from buildarena_simulation.scenario import TerrainBox
+from buildarena_simulation.scenario import TerrainBox
 
 _MARGIN = 1.5
 _SLACK = 15.0

@@ -1,20 +1,17 @@
 """How a loose ball leaves a machine, flies, and comes down."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.series import Series, rotations
-from buildarena_geometry.modules.solids import Ball, Cylinder
+from buildarena_geometry import Block, Machine
+from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.structure.model import Shape
 from buildarena_simulation.terrain import shape_of
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Block, Machine
-    from buildarena_geometry.modules.solids import Solid
-    from buildarena_simulation import Scenario, Trajectory
 
 TOUCH: Final = 0.12
 """A ball this near to something touches it: bodies are a little smaller to engines, units."""

@@ -1,15 +1,13 @@
 """When a machine in the air first touches something, and how fast it is then."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.carrying import from_below
 from buildarena_benchmark.scorers.measures.components import Mask, masses_of
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
 
 _TOUCH: Final = 0.02
 """Smallest share of the machine's weight that the ground bears when it is touched."""

@@ -1,11 +1,7 @@
 """Trials without forces: mechanisms and flight cannot be judged by positions alone."""
 
-from typing import TYPE_CHECKING
-
 from buildarena_benchmark.scorers.scorer import FORCES_NOT_MEASURED, Verdict
-
-if TYPE_CHECKING:
-    from buildarena_simulation import Trajectory
+from buildarena_simulation import Trajectory
 
 
 def unmeasured(trajectory: "Trajectory", *, cargo: bool) -> Verdict | None:

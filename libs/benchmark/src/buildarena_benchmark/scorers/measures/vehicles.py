@@ -1,15 +1,12 @@
 """The wheels of a vehicle, and until when it has them all."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.components import Mask
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Machine
-    from buildarena_simulation import Trajectory
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
 
 
 def wheels_of(machine: "Machine", trajectory: "Trajectory") -> list[int]:

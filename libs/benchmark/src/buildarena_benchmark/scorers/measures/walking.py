@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import product
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,15 +10,12 @@ from numpy.typing import NDArray
 from buildarena_benchmark.scorers.measures.components import Mask
 from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_benchmark.scorers.measures.series import Series, rotations, starting_block
+from buildarena_geometry import Block, Machine
 from buildarena_geometry.modules.joints import MOVING_JOINTS
-from buildarena_geometry.modules.solids import Ball, Cylinder
+from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.terrain import shape_of
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Block, Machine
-    from buildarena_geometry.modules.solids import Solid
-    from buildarena_simulation import Scenario, Trajectory
-    from buildarena_simulation.scenario import TerrainBox
 
 TOUCHES: Final = 0.05
 """What is no higher above ground or terrain touches it, units: engines let bodies sink in by 0.02,

@@ -1,18 +1,14 @@
 """What work a machine's springs, drives and falling parts can have done so far."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from buildarena_benchmark.scorers.measures.components import masses_of_blocks
 from buildarena_benchmark.scorers.measures.series import Series, rotations
+from buildarena_geometry import Block, Machine
+from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.model import Structure
-
-if TYPE_CHECKING:
-    from buildarena_geometry import Block, Machine
-    from buildarena_simulation import Scenario, Trajectory
 
 
 def most_work(
