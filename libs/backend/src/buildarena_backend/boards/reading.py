@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import Row, func, select, text
 
 from buildarena_backend.boards.cells import BoardCells
-from buildarena_backend.boards.trials import RANKED, TrialFilter, read_trials, trial_columns
+from buildarena_backend.boards.trials import TrialFilter, read_trials, trial_columns
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import columns_of, value_of
 from buildarena_backend.database.tables import board_changes, jobs, rollouts, sweep_jobs
@@ -115,12 +115,6 @@ class Boards:
             for row in connection.execute(simulated):
                 _add_rollout(rounds.setdefault(row.job_id, []), row)
         return [(trial, rounds.get(trial.job_id, [])) for trial in found]
-
-    def tracks(self) -> list[str]:
-        """Every track that has jobs, ended or not; files that were tried have no leaderboard."""
-        query = select(jobs.c.track).where(RANKED).distinct().order_by(jobs.c.track)
-        with self._database.transaction() as connection:
-            return [row.track for row in connection.execute(query)]
 
     def changes(
         self, track: str, *, before: int | None = None, limit: int = 100, scored_only: bool = True

@@ -124,11 +124,6 @@ def group_of(role: str) -> str:
     return f"buildarena_{role}"
 
 
-def tables_named() -> frozenset[str]:
-    """Every table that a role's rights name."""
-    return frozenset(_EVERY)
-
-
 def grant_rights(connection: Connection) -> list[str]:
     """Gives each role that the server has exactly its rights on this database's tables.
 

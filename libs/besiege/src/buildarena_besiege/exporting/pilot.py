@@ -82,11 +82,6 @@ def _channels(pilot: ProgramPilot) -> list[tuple[tuple[str, str], str]]:
     ]
 
 
-def channel_names(pilot: ProgramPilot) -> list[str]:
-    """The names of all actions of blocks, in the order in which a log tells of them."""
-    return [name for _, name in _channels(pilot)]
-
-
 def pilot_lua(
     machine: Machine,
     scenario: Scenario,
