@@ -30,14 +30,14 @@ def sweep(context: Context, new_job) -> Callable[..., str]:
     """Stores a sweep of jobs with these seeds and, if given, a budget."""
 
     def make(*seeds: int, name: str = "sweep_a", owner: str | None = None, **limits: object) -> str:
-        new = [replace(new_job(seed), owner=owner, payer=name) for seed in seeds]
+        new = replace(new_job(*seeds), owner=owner, payer=name)
         if limits:
             set_budget(context, name, **limits)
         with context.store.database.transaction() as connection:
-            context.store.jobs.add(new, connection=connection)
+            context.store.jobs.add([new], connection=connection)
             context.store.sweeps.add(
                 NewSweep(id=name, name=name, spec={}, owner=owner),
-                [job.key.job_id for job in new],
+                new.job_ids,
                 connection=connection,
             )
         return name

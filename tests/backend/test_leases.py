@@ -23,7 +23,7 @@ from support.jobs import (
 from buildarena_backend.database.account_tables import MAX_USD
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.errors import StaleLeaseError, UnknownIdError
-from buildarena_backend.jobs.job import NewJob
+from buildarena_backend.jobs.job import NewJobs
 from buildarena_backend.journal.journal import Usage
 from buildarena_backend.journal.turns import TurnResult
 from buildarena_backend.leases.leases import Lease, Leases
@@ -213,9 +213,9 @@ def test_what_is_known_of_leases_goes_an_hour_after_their_end(context, add) -> N
 def test_a_job_with_the_same_key_is_the_same_job_also_when_it_is_added_at_once(
     context, new_job
 ) -> None:
-    given = [new_job(seed) for seed in range(200)]
+    given = [new_job(*range(100), model=model) for model in "mn"]
 
-    def add(new: list[NewJob]) -> int:
+    def add(new: list[NewJobs]) -> int:
         with context.store.database.transaction() as connection:
             return context.store.jobs.add(new, connection=connection)
 
@@ -226,12 +226,13 @@ def test_a_job_with_the_same_key_is_the_same_job_also_when_it_is_added_at_once(
 
 
 def test_jobs_are_claimed_in_the_order_in_which_they_were_given(context, new_job) -> None:
-    given = [new_job(seed, model) for model in ("m", "n") for seed in (3, 1, 4, 15, 9, 2, 6, 5)]
+    seeds = (3, 1, 4, 15, 9, 2, 6, 5)
+    given = [new_job(*seeds, model=model) for model in "mn"]
     with context.store.database.transaction() as connection:
-        assert context.store.jobs.add([*given, given[0]], connection=connection) == len(given)
-    claimed = [claim(context).job for _ in given]
-    assert [(job.model, job.seed) for job in claimed] == [(j.model, j.key.seed) for j in given]
-    assert len({job.draw for job in claimed}) == len(given)
+        assert context.store.jobs.add([*given, given[0]], connection=connection) == 16
+    claimed = [claim(context).job for _ in range(16)]
+    assert [(job.model, job.seed) for job in claimed] == [(m, seed) for m in "mn" for seed in seeds]
+    assert len({job.draw for job in claimed}) == 16
 
 
 def test_a_cancelled_job_is_opened_when_wanted_again_and_an_errored_one_retried(

@@ -160,7 +160,7 @@ def test_a_game_has_no_worlds_that_a_seed_could_vary(context) -> None:
         submissions = Submissions(own, load_registry())
         spec = {"tasks": ["lift-1"], "models": ["builtin/idle"], "simulator": "besiege"}
         (job,) = submissions.plan(SweepSpec(**spec, samples=1))
-        assert "worlds" not in job.key.track
+        assert "worlds" not in job.track
         with pytest.raises(SubmissionError, match="worlds"):
             submissions.plan(SweepSpec(**spec, samples=1, worlds=2))
 

@@ -8,7 +8,7 @@ from typing import Final
 from buildarena_backend.agents.submission import chosen_task, submit_machine
 from buildarena_backend.catalog.tracks import file_track
 from buildarena_backend.jobs.files import require_room
-from buildarena_backend.jobs.job import Job, JobKey, NewJob, configuration_hash
+from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import FILE_PROVIDER
 from buildarena_backend.sweeps.claims import add_claim
@@ -54,33 +54,31 @@ def request_trial(
     name = f"file/{digest[:NAME_LENGTH]}"
     config = {"name": name, "provider": FILE_PROVIDER, "model": digest}
     track = file_track(simulator, simulation_version(context, simulator))
-    key = JobKey(
+    new = NewJobs(
         task=task,
         task_version=chosen.version,
         model_hash=configuration_hash(config, {}),
         track=track.id,
-        seed=seed,
-    )
-    new = NewJob(
-        key=key,
+        seeds=[seed],
         model=name,
         model_config=config,
         track_config=track.as_config(),
         owner=owner,
         traceparent=current_traceparent(),
     )
+    (job_id,) = new.job_ids
     queue = None
     with context.store.lifecycle.submission() as connection:
         added = context.store.jobs.add([new], connection=connection)
-        add_claim(key.job_id, owner, connection=connection)
+        add_claim(job_id, owner, connection=connection)
         if added:
             require_room(owner, connection=connection)
-        fresh = context.store.external_calls.open(key.job_id, connection=connection)
+        fresh = context.store.external_calls.open(job_id, connection=connection)
         if fresh:
-            lease = context.store.external_calls.lease(key.job_id, connection=connection)
+            lease = context.store.external_calls.lease(job_id, connection=connection)
             if lease is None:
-                raise RuntimeError(f"job {key.job_id} was opened and is not open")
+                raise RuntimeError(f"job {job_id} was opened and is not open")
             queue = submit_machine(context, lease, machine, None, connection=connection)
     if queue is not None:
         context.queues.wake(queue)
-    return context.store.jobs.get(key.job_id), fresh
+    return context.store.jobs.get(job_id), fresh

@@ -28,7 +28,7 @@ from buildarena_backend.catalog.tracks import (
     worlds_of,
 )
 from buildarena_backend.errors import PipelineError, SubmissionError, UnknownIdError
-from buildarena_backend.jobs.job import Job, JobKey, NewJob, configuration_hash
+from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
 from buildarena_backend.journal.external_calls import ExternalCall
 from buildarena_backend.journal.transcript import Transcript
 from buildarena_backend.leases.leases import Lease
@@ -163,36 +163,34 @@ class ExternalSessions:
         )
         model = f"{kind}/{agent}"
         config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}
-        key = JobKey(
+        new = NewJobs(
             task=task,
             task_version=chosen.version,
             model_hash=configuration_hash(config, {}),
             track=track.id,
-            seed=seed,
-        )
-        new = NewJob(
-            key=key,
+            seeds=[seed],
             model=model,
             model_config=config,
             track_config=track.as_config(),
             owner=owner,
             traceparent=current_traceparent(),
         )
+        (job_id,) = new.job_ids
         # Refused inside the transaction, so that nothing of it stays.
         with self._context.store.database.transaction() as connection:
             claim_name(kind, agent, owner=owner, connection=connection, force=force)
             self._context.store.jobs.add([new], connection=connection)
             calls = self._context.store.external_calls
-            reopened = not calls.open(key.job_id, connection=connection)
+            reopened = not calls.open(job_id, connection=connection)
             if reopened:
-                lease = calls.lease(key.job_id, connection=connection)
+                lease = calls.lease(job_id, connection=connection)
                 if lease is None or lease.job.owner != owner:
                     message = (
                         f"{kind} {agent!r} has played seed {seed} of {task}: take another seed"
                     )
                     raise SubmissionError([ValidationIssue(path="seed", message=message)])
         return OpenedSession(
-            job=self._context.store.jobs.get(key.job_id),
+            job=self._context.store.jobs.get(job_id),
             task=chosen,
             briefing=briefing(chosen, data_sheets=data_sheets, worlds=worlds_of(track.as_config())),
             reopened=reopened,

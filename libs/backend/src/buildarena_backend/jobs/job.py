@@ -49,22 +49,21 @@ class JobKey:
         return "job_" + content_hash(key)[:20]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NewJob:
-    """A job to be added.
+@dataclass(frozen=True, kw_only=True)
+class NewJobs:
+    """Jobs to be added that differ in their seeds alone; names are those of `JobKey` and `Job`.
 
     Attributes:
-        key: Its unique key.
-        model: Model name.
-        model_config: The model's configuration, part of the hash in the key.
-        track_config: The track's parts, whose spelling is in the key.
-        limits: Token, request, cost and time limits of its session, part of that hash too.
-        owner: Id of the API key that submits it, if any.
-        payer: Id of the sweep whose budget pays for it, if any.
-        traceparent: The span of its submission, by W3C's Trace Context, if there is one.
+        owner: Id of the API key that submits them, if any.
+        payer: Id of the sweep whose budget pays for them, if any.
+        traceparent: The span of their submission, by W3C's Trace Context, if there is one.
     """
 
-    key: JobKey
+    task: str
+    task_version: str
+    model_hash: str
+    track: str
+    seeds: Sequence[int]
     model: str
     model_config: Mapping[str, Any]
     track_config: Mapping[str, Any]
@@ -72,6 +71,21 @@ class NewJob:
     owner: str | None = None
     payer: str | None = None
     traceparent: str | None = None
+
+    def key(self, seed: int) -> JobKey:
+        """What makes the job of a seed unique."""
+        return JobKey(
+            task=self.task,
+            task_version=self.task_version,
+            model_hash=self.model_hash,
+            track=self.track,
+            seed=seed,
+        )
+
+    @cached_property
+    def job_ids(self) -> list[str]:
+        """Their ids, in the order of the seeds."""
+        return [self.key(seed).job_id for seed in self.seeds]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

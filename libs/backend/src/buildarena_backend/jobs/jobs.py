@@ -15,7 +15,7 @@ from buildarena_backend.errors import UnknownIdError
 from buildarena_backend.jobs.adding import add_jobs
 from buildarena_backend.jobs.attempts import Attempt, Ending, end_attempts
 from buildarena_backend.jobs.filters import JobFilter, distinct_values
-from buildarena_backend.jobs.job import JOB_COLUMNS, Job, JobFile, NewJob
+from buildarena_backend.jobs.job import JOB_COLUMNS, Job, JobFile, NewJobs
 from buildarena_backend.jobs.pages import Order, SortValue, read_page
 from buildarena_backend.jobs.summaries import JobSummary, summarise
 from buildarena_backend.jobs.transitions import REOPENED, transition
@@ -28,7 +28,7 @@ class Jobs:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def add(self, new: Sequence[NewJob], *, connection: Connection) -> int:
+    def add(self, new: Sequence[NewJobs], *, connection: Connection) -> int:
         """Adds the jobs that do not exist yet; the others stay as they are.
 
         A job that was cancelled or put on hold before is opened again, because somebody wants it
@@ -38,11 +38,12 @@ class Jobs:
             How many were added or opened again.
         """
         ids = add_jobs(new, connection=connection)
-        if len(ids) < len(new):
-            ids += self._reopen([job.key.job_id for job in new], new[0], connection)
+        wanted = [id_ for some in new for id_ in some.job_ids]
+        if len(ids) < len(wanted):
+            ids += self._reopen(wanted, new[0], connection)
         return len(ids)
 
-    def _reopen(self, ids: Sequence[str], wanted: NewJob, connection: Connection) -> list[str]:
+    def _reopen(self, ids: Sequence[str], wanted: NewJobs, connection: Connection) -> list[str]:
         return transition(
             jobs.c.id == any_(bound_texts(ids)),
             (jobs.c.outcome == Outcome.CANCELLED) | (jobs.c.state == JobState.ON_HOLD),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -12,7 +11,7 @@ from importlib import resources
 
 from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
 from buildarena_backend.catalog.prices import price_usd
-from buildarena_backend.jobs.job import NewJob
+from buildarena_backend.jobs.job import NewJobs
 from buildarena_benchmark.statistics import BoardPower, board_power
 
 
@@ -47,32 +46,32 @@ class SweepEstimate:
     power: BoardPower
 
 
-def estimate(jobs: Sequence[NewJob], registry: ModelRegistry) -> SweepEstimate:
+def estimate(jobs: Sequence[NewJobs], registry: ModelRegistry) -> SweepEstimate:
     """Adds up the mean figures of each job's task; built-in models cost nothing.
 
     Source: the paper's cost tables; the mean over its twelve models per task, and over all tasks
     for a task of one's own.
     """
-    by_model: dict[str, list[NewJob]] = {}
-    for job in jobs:
-        by_model.setdefault(job.model, []).append(job)
+    by_model: dict[str, list[NewJobs]] = {}
+    for some in jobs:
+        by_model.setdefault(some.model, []).append(some)
     models = [_model(name, found, registry) for name, found in by_model.items()]
     total = sum(model.cost_usd or 0.0 for model in models)
-    cells = Counter((job.model, job.key.task) for job in jobs)
     power = board_power(
         models=len(by_model),
-        tasks=len({task for _, task in cells}),
-        trials=min(cells.values()),
+        tasks=len({some.task for some in jobs}),
+        trials=min(len(some.seeds) for some in jobs),
     )
-    return SweepEstimate(jobs=len(jobs), models=models, cost_usd=round(total, 2), power=power)
+    number = sum(model.jobs for model in models)
+    return SweepEstimate(jobs=number, models=models, cost_usd=round(total, 2), power=power)
 
 
-def _model(name: str, jobs: Sequence[NewJob], registry: ModelRegistry) -> ModelEstimate:
+def _model(name: str, jobs: Sequence[NewJobs], registry: ModelRegistry) -> ModelEstimate:
     entry = registry.models[name]
     builtin = registry.provider_of(entry).protocol == BUILTIN_PROTOCOL
-    figures = [Figures() if builtin else _figures(job.key.task) for job in jobs]
-    used_in = sum(f.input_tokens for f in figures)
-    used_out = sum(f.output_tokens for f in figures)
+    figures = [(Figures() if builtin else _figures(some.task), len(some.seeds)) for some in jobs]
+    used_in = sum(f.input_tokens * number for f, number in figures)
+    used_out = sum(f.output_tokens * number for f, number in figures)
     cost: Decimal | None = Decimal()
     if not builtin:
         cost = price_usd(
@@ -81,8 +80,8 @@ def _model(name: str, jobs: Sequence[NewJob], registry: ModelRegistry) -> ModelE
         cost = cost or None
     return ModelEstimate(
         model=name,
-        jobs=len(jobs),
-        requests=round(sum(f.requests for f in figures), 1),
+        jobs=sum(number for _, number in figures),
+        requests=round(sum(f.requests * number for f, number in figures), 1),
         input_tokens=round(used_in, 1),
         output_tokens=round(used_out, 1),
         cost_usd=None if cost is None else float(cost),

@@ -13,7 +13,7 @@ from buildarena_backend.catalog.tracks import Track, make_track
 from buildarena_backend.catalog.workflows import workflow_sources
 from buildarena_backend.errors import SubmissionError
 from buildarena_backend.ids import content_hash, new_id
-from buildarena_backend.jobs.job import Job, JobKey, NewJob, configuration_hash
+from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.submission.estimates import SweepEstimate, estimate
@@ -76,12 +76,13 @@ class Submissions:
         """
         new = self._plan(spec, {"task": spec.task}, {"model": spec.model}, [spec.seed])
         traceparent = current_traceparent()
-        own = [replace(job, owner=owner, traceparent=traceparent) for job in new]
+        own = [replace(some, owner=owner, traceparent=traceparent) for some in new]
+        (job_id,) = own[0].job_ids
         with self._context.store.lifecycle.submission() as connection:
             added = self._context.store.jobs.add(own, connection=connection)
-            add_claim(own[0].key.job_id, owner, connection=connection)
+            add_claim(job_id, owner, connection=connection)
         self._context.queues.wake(CONSTRUCT_QUEUE)
-        return self._context.store.jobs.get(new[0].key.job_id), added > 0
+        return self._context.store.jobs.get(job_id), added > 0
 
     def submit_sweep(
         self,
@@ -104,7 +105,7 @@ class Submissions:
             SubmissionError: Something of it is unknown; nothing was stored.
         """
         new = self.plan(spec)
-        job_ids = [job.key.job_id for job in new]
+        job_ids = [id_ for some in new for id_ in some.job_ids]
         jobs_hash = content_hash(sorted(job_ids))
         sweep = NewSweep(
             id=new_id("sweep"),
@@ -116,7 +117,7 @@ class Submissions:
             jobs_hash=jobs_hash,
         )
         traceparent = current_traceparent()
-        own = [replace(job, owner=owner, payer=sweep.id, traceparent=traceparent) for job in new]
+        own = [replace(some, owner=owner, payer=sweep.id, traceparent=traceparent) for some in new]
         limits = None if spec.budget is None else spec.budget.as_limits()
         store = self._context.store
         before, added = None, 0
@@ -130,10 +131,10 @@ class Submissions:
                     store.budgets.set(sweep.id, limits, connection=connection)
                 added = store.jobs.add(own, connection=connection)
                 store.sweeps.add(sweep, job_ids, connection=connection)
-        self._context.queues.wake(CONSTRUCT_QUEUE, len(new))
+        self._context.queues.wake(CONSTRUCT_QUEUE, len(job_ids))
         return Submitted(
             sweep=store.sweeps.get(before or sweep.id),
-            jobs=len(new),
+            jobs=len(job_ids),
             added=added,
             resumed=before is not None,
         )
@@ -167,7 +168,7 @@ class Submissions:
         """
         return estimate(self.plan(spec), self._registry)
 
-    def plan(self, spec: SweepSpec) -> list[NewJob]:
+    def plan(self, spec: SweepSpec) -> list[NewJobs]:
         """The jobs that a sweep consists of, without storing anything.
 
         Raises:
@@ -183,37 +184,32 @@ class Submissions:
         tasks: Mapping[str, str],
         models: Mapping[str, str],
         seeds: Sequence[int],
-    ) -> list[NewJob]:
+    ) -> list[NewJobs]:
         """Every task with every model and every seed; names come by their paths in the spec."""
         found = self._context.tasks.named(list(tasks.values()))
         self._require_known(variant, tasks, models, found)
         task_names, model_names = set(tasks.values()), set(models.values())
         self._require_size(len(task_names) * len(model_names) * len(seeds))
         tracks = {on_demand: self._track(variant, on_demand) for on_demand in (False, True)}
-        configs = {on_demand: track.as_config() for on_demand, track in tracks.items()}
         limits = variant.limits.model_dump(exclude_none=True)
         new = []
         for task_name in dict.fromkeys(tasks.values()):
             on_demand = found[task_name].constraints.on_demand
             for model_name in dict.fromkeys(models.values()):
                 config = model_config(self._registry, model_name, variant.decoding)
-                config_hash = configuration_hash(config, limits)
-                new += [
-                    NewJob(
-                        key=JobKey(
-                            task=task_name,
-                            task_version=found[task_name].version,
-                            model_hash=config_hash,
-                            track=tracks[on_demand].id,
-                            seed=seed,
-                        ),
+                new.append(
+                    NewJobs(
+                        task=task_name,
+                        task_version=found[task_name].version,
+                        model_hash=configuration_hash(config, limits),
+                        track=tracks[on_demand].id,
+                        seeds=seeds,
                         model=model_name,
                         model_config=config,
-                        track_config=configs[on_demand],
+                        track_config=tracks[on_demand].as_config(),
                         limits=limits,
                     )
-                    for seed in seeds
-                ]
+                )
         return new
 
     def _track(self, variant: Variant, on_demand: bool) -> Track:
