@@ -20,6 +20,7 @@ from fastapi.routing import _IncludedRouter
 from starlette.testclient import TestClient
 
 from buildarena_api.app import create_app
+from buildarena_api.http.door import server_config
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.process.context import Context, open_context
 from buildarena_cli.local import free_port
@@ -97,13 +98,7 @@ def live_api(context: Context) -> Iterator[str]:
     usual_logs = structlog.get_config()
     structlog.configure(logger_factory=structlog.ReturnLoggerFactory())
     port = free_port()
-    config = uvicorn.Config(
-        app_of(context),
-        host="127.0.0.1",
-        port=port,
-        log_config=None,
-        proxy_headers=False,
-    )
+    config = server_config(app_of(context), context.settings, host="127.0.0.1", port=port)
     server = PromptServer(config)
     thread = threading.Thread(target=server.run)
     thread.start()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
+from typing import Final
 
 from fastapi import Depends, FastAPI
 from fastapi.routing import APIRoute
@@ -13,13 +14,11 @@ from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from buildarena_api.dashboard.files import read_pages
 from buildarena_api.dashboard.serving import Dashboard, is_page
+from buildarena_api.dependencies import Services
 from buildarena_api.events.hub import EventHub
-from buildarena_api.http.access import admission, caller_of, known_key
-from buildarena_api.http.admission import BodyBuffers
-from buildarena_api.http.concurrency import limited, usual_limits
-from buildarena_api.http.infrastructure import InfrastructureMetrics
+from buildarena_api.http.access import admission, caller_of, known_sender, limited
+from buildarena_api.http.bodies import BodyLimitMiddleware
 from buildarena_api.http.key_checks import KeyChecks
-from buildarena_api.http.limits import BodyLimitMiddleware
 from buildarena_api.http.locality import LocalOnlyMiddleware
 from buildarena_api.http.log import RequestLog
 from buildarena_api.http.methods import MethodMiddleware
@@ -29,13 +28,11 @@ from buildarena_api.http.outer_address import (
     ForwardedHostMiddleware,
     RootPathMiddleware,
 )
-from buildarena_api.http.overload import OverloadMiddleware
-from buildarena_api.http.own_pool import OwnPool
-from buildarena_api.http.probes import Probes
+from buildarena_api.http.parts import Parts
+from buildarena_api.http.places import OpenRequests, usual_places
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.http.response_cache import ResponseCache
-from buildarena_api.http.weights import Weights
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
@@ -66,29 +63,23 @@ from buildarena_api.runners.service import RunnerService
 from buildarena_backend import __version__
 from buildarena_backend.agents.sessions import ExternalSessions
 from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.database.database import Database
 from buildarena_backend.process.context import Context
 from buildarena_backend.process.reaper import Reaper
-from buildarena_backend.settings import Settings
+from buildarena_backend.store import open_store
 from buildarena_backend.submission.submission import Submissions
-from buildarena_backend.trials.known_simulators import configured_simulators
 
-POOL_SIZE = 10
-"""Connections for ordinary requests."""
-WATCHERS = 3
-"""Threads and connections for key checks and event streams."""
-EXPORTERS = 4
-"""Threads and connections for exports: as many as may go on at once."""
+POOL_SIZE: Final = 10
+"""Connections for requests."""
+WATCHING: Final = 4
+"""Connections for key checks, event streams and questions how the service is."""
+POOL_TIMEOUT_S: Final = 2.0
+"""How long a request waits for a database connection before it is answered with 503."""
 ORDINARY = (
     verifications,
     sessions,
-    machines,
-    replays,  # before jobs, whose artifacts have paths like theirs
-    transcript_search,
-    trials,
-    pictures,
-    jobs,
     sweeps,
-    leaderboard,
     tasks,
     catalogue,
     callers,
@@ -97,9 +88,12 @@ ORDINARY = (
     versions,
     workers,
 )
-LIMITED_THEMSELVES = (events, exports, metrics)
-"""Routes whose requests don't count among a caller's ordinary ones: they take long, or no
-thread."""
+HEAVY = (replays, transcript_search, pictures, leaderboard)
+"""Routes whose questions take a core for as long as they last."""
+LIMITED_THEMSELVES = (events, exports, machines, trials, jobs, metrics)
+"""Routes that say how much of what they answer goes on at once; metrics take no thread."""
+# Those before `jobs` whose artifacts have paths like theirs.
+ROUTES = (*HEAVY, *LIMITED_THEMSELVES, *ORDINARY)
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
 details that name the field and the valid choices."""
@@ -112,28 +106,20 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         context: Connections; they stay the caller's to close.
         registry: The models that jobs can name.
     """
+    watching = _watching(context)
+    services = _services(context, registry, watching)
     reaper = Reaper(context)
-    probes = Probes(context)
-    watching = OwnPool(context, size=WATCHERS, name="watching")
-    exporting = OwnPool(context, size=EXPORTERS, name="exporting")
-    rate_limits = RateLimits(context.settings.required_broker_url(), context.settings.rate_limit)
-
-    hub = EventHub(watching)
-    runners = RunnerService(context)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
-        probes.start()
         reaper.start()
-        runners.start()
+        services.runners.start()
         yield
         reaper.stop()
-        await asyncio.to_thread(probes.close)
-        runners.close()
-        await hub.close()
-        await rate_limits.close()
-        watching.close()
-        exporting.close()
+        services.runners.close()
+        await services.hub.close()
+        await services.rate_limits.close()
+        watching.store.database.close()
 
     # Its documentation page needs nothing from elsewhere.
     app = FastAPIOffline(
@@ -149,51 +135,63 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         generate_unique_id_function=lambda route: route.name,
         license_info={"name": "Apache-2.0", "identifier": "Apache-2.0"},
     )
-    app.state.probes = probes
-    app.state.metrics = ServiceMetrics(
-        probes,
-        simulators=configured_simulators(context.settings),
-        models=[model.name for model in registry.models.values()],
-    )
-    app.state.context = context
-    app.state.metrics.registry.register(
-        InfrastructureMetrics(
-            context,
-            probes,
-            {
-                "ordinary": context.store.database.engine,
-                "watching": watching.context.store.database.engine,
-                "exporting": exporting.context.store.database.engine,
-            },
-        )
-    )
-    app.state.exporting = exporting
-    app.state.hub = hub
-    app.state.runners = runners
-    app.state.key_checks = KeyChecks(watching)
-    app.state.concurrency = usual_limits()
-    app.state.body_buffers = BodyBuffers()
-    app.state.registry = registry
-    app.state.boards = BoardCache(context.store.results.boards, context.tasks)
-    app.state.scenes = ResponseCache(trials.MAX_CACHED_SCENES)
-    app.state.pictures = ResponseCache(pictures.MAX_CACHED_PICTURES)
-    app.state.replays = Replays(context)
-    app.state.submissions = Submissions(context, registry)
-    app.state.external = ExternalSessions(context)
-    app.state.rate_limits = rate_limits
+    app.state.services = services
     add_problem_handlers(app)
     _add_routes(app)
     # Behind every route, so that no page can stand in the place of one.
     base = context.settings.base_path
     app.router.default = Dashboard(read_pages(base=base), app.router.default, base=base)
-    _add_middleware(app)
+    _add_middleware(app, services)
     return app
+
+
+def _watching(context: Context) -> Context:
+    """The same with connections that no request takes."""
+    settings = context.settings
+    database = Database(
+        settings.required_database_url(),
+        pool_size=WATCHING,
+        pool_timeout_s=POOL_TIMEOUT_S,
+        name="buildarena-api watching",
+    )
+    store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
+    return replace(context, store=store, tasks=TaskCatalog(store.tasks))
+
+
+def _services(context: Context, registry: ModelRegistry, watching: Context) -> Services:
+    settings, parts = context.settings, Parts(watching)
+    engines = {
+        "ordinary": context.store.database.engine,
+        "watching": watching.store.database.engine,
+    }
+    return Services(
+        context=context,
+        registry=registry,
+        submissions=Submissions(context, registry),
+        external=ExternalSessions(context),
+        runners=RunnerService(context),
+        hub=EventHub(watching),
+        boards=BoardCache(context.store.results.boards, context.tasks),
+        replays=Replays(context),
+        pictures=ResponseCache(pictures.MAX_CACHED_PICTURES),
+        scenes=ResponseCache(trials.MAX_CACHED_SCENES),
+        key_checks=KeyChecks(watching.store.keys),
+        rate_limits=RateLimits(settings.required_broker_url(), settings.rate_limit),
+        places=usual_places(),
+        parts=parts,
+        metrics=ServiceMetrics(
+            context,
+            parts,
+            pools=engines,
+            models=[model.name for model in registry.models.values()],
+        ),
+    )
 
 
 def _add_routes(app: FastAPI) -> None:
     app.include_router(health.router)
-    for route in (*LIMITED_THEMSELVES, *ORDINARY):
-        own = [] if route in LIMITED_THEMSELVES else [limited()]
+    for route in ROUTES:
+        own = [limited("heavy")] if route in HEAVY else [limited()] if route in ORDINARY else []
         app.include_router(
             route.router,
             dependencies=[Depends(caller_of), *own],
@@ -206,15 +204,15 @@ def all_routes() -> list[APIRoute]:
     """Every route of the application."""
     return [
         found
-        for part in (health, runner, *ORDINARY, *LIMITED_THEMSELVES)
+        for part in (health, runner, *ROUTES)
         for found in part.router.routes
         if isinstance(found, APIRoute)
     ]
 
 
-def _add_middleware(app: FastAPI) -> None:
+def _add_middleware(app: FastAPI, services: Services) -> None:
     """The last one added is the first that a request meets."""
-    settings: Settings = app.state.context.settings
+    settings = services.context.settings
     if settings.base_path:
         app.add_middleware(RootPathMiddleware, base=settings.base_path)
     app.add_middleware(
@@ -222,16 +220,15 @@ def _add_middleware(app: FastAPI) -> None:
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
         pieces=runner.is_piece,
         most=runner.max_request_bytes,
-        admit=admission(app),
-        buffers=app.state.body_buffers,
+        admit=admission(services),
+        places=services.places["bodies"],
     )
-    routes = all_routes()
-    methods = [(found.path, found.methods or ()) for found in routes]
+    methods = [(found.path, found.methods or ()) for found in all_routes()]
     app.add_middleware(MethodMiddleware, routes=methods)
     if not settings.require_keys:
         app.add_middleware(LocalOnlyMiddleware, is_page=is_page)
-    app.add_middleware(RequestLog, metrics=app.state.metrics)
-    app.add_middleware(OverloadMiddleware, known=known_key(app), weights=Weights(routes))
+    app.add_middleware(RequestLog, metrics=services.metrics)
+    app.add_middleware(OpenRequests, who=known_sender(services))
     if settings.base_path:
         app.add_middleware(BasePathMiddleware, base=settings.base_path)
     if settings.trusted_proxies:

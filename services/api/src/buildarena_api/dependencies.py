@@ -1,57 +1,92 @@
-"""What routes depend on: the process' connections and the model registry."""
+"""What routes depend on: all that one process has, and their own pieces of it."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Final
 
 from fastapi import Depends, Query, Request
 from pydantic import AfterValidator
 
-from buildarena_api.http.own_pool import OwnPool
-from buildarena_backend.agents.sessions import ExternalSessions
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.process.context import Context
-from buildarena_backend.submission.submission import Submissions
+
+if TYPE_CHECKING:
+    from buildarena_api.events.hub import EventHub
+    from buildarena_api.http.key_checks import KeyChecks
+    from buildarena_api.http.metrics import ServiceMetrics
+    from buildarena_api.http.parts import Parts
+    from buildarena_api.http.places import Kind, Places
+    from buildarena_api.http.rate_limits import RateLimits
+    from buildarena_api.http.response_cache import ResponseCache
+    from buildarena_api.leaderboard.cache import BoardCache
+    from buildarena_api.replays.making import Replays
+    from buildarena_api.runners.service import RunnerService
+    from buildarena_backend.agents.sessions import ExternalSessions
+    from buildarena_backend.submission.submission import Submissions
 
 
-async def _context(request: Request) -> Context:
-    context: Context = request.app.state.context
-    return context
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Services:
+    """All that serves requests in one process.
+
+    Attributes:
+        context: The process' connections.
+        registry: The models that jobs can name.
+        places: How much of what goes on at once, by kind.
+        pictures: GLB files and thumbnails.
+        scenes: What trials are drawn from.
+    """
+
+    context: Context
+    registry: ModelRegistry
+    submissions: Submissions
+    external: ExternalSessions
+    runners: RunnerService
+    hub: EventHub
+    boards: BoardCache
+    replays: Replays
+    pictures: ResponseCache
+    scenes: ResponseCache
+    key_checks: KeyChecks
+    rate_limits: RateLimits
+    places: Mapping[Kind, Places]
+    parts: Parts
+    metrics: ServiceMetrics
 
 
-async def _registry(request: Request) -> ModelRegistry:
-    registry: ModelRegistry = request.app.state.registry
-    return registry
+def services_of(request: Request) -> Services:
+    """What serves a request."""
+    services: Services = request.app.state.services
+    return services
 
 
-async def _exporting(request: Request) -> OwnPool:
-    pool: OwnPool = request.app.state.exporting
-    return pool
+async def _services(request: Request) -> Services:
+    return services_of(request)
 
 
-ExportingDep = Annotated[OwnPool, Depends(_exporting)]
+ServicesDep = Annotated[Services, Depends(_services)]
+
+
+async def _context(services: ServicesDep) -> Context:
+    return services.context
+
+
+async def _registry(services: ServicesDep) -> ModelRegistry:
+    return services.registry
+
+
 ContextDep = Annotated[Context, Depends(_context)]
 RegistryDep = Annotated[ModelRegistry, Depends(_registry)]
-
-
-async def _submissions(request: Request) -> Submissions:
-    submissions: Submissions = request.app.state.submissions
-    return submissions
-
-
-async def _external(request: Request) -> ExternalSessions:
-    sessions: ExternalSessions = request.app.state.external
-    return sessions
-
-
-ExternalDep = Annotated[ExternalSessions, Depends(_external)]
-SubmissionsDep = Annotated[Submissions, Depends(_submissions)]
 
 
 def _plus(track: str) -> str:
     return track.replace(" ", "+")
 
 
+MAX_ROWS: Final = 200
+"""Of one page of a list."""
 # In a URL a plus is a space to those who read it, and no track has one.
 Track = Annotated[str, AfterValidator(_plus)]
 IdPrefix = Annotated[

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Annotated, Final
+from collections.abc import Sequence
+from typing import Annotated
 
 from fastapi import Depends, Query
 
@@ -16,19 +16,6 @@ from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.process.context import Context
 from buildarena_benchmark import ValidationIssue
 from buildarena_benchmark.scorers.registry import known_flags
-
-SEARCHED: Final[Mapping[str, int]] = {
-    "text": 10,
-    "flag": 10,
-    "indicator_min": 2,
-    "indicator_max": 2,
-}
-"""What filters weigh for which jobs are searched, beyond their rows."""
-
-
-def weight_of_search(query: Mapping[str, str]) -> int:
-    """What the filters of a query weigh."""
-    return sum(units for name, units in SEARCHED.items() if name in query)
 
 
 def job_filter(

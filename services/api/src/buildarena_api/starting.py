@@ -9,10 +9,9 @@ from importlib import import_module
 
 from sqlalchemy.exc import OperationalError
 
-from buildarena_api.app import POOL_SIZE, create_app
+from buildarena_api.app import POOL_SIZE, POOL_TIMEOUT_S, create_app
 from buildarena_api.http.access import check_binding
-from buildarena_api.http.own_pool import POOL_TIMEOUT_S
-from buildarena_api.http.serving import serve
+from buildarena_api.http.door import serve, server_config
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.errors import SchemaVersionError, StartupError
 from buildarena_backend.process.context import open_context
@@ -57,14 +56,13 @@ def main() -> None:
     _settle()
     try:
         serve(
-            app,
-            host=settings.host,
-            port=settings.port,
-            log_config=None,
-            access_log=False,
-            timeout_graceful_shutdown=5,
-            ws="none",
-            proxy_headers=False,  # the application itself reads them, from trusted proxies
+            server_config(
+                app,
+                settings,
+                host=settings.host,
+                port=settings.port,
+                timeout_graceful_shutdown=5,
+            )
         )
     finally:
         context.close()

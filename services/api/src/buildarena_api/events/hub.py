@@ -7,18 +7,21 @@ and each event's text.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import partial
+from typing import Final, TypeVar
 
 import structlog
+from anyio import CapacityLimiter, to_thread
 from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.events.texts import event_texts
-from buildarena_api.http.own_pool import OwnPool
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.events import SETTLED_AFTER, Event
+from buildarena_backend.process.context import Context
 from buildarena_backend.states import TURN
 
 log = structlog.get_logger(__name__)
@@ -29,8 +32,13 @@ KEYS_EVERY_S = 2.0
 PAGE = 1000
 JOB_PAGE = 50
 """Events of a job that are read at once: those that are turns may be long."""
+AT_ONCE: Final = 3
+"""Threads that read."""
 BACKLOG = 10_000
 """Events kept for a slow listener; one that falls further behind is cut off and may come again."""
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,13 +91,13 @@ class EventHub:
     """Polls the events table while anybody listens.
 
     Args:
-        pool: Threads and database connections to read with.
+        context: Connections that ordinary requests do not take all of.
     """
 
-    def __init__(self, pool: OwnPool) -> None:
-        self._pool = pool
-        self._store = pool.context.store
-        self._transcripts = Transcripts(self._store, pool.context.artifacts)
+    def __init__(self, context: Context) -> None:
+        self._store = context.store
+        self._transcripts = Transcripts(self._store, context.artifacts)
+        self._threads = CapacityLimiter(AT_ONCE)
         self._channels: dict[str, Channel] = {}
         self._opening: dict[str, asyncio.Task[Channel]] = {}
         self._task: asyncio.Task[None] | None = None
@@ -167,7 +175,7 @@ class EventHub:
             self._store.sweeps.get(id_)
             return frozenset(self._store.sweeps.job_ids(id_))
 
-        channel = Channel(id_, is_sweep=sweep, job_ids=await self._pool.run(job_ids))
+        channel = Channel(id_, is_sweep=sweep, job_ids=await self._run(job_ids))
         for left in [one for one in self._channels.values() if not one.listeners]:
             del self._channels[left.id]
         return self._channels.setdefault(id_, channel)
@@ -190,12 +198,12 @@ class EventHub:
             texts = event_texts(self._transcripts, found)
             return Piece(tuple(event.id for event in found), b"".join(texts))
 
-        return await self._pool.run(read)
+        return await self._run(read)
 
     async def _join(self, channel: Channel, listener: _Listener) -> tuple[Channel, int]:
         """The channel that passes events on, and the id up to which none come any more."""
         if self._floor is None:
-            self._floor = await self._pool.run(self._store.events.newest)
+            self._floor = await self._run(self._store.events.newest)
         # The one that was opened may have been dropped since.
         channel = self._channels.setdefault(channel.id, channel)
         channel.listeners.add(listener)
@@ -207,6 +215,10 @@ class EventHub:
         channel.listeners.discard(listener)
         if not channel.listeners and self._channels.get(channel.id) is channel:
             del self._channels[channel.id]
+
+    async def _run(self, read: Callable[[], T]) -> T:
+        """What is read by a thread that no request waits for."""
+        return await to_thread.run_sync(read, limiter=self._threads)
 
     def _listening(self) -> list[_Listener]:
         return [one for channel in self._channels.values() for one in channel.listeners]
@@ -231,7 +243,7 @@ class EventHub:
         found: list[Event] = []
         last_id = self._floor or 0
         while True:
-            page = await self._pool.run(self._store.events.after, last_id, limit=PAGE)
+            page = await self._run(partial(self._store.events.after, last_id, limit=PAGE))
             found += page
             if len(page) < PAGE:
                 return found
@@ -246,7 +258,7 @@ class EventHub:
         keys = sorted({one.key_id for one in listening if one.key_id is not None})
         if not keys:
             return
-        bad = await self._pool.run(self._store.keys.ended, keys)
+        bad = await self._run(partial(self._store.keys.ended, keys))
         for one in listening:
             if one.key_id in bad:
                 one.end()
@@ -254,7 +266,7 @@ class EventHub:
     async def _pass_on(self, events: list[Event]) -> None:
         channels = list(self._channels.values())
         wanted = [event for event in events if any(one.wants(event) for one in channels)]
-        texts = await self._pool.run(event_texts, self._transcripts, wanted) if wanted else []
+        texts = await self._run(partial(event_texts, self._transcripts, wanted)) if wanted else []
         self._seen.update(event.id for event in events)
         for event, text in zip(wanted, texts, strict=True):
             piece = Piece((event.id,), text)

@@ -9,11 +9,11 @@ the operator asks for no keys, which is allowed on loopback only, whoever asks i
 from __future__ import annotations
 
 import hmac
-from collections.abc import Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
-from fastapi import Depends, FastAPI, Request
+from fastapi import Depends, Request
 from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
 from fastapi.security.utils import get_authorization_scheme_param
 from sqlalchemy.exc import OperationalError
@@ -21,11 +21,11 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.datastructures import Headers
 from starlette.types import Scope
 
-from buildarena_api.http.admission import PLACE, Admit, Place, address_of
-from buildarena_api.http.key_checks import KeyChecks
+from buildarena_api.dependencies import Services, services_of
+from buildarena_api.http.bodies import Admit
+from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ProblemError, database_problem
 from buildarena_api.http.rate_limits import RateLimits
-from buildarena_api.http.weights import weight_of
 from buildarena_backend.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
@@ -147,69 +147,94 @@ async def runner_of(
 
 async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None) -> Caller:
     """Who sent the request, counted; what they may do is not looked at."""
-    limits: RateLimits = request.app.state.rate_limits
-    checks: KeyChecks = request.app.state.key_checks
-    settings: Settings = request.app.state.context.settings
-    try:
-        caller = _reader_of_metrics(request, settings, given)
-        caller = caller or await _identify(settings, checks, given)
-    except ProblemError:
-        # Guessing keys is limited too.
-        await _count(limits, f"refused:{address_of(request.scope)}")
-        raise
+    services = services_of(request)
+    caller = _reader_of_metrics(request, services.context.settings, given)
+    caller = caller or await _identified(services, request.scope, given)
     request.state.caller = caller
-    _move(request.scope, caller)
-    await _count(limits, who_asks(request), weight=weight_of(request.scope).units)
+    await _count(services.rate_limits, _name(caller, request.scope))
     return caller
 
 
-def admission(app: FastAPI) -> Admit:
+async def _identified(
+    services: Services, scope: Scope, given: HTTPAuthorizationCredentials | None
+) -> Caller:
+    try:
+        return await _identify(services, given)
+    except ProblemError:
+        # Guessing keys is limited too.
+        await _count(services.rate_limits, f"refused:{address_of(scope)}")
+        raise
+
+
+def admission(services: Services) -> Admit:
     """What refuses requests that have a body before it is read, from their headers alone."""
 
-    async def admit(scope: Scope) -> None:
-        settings: Settings = app.state.context.settings
-        headers = Headers(scope=scope)
-        scheme, secret = get_authorization_scheme_param(headers.get("authorization"))
-        bearer = scheme.lower() == "bearer" and bool(secret)
-        given = HTTPAuthorizationCredentials(scheme=scheme, credentials=secret) if bearer else None
+    async def admit(scope: Scope) -> str:
+        secret = _secret(scope)
+        given = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
         try:
-            caller = await _identify(settings, app.state.key_checks, given)
-        except ProblemError:
-            await _count(app.state.rate_limits, f"refused:{address_of(scope)}")
-            raise
+            return _name(await _identified(services, scope, given or None), scope)
         except (OperationalError, PoolTimeoutError) as error:
             # Before the routes, whose handlers answer the same.
             raise database_problem(error) from error
-        _move(scope, caller)
 
     return admit
 
 
-def known_key(app: FastAPI) -> Callable[[str], str | None]:
-    """Whose key a secret is, if it was seen to be good lately; nothing is asked."""
+def known_sender(services: Services) -> Callable[[Scope], str]:
+    """Whose a request is, without asking anybody: a key's that was good lately, or its address'.
 
-    def known(secret: str) -> str | None:
-        if _is_operators(secret, app.state.context.settings):
+    A key that nobody checked yet proves nothing: whoever invents one for each request has one
+    address.
+    """
+
+    def who(scope: Scope) -> str:
+        secret = _secret(scope)
+        if secret and _is_operators(secret, services.context.settings):
             return OPERATOR
-        checks: KeyChecks = app.state.key_checks
-        return checks.known(secret)
+        return (secret and services.key_checks.known(secret)) or address_of(scope)
 
-    return known
-
-
-def _move(scope: Scope, caller: Caller) -> None:
-    """Counts an open request for the key that sent it."""
-    place: Place | None = scope.get(PLACE)
-    if place is not None and caller.key_id is not None and place.who != caller.key_id:
-        place.move(caller.key_id)
+    return who
 
 
-def who_asks(request: Request) -> str:
+def address_of(scope: Scope) -> str:
+    """The address that a request came from, as a caller."""
+    client = scope.get("client")
+    return "address:unknown" if client is None else f"address:{client[0]}"
+
+
+def _secret(scope: Scope) -> str:
+    """The key that a request carries; empty without one."""
+    scheme, secret = get_authorization_scheme_param(Headers(scope=scope).get("authorization"))
+    return secret if scheme.lower() == "bearer" else ""
+
+
+def _name(caller: Caller, scope: Scope) -> str:
     """Whose share a request is taken from: the key's, or the address' where there is none."""
-    caller: Caller | None = getattr(request.state, "caller", None)
-    if caller is None or caller.key_id is None:
-        return address_of(request.scope)
-    return caller.key_id
+    return caller.key_id or address_of(scope)
+
+
+def limited(
+    kind: Kind | Callable[[Request], Kind] = "ordinary",
+    *,
+    until: Literal["function", "request"] = "function",
+    caller: Callable[..., Awaitable[Caller]] = caller_of,
+) -> Any:
+    """A dependency: the caller's place among those of a kind.
+
+    Args:
+        kind: Which, or how a request tells.
+        until: ``function``, or ``request`` to keep the place until the answer was sent.
+        caller: The dependency that says who asks.
+    """
+
+    # Annotations are looked up outside of this function, where its arguments are not.
+    async def take_place(request: Request, who: Caller = Depends(caller)) -> AsyncIterator[None]:  # noqa: B008
+        chosen = kind(request) if callable(kind) else kind
+        async with services_of(request).places[chosen].of(_name(who, request.scope)):
+            yield
+
+    return Depends(take_place, scope=until)
 
 
 CallerDep = Annotated[Caller, Depends(caller_of)]
@@ -221,20 +246,18 @@ async def admin_only(caller: CallerDep) -> None:
     caller.require("admin")
 
 
-async def _count(limits: RateLimits, who: str, *, weight: int = 1) -> None:
-    refused = await limits.hit(who, weight=weight)
-    if refused is not None:
+async def _count(limits: RateLimits, who: str) -> None:
+    wait_s = await limits.hit(who)
+    if wait_s is not None:
         raise ProblemError(
             429,
-            f"more than {limits.spelled} requests: this one weighs {weight}, {refused.left} are "
-            f"left; wait {refused.wait_s} s",
-            headers={"Retry-After": str(refused.wait_s)},
+            f"more than {limits.spelled} requests; wait {wait_s} s",
+            headers={"Retry-After": str(wait_s)},
         )
 
 
-async def _identify(
-    settings: Settings, checks: KeyChecks, given: HTTPAuthorizationCredentials | None
-) -> Caller:
+async def _identify(services: Services, given: HTTPAuthorizationCredentials | None) -> Caller:
+    settings = services.context.settings
     if given is None:
         if settings.require_keys:
             raise _unauthorized("an API key is needed: send `Authorization: Bearer KEY`")
@@ -242,7 +265,7 @@ async def _identify(
     secret = given.credentials
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
-    found = await checks.check(secret)
+    found = await services.key_checks.check(secret)
     if found is None:
         raise _unauthorized("unknown API key")
     if found.refusal is not None:

@@ -1,10 +1,16 @@
-"""Metrics for Prometheus: the service's from the database, the API's own from here."""
+"""Metrics for Prometheus: the service's from the database, the API's own from here.
+
+Workers have no port: what they know of themselves they report to the database, and is read there.
+"""
 
 from __future__ import annotations
 
 import platform
-from collections.abc import Collection, Iterable
-from typing import Final
+import shutil
+from collections import Counter as Counts
+from collections.abc import Collection, Iterable, Mapping
+from itertools import accumulate
+from typing import Any, Final
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, Info
 from prometheus_client.core import (
@@ -15,10 +21,12 @@ from prometheus_client.core import (
 )
 from prometheus_client.process_collector import ProcessCollector
 from prometheus_client.registry import Collector
+from sqlalchemy import Engine
+from sqlalchemy.pool import QueuePool
 
-from buildarena_api.http.probes import PartFailedError, Probes
-from buildarena_api.http.server_metrics import server_metrics
+from buildarena_api.http.parts import Parts
 from buildarena_backend import __version__
+from buildarena_backend.process.context import Context
 from buildarena_backend.states import (
     CONSTRUCT_QUEUE,
     AttemptResult,
@@ -27,14 +35,12 @@ from buildarena_backend.states import (
     Stage,
     simulate_queue,
 )
-from buildarena_backend.telemetry.metrics import (
-    STAGE_SECONDS,
-    MetricValues,
-    ModelUse,
-    QueueDepth,
-    StageTimes,
-)
+from buildarena_backend.telemetry.metrics import STAGE_SECONDS, MetricValues, StageTimes
+from buildarena_backend.telemetry.server_figures import ServerFigures
+from buildarena_backend.trials.known_simulators import configured_simulators
+from buildarena_backend.workers import WorkerCounts
 
+PREFIX: Final = "buildarena_"
 # Rates need a counter's zero, and alerts a gauge's: one that begins at its first event hides it.
 PLACES: Final = tuple(
     (str(state), str(stage), str(outcome))
@@ -55,29 +61,36 @@ class ServiceMetrics(Collector):
     """The API's registry: its own requests, its process, and the service's figures.
 
     Args:
-        probes: What the service stands on.
-        simulators: Those that have jobs whether or not there is one now.
+        context: The process' connections.
+        parts: What the service stands on.
+        pools: The process' pools of database connections, by what they are for.
         models: Those that jobs can name.
     """
 
     def __init__(
-        self, probes: Probes, *, simulators: Collection[str], models: Collection[str]
+        self,
+        context: Context,
+        parts: Parts,
+        *,
+        pools: Mapping[str, Engine],
+        models: Collection[str],
     ) -> None:
-        self._probes = probes
+        self._folder = context.settings.artifact_folder
+        self._parts, self._pools, self._models = parts, pools, models
+        simulators = configured_simulators(context.settings)
         self._queues = (CONSTRUCT_QUEUE, *map(simulate_queue, simulators))
-        self._models = models
         self.registry = CollectorRegistry()
         ProcessCollector(registry=self.registry)
-        build = Info("buildarena_build", "The program that answers.", registry=self.registry)
+        build = Info(PREFIX + "build", "The program that answers.", registry=self.registry)
         build.info({"version": __version__, "python": platform.python_version()})
         self.http_seconds = Histogram(
-            "buildarena_http_request_seconds",
+            PREFIX + "http_request_seconds",
             "Time to the end of an answer, by route, method and status.",
             ["route", "method", "status"],
             registry=self.registry,
         )
         self.responses = Counter(
-            "buildarena_http_responses",
+            PREFIX + "http_responses",
             "Answers by status, whatever their route.",
             ["status"],
             registry=self.registry,
@@ -87,130 +100,158 @@ class ServiceMetrics(Collector):
         self.registry.register(self)
 
     def describe(self) -> Iterable[Metric]:
-        """Nothing in advance: registering must not read the database."""
+        """Nothing in advance: registering must not ask anybody."""
         return ()
 
     def collect(self) -> Iterable[Metric]:
-        """The service's figures as metrics; none while the database does not answer."""
-        try:
-            figures, counts = self._probes.values.latest(), self._probes.database.latest()
-        except PartFailedError:
-            return
-        yield from _job_metrics(figures)
-        yield from _queue_metrics(figures, self._queues)
-        yield from _model_metrics(figures, self._models)
-        yield _stage_metric(figures)
-        yield from _audit_metrics(figures)
-        yield from server_metrics(figures.server)
-        workers = GaugeMetricFamily(
-            "buildarena_workers", "Worker processes alive, by kind.", labels=["kind"]
-        )
-        for kind, alive in sorted({**{str(stage): 0 for stage in Stage}, **counts.alive}.items()):
-            workers.add_metric([kind], alive)
-        yield workers
+        """The figures of this moment; those that the database does not tell are left out."""
+        parts = self._parts
+        for name, part, what in (
+            ("database_up", parts.database, "the database answers and has the schema expected"),
+            ("artifact_store_up", parts.artifacts, "artifacts can be written and read"),
+            ("broker_up", parts.broker, "the broker answers"),
+        ):
+            yield _gauge(name, f"1 when {what}, else 0.", float(part.works))
+        yield from self._of_the_process()
+        if parts.database.works:
+            yield from _of_workers(parts.database.latest(), self._queues)
+            if parts.figures.works:
+                figures = parts.figures.latest()
+                yield from _of_jobs(figures, self._queues)
+                yield from _of_models(figures, self._models)
+                yield _of_stages(figures)
+                yield from _of_postgres(figures.server)
+
+    def _of_the_process(self) -> Iterable[Metric]:
+        exists = next(at for at in (self._folder, *self._folder.parents) if at.exists())
+        disk = shutil.disk_usage(exists)
+        what = "Free space where artifacts lie, or the data folder where those are in a bucket."
+        yield _gauge("data_free_bytes", what, disk.free)
+        yield _gauge("data_size_bytes", "Size of that disk.", disk.total)
+        pools = {
+            name: engine.pool
+            for name, engine in self._pools.items()
+            if isinstance(engine.pool, QueuePool)
+        }
+        used = {name: pool.checkedout() for name, pool in pools.items()}
+        # Pools may grow to twice their size (`buildarena_backend.Database`).
+        most = {name: 2 * pool.size() for name, pool in pools.items()}
+        what = "Connections of this process in use."
+        yield _gauges("database_connections_used", what, used, "pool")
+        what = "Connections that a pool may open."
+        yield _gauges("database_connections_limit", what, most, "pool")
 
 
-def _job_metrics(figures: MetricValues) -> Iterable[Metric]:
-    jobs = GaugeMetricFamily(
-        "buildarena_jobs",
-        "Jobs by state, stage and outcome.",
-        labels=["state", "stage", "outcome"],
-    )
-    errors = GaugeMetricFamily(
-        "buildarena_errored_jobs", "Jobs that ended as errored, by class.", labels=["reason"]
-    )
-    counts = dict.fromkeys(PLACES, 0)
+def _gauge(name: str, what: str, value: float) -> Metric:
+    return GaugeMetricFamily(PREFIX + name, what, value=value)
+
+
+def _gauges(name: str, what: str, values: Mapping[Any, float], *labels: str) -> Metric:
+    return _filled(GaugeMetricFamily(PREFIX + name, what, labels=labels), values)
+
+
+def _counters(name: str, what: str, values: Mapping[Any, float], *labels: str) -> Metric:
+    return _filled(CounterMetricFamily(PREFIX + name, what, labels=labels), values)
+
+
+def _filled(metric: GaugeMetricFamily | CounterMetricFamily, values: Mapping[Any, float]) -> Metric:
+    """A metric with values by label, or by all labels where it has several."""
+    for key, value in sorted(values.items()):
+        metric.add_metric(list(key) if isinstance(key, tuple) else [str(key)], value)
+    return metric
+
+
+def _of_workers(counts: WorkerCounts, known: Collection[str]) -> Iterable[Metric]:
+    stages = dict.fromkeys(map(str, Stage), 0)
+    what = "Worker processes alive, by kind."
+    yield _gauges("workers", what, stages | dict(counts.alive), "kind")
+    what = "Worker processes alive, by the queue they serve."
+    serving = dict.fromkeys(known, 0) | dict(counts.serving)
+    yield _gauges("queue_workers", what, serving, "queue")
+    what = "Worker processes that went silent within the last hour and did not sign off."
+    lost = {kind: counts.lost.get(kind, 0) for kind in stages}
+    yield _gauges("workers_lost", what, lost, "kind")
+    what = "The most that a worker's clock differs from the database's."
+    error_s = abs(counts.clocks[0][1]) if counts.clocks else 0.0
+    yield _gauge("worker_clock_error_seconds", what, error_s)
+    what = "The most memory that a worker ever had."
+    yield _gauges("worker_peak_memory_bytes", what, counts.peak_memory_bytes, "kind")
+
+
+def _of_jobs(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
+    places, reasons = Counts(dict.fromkeys(PLACES, 0)), Counts[str]()
     for count in figures.jobs:
-        key = (count.state, count.stage, count.outcome)
-        counts[key] = counts.get(key, 0) + count.jobs
-    for key, number in counts.items():
-        jobs.add_metric(list(key), number)
-    reasons: dict[str, int] = {}
-    for count in figures.jobs:
+        places[count.state, count.stage, count.outcome] += count.jobs
         if count.outcome == Outcome.ERRORED:
-            reasons[count.reason] = reasons.get(count.reason, 0) + count.jobs
-    for reason, number in reasons.items():
-        errors.add_metric([reason], number)
-    sweeps = GaugeMetricFamily("buildarena_sweeps", "Sweeps by state.", labels=["state"])
-    for state, number in figures.sweeps.items():
-        sweeps.add_metric([state], number)
-    return jobs, errors, sweeps
+            reasons[count.reason] += count.jobs
+    what = "Jobs by state, stage and outcome."
+    yield _gauges("jobs", what, places, "state", "stage", "outcome")
+    yield _gauges("errored_jobs", "Jobs that ended as errored, by class.", reasons, "reason")
+    yield _gauges("sweeps", "Sweeps by state.", figures.sweeps, "state")
+    none = dict.fromkeys(known, 0)
+    waiting = none | {queue.queue: queue.jobs for queue in figures.queues}
+    yield _gauges("queue_jobs", "Jobs that wait.", waiting, "queue")
+    oldest = none | {queue.queue: queue.oldest_s for queue in figures.queues}
+    what = "How long the longest waiting job has waited."
+    yield _gauges("queue_oldest_seconds", what, oldest, "queue")
+    what = "Jobs that a worker is at, by the queue it took them from."
+    yield _gauges("queue_running", what, none | figures.running, "queue")
+    what = "Verifications that ended, by verdict."
+    yield _counters("verifications", what, figures.verifications, "verdict")
+    what = "Scored jobs that count once they are verified, or were refuted, by audit."
+    yield _gauges("audited_jobs", what, figures.audits, "audit")
 
 
-def _queue_metrics(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
-    depth = GaugeMetricFamily("buildarena_queue_jobs", "Jobs that wait.", labels=["queue"])
-    oldest = GaugeMetricFamily(
-        "buildarena_queue_oldest_seconds",
-        "How long the longest waiting job has waited.",
-        labels=["queue"],
-    )
-    waiting = {name: QueueDepth(queue=name, jobs=0, oldest_s=0.0) for name in known}
-    for name, queue in sorted((waiting | {each.queue: each for each in figures.queues}).items()):
-        depth.add_metric([name], queue.jobs)
-        oldest.add_metric([name], queue.oldest_s)
-    running = GaugeMetricFamily(
-        "buildarena_queue_running",
-        "Jobs that a worker is at, by the queue it took them from.",
-        labels=["queue"],
-    )
-    for name, number in sorted((dict.fromkeys(known, 0) | figures.running).items()):
-        running.add_metric([name], number)
-    return depth, oldest, running
+def _of_models(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
+    none = dict.fromkeys(known, 0.0)
+    requests = none | {use.model: use.requests for use in figures.models}
+    yield _counters("model_requests", "Model requests answered.", requests, "model")
+    tokens = {(name, direction): 0 for name in known for direction in ("input", "output")}
+    for use in figures.models:
+        tokens[use.model, "input"] = use.input_tokens
+        tokens[use.model, "output"] = use.output_tokens
+    yield _counters("model_tokens", "Tokens, by direction.", tokens, "model", "direction")
+    cost = none | {use.model: use.cost_usd for use in figures.models}
+    yield _counters("model_cost_usd", "US dollars spent on model requests.", cost, "model")
 
 
-def _model_metrics(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
-    requests = CounterMetricFamily(
-        "buildarena_model_requests", "Model requests answered.", labels=["model"]
-    )
-    tokens = CounterMetricFamily(
-        "buildarena_model_tokens", "Tokens, by direction.", labels=["model", "direction"]
-    )
-    cost = CounterMetricFamily(
-        "buildarena_model_cost_usd", "US dollars spent on model requests.", labels=["model"]
-    )
-    none = {name: ModelUse.none(name) for name in known}
-    for use in (none | {each.model: each for each in figures.models}).values():
-        requests.add_metric([use.model], use.requests)
-        tokens.add_metric([use.model, "input"], use.input_tokens)
-        tokens.add_metric([use.model, "output"], use.output_tokens)
-        cost.add_metric([use.model], use.cost_usd)
-    return requests, tokens, cost
-
-
-def _audit_metrics(figures: MetricValues) -> Iterable[Metric]:
-    verifications = CounterMetricFamily(
-        "buildarena_verifications", "Verifications that ended, by verdict.", labels=["verdict"]
-    )
-    for verdict, number in sorted(figures.verifications.items()):
-        verifications.add_metric([verdict], number)
-    audits = GaugeMetricFamily(
-        "buildarena_audited_jobs",
-        "Scored jobs that count once they are verified, or were refuted, by audit.",
-        labels=["audit"],
-    )
-    for audit, number in sorted(figures.audits.items()):
-        audits.add_metric([audit], number)
-    return verifications, audits
-
-
-def _stage_metric(figures: MetricValues) -> Metric:
+def _of_stages(figures: MetricValues) -> Metric:
     stages = HistogramMetricFamily(
-        "buildarena_stage_seconds",
+        PREFIX + "stage_seconds",
         "How long attempts took, by stage and how they ended.",
         labels=["stage", "result"],
     )
-    none = {
+    known = {
         (stage, result): StageTimes.none(stage, result)
         for stage in Stage
         for result in AttemptResult
-    }
-    known = none | {(times.stage, times.result): times for times in figures.stages}
+    } | {(times.stage, times.result): times for times in figures.stages}
     bounds = [*(str(float(bound)) for bound in STAGE_SECONDS), "+Inf"]
     for times in known.values():
-        buckets = []
-        total = 0
-        for bound, count in zip(bounds, times.counts, strict=True):
-            total += count
-            buckets.append((bound, float(total)))
+        sums = accumulate(map(float, times.counts))
+        buckets = list(zip(bounds, sums, strict=True))
         stages.add_metric([times.stage, times.result], buckets, sum_value=times.total_s)
     return stages
+
+
+def _of_postgres(figures: ServerFigures) -> Iterable[Metric]:
+    for name, what in (
+        ("size_bytes", "Size of the database on disk."),
+        ("server_connections", "Connections to all databases of the server."),
+        ("server_connections_limit", "Connections that the server takes."),
+        ("transaction_age", "Transactions since the oldest row that is not frozen."),
+    ):
+        yield _gauge(f"postgres_{name}", what, getattr(figures, name))
+    what = "How long the oldest transaction has been open, of those that the API's login sees."
+    yield _gauge("postgres_oldest_transaction_seconds", what, figures.oldest_transaction_s)
+    what = "Connections to the database, by state."
+    yield _gauges("postgres_connections", what, figures.connections, "state")
+    what = "Live rows, as the server estimates them."
+    yield _gauges("postgres_rows", what, figures.rows, "table")
+    what = "Rows that are to be removed, likewise."
+    yield _gauges("postgres_dead_rows", what, figures.dead_rows, "table")
+    ended = {"committed": figures.committed, "rolled_back": figures.rolled_back}
+    yield _counters("postgres_transactions", "Transactions that ended, by how.", ended, "result")
+    yield CounterMetricFamily(
+        PREFIX + "postgres_deadlocks", "Transactions undone by deadlocks.", value=figures.deadlocks
+    )

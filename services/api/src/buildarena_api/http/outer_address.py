@@ -11,6 +11,20 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 HOST: Final = re.compile(rb"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\])(?::[0-9]{1,5})?")
 
 
+class Networks:
+    """Addresses and networks, separated by commas; an address is in them, or is not."""
+
+    def __init__(self, named: str) -> None:
+        self._networks = [ip_network(part) for part in named.split(",") if part]
+
+    def __contains__(self, address: str) -> bool:
+        """Whether an address is one of them; what is no address never is."""
+        try:
+            return any(ip_address(address) in network for network in self._networks)
+        except ValueError:
+            return False
+
+
 class BasePathMiddleware:
     """Serves everything below a path too, as a proxy asks for it that passes paths on unchanged.
 
@@ -90,21 +104,13 @@ class ForwardedHostMiddleware:
 
     def __init__(self, app: ASGIApp, trusted: str) -> None:
         self._app = app
-        self._networks = [ip_network(part) for part in trusted.split(",") if part]
+        self._trusted = Networks(trusted)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Passes a request on with the host that its client asked for."""
-        if scope["type"] == "http" and self._trusts(scope):
+        if scope["type"] == "http" and (scope.get("client") or [""])[0] in self._trusted:
             given = [value for name, value in scope["headers"] if name == b"x-forwarded-host"]
             if len(given) == 1 and HOST.fullmatch(given[0]):
                 headers = [header for header in scope["headers"] if header[0] != b"host"]
                 scope = {**scope, "headers": [(b"host", given[0]), *headers]}
         await self._app(scope, receive, send)
-
-    def _trusts(self, scope: Scope) -> bool:
-        client = scope.get("client")
-        try:
-            address = ip_address(client[0]) if client else None
-        except ValueError:
-            return False
-        return address is not None and any(address in network for network in self._networks)

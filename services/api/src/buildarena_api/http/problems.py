@@ -15,10 +15,8 @@ from pydantic import BaseModel, Field
 from sqlalchemy.exc import DataError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
-from starlette.requests import ClientDisconnect
 from starlette.types import Send
 
-from buildarena_api.http.admission import SlowBodyError
 from buildarena_backend.errors import (
     ArtifactDamagedError,
     ArtifactMissingError,
@@ -135,10 +133,6 @@ def add_problem_handlers(app: FastAPI) -> None:
     async def on_problem(_: Request, error: ProblemError) -> JSONResponse:
         return _answer(error.status, error.detail, error.errors, error.headers)
 
-    @app.exception_handler(SlowBodyError)
-    async def on_slow_body(_: Request, error: SlowBodyError) -> JSONResponse:
-        return _answer(408, str(error), headers={"Connection": "close"})
-
     @app.exception_handler(SubmissionError)
     async def on_submission(_: Request, error: SubmissionError) -> JSONResponse:
         return _answer(422, str(error), error.issues)
@@ -192,12 +186,6 @@ def _add_store_handlers(app: FastAPI) -> None:
     async def on_unstorable(_: Request, error: DataError) -> JSONResponse:
         log.info("unstorable", error=str(error.orig))
         return _answer(422, "a text or number of the request is none that can be stored or found")
-
-    @app.exception_handler(ClientDisconnect)
-    async def on_cut_off(request: Request, _: ClientDisconnect) -> JSONResponse:
-        # Nobody reads it: the body broke off because the client left.
-        log.info("body_cut_off", path=request.url.path)
-        return _answer(400, "the body was cut off")
 
     @app.exception_handler(OperationalError)
     @app.exception_handler(PoolTimeoutError)

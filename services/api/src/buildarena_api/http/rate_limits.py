@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
 from typing import Any
 
 import structlog
@@ -23,19 +22,6 @@ from buildarena_backend.queue.breakers import AsyncCircuitBreaker
 TIMEOUT_S = 0.3
 """How long a request waits for its count; the store is not asked again until it answers."""
 GROUP = "buildarena"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Refused:
-    """A request was one too many.
-
-    Attributes:
-        wait_s: Seconds after which it may come again.
-        left: What the caller may still send now, in requests of weight 1.
-    """
-
-    wait_s: int
-    left: int
 
 
 log = structlog.get_logger(__name__)
@@ -65,46 +51,27 @@ class RateLimits:
         self._breaker = AsyncCircuitBreaker(self._storage.check)
         self.spelled = rate.replace("/", " per ")
 
-    async def hit(self, who: str, *, weight: int = 1) -> Refused | None:
-        """Counts a request.
-
-        Args:
-            who: The caller.
-            weight: As how many it counts; at most as all that one may send in the time.
-
-        Returns:
-            None when it may pass, otherwise what is left.
-        """
-        cost = min(weight, self._item.amount)
+    async def hit(self, who: str) -> int | None:
+        """Counts a request; None when it may pass, otherwise in how many seconds it may."""
         if not self._breaker.is_open:
             try:
-                if await self._shared.hit(self._item, GROUP, who, cost=cost):
+                if await self._shared.hit(self._item, GROUP, who):
                     return None
-                stats = await self._shared.get_window_stats(self._item, GROUP, who)
+                return _wait_s(await self._shared.get_window_stats(self._item, GROUP, who))
             # What uvloop says of a connection that ended while nobody looked is a RuntimeError.
             except (RedisError, OSError, RuntimeError) as error:
                 if not self._breaker.is_open:
                     log.warning("rate_limits_unreachable", error=str(error))
                 self._breaker.failed()
-            else:
-                return self._refused(cost, stats)
-        if self._own.hit(self._item, GROUP, who, cost=cost):
+        if self._own.hit(self._item, GROUP, who):
             return None
-        return self._refused(cost, self._own.get_window_stats(self._item, GROUP, who))
-
-    def _refused(self, cost: int, stats: WindowStats) -> Refused:
-        """Why a request was refused.
-
-        The library says when the next unit comes free. What is further needed comes free as the
-        window goes on, as evenly as nobody knows better.
-        """
-        missing = max(0, cost - stats.remaining - 1)
-        wait_s = (
-            stats.reset_time - time.time() + missing * self._item.get_expiry() / self._item.amount
-        )
-        return Refused(wait_s=max(1, math.ceil(wait_s)), left=stats.remaining)
+        return _wait_s(self._own.get_window_stats(self._item, GROUP, who))
 
     async def close(self) -> None:
         """Closes the connections."""
         await self._breaker.close()
         await self._pool.aclose()
+
+
+def _wait_s(stats: WindowStats) -> int:
+    return max(1, math.ceil(stats.reset_time - time.time()))

@@ -2,40 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Annotated, Final
+from typing import Annotated
 
-from fastapi import Depends, Query, Request
+from fastapi import Depends, Query
 
-from buildarena_api.dependencies import ContextDep, Track
+from buildarena_api.dependencies import ServicesDep, Track
 from buildarena_api.http.problems import ProblemError
-from buildarena_api.http.weights import HEAVIEST
-from buildarena_api.leaderboard.cache import BoardCache, Question
+from buildarena_api.leaderboard.cache import Question
 from buildarena_benchmark import ValidationIssue, builtin_tasks, paper_tasks
 from buildarena_benchmark.leaderboard import BoardQuery
 
-PARTIAL: Final = ("sweep", "since", "until")
-"""Filters by which only some jobs of a cell count: boards are made of jobs then."""
-NARROWED: Final = ("task", "level", "category", "model")
 MAX_SWEEPS = 50
 """Sweeps that one board is made of at most."""
-
-
-def weight_of_board(query: Mapping[str, str]) -> int:
-    """What a question for a board weighs: one that others ask too is in memory."""
-    if any(name in query for name in PARTIAL):
-        return HEAVIEST
-    return 5 if any(name in query for name in NARROWED) else 2
-
-
-async def _boards(request: Request) -> BoardCache:
-    boards: BoardCache = request.app.state.boards
-    return boards
-
-
-BoardsDep = Annotated[BoardCache, Depends(_boards)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,8 +36,7 @@ class Selection:
 
 
 def select_board(
-    boards: BoardsDep,
-    context: ContextDep,
+    services: ServicesDep,
     *,
     track: Annotated[Track | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
@@ -84,6 +63,7 @@ def select_board(
         ProblemError: A track, task, level or category is unknown, or a time has no zone.
         NotFoundError: A sweep is unknown.
     """
+    context, boards = services.context, services.boards
     sweeps = frozenset(sweep) if sweep else None
     members = sum(context.store.sweeps.size(id_) for id_ in sorted(sweeps or ()))
     tracks = boards.tracks(sweeps)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Request
+from fastapi import APIRouter, Header
 from sse_starlette import EventSourceResponse
 
+from buildarena_api.dependencies import ServicesDep
 from buildarena_api.events.hub import Channel, EventHub
-from buildarena_api.http.access import CallerDep
-from buildarena_api.http.concurrency import limited
+from buildarena_api.http.access import CallerDep, limited
 from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(
@@ -39,10 +39,10 @@ LastEventId = Annotated[
     responses=STREAM | problem_responses(404, 422, 503),
 )
 async def stream_job(
-    job_id: str, request: Request, caller: CallerDep, last_event_id: LastEventId = 0
+    job_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Streams the events of a job, from the beginning or after a given one."""
-    hub = _hub(request)
+    hub = services.hub
     return _streamed(hub, await hub.open_job(job_id), last_event_id, caller.key_id)
 
 
@@ -52,16 +52,11 @@ async def stream_job(
     responses=STREAM | problem_responses(404, 422, 503),
 )
 async def stream_sweep(
-    sweep_id: str, request: Request, caller: CallerDep, last_event_id: LastEventId = 0
+    sweep_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Streams the events of a sweep and its jobs, from the beginning or after a given one."""
-    hub = _hub(request)
+    hub = services.hub
     return _streamed(hub, await hub.open_sweep(sweep_id), last_event_id, caller.key_id)
-
-
-def _hub(request: Request) -> EventHub:
-    hub: EventHub = request.app.state.hub
-    return hub
 
 
 def _streamed(

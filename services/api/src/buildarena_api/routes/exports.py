@@ -12,11 +12,10 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.dependencies import ExportingDep, RegistryDep
-from buildarena_api.http.concurrency import limited
+from buildarena_api.dependencies import ServicesDep
+from buildarena_api.http.access import limited
 from buildarena_api.http.problems import problem_responses
-from buildarena_api.http.weights import HEAVIEST, weighs
-from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep
+from buildarena_api.leaderboard.filters import SelectionDep
 from buildarena_api.leaderboard.views import Board, Row, board_view
 from buildarena_backend.store import Store
 from buildarena_benchmark import paper_tasks
@@ -28,7 +27,7 @@ from buildarena_benchmark.leaderboard import (
     published_rows,
 )
 
-router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited()])
+router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("exports")])
 
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",
@@ -100,12 +99,9 @@ class Result(BaseModel):
         **problem_responses(404, 422, 503),
     },
 )
-@weighs(HEAVIEST)
-async def export(
-    exporting: ExportingDep,
-    boards: BoardsDep,
+def export(
+    services: ServicesDep,
     selection: SelectionDep,
-    registry: RegistryDep,
     *,
     format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
 ) -> Response:
@@ -120,20 +116,18 @@ async def export(
                 ranked,
                 track=track or "",
                 tracks=tracks,
-                registry=registry,
-                catalogue=exporting.context.tasks,
+                registry=services.registry,
+                catalogue=services.context.tasks,
             ),
         )
 
     if track is None:
-        body = await exporting.run(render, RankedBoard(tasks=(), overall=()))
+        body = render(RankedBoard(tasks=(), overall=()))
     else:
         kind = f"{format} {' '.join(tracks)}"
-        question = selection.question
-        answer = await exporting.run(
-            boards.answer, question, kind, lambda shown: render(shown.board())
-        )
-        body = answer.body
+        body = services.boards.answer(
+            selection.question, kind, lambda shown: render(shown.board())
+        ).body
     name = f"leaderboard.{'tex' if format == 'latex' else format}"
     headers = {"Content-Disposition": f'attachment; filename="{name}"'}
     return Response(body, media_type=MEDIA_TYPES[format], headers=headers)
@@ -144,10 +138,9 @@ async def export(
     response_model=list[Result],
     responses=problem_responses(404, 503),
 )
-@weighs(HEAVIEST)
-async def sweep_results(sweep_id: str, exporting: ExportingDep) -> Response:
+def sweep_results(sweep_id: str, services: ServicesDep) -> Response:
     """All ended jobs of a sweep with their rounds: what a report is made of."""
-    body = await exporting.run(_results, exporting.context.store, sweep_id)
+    body = _results(services.context.store, sweep_id)
     return Response(body, media_type="application/json")
 
 

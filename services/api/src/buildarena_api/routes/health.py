@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
-from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.probes import PartFailedError, Probes
+from buildarena_api.dependencies import ServicesDep
+from buildarena_api.http.parts import PartFailedError, Parts
 from buildarena_backend.errors import SchemaVersionError
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import CONSTRUCT_QUEUE, Audit, SweepState, simulate_queue
@@ -51,29 +51,29 @@ class Health(BaseModel):
     "/health",
     responses={503: {"model": Health, "description": "down"}},
 )
-async def health(context: ContextDep, request: Request, response: Response) -> Health:
+async def health(services: ServicesDep, response: Response) -> Health:
     """Says how database, broker, artifacts, workers and disk are, as they were last asked.
 
     Answers at once, also while one of them accepts connections and does not answer, and 503 when
     jobs can't be accepted.
     """
-    probes: Probes = request.app.state.probes
-    await probes.renew(probes.database, probes.broker, probes.artifacts, probes.values)
-    database, counts = _database(probes)
-    checks = [database, _broker(probes), _artifacts(probes), _disk(context)]
+    context, parts = services.context, services.parts
+    await parts.renew()
+    database, counts = _database(parts)
+    checks = [database, _broker(parts), _artifacts(parts), _disk(context)]
     if counts is None:
         response.status_code = 503
         return Health(status="down", checks=checks)
-    figures = _figures(probes)
+    figures = _figures(parts)
     checks += [*_workers(context, counts, figures), _lost(counts), _clocks(counts)]
     if figures is not None:
         checks += [_waiting(figures), _audits(figures), _budgets(figures)]
     return Health(status="ok" if all(c.ok for c in checks) else "degraded", checks=checks)
 
 
-def _database(probes: Probes) -> tuple[Check, WorkerCounts | None]:
+def _database(parts: Parts) -> tuple[Check, WorkerCounts | None]:
     try:
-        counts = probes.database.latest()
+        counts = parts.database.latest()
     except PartFailedError as error:
         advice = "start Postgres, or correct BUILDARENA_DATABASE_URL"
         if isinstance(error.__cause__, SchemaVersionError):
@@ -84,15 +84,15 @@ def _database(probes: Probes) -> tuple[Check, WorkerCounts | None]:
     return Check(name="database", ok=True, detail="reachable, schema as expected"), counts
 
 
-def _figures(probes: Probes) -> MetricValues | None:
+def _figures(parts: Parts) -> MetricValues | None:
     with contextlib.suppress(PartFailedError):
-        return probes.values.latest()
+        return parts.figures.latest()
     return None
 
 
-def _broker(probes: Probes) -> Check:
+def _broker(parts: Parts) -> Check:
     try:
-        waiting = probes.broker.latest()
+        waiting = parts.broker.latest()
     except PartFailedError as error:
         return Check(
             name="broker",
@@ -103,9 +103,9 @@ def _broker(probes: Probes) -> Check:
     return Check(name="broker", ok=True, detail=f"reachable, {waiting} messages for construct")
 
 
-def _artifacts(probes: Probes) -> Check:
+def _artifacts(parts: Parts) -> Check:
     try:
-        probes.artifacts.latest()
+        parts.artifacts.latest()
     except PartFailedError as error:
         return Check(
             name="artifacts",

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from hashlib import sha256
 from typing import Annotated, Final, Literal
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 
-from buildarena_api.dependencies import ContextDep, RegistryDep, SubmissionsDep
+from buildarena_api.dependencies import MAX_ROWS, ContextDep, RegistryDep, ServicesDep
 from buildarena_api.http import cursors
-from buildarena_api.http.access import CallerDep
+from buildarena_api.http.access import CallerDep, limited
+from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.http.weights import HEAVIEST, rows, weighs
-from buildarena_api.job_filters import JobFilterDep, require_known, weight_of_search
+from buildarena_api.job_filters import JobFilterDep, require_known
 from buildarena_api.routes.transcripts import as_markdown
 from buildarena_api.schemas import (
     AttemptView,
@@ -33,17 +32,16 @@ from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
 from buildarena_backend.process.context import Context
 
-router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
+
+def _kind(request: Request) -> Kind:
+    """A page of a list is read in its order; what searches or counts looks through all jobs."""
+    searches = not {"text", "flag"}.isdisjoint(request.query_params)
+    return "heavy" if searches or request.url.path.endswith("/summary") else "ordinary"
+
+
+router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[limited(_kind)])
 
 DEFAULT_LIMIT: Final = 100
-
-
-def _weight_of_list(query: Mapping[str, str]) -> int:
-    return min(HEAVIEST, rows(query, default=DEFAULT_LIMIT) + weight_of_search(query))
-
-
-def _weight_of_summary(query: Mapping[str, str]) -> int:
-    return min(HEAVIEST, 5 + weight_of_search(query))
 
 
 ARTIFACT_TYPES = {
@@ -54,16 +52,15 @@ ARTIFACT_TYPES = {
 
 @router.post("", status_code=202, responses=problem_responses(422, 503))
 def submit_job(
-    spec: JobSpec, response: Response, submissions: SubmissionsDep, caller: CallerDep
+    spec: JobSpec, response: Response, services: ServicesDep, caller: CallerDep
 ) -> JobView:
     """Submits one job. An equal job that exists already is returned as it is, never redone."""
-    job, _ = submissions.submit_job(spec, owner=caller.key_id)
+    job, _ = services.submissions.submit_job(spec, owner=caller.key_id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
 
 
 @router.get("", response_model=JobPage, responses=problem_responses(404, 422, 503))
-@weighs(_weight_of_list)
 def list_jobs(
     context: ContextDep,
     registry: RegistryDep,
@@ -76,7 +73,7 @@ def list_jobs(
         Literal["asc", "desc"], Query(description="desc: the newest, or greatest, first")
     ] = "desc",
     cursor: Annotated[str | None, Query(max_length=1000)] = None,
-    limit: Annotated[int, Query(ge=1, le=1000)] = DEFAULT_LIMIT,
+    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = DEFAULT_LIMIT,
 ) -> Response:
     """Lists jobs, newest first by default.
 
@@ -106,7 +103,6 @@ def _cursor(order: Order, job: Job) -> str:
 
 
 @router.get("/summary", responses=problem_responses(404, 422, 503))
-@weighs(_weight_of_summary)
 def summarise_jobs(
     context: ContextDep, registry: RegistryDep, wanted: JobFilterDep
 ) -> JobSummaryView:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from typing import Annotated, Literal, Self
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from buildarena_api.dependencies import ContextDep
+from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.access import admin_only
-from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.schemas import BudgetView
 from buildarena_backend.accounts.keys import ApiKey
@@ -152,34 +151,32 @@ def list_keys(context: ContextDep) -> list[KeyView]:
 
 @router.post("/{key_id}/rotate", responses=problem_responses(404, 409, 422, 503))
 def rotate_key(
-    key_id: str, body: Rotation, response: Response, context: ContextDep, request: Request
+    key_id: str, body: Rotation, response: Response, services: ServicesDep
 ) -> KeyCreated:
     """Gives a key another secret, which is in this answer only; it keeps what it owns.
 
     Its present secret stays good for a while. One before that ends at once.
     """
-    key, secret = context.store.keys.rotate(key_id, overlap=timedelta(hours=body.overlap_hours))
-    checks: KeyChecks = request.app.state.key_checks
-    checks.forget()
+    overlap = timedelta(hours=body.overlap_hours)
+    key, secret = services.context.store.keys.rotate(key_id, overlap=overlap)
+    services.key_checks.forget()
     response.headers["Cache-Control"] = "no-store"
-    return KeyCreated(**_view(context, key).model_dump(), secret=secret)
+    return KeyCreated(**_view(services.context, key).model_dump(), secret=secret)
 
 
 @router.post("/{key_id}/revoke", responses=problem_responses(404, 503))
-def revoke_key(key_id: str, context: ContextDep, request: Request) -> KeyView:
+def revoke_key(key_id: str, services: ServicesDep) -> KeyView:
     """Revokes a key at once; its jobs continue."""
-    revoked = _view(context, context.store.keys.revoke(key_id))
-    checks: KeyChecks = request.app.state.key_checks
-    checks.forget()
+    revoked = _view(services.context, services.context.store.keys.revoke(key_id))
+    services.key_checks.forget()
     return revoked
 
 
 @router.post("/{key_id}/reinstate", responses=problem_responses(404, 503))
-def reinstate_key(key_id: str, context: ContextDep, request: Request) -> KeyView:
+def reinstate_key(key_id: str, services: ServicesDep) -> KeyView:
     """Lets a key work again that was suspended because a trial of its runners was refuted."""
-    reinstated = _view(context, context.store.keys.reinstate(key_id))
-    checks: KeyChecks = request.app.state.key_checks
-    checks.forget()
+    reinstated = _view(services.context, services.context.store.keys.reinstate(key_id))
+    services.key_checks.forget()
     return reinstated
 
 

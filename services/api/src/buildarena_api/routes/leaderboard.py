@@ -10,13 +10,12 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.dependencies import ContextDep, RegistryDep
+from buildarena_api.dependencies import MAX_ROWS, ContextDep, ServicesDep
 from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
-from buildarena_api.http.weights import HEAVIEST, rows, weighs
 from buildarena_api.leaderboard.cache import Question
-from buildarena_api.leaderboard.filters import BoardsDep, SelectionDep, unknown, weight_of_board
+from buildarena_api.leaderboard.filters import SelectionDep, unknown
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
@@ -30,11 +29,6 @@ MAX_DISTINCT = 20
 
 
 DEFAULT_LIMIT: Final = 100
-
-
-def _weight_of_manifest(query: Mapping[str, str]) -> int:
-    """Manifests are counted task by task and model by model."""
-    return weight_of_board(query) if {"task", "model"} <= query.keys() else HEAVIEST
 
 
 class TestView(BaseModel):
@@ -110,19 +104,16 @@ class VerifyAccepted(BaseModel):
 
 
 @router.get("/leaderboard", response_model=Board, responses=problem_responses(404, 422, 503))
-@weighs(weight_of_board)
 def leaderboard(
-    boards: BoardsDep,
+    services: ServicesDep,
     selection: SelectionDep,
-    registry: RegistryDep,
-    context: ContextDep,
     request: Request,
 ) -> Any:
     """Ranks the models of one track, on each task and overall; tracks are never mixed."""
     track, tracks = selection.track, selection.tracks
     if track is None:
         return Board(track=None, tracks=[], tasks=[])
-    answer = boards.answer(
+    answer = services.boards.answer(
         selection.question,
         "json " + " ".join(tracks),
         lambda shown: (
@@ -130,8 +121,8 @@ def leaderboard(
                 shown.board(),
                 track=track,
                 tracks=tracks,
-                registry=registry,
-                catalogue=context.tasks,
+                registry=services.registry,
+                catalogue=services.context.tasks,
             )
             .model_dump_json()
             .encode()
@@ -143,14 +134,13 @@ def leaderboard(
 @router.get(
     "/leaderboard/figures", response_model=Figures, responses=problem_responses(404, 422, 503)
 )
-@weighs(weight_of_board)
-def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any:
+def figures(services: ServicesDep, selection: SelectionDep, request: Request) -> Any:
     """What the figures of a board are drawn from; reports are drawn from the same."""
     track = selection.track
     if track is None:
         return Figures(track=None, dimensions=[], failures=[], cost=[], front=[])
-    tasks = boards.tasks()
-    answer = boards.answer(
+    tasks = services.boards.tasks()
+    answer = services.boards.answer(
         selection.question,
         "figures",
         lambda shown: (
@@ -163,9 +153,8 @@ def figures(boards: BoardsDep, selection: SelectionDep, request: Request) -> Any
 
 
 @router.get("/leaderboard/compare", responses=problem_responses(404, 422, 503))
-@weighs(lambda query: max(10, weight_of_board(query)))
 def compare(
-    boards: BoardsDep,
+    services: ServicesDep,
     selection: SelectionDep,
     first: Annotated[str, Query(description="A model, or model@configuration")],
     second: Annotated[str, Query(description="Another")],
@@ -173,9 +162,9 @@ def compare(
     """Compares two models, task by task."""
     tasks: list[TaskComparison] = []
     if selection.track is not None:
-        every = boards.inside(selection.question)
+        every = services.boards.inside(selection.question)
         sides = [
-            boards.trials(selection.question, _usual(every, field, name))
+            services.boards.trials(selection.question, _usual(every, field, name))
             for field, name in (("first", first), ("second", second))
         ]
         found = compare_models(*sides)
@@ -207,13 +196,12 @@ def _usual(every: Mapping[CellId, CellRecord], field: str, name: str) -> list[Ce
     response_model=ChangePage,
     responses=problem_responses(404, 422, 503),
 )
-@weighs(lambda query: rows(query, default=DEFAULT_LIMIT))
 def changes(
     context: ContextDep,
     selection: SelectionDep,
     *,
     before: Annotated[int | None, Query(ge=0, description="Only older ones")] = None,
-    limit: Annotated[int, Query(ge=1, le=1000)] = DEFAULT_LIMIT,
+    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = DEFAULT_LIMIT,
     unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
 ) -> Response:
     """What entered a track's board, left it or was scored again, and why; newest first."""
@@ -231,14 +219,13 @@ def changes(
 
 
 @router.get("/leaderboard/manifest", responses=problem_responses(404, 422, 503))
-@weighs(_weight_of_manifest)
 def manifest(
-    context: ContextDep, boards: BoardsDep, selection: SelectionDep
+    context: ContextDep, services: ServicesDep, selection: SelectionDep
 ) -> list[ManifestEntry]:
     """The versions behind an entry (name task and model): what its jobs' manifests say."""
     if selection.track is None:
         return []
-    inside = boards.inside(selection.question)
+    inside = services.boards.inside(selection.question)
     entries: dict[str, list[dict[str, Any]]] = {}
     for task, version, model in sorted(
         {(i.task, i.task_version, cell.model) for i, cell in inside.items()}
@@ -259,21 +246,21 @@ def manifest(
 
 @router.post("/leaderboard/verify", status_code=202, responses=problem_responses(422, 503))
 def verify(
-    body: VerifyRequest, context: ContextDep, boards: BoardsDep, caller: CallerDep
+    body: VerifyRequest, context: ContextDep, services: ServicesDep, caller: CallerDep
 ) -> VerifyAccepted:
     """Replays and re-simulates all of a model's results on a board, or a sample.
 
     Imported results count when they were verified.
     """
-    tracks = boards.tracks()
+    tracks = services.boards.tracks()
     if body.track is not None and body.track not in tracks:
         raise unknown("track", body.track, tracks)
     track = body.track or (tracks[0] if tracks else None)
     query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None)
     question = Question(track=track or "", query=query)
-    every = boards.inside(question)
+    every = services.boards.inside(question)
     own = [id_ for id_, cell in every.items() if cell.model == body.model]
-    scored = boards.scored_ids(question, own)
+    scored = services.boards.scored_ids(question, own)
     if not scored:
         raise unknown("model", body.model, sorted({cell.model for cell in every.values()}))
     chosen = scored

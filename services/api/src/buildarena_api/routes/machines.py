@@ -8,9 +8,8 @@ from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.access import CallerDep
+from buildarena_api.http.access import CallerDep, limited
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.machine_uploads import (
     MAX_BYTES,
     UploadChecker,
@@ -28,7 +27,7 @@ from buildarena_benchmark import ValidationIssue, broken_constraint
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE
 
-router = APIRouter(prefix="/v1/machines", tags=["machines"])
+router = APIRouter(prefix="/v1/machines", tags=["machines"], dependencies=[limited("files")])
 
 CHECK_PATH: Final = "/v1/machines/check"
 TRIAL_PATH: Final = "/v1/machines/trials"
@@ -85,7 +84,6 @@ class MachineCheckView(BaseModel):
     responses=problem_responses(404, 413, 422, 503),
     openapi_extra=FILE,
 )
-@weighs(HEAVIEST, lane="files")
 def check_machine(
     data: FileDep, checker: CheckerDep, context: ContextDep, task: TaskName = None
 ) -> Response:
@@ -122,7 +120,6 @@ def check_machine(
     },
     openapi_extra=FILE,
 )
-@weighs(HEAVIEST, lane="files")
 def try_file(
     data: FileDep,
     checker: CheckerDep,

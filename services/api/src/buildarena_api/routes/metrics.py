@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
-from buildarena_api.http.metrics import ServiceMetrics
-from buildarena_api.http.probes import Probes
+from buildarena_api.dependencies import ServicesDep
 from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(prefix="/v1", tags=["health"])
@@ -18,12 +17,10 @@ router = APIRouter(prefix="/v1", tags=["health"])
     # Where a key of the database's is used, which is then asked for it.
     responses={200: {"content": {"text/plain": {}}}, **problem_responses(503)},
 )
-async def show_metrics(request: Request) -> Response:
+async def show_metrics(services: ServicesDep) -> Response:
     """Figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests.
 
     Answers at once: what a part of the service does not answer is left out, and its `_up` is 0.
     """
-    metrics: ServiceMetrics = request.app.state.metrics
-    probes: Probes = request.app.state.probes
-    await probes.renew(probes.database, probes.broker, probes.artifacts, probes.values)
-    return Response(generate_latest(metrics.registry), media_type=CONTENT_TYPE_LATEST)
+    await services.parts.renew()
+    return Response(generate_latest(services.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -5,15 +5,13 @@ from __future__ import annotations
 import json
 from difflib import get_close_matches
 from functools import cache
-from typing import Annotated, Final
+from typing import Final
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Request, Response
 
-from buildarena_api.dependencies import ContextDep
+from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.http.response_cache import ResponseCache
-from buildarena_api.http.weights import weighs
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
@@ -31,14 +29,6 @@ MAX_CACHED_PICTURES: Final = 64 << 20
 """Bytes of GLB files and pictures in memory."""
 
 
-async def _pictures(request: Request) -> ResponseCache:
-    pictures: ResponseCache = request.app.state.pictures
-    return pictures
-
-
-PicturesDep = Annotated[ResponseCache, Depends(_pictures)]
-
-
 @router.get(
     "/modules/{name}.glb",
     response_class=Response,
@@ -54,13 +44,12 @@ def module_model(name: str, request: Request) -> Response:
     response_class=Response,
     responses={200: {"content": {GLB: {}}}, **problem_responses(404, 503)},
 )
-@weighs(3)
 def machine_model(
-    job_id: str, context: ContextDep, pictures: PicturesDep, request: Request
+    job_id: str, context: ContextDep, services: ServicesDep, request: Request
 ) -> Response:
     """The job's machine as a GLB file: a node for each part, named by its id."""
     digest = _machine_hash(context, context.store.jobs.get(job_id))
-    answer = pictures.get_or_make(
+    answer = services.pictures.get_or_make(
         f"glb {digest}", lambda: machine_glb(_machine(context, digest, job_id))
     )
     return conditional(request, answer, GLB)
@@ -71,9 +60,8 @@ def machine_model(
     response_class=Response,
     responses={200: {"content": {PNG: {}}}, **problem_responses(404, 503)},
 )
-@weighs(3)
 def thumbnail(
-    job_id: str, context: ContextDep, pictures: PicturesDep, request: Request
+    job_id: str, context: ContextDep, services: ServicesDep, request: Request
 ) -> Response:
     """A picture of the job's machine where its trial puts it, 480 x 320 pixels.
 
@@ -81,7 +69,7 @@ def thumbnail(
     """
     job = context.store.jobs.get(job_id)
     digest = _machine_hash(context, job)
-    answer = pictures.get_or_make(
+    answer = services.pictures.get_or_make(
         f"png {digest} {job.task} {job.task_version} {job.state}",
         lambda: _thumbnail(context, job, digest),
     )

@@ -12,13 +12,11 @@ from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 
-from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.access import Caller, RunnerDep, RunnerRights, runner_of
-from buildarena_api.http.concurrency import limited
+from buildarena_api.dependencies import ContextDep, ServicesDep
+from buildarena_api.http.access import Caller, RunnerDep, RunnerRights, limited, runner_of
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.runners.lease_queue import MAX_NAMES, Leased, LeaseQuery
 from buildarena_api.runners.outcomes import stale
-from buildarena_api.runners.service import RunnerService
 from buildarena_api.runners.views import (
     Ended,
     Fault,
@@ -81,14 +79,13 @@ def _file(
     return UploadedFile(sha256=sha256, size=size)
 
 
-async def _service(request: Request) -> RunnerService:
-    service: RunnerService = request.app.state.runners
-    return service
+async def _piece(request: Request) -> bytes:
+    return await request.body()
 
 
 NamedDep = Annotated[JobToken, Depends(_named)]
 FileDep = Annotated[UploadedFile, Depends(_file)]
-ServiceDep = Annotated[RunnerService, Depends(_service)]
+PieceDep = Annotated[bytes, Depends(_piece)]
 
 
 @router.get("", dependencies=[_ORDINARY], responses=problem_responses(503))
@@ -119,7 +116,7 @@ async def lease_trial(
     *,
     lease_request: LeaseRequest,
     caller: RunnerDep,
-    service: ServiceDep,
+    services: ServicesDep,
     context: ContextDep,
     request: Request,
 ) -> Any:
@@ -130,7 +127,7 @@ async def lease_trial(
     rights = _rights(caller)
     _require_allowed(lease_request, rights)
     prefix = runner_prefix(caller.key_id)
-    leased = await service.lease_queue.granted(
+    leased = await services.runners.lease_queue.granted(
         LeaseQuery(
             simulators=tuple(sorted(lease_request.simulators.items())),
             job_owners=None if rights.job_owners is None else tuple(rights.job_owners),
@@ -212,11 +209,11 @@ def get_received(
     file: FileDep,
     caller: RunnerDep,
     context: ContextDep,
-    service: ServiceDep,
+    services: ServicesDep,
 ) -> Received:
     """How much of a file has been received: after a lost connection, go on there."""
     _require_live(context, named, caller)
-    offset = service.uploads.offset(named, file)
+    offset = services.runners.uploads.offset(named, file)
     return Received(offset=offset, whole=offset == file.size)
 
 
@@ -231,30 +228,25 @@ def get_received(
         }
     },
 )
-async def send_piece(
+def send_piece(
     *,
     named: NamedDep,
     file: FileDep,
     offset: Annotated[
         int, Query(ge=0, le=MAX_FILE_BYTES, description="Where the piece begins in the file")
     ],
-    request: Request,
+    piece: PieceDep,
     caller: RunnerDep,
-    service: ServiceDep,
+    services: ServicesDep,
 ) -> Received:
     """Takes a piece of a file; one that was received before changes nothing."""
-    data = await request.body()
-
-    def keep() -> int:
-        _require_live(service.pool.context, named, caller)
-        try:
-            return service.uploads.append(named, file, offset, data)
-        except UploadError as error:
-            raise ProblemError(
-                422, str(error), errors=[ValidationIssue(path="offset", message=str(error))]
-            ) from error
-
-    received = await service.pool.run(keep)
+    _require_live(services.context, named, caller)
+    try:
+        received = services.runners.uploads.append(named, file, offset, piece)
+    except UploadError as error:
+        raise ProblemError(
+            422, str(error), errors=[ValidationIssue(path="offset", message=str(error))]
+        ) from error
     return Received(offset=received, whole=received == file.size)
 
 
@@ -263,13 +255,12 @@ async def send_piece(
     dependencies=[limited("runner_outcomes", caller=runner_of)],
     responses=problem_responses(404, 409, 422, 500, 503),
 )
-async def complete_trial(
-    named: NamedDep, body: Outcome, caller: RunnerDep, service: ServiceDep
+def complete_trial(
+    named: NamedDep, body: Outcome, caller: RunnerDep, services: ServicesDep
 ) -> Ended:
     """Hands over what came of a trial, which is checked and scored here; ends the lease."""
     prefix = runner_prefix(caller.key_id)
-    status = await service.pool.run(service.outcomes.complete, named, prefix, body)
-    return Ended(status=status)
+    return Ended(status=services.runners.outcomes.complete(named, prefix, body))
 
 
 @router.post(
@@ -277,12 +268,10 @@ async def complete_trial(
     dependencies=[limited("runner_outcomes", caller=runner_of)],
     responses=problem_responses(404, 409, 422, 500, 503),
 )
-async def report_fault(
-    named: NamedDep, body: Fault, caller: RunnerDep, service: ServiceDep
-) -> Ended:
+def report_fault(named: NamedDep, body: Fault, caller: RunnerDep, services: ServicesDep) -> Ended:
     """Reports that the runner or its simulator failed; ends the lease."""
     prefix = runner_prefix(caller.key_id)
-    return Ended(status=await service.pool.run(service.outcomes.fault, named, prefix, body))
+    return Ended(status=services.runners.outcomes.fault(named, prefix, body))
 
 
 @router.post(
@@ -290,9 +279,9 @@ async def report_fault(
     dependencies=[_ORDINARY],
     responses=problem_responses(404, 409, 422, 503),
 )
-def hand_back(named: NamedDep, caller: RunnerDep, service: ServiceDep) -> Ended:
+def hand_back(named: NamedDep, caller: RunnerDep, services: ServicesDep) -> Ended:
     """Gives a trial back without fault, as at shutdown; ends the lease."""
-    return Ended(status=service.outcomes.hand_back(named, runner_prefix(caller.key_id)))
+    return Ended(status=services.runners.outcomes.hand_back(named, runner_prefix(caller.key_id)))
 
 
 def _rights(caller: Caller) -> RunnerRights:

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.benches import BenchMachineView, machine_view
-from buildarena_api.dependencies import ContextDep, ExternalDep
+from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
@@ -153,7 +153,7 @@ class ToolOutcome(BaseModel):
 def open_session(
     body: OpenSession,
     response: Response,
-    sessions: ExternalDep,
+    services: ServicesDep,
     caller: CallerDep,
 ) -> SessionOpened:
     """Opens a session in which an agent of yours, or you yourself, build for one task.
@@ -161,7 +161,7 @@ def open_session(
     The same name, kind, task, seed, simulator, worlds and data sheets give the same session for as
     long as it is open.
     """
-    opened = sessions.open(
+    opened = services.external.open(
         task=body.task,
         agent=body.agent,
         seed=body.seed,
@@ -188,13 +188,13 @@ def open_session(
 
 
 @router.get("/{session_id}", responses=problem_responses(404, 503))
-def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
+def show_session(session_id: str, services: ServicesDep) -> SessionView:
     """Shows a session: its machines with every part's faces, its tools, and how much is left.
 
     Whoever builds by hand sees by it where something can be attached. What came of each call is in
     the job's transcript.
     """
-    state = sessions.view(session_id)
+    state = services.external.view(session_id)
     return SessionView(
         job=JobView.of(state.job),
         open=state.open,
@@ -211,22 +211,24 @@ def show_session(session_id: str, sessions: ExternalDep) -> SessionView:
 
 
 @router.get("/{session_id}/machine", responses=problem_responses(404, 409, 503))
-def session_machine(session_id: str, sessions: ExternalDep) -> dict[str, Any]:
+def session_machine(session_id: str, services: ServicesDep) -> dict[str, Any]:
     """The machine that a submission would try now, as a document: try it, and build on."""
     try:
-        return Workbench.holding(sessions.view(session_id).machines).submitted().to_document()
+        return (
+            Workbench.holding(services.external.view(session_id).machines).submitted().to_document()
+        )
     except NothingToSubmitError as error:
         raise ProblemError(409, str(error)) from error
 
 
 @router.post("/{session_id}/calls", responses=problem_responses(404, 409, 422, 503))
 def call_tool(
-    session_id: str, body: ToolCall, sessions: ExternalDep, context: ContextDep, caller: CallerDep
+    session_id: str, body: ToolCall, services: ServicesDep, context: ContextDep, caller: CallerDep
 ) -> ToolOutcome:
     """Carries out one action; a refused one changes nothing."""
     _require_own(session_id, context, caller)
     try:
-        done = sessions.call(
+        done = services.external.call(
             session_id, machine=body.machine, tool=body.tool, arguments=body.arguments
         )
     except SessionClosedError as error:
@@ -236,7 +238,7 @@ def call_tool(
 
 @router.post("/{session_id}/tests", status_code=202, responses=problem_responses(404, 409, 503))
 def test_session(
-    session_id: str, sessions: ExternalDep, context: ContextDep, caller: CallerDep
+    session_id: str, services: ServicesDep, context: ContextDep, caller: CallerDep
 ) -> JobView:
     """Has the machine tried as it stands, where the task has test trials; the session goes on then.
 
@@ -244,7 +246,7 @@ def test_session(
     """
     _require_own(session_id, context, caller)
     try:
-        return JobView.of(sessions.test(session_id))
+        return JobView.of(services.external.test(session_id))
     except (SessionClosedError, NothingToSubmitError, NoTestError) as error:
         raise ProblemError(409, str(error)) from error
 
@@ -253,14 +255,14 @@ def test_session(
 def submit_session(
     session_id: str,
     response: Response,
-    sessions: ExternalDep,
+    services: ServicesDep,
     context: ContextDep,
     caller: CallerDep,
 ) -> JobView:
     """Ends the session; the machine is simulated and scored."""
     _require_own(session_id, context, caller)
     try:
-        job = sessions.submit(session_id)
+        job = services.external.submit(session_id)
     except (SessionClosedError, NothingToSubmitError) as error:
         raise ProblemError(409, str(error)) from error
     response.headers["Location"] = f"/v1/jobs/{job.id}"

@@ -10,11 +10,10 @@ from fastapi import APIRouter, Header, Query, Response
 from pydantic import BaseModel, ConfigDict
 from sqlalchemy.exc import IntegrityError
 
-from buildarena_api.dependencies import ContextDep, IdPrefix, SubmissionsDep
+from buildarena_api.dependencies import ContextDep, IdPrefix, ServicesDep
 from buildarena_api.http import cursors
 from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.http.weights import rows, weighs
 from buildarena_api.schemas import (
     DONE,
     BudgetView,
@@ -72,7 +71,7 @@ def submit_sweep(
     response: Response,
     *,
     context: ContextDep,
-    submissions: SubmissionsDep,
+    services: ServicesDep,
     caller: CallerDep,
     request_key: RequestKey = None,
     resume: Resume = False,
@@ -85,7 +84,7 @@ def submit_sweep(
         if before is not None:
             return _accepted_before(before, spec, response, context)
     try:
-        done = submissions.submit_sweep(
+        done = services.submissions.submit_sweep(
             spec, owner=caller.key_id, request_key=request_key, resume=resume
         )
     except IntegrityError:
@@ -109,9 +108,9 @@ def _accepted_before(
 
 
 @router.post("/estimate", responses=problem_responses(422, 503))
-def estimate_sweep(spec: SweepSpec, submissions: SubmissionsDep) -> SweepEstimate:
+def estimate_sweep(spec: SweepSpec, services: ServicesDep) -> SweepEstimate:
     """Estimates a sweep's jobs and their cost; stores nothing."""
-    return SweepEstimate.model_validate(submissions.estimate(spec))
+    return SweepEstimate.model_validate(services.submissions.estimate(spec))
 
 
 @router.post("/{sweep_id}/pause", responses=problem_responses(404, 409, 503))
@@ -130,12 +129,12 @@ def resume_sweep(
     sweep_id: str,
     context: ContextDep,
     caller: CallerDep,
-    submissions: SubmissionsDep,
+    services: ServicesDep,
     body: Resumption | None = None,
 ) -> SweepView:
     """Resumes a paused sweep, or one whose budget is used up, with a larger budget if given."""
     _require_owner(context, caller, sweep_id)
-    submissions.resume(sweep_id, None if body is None else body.budget)
+    services.submissions.resume(sweep_id, None if body is None else body.budget)
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
@@ -145,14 +144,14 @@ def set_sweep_budget(
     body: Budget,
     context: ContextDep,
     caller: CallerDep,
-    submissions: SubmissionsDep,
+    services: ServicesDep,
 ) -> SweepView:
     """Sets the sweep's budget, whatever was spent before included; it replaces the one before.
 
     A sweep whose budget was used up goes on, a paused one stays paused.
     """
     _require_owner(context, caller, sweep_id)
-    submissions.set_budget(sweep_id, body)
+    services.submissions.set_budget(sweep_id, body)
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
@@ -185,7 +184,6 @@ def _require_owner(context: Context, caller: Caller, sweep_id: str) -> None:
 
 
 @router.get("", responses=problem_responses(422, 503))
-@weighs(lambda query: rows(query, default=DEFAULT_LIMIT, each=20))
 def list_sweeps(
     context: ContextDep,
     cursor: Annotated[str | None, Query(max_length=500)] = None,
@@ -212,7 +210,6 @@ def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
 
 
 @router.get("/{sweep_id}/forecast", responses=problem_responses(404, 503))
-@weighs(3)
 def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
     """Forecasts when a sweep ends and what it comes to cost, from what ran so far."""
     store = context.store

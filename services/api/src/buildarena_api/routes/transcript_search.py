@@ -9,7 +9,6 @@ from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.http.weights import HEAVIEST, weighs
 from buildarena_api.job_filters import require_known
 from buildarena_api.schemas import AnyOutcome
 from buildarena_backend.jobs.filters import JobFilter
@@ -52,7 +51,6 @@ class TranscriptMatchesView(BaseModel):
 
 
 @router.get("", responses=problem_responses(404, 422, 503))
-@weighs(HEAVIEST)
 def search_transcripts(
     context: ContextDep,
     registry: RegistryDep,

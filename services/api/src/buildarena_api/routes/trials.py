@@ -6,15 +6,13 @@ import json
 from threading import Lock
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 
-from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.concurrency import limited
+from buildarena_api.dependencies import ContextDep, ServicesDep
+from buildarena_api.http.access import limited
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.negotiation import prefers
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.http.response_cache import ResponseCache
-from buildarena_api.http.weights import weighs
 from buildarena_api.scenes import SceneView, scene_view
 from buildarena_api.withholding import require_told
 from buildarena_backend.jobs.job import Job
@@ -33,11 +31,6 @@ MAX_CACHED_SCENES: Final = 16 << 20
 """Bytes of scenes in memory; one of a hundred blocks has 15 kB."""
 Number = Annotated[int, Query(ge=0, le=1000, description="Which rollout's")]
 _unpacking = Lock()
-
-
-async def _scenes(request: Request) -> ResponseCache:
-    scenes: ResponseCache = request.app.state.scenes
-    return scenes
 
 
 @router.get(
@@ -75,23 +68,22 @@ def get_trajectory(
     )
 
 
-@router.get("/{job_id}/scene", response_model=SceneView, responses=problem_responses(404, 422, 503))
-@weighs(3)
-def show_scene(
-    job_id: str,
-    context: ContextDep,
-    scenes: Annotated[ResponseCache, Depends(_scenes)],
-    request: Request,
-    number: Number = 0,
-) -> Any:
+@router.get(
+    "/{job_id}/scene",
+    response_model=SceneView,
+    dependencies=[limited("heavy")],
+    responses=problem_responses(404, 422, 503),
+)
+def show_scene(job_id: str, services: ServicesDep, request: Request, number: Number = 0) -> Any:
     """All that is needed to draw a trial: the scenario, the machine's parts and their bodies.
 
     With a trajectory's poses it makes a film: a block's root point lies at
     `position - rotation * center`, and its bodies are given in the block's own frame.
     """
+    context = services.context
     job = context.store.jobs.get(job_id)
     digest, seed = _tried(context, job, number)
-    answer = scenes.get_or_make(
+    answer = services.scenes.get_or_make(
         f"{digest} {seed} {job.task} {job.task_version}",
         lambda: _scene(context, job, digest, seed),
     )

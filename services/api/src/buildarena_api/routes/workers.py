@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.dependencies import ContextDep
+from buildarena_api.dependencies import MAX_ROWS, ContextDep
 from buildarena_api.http import cursors
 from buildarena_api.http.problems import problem_responses
 
@@ -47,7 +47,7 @@ class WorkerPage(BaseModel):
 @router.get("", responses=problem_responses(422, 503))
 def list_workers(
     context: ContextDep,
-    limit: Annotated[int, Query(ge=1, le=500)] = 100,
+    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = 100,
     cursor: str | None = None,
 ) -> WorkerPage:
     """Lists the workers that reported within the last hour, the last started first."""

@@ -7,7 +7,6 @@ from typing import Final
 import structlog
 from sqlalchemy.exc import SQLAlchemyError
 
-from buildarena_api.http.own_pool import OwnPool
 from buildarena_api.runners.lease_queue import LeaseQueue
 from buildarena_api.runners.outcomes import Outcomes, drop_dead_uploads
 from buildarena_backend.artifacts.uploads import Uploads
@@ -15,8 +14,6 @@ from buildarena_backend.errors import ArtifactStoreError
 from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
 
-SCORERS: Final = 3
-"""Threads and connections for outcomes: their trajectories are unpacked and scored in them."""
 DROP_EVERY_S: Final = 60.0
 
 log = structlog.get_logger(__name__)
@@ -29,18 +26,17 @@ class RunnerService:
         context: The process' connections.
 
     Attributes:
-        pool: Where outcomes are scored.
         uploads: What runners have uploaded.
         lease_queue: Finds trials.
         outcomes: Ends leases.
     """
 
     def __init__(self, context: Context) -> None:
-        self.pool = OwnPool(context, size=SCORERS, name="outcomes")
+        self._context = context
         settings = context.settings
         self.uploads = Uploads(settings.artifacts_location, settings.artifact_options)
         self.lease_queue = LeaseQueue(context)
-        self.outcomes = Outcomes(self.pool.context, self.uploads)
+        self.outcomes = Outcomes(context, self.uploads)
         self._cleaner = Periodic(self._clean, name="uploads", period_s=DROP_EVERY_S)
 
     def start(self) -> None:
@@ -48,13 +44,12 @@ class RunnerService:
         self._cleaner.start()
 
     def close(self) -> None:
-        """Ends what was started and closes the connections."""
+        """Ends what was started."""
         self._cleaner.stop()
-        self.pool.close()
 
     def _clean(self) -> None:
         try:
-            dropped = drop_dead_uploads(self.pool.context, self.uploads)
+            dropped = drop_dead_uploads(self._context, self.uploads)
         except (ArtifactStoreError, SQLAlchemyError) as error:
             log.warning("uploads_not_cleaned", error=str(error).splitlines()[0])
         except Exception:

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Collection
-from contextlib import suppress
+from collections.abc import Awaitable, Callable, Collection
+from contextlib import AbstractAsyncContextManager, nullcontext, suppress
 from typing import Final
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.admission import (
-    Admit,
-    BodyBuffers,
-    BuffersFullError,
-    PacedReceive,
-    SlowBodyError,
-    who_is,
-)
+from buildarena_api.http.places import Places
 from buildarena_api.http.problems import ProblemError, send_problem
 from buildarena_geometry.json_texts import MAX_DEPTH, is_too_deep
 
 MAX_BYTES = 4 * 1024 * 1024
 """Largest request body: a sweep of 100,000 seeds has less than a megabyte."""
+SMALL_BYTES: Final = 64 * 1024
+"""A larger body takes a place, until it is answered."""
+BODY_S: Final = 120.0
+"""How long a body may take to come."""
 DRAIN_BYTES: Final = 256 * 1024
 DRAIN_S: Final = 0.5
 SECURITY_HEADERS = {
@@ -32,6 +29,9 @@ SECURITY_HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Resource-Policy": "same-origin",
 }
+
+Admit = Callable[[Scope], Awaitable[str]]
+"""Who sends a request, from its headers alone; raises `ProblemError` if it is not to be read."""
 
 log = structlog.get_logger(__name__)
 
@@ -46,7 +46,7 @@ class BodyLimitMiddleware:
         max_bytes: Largest request body accepted.
         most: The largest that some routes take, by path: None where it is `max_bytes`.
         admit: Refuses a request from its headers, before anything of its body is read.
-        buffers: What bodies take of memory.
+        places: For large bodies.
     """
 
     def __init__(
@@ -58,10 +58,10 @@ class BodyLimitMiddleware:
         max_bytes: int = MAX_BYTES,
         most: Callable[[str], int | None] = lambda _: None,
         admit: Admit,
-        buffers: BodyBuffers,
+        places: Places,
     ) -> None:
         self._app = app
-        self._most, self._admit, self._buffers = most, admit, buffers
+        self._most, self._admit, self._places = most, admit, places
         self._documents = frozenset(documents)
         self._pieces = pieces
         self._max_bytes = max_bytes
@@ -72,22 +72,24 @@ class BodyLimitMiddleware:
             await self._app(scope, receive, send)
             return
         safe_send = _with_headers(send)
-        headers, paced = Headers(scope=scope), PacedReceive(receive)
+        headers = Headers(scope=scope)
         if not _has_body(headers):
             await self._app(scope, receive, safe_send)
             return
         try:
-            await self._admit(scope)
-            await self._pass_whole(scope, headers, paced, safe_send)
+            async with self._place(await self._admit(scope), headers):
+                await self._pass_whole(scope, headers, receive, safe_send)
         except ProblemError as error:
             await _drain(receive)
             closing = {**(error.headers or {}), "Connection": "close"}
             await send_problem(safe_send, error.status, error.detail, headers=closing)
-        except SlowBodyError as error:
-            log.info("body_too_slow", path=scope["path"])
-            await send_problem(safe_send, 408, str(error), headers={"Connection": "close"})
         except ConnectionError:
             log.info("body_cut_off", path=scope["path"])
+
+    def _place(self, who: str, headers: Headers) -> AbstractAsyncContextManager[None]:
+        length = headers.get("content-length", "")
+        is_small = length.isdigit() and int(length) <= SMALL_BYTES
+        return nullcontext() if is_small else self._places.of(who)
 
     async def _pass_whole(
         self, scope: Scope, headers: Headers, receive: Receive, send: Send
@@ -97,16 +99,16 @@ class BodyLimitMiddleware:
         length = headers.get("content-length")
         if length is not None and length.isdigit() and int(length) > most:
             raise _too_large(most)
-        async with self._buffers.share(who_is(scope)) as take:
-            try:
-                body = await _read(receive, most, take)
-            except BuffersFullError as error:
-                raise _full(error) from error
-            if not self._is_no_json(path) and is_too_deep(body):
-                detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
-                await send_problem(send, 422, detail)
-            else:
-                await self._app(scope, _replay(body, receive), send)
+        try:
+            async with asyncio.timeout(BODY_S):
+                body = await _read(receive, most)
+        except TimeoutError as error:
+            raise ProblemError(408, f"the body did not come within {BODY_S:g} s") from error
+        if not self._is_no_json(path) and is_too_deep(body):
+            detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
+            await send_problem(send, 422, detail)
+        else:
+            await self._app(scope, _replay(body, receive), send)
 
     def _is_no_json(self, path: str) -> bool:
         return path in self._documents or self._pieces(path)
@@ -116,7 +118,7 @@ def _has_body(headers: Headers) -> bool:
     return headers.get("content-length", "0") != "0" or "transfer-encoding" in headers
 
 
-async def _read(receive: Receive, most: int, take: Callable[[int], None]) -> bytes:
+async def _read(receive: Receive, most: int) -> bytes:
     """The whole body.
 
     Raises:
@@ -131,7 +133,6 @@ async def _read(receive: Receive, most: int, take: Callable[[int], None]) -> byt
         piece = message.get("body", b"")
         if len(body) + len(piece) > most:
             raise _too_large(most)
-        take(len(piece))
         body += piece
         if not message.get("more_body", False):
             return bytes(body)
@@ -151,14 +152,6 @@ async def _drain(receive: Receive) -> None:
 
 def _too_large(most: int) -> ProblemError:
     return ProblemError(413, f"the request is larger than {most:,} bytes")
-
-
-def _full(error: BuffersFullError) -> ProblemError:
-    if error.is_of_the_caller:
-        detail = "your requests hold as much memory as one caller's may: send fewer at once"
-        return ProblemError(429, detail, headers={"Retry-After": "1"})
-    detail = "the service holds as many bytes of requests as it may"
-    return ProblemError(503, detail, headers={"Retry-After": "2"})
 
 
 def _with_headers(send: Send) -> Send:

@@ -1,0 +1,278 @@
+"""The front door: which connections are taken, and how long and how large a header may be.
+
+A connection costs a descriptor before anybody knows whose it is, so it is counted when it is
+accepted: for its address, unless that is a trusted proxy's, and for the process. One too many is
+still asked what it wants, for a moment: if it is `GET /v1/health`, it is answered. Of those in
+this anteroom the oldest makes room for the newest, so that a probe, which says all it has to say
+at once, is answered however many others say nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+import resource
+import signal
+import socket
+import sys
+from collections import Counter
+from contextlib import suppress
+from functools import partial
+from http import HTTPStatus
+from typing import Any, Final
+
+import httptools
+import structlog
+import uvicorn
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
+
+from buildarena_api.http.outer_address import Networks
+from buildarena_backend.keepalive import socket_options
+from buildarena_backend.settings import Settings
+
+MAX_CONNECTIONS: Final = 8_000
+"""Connections of a process; fewer where it may not open so many files."""
+MAX_OF_AN_ADDRESS: Final = 1_000
+ANTEROOM: Final = 256
+"""Connections beyond these that are asked whether they want to know the service's health."""
+OWN_DESCRIPTORS: Final = 256
+"""Files and connections that the process opens itself."""
+HEADER_S: Final = 10.0
+"""How long a connection may take for a request's header."""
+ANTEROOM_S: Final = 2.0
+MAX_HEADER_BYTES: Final = 32 * 1024
+MAX_HEADERS: Final = 100
+UNANSWERED_S: Final = 60
+"""A client may leave what it is sent unread for so long: whoever only reads slowly is not dead."""
+LOG_EVERY_S: Final = 10.0
+
+log = structlog.get_logger(__name__)
+
+
+class Door:
+    """Counts the connections of a process.
+
+    Args:
+        settings: Name the proxies whose connections are many clients'.
+        most: Connections of all addresses.
+        most_each: Connections of one.
+    """
+
+    def __init__(
+        self,
+        settings: Settings,
+        *,
+        most: int = MAX_CONNECTIONS,
+        most_each: int = MAX_OF_AN_ADDRESS,
+    ) -> None:
+        self._most, self._most_each = most, most_each
+        self._proxies = Networks(settings.trusted_proxies)
+        base = settings.base_path.encode()
+        self._health = (b"GET /v1/health ", b"GET " + base + b"/v1/health ")
+        self._open: Counter[str] = Counter()
+        self._total = 0
+        self._anteroom: dict[FrontDoor, None] = {}
+        self._answering: set[FrontDoor] = set()
+        self._refused, self._logged_at = 0, -LOG_EVERY_S
+
+    def admit(self, connection: FrontDoor, address: str) -> bool:
+        """Counts a connection; whether it may ask for anything, or for the health alone."""
+        has_room = self._open[address] < self._most_each or address in self._proxies
+        if has_room and self._total < self._most:
+            self._open[address] += 1
+            self._total += 1
+            return True
+        if len(self._anteroom) >= ANTEROOM:
+            oldest = next(iter(self._anteroom))
+            del self._anteroom[oldest]
+            oldest.transport.abort()
+        self._anteroom[connection] = None
+        self._note(address)
+        return False
+
+    def asks_for_health(self, connection: FrontDoor, data: bytes) -> bool:
+        """Whether a connection in the anteroom is to be answered; none makes it leave then."""
+        if not data.startswith(self._health) or len(self._answering) >= ANTEROOM:
+            return False
+        self._anteroom.pop(connection, None)
+        self._answering.add(connection)
+        return True
+
+    def leave(self, connection: FrontDoor, address: str) -> None:
+        """Counts a connection no more."""
+        if connection.is_admitted:
+            self._total -= 1
+            self._open[address] -= 1
+            if not self._open[address]:
+                del self._open[address]
+        else:
+            self._anteroom.pop(connection, None)
+            self._answering.discard(connection)
+
+    def _note(self, address: str) -> None:
+        self._refused += 1
+        now = asyncio.get_running_loop().time()
+        if now - self._logged_at > LOG_EVERY_S:
+            log.warning("connections_refused", connections=self._refused, last=address)
+            self._logged_at, self._refused = now, 0
+
+
+class FrontDoor(HttpToolsProtocol):
+    """One connection: uvicorn's own protocol, with bounds on what it may send before it is known.
+
+    Args:
+        door: Counts the connections.
+        given: What uvicorn hands its protocols.
+    """
+
+    def __init__(self, door: Door, **given: Any) -> None:
+        super().__init__(**given)
+        self._door = door
+        self._awaits_header = True
+        self._header_bytes = 0
+        self._deadline: asyncio.TimerHandle | None = None
+        self._refusal = (HTTPStatus.BAD_REQUEST, "this is no HTTP request")
+        self.is_admitted = False
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Counts the connection, and waits for its first request."""
+        super().connection_made(transport)
+        self._address = self.client[0] if self.client else ""
+        self.is_admitted = self._door.admit(self, self._address)
+        self._expect_header(HEADER_S if self.is_admitted else ANTEROOM_S)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Counts it no more."""
+        self._stop_waiting()
+        self._door.leave(self, self._address)
+        super().connection_lost(exc)
+
+    def data_received(self, data: bytes) -> None:
+        """Reads on, as long as the header is not too large or asked for by nobody known."""
+        if not (self.is_admitted or self._door.asks_for_health(self, data)):
+            self.transport.abort()
+            return
+        if self._awaits_header and self._deadline is None:
+            self._expect_header(HEADER_S)
+        super().data_received(data)
+        if self._awaits_header:
+            self._header_bytes += len(data)
+            if self._header_bytes > MAX_HEADER_BYTES and not self.transport.is_closing():
+                self._refuse_header()
+                self.send_400_response("")
+
+    def on_headers_complete(self) -> None:
+        """Passes a request on whose header is small enough."""
+        self._stop_waiting()
+        self._awaits_header, self._header_bytes = False, 0
+        size = len(self.url) + sum(len(name) + len(value) for name, value in self.headers)
+        if len(self.headers) > MAX_HEADERS or size > MAX_HEADER_BYTES:
+            self._refuse_header()
+            raise httptools.HttpParserError(self._refusal[1])
+        super().on_headers_complete()
+
+    def on_message_complete(self) -> None:
+        """The next thing that comes is another request's header."""
+        self._awaits_header = True
+        super().on_message_complete()
+
+    def on_response_complete(self) -> None:
+        """Ends a connection whose request was answered before all of it came."""
+        super().on_response_complete()
+        if not (self.is_admitted and self._awaits_header):
+            self.transport.close()
+
+    def send_400_response(self, msg: str) -> None:
+        """Says in a problem why a header is refused, and ends the connection."""
+        del msg  # uvicorn's own
+        status, detail = self._refusal
+        problem = {"type": "about:blank", "title": status.phrase, "status": int(status)}
+        body = json.dumps({**problem, "detail": detail, "errors": []}).encode()
+        head = (
+            f"HTTP/1.1 {int(status)} {status.phrase}\r\nContent-Type: application/problem+json\r\n"
+            f"Content-Length: {len(body)}\r\nConnection: close\r\n\r\n"
+        )
+        self.transport.write(head.encode() + body)
+        self.transport.close()
+
+    def _refuse_header(self) -> None:
+        self._refusal = (
+            HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE,
+            f"a header has at most {MAX_HEADER_BYTES:,} bytes and {MAX_HEADERS} fields",
+        )
+
+    def _expect_header(self, seconds: float) -> None:
+        self._deadline = self.loop.call_later(seconds, self.transport.abort)
+
+    def _stop_waiting(self) -> None:
+        if self._deadline is not None:
+            self._deadline.cancel()
+            self._deadline = None
+
+
+class Server(uvicorn.Server):
+    """A server that gives up clients which are gone without a word.
+
+    Such a client would otherwise keep its stream, one of those that it may have, for a quarter of
+    an hour, and a connection that it says nothing over forever.
+    """
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        """Begins to listen; connections that are taken have the options of what listens."""
+        await super().startup(sockets=sockets)
+        options = socket_options(unanswered_s=UNANSWERED_S)
+        for listening in (one for server in self.servers for one in server.sockets):
+            with socket.socket(fileno=os.dup(listening.fileno())) as sock:
+                for level, name, value in options:
+                    sock.setsockopt(level, name, value)
+
+
+def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
+    """How an application is served behind the door.
+
+    Args:
+        app: The application.
+        settings: The process'.
+        more: Further options of uvicorn.
+    """
+    door = Door(
+        settings, most=min(MAX_CONNECTIONS, _descriptors() - OWN_DESCRIPTORS - 2 * ANTEROOM)
+    )
+    protocol: Any = partial(FrontDoor, door)
+    return uvicorn.Config(
+        app,
+        http=protocol,
+        ws="none",
+        log_config=None,
+        access_log=False,
+        proxy_headers=False,  # the application itself reads them, from trusted proxies
+        **more,
+    )
+
+
+def serve(config: uvicorn.Config) -> None:
+    """Serves an application until the process is asked to stop; exits when it can't listen.
+
+    The server raises the signal that stopped it once more when it has ended: it ends this call, and
+    not the process, which still has spans to send.
+    """
+    signal.signal(signal.SIGTERM, _stop)
+    server = Server(config)
+    with suppress(KeyboardInterrupt):
+        server.run()
+    if not server.started:
+        sys.exit(3)
+
+
+def _descriptors() -> int:
+    """As many files as the process may open, of which it is given as many as it may have."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    with suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+        return hard
+    return soft
+
+
+def _stop(*_: object) -> None:
+    sys.exit(0)

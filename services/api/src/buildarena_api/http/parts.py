@@ -1,0 +1,148 @@
+"""What the service stands on: asked by whoever wants to know how it is, and waited for by nobody.
+
+A store that accepts connections and says nothing holds up whoever asks it. So each part is asked in
+a thread of its own, and health and metrics answer from its last verdict.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Callable
+from typing import Final, Generic, TypeVar
+
+from anyio import CapacityLimiter, to_thread
+
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.process.context import Context
+from buildarena_backend.states import CONSTRUCT_QUEUE
+from buildarena_backend.telemetry.metrics import MetricValues
+from buildarena_backend.workers import WorkerCounts
+
+PATIENCE_S: Final = 3.0
+"""How long a part may take before it counts as not answering."""
+MOMENT_S: Final = 0.04
+"""How long somebody who asks waits for a fresh verdict."""
+OLD_S: Final = 30.0
+"""A verdict of this age says nothing any more: whoever asks waits for another."""
+ARTIFACTS_FRESH_S: Final = 5.0
+"""A bucket takes money for each question."""
+FIGURES_FRESH_S: Final = 15.0
+"""Several scrapes within this time share one reading of the service's figures."""
+
+T = TypeVar("T")
+
+
+class PartFailedError(Exception):
+    """A part of the infrastructure does not work; the message is for people.
+
+    Attributes:
+        is_silent: It takes what it is sent, and does not answer.
+    """
+
+    def __init__(self, message: str, *, is_silent: bool = False) -> None:
+        super().__init__(message)
+        self.is_silent = is_silent
+
+
+class Part(Generic[T]):
+    """One part, which is asked one question at a time.
+
+    Args:
+        ask: Asks it; any exception says that it does not work.
+        fresh_s: A verdict of this age is given without asking again.
+    """
+
+    def __init__(self, ask: Callable[[], T], *, fresh_s: float = 0.0) -> None:
+        self._ask, self._fresh_s = ask, fresh_s
+        self._thread = CapacityLimiter(1)
+        self._asking: asyncio.Task[None] | None = None
+        self._heard_at = -math.inf
+        self._verdict: T | PartFailedError = PartFailedError("has not answered yet")
+
+    async def renew(self) -> None:
+        """Asks the part, and gives it a moment to answer; all of its time if never heard of."""
+        age_s = time.monotonic() - self._heard_at
+        if self._asking is None and age_s >= self._fresh_s:
+            self._asking = asyncio.create_task(self._ask_it())
+        if self._asking is not None:
+            await asyncio.wait([self._asking], timeout=MOMENT_S if age_s < OLD_S else PATIENCE_S)
+
+    def latest(self) -> T:
+        """What the part last said, at once.
+
+        Raises:
+            PartFailedError: It does not work, does not answer, or was not asked yet.
+        """
+        if isinstance(self._verdict, PartFailedError):
+            raise self._verdict.with_traceback(None)
+        return self._verdict
+
+    @property
+    def works(self) -> bool:
+        """Whether the last answer was a good one."""
+        return not isinstance(self._verdict, PartFailedError)
+
+    async def _ask_it(self) -> None:
+        asked_at = time.monotonic()
+        question = to_thread.run_sync(self._ask, abandon_on_cancel=True, limiter=self._thread)
+        asking = asyncio.ensure_future(question)
+        try:
+            while not (await asyncio.wait([asking], timeout=PATIENCE_S))[0]:
+                waited_s = time.monotonic() - asked_at
+                self._hear(
+                    PartFailedError(f"has not answered for {waited_s:.0f} s", is_silent=True)
+                )
+            self._hear(asking.result())
+        except Exception as error:  # noqa: BLE001 - whatever is wrong is the verdict
+            lines = str(error).strip().splitlines() or [type(error).__name__]
+            failed = PartFailedError(lines[0])
+            failed.__cause__ = error
+            self._hear(failed)
+        finally:
+            self._asking = None
+
+    def _hear(self, verdict: T | PartFailedError) -> None:
+        self._verdict, self._heard_at = verdict, time.monotonic()
+
+
+class Parts:
+    """The parts of the service.
+
+    Args:
+        context: Connections that nothing else takes all of.
+
+    Attributes:
+        database: Whether its schema fits; the register of workers.
+        broker: Messages that wait for construct workers.
+        artifacts: Whether artifacts can be written and read.
+        figures: The service's figures.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        settings = context.settings
+        # With short time limits, which would be wrong for large artifacts.
+        probed = ArtifactStore(
+            settings.artifacts_location, settings.artifact_options, timeout_s=PATIENCE_S
+        )
+        self.database = Part(self._ask_database)
+        self.broker = Part(self._ask_broker)
+        self.artifacts = Part(probed.probe, fresh_s=ARTIFACTS_FRESH_S)
+        self.figures: Part[MetricValues] = Part(context.store.metrics.read, fresh_s=FIGURES_FRESH_S)
+
+    async def renew(self) -> None:
+        """Gives all parts a moment for a fresh answer."""
+        parts = (self.database, self.broker, self.artifacts, self.figures)
+        await asyncio.gather(*(part.renew() for part in parts))
+
+    def _ask_database(self) -> WorkerCounts:
+        self._context.store.database.require_schema()
+        return self._context.store.workers.counts()
+
+    def _ask_broker(self) -> int:
+        waiting = self._context.queues.waiting(CONSTRUCT_QUEUE)
+        if waiting is None:
+            raise PartFailedError("not reachable")
+        return waiting

@@ -1,0 +1,156 @@
+"""How much of something goes on at once: of one caller, and of all together.
+
+Decided in the event loop, before a request takes a thread or a database connection.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import random
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import AsyncExitStack, asynccontextmanager
+from typing import Final, Literal
+from weakref import WeakValueDictionary
+
+from anyio import CapacityLimiter
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from buildarena_api.http.problems import ProblemError, send_problem
+
+WAIT_S: Final = 30.0
+"""How long a request waits for its turn."""
+MAX_OPEN: Final = 96
+"""Requests of one caller that are open at once: its streams, and as many ordinary ones again
+as can wait for their turn."""
+HELD_S: Final = (0.5, 1.0)
+"""How long a refusal is held back: who asks again at once would be refused thousands of times in a
+second. Not as long for all, or they come again together."""
+HEALTH_PATH: Final = "/v1/health"
+
+Kind = Literal[
+    "ordinary",
+    "heavy",
+    "exports",
+    "files",
+    "bodies",
+    "streams",
+    "trajectories",
+    "runner_waits",
+    "runner_outcomes",
+]
+
+
+class Places:
+    """Places for one kind of work.
+
+    A caller's requests wait for each other first, and only as many as it may have at once then wait
+    among all: so callers take turns, however many requests one of them sends.
+
+    Args:
+        what: What they are for, for messages.
+        each: How many one caller may have.
+        total: How many all callers together may have.
+        waiting: Requests of one caller that wait for their turn; more are refused, and with 0 also
+            those that find all places taken.
+        retry_s: When a refused caller may come back.
+    """
+
+    def __init__(
+        self, what: str, *, each: int, total: float = math.inf, waiting: int = 64, retry_s: int = 2
+    ) -> None:
+        self._what, self._each, self._total = what, each, total
+        self._waiting, self._retry_s = waiting, retry_s
+        self._all = CapacityLimiter(total)
+        self._own: WeakValueDictionary[str, CapacityLimiter] = WeakValueDictionary()
+
+    @asynccontextmanager
+    async def of(self, who: str) -> AsyncIterator[None]:
+        """Keeps a caller's place inside the block.
+
+        Raises:
+            ProblemError: 429 when the caller has as many as one may, 503 when all together have.
+        """
+        own = self._own.setdefault(who, CapacityLimiter(self._each))
+        if own.available_tokens < 1 and own.statistics().tasks_waiting >= self._waiting:
+            raise self._full(429)
+        if not self._waiting and self._all.available_tokens < 1:
+            raise self._full(503)
+        async with AsyncExitStack() as held:
+            status = 429
+            try:
+                async with asyncio.timeout(WAIT_S):
+                    await held.enter_async_context(own)
+                    status = 503
+                    await held.enter_async_context(self._all)
+            except TimeoutError as error:
+                raise self._full(status) from error
+            yield
+
+    def _full(self, status: int) -> ProblemError:
+        whose = f"you have {self._each}" if status == 429 else f"the service has {self._total}"  # noqa: PLR2004 - Too Many Requests
+        waiting = f", and {self._waiting} wait" if self._waiting else ""
+        return ProblemError(
+            status,
+            f"{whose} {self._what} going on, as many as may be{waiting}",
+            headers={"Retry-After": str(self._retry_s)},
+        )
+
+
+def usual_places() -> Mapping[Kind, Places]:
+    """What `docs/security.md` says, for one process."""
+    return {
+        # Fewer than there are threads and connections, so that one caller leaves some.
+        "ordinary": Places("requests", each=8, retry_s=1),
+        # Each takes a core and the interpreter for as long as it lasts.
+        "heavy": Places("heavy questions", each=1, total=2),
+        "exports": Places("exports", each=1, total=2),
+        # One process checks them, one after the other.
+        "files": Places("checks of files", each=1, total=2),
+        # Each may have 4 MB in memory.
+        "bodies": Places("large bodies", each=4, total=32),
+        # One may have 64 MB in memory until it is sent.
+        "trajectories": Places("trajectories", each=4, total=12),
+        "streams": Places("event streams", each=32, total=512, waiting=0, retry_s=5),
+        "runner_waits": Places("waits for a trial", each=64, total=1000, waiting=0),
+        # One may have a hundred megabytes in memory until it is scored.
+        "runner_outcomes": Places("outcomes", each=2, total=3),
+    }
+
+
+class OpenRequests:
+    """Middleware around everything else: refuses cheaply who has too many requests open.
+
+    Args:
+        app: The application.
+        who: Whose request it is, as far as can be told without asking anybody.
+    """
+
+    def __init__(self, app: ASGIApp, *, who: Callable[[Scope], str]) -> None:
+        self._app, self._who = app, who
+        self._open: Counter[str] = Counter()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Passes a request on, or refuses it."""
+        if scope["type"] != "http" or scope["path"] == HEALTH_PATH:
+            await self._app(scope, receive, send)
+            return
+
+        async def holding_send(message: Message) -> None:
+            if message["type"] == "http.response.start" and message["status"] == 429:  # noqa: PLR2004 - Too Many Requests
+                await asyncio.sleep(random.uniform(*HELD_S))  # noqa: S311 - nothing secret
+            await send(message)
+
+        who = self._who(scope)
+        if self._open[who] >= MAX_OPEN:
+            detail = f"you have {MAX_OPEN} requests open, as many as may be"
+            await send_problem(holding_send, 429, detail, headers={"Retry-After": "1"})
+            return
+        self._open[who] += 1
+        try:
+            await self._app(scope, receive, holding_send)
+        finally:
+            self._open[who] -= 1
+            if not self._open[who]:
+                del self._open[who]
