@@ -5,6 +5,7 @@ attacker is a process of its own, so that it does not slow the measurement itsel
 """
 
 import asyncio
+import resource
 import statistics
 import subprocess
 import sys
@@ -23,8 +24,18 @@ from support.servers.api_process import Service, api_service
 from buildarena_backend.database.database import Database
 
 JOBS = 1000
-FLOODS = {"streams": 800, "verifications": 1500, "exports": 200, "boards": 400}
+FLOODS = {
+    "streams": 800,
+    "verifications": 1500,
+    "exports": 200,
+    "boards": 400,
+    "half requests": 20_000,
+}
 """How many requests of each kind are open at once."""
+HALF = b"GET /v1/jobs HTTP/1.1\r\nHost: x\r\nX-More: "
+HEALTH_BOUND_S = 1.0
+"""Beside half requests, which need no key, the service's health is asked for over connections of
+its own, as probes do."""
 P99_BOUND_S = 0.25
 RETRY_S = 1.0
 """How soon the attacker asks again, whatever it was told."""
@@ -51,6 +62,7 @@ class Measured:
         answers: The attacker's answers by status.
         p50_s: Median of the innocent's requests, in seconds.
         p99_s: Their 99th percentile.
+        longest_s: The longest.
         failed: The innocent's requests that were not answered with 200.
         memory_mib: The API process' memory at the end.
     """
@@ -58,6 +70,7 @@ class Measured:
     answers: dict[str, int]
     p50_s: float
     p99_s: float
+    longest_s: float
     failed: int
     memory_mib: float
 
@@ -109,30 +122,41 @@ def score_all(tenants: Tenants) -> None:
 
 def flood(tenants: Tenants, kind: str, count: int, *, for_s: float) -> Measured:
     """Lets the attacker loose and asks as the innocent meanwhile."""
+    path = "/v1/health" if kind == "half requests" else "/v1/jobs"
     words = [kind, str(count), str(for_s), tenants.service.url, tenants.attacker, tenants.sweep]
     with subprocess.Popen(
         [sys.executable, __file__, *words], stdout=subprocess.PIPE, text=True
     ) as process:
         assert process.stdout is not None
         process.stdout.readline()  # it is about to begin
-        times, failed = _ask(tenants, for_s)
+        times, failed = _ask(tenants, path, for_s)
         told = process.stdout.readline().split()
     answers = dict(zip(told[::2], map(int, told[1::2]), strict=True))
     memory = psutil.Process(tenants.service.pid).memory_info().rss / 2**20
     ranked = statistics.quantiles(times, n=100)
     return Measured(
-        answers=answers, p50_s=ranked[49], p99_s=ranked[98], failed=failed, memory_mib=memory
+        answers=answers,
+        p50_s=ranked[49],
+        p99_s=ranked[98],
+        longest_s=max(times),
+        failed=failed,
+        memory_mib=memory,
     )
 
 
-def _ask(tenants: Tenants, for_s: float) -> tuple[list[float], int]:
+def _ask(tenants: Tenants, path: str, for_s: float) -> tuple[list[float], int]:
     headers = {"Authorization": f"Bearer {tenants.innocent}"}
+    if path == "/v1/health":
+        headers["Connection"] = "close"
     times, failed = [], 0
     end = time.monotonic() + for_s
     with httpx.Client(base_url=tenants.service.url, headers=headers, timeout=30) as client:
         while len(times) < MIN_ASKED or time.monotonic() < end:
             started = time.monotonic()
-            failed += client.get("/v1/jobs").status_code != 200
+            try:
+                failed += client.get(path).status_code != 200
+            except httpx.TransportError:
+                failed += 1
             times.append(time.monotonic() - started)
             time.sleep(0.02)
     return times, failed
@@ -161,6 +185,10 @@ class _Attacker:
     async def _ask(self, method: str, path: str) -> None:
         reader, writer = await asyncio.open_connection(self._address.host, self._address.port)
         try:
+            if not path:
+                writer.write(HALF)
+                self.answers["closed" if not await reader.read(1) else "answered"] += 1
+                return
             head = (
                 f"{method} {path} HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {self._secret}\r\n"
             )
@@ -175,10 +203,12 @@ class _Attacker:
 def _paths(kind: str, count: int, url: str, secret: str, sweep: str) -> list[tuple[str, str]]:
     if kind == "verifications":
         headers = {"Authorization": f"Bearer {secret}"}
-        params = {"sweep": sweep, "limit": 1000}
+        params = {"sweep": sweep, "limit": 200}
         jobs = httpx.get(f"{url}/v1/jobs", params=params, headers=headers, timeout=30).json()
         ids = [job["id"] for job in jobs["jobs"]]
         return [("POST", f"/v1/jobs/{ids[n % len(ids)]}/verify") for n in range(count)]
+    if kind == "half requests":
+        return [("GET", "")] * count
     path = {
         "streams": f"/v1/sweeps/{sweep}/events",
         "exports": f"/v1/sweeps/{sweep}/results",
@@ -190,6 +220,8 @@ def _paths(kind: str, count: int, url: str, secret: str, sweep: str) -> list[tup
 
 async def _attack(words: list[str]) -> Counter[str]:
     kind, count, for_s, url, secret, sweep = words
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     asked = _paths(kind, int(count), url, secret, sweep)
     sys.stdout.write("begins\n")
     sys.stdout.flush()
@@ -205,11 +237,17 @@ def main() -> None:
         for kind, count in FLOODS.items():
             if kind == "verifications":
                 score_all(both)
-            found = flood(both, kind, count, for_s=10)
-            slow = slow or found.p99_s > P99_BOUND_S or found.failed > 0
+            found = flood(both, kind, count, for_s=30 if kind == "half requests" else 10)
+            is_slow = (
+                found.longest_s > HEALTH_BOUND_S
+                if kind == "half requests"
+                else found.p99_s > P99_BOUND_S
+            )
+            slow = slow or is_slow or found.failed > 0
             sys.stdout.write(
                 f"{kind:<14} {count:>5} at once   innocent p50 {found.p50_s * 1000:5.0f} ms"
-                f"   p99 {found.p99_s * 1000:5.0f} ms   failed {found.failed}"
+                f"   p99 {found.p99_s * 1000:5.0f} ms"
+                f"   longest {found.longest_s * 1000:5.0f} ms   failed {found.failed}"
                 f"   API {found.memory_mib:4.0f} MiB   answers {found.answers}\n"
             )
             sys.stdout.flush()

@@ -24,6 +24,7 @@ FULL: Mapping[str, float] = {
     "exports": 200,
     "boards": 400,
     "verifications": 1500,
+    "half requests": 20_000,
     "flood_s": 10,
     "bomb_mib": 2048,
     "lies": 100,

@@ -191,6 +191,8 @@ def flood(kind: str) -> Callable[[Arena], Tried]:
         found.refused = f"answers {measured.answers}"
         found.require(measured.failed == 0, f"{measured.failed} of another key's requests failed")
         found.require(not measured.answers.get("500"), "answers with 500")
+        late = kind == "half requests" and measured.longest_s > floods.HEALTH_BOUND_S
+        found.require(not late, f"health answered after {measured.longest_s:.1f} s")
         return found
 
     scenario.__doc__ = f"{kind} at once by one key."
@@ -255,7 +257,7 @@ SCENARIOS: dict[str, Callable[[Arena], Tried]] = {
     "harmful runner": harmful_runner,
     "strangers": strangers,
     "look-alikes": look_alikes,
-    **{kind: flood(kind) for kind in ("streams", "exports", "boards", "verifications")},
+    **{kind: flood(kind) for kind in floods.FLOODS},
     "full disk": full_disk,
     "stopped broker": stopped_broker,
     "flushed broker": flushed_broker,

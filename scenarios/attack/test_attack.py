@@ -18,6 +18,7 @@ SMALL = {
     "exports": 12,
     "boards": 20,
     "verifications": 60,
+    "half requests": 1500,
     "flood_s": 1.0,
     "bomb_mib": 64,
     "lies": 3,

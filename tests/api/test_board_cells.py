@@ -223,7 +223,7 @@ def test_a_question_at_rest_is_one_look_at_the_log(context, process) -> None:
     api = process()
     asked(api, BOARD)
     with statements_of(context.store.database.engine) as statements:
-        api.app.state.boards.tracks()
+        api.app.state.services.boards.tracks()
     assert len(statements) == 1
     assert "board_changes" in statements[0]
 
@@ -254,7 +254,7 @@ def test_a_database_that_went_back_in_time_is_read_anew(context, process) -> Non
     """A backup was restored under a process: numbers of transactions begin again."""
     api = process()
     asked(api, BOARD)
-    boards = api.app.state.boards
+    boards = api.app.state.services.boards
     boards._mark = f"{10**9}:{10**9}:"
     with context.store.database.transaction() as connection:
         connection.execute(text("ALTER TABLE jobs DISABLE TRIGGER USER"))

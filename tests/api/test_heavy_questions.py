@@ -1,107 +1,44 @@
-"""Heavy questions cost their caller more, and take no other caller's place."""
+"""Heavy questions wait for each other, and take no other caller's place."""
 
 import asyncio
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import product
+from typing import Any
 
 import httpx
 import pytest
 from sqlalchemy import text
 from support.clients.tenants import WITH_KEYS, new_tenant
 from support.jobs import execute
-from support.servers.live_api import api_client, changed, live_api
+from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
 from support.statements import statements_of
 
-from buildarena_api.app import all_routes
-from buildarena_api.http.concurrency import MAX_WAITING, ConcurrencyLimit, usual_limits
+from buildarena_api.http.places import Places
 from buildarena_api.http.problems import ProblemError
-from buildarena_api.http.weights import HEAVIEST, MAX_QUERY_BYTES, Weight, Weights
 from buildarena_backend.catalog.specs import SweepSpec
 
-LIGHT_PATHS = (
-    *("/v1/jobs", "/v1/jobs?limit=100&task=lift-1", "/v1/jobs/job_1", "/v1/sweeps", "/v1/caller"),
-    *("/v1/leaderboard/changes", "/v1/nothing?limit=1000"),
+MAX_WAITING = 64
+BOARDS = (
+    *("/v1/leaderboard", "/v1/leaderboard/figures", "/v1/leaderboard/manifest"),
+    *("/v1/jobs?text=x", "/v1/jobs?flag=invented", "/v1/jobs/summary"),
+    "/v1/leaderboard/compare?first=builtin/idle&second=builtin/idle",
 )
-HEAVY_PATHS = {
-    "/v1/jobs?limit=101": 2,
-    "/v1/jobs?limit=1000&cursor=abc": 10,
-    "/v1/jobs?text=&limit=1": 11,
-    "/v1/jobs?text=b&sort=cost&order=asc&limit=1000": 20,
-    "/v1/jobs?flag=invented": 11,
-    "/v1/leaderboard": 2,
-    "/v1/leaderboard?model=invented": 5,
-    "/v1/leaderboard?task=invented&task=other": 5,
-    "/v1/leaderboard/figures?sweep=invented": 20,
-    "/v1/leaderboard/compare?first=a&second=b": 10,
-    "/v1/leaderboard/compare?first=a&second=b&until=2025-01-01": 20,
-    "/v1/leaderboard/changes?limit=1000": 10,
-    "/v1/leaderboard/manifest?task=lift-1&model=a": 5,
-    "/v1/leaderboard/export": 20,
-    "/v1/sweeps/sweep_1/results": 20,
-    "/v1/sweeps?limit=100": 5,
-    "/v1/jobs/job_1/replay": 5,
-    "/v1/jobs/job_1/scene?number=3": 3,
-}
-LIMITS = (
-    *("limit=%31000", "%6Cimit=1000", "limit=1000.0", "limit=%2B1000", "limit=1_000"),
-    *("limit=%201000", "limit=01000", "limit=%D9%A1%D9%A0%D9%A0%D9%A0", "limit=20&limit=1000"),
-    f"limit=1000&since=2025-01-01T00:00:00Z&task={'x' * MAX_QUERY_BYTES}",
-)
-"""Ways to spell a thousand."""
+"""Questions that look through all jobs."""
 
 
-@pytest.fixture(scope="module")
-def weights() -> Weights:
-    return Weights(all_routes())
-
-
-def weighed(weights: Weights, path: str, method: str = "GET") -> Weight:
-    place, _, query = path.partition("?")
-    return weights.of({"method": method, "path": place, "query_string": query.encode()})
-
-
-def test_questions_weigh_what_they_cost_in_lanes_that_have_limits(weights) -> None:
-    assert [path for path in LIGHT_PATHS if not weighed(weights, path).is_light] == []
-    found = {path: weighed(weights, path) for path in HEAVY_PATHS}
-    assert found == {path: Weight(units=units, lane="heavy") for path, units in HEAVY_PATHS.items()}
-    for path in ("/v1/machines/check", "/v1/machines/trials?task=lift-1"):
-        assert weighed(weights, path, "POST") == Weight(units=HEAVIEST, lane="files")
-        assert weighed(weights, path, "GET").is_light
-    for lane in ("heavy", "files"):
-        assert isinstance(getattr(usual_limits(), lane), ConcurrencyLimit)
-
-
-def test_no_spelling_of_many_rows_is_light(api, weights, submissions) -> None:
-    submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=150))
-    for limit in LIMITS:
-        answer = api.get(f"/v1/jobs?{limit}")
-        brings_many = answer.status_code == 200 and len(answer.json()["jobs"]) > 100
-        assert not (brings_many and weighed(weights, f"/v1/jobs?{limit}").is_light), limit
-
-
-def test_a_weight_is_taken_from_the_callers_rate(context) -> None:
-    path, light = "/v1/jobs?limit=1000", "/v1/jobs?limit=20"
-    with (
-        changed(context, **{**WITH_KEYS, "rate_limit": "25/minute"}) as own,
-        api_client(own) as client,
-    ):
-        mine, other = new_tenant(client, "mine"), new_tenant(client, "other")
-        assert [mine.ask("GET", path).status_code for _ in range(2)] == [200, 200]
-        refused, early = (mine.ask("GET", path) for _ in range(2))
-        assert refused.status_code == early.status_code == 429
-        assert refused.headers["content-type"] == "application/problem+json"
-        assert int(refused.headers["retry-after"]) >= 1
-        assert "weighs 10, 5 are left" in refused.json()["detail"]
-        assert "came too early" in early.json()["detail"]
-        # What is left is enough for light ones, and another's is untouched.
-        assert [mine.ask("GET", light).status_code for _ in range(6)] == [200] * 5 + [429]
-        assert other.ask("GET", path).status_code == 200
-    with changed(context, rate_limit="5/minute") as own, api_client(own) as client:
-        # What weighs more than the rate can be asked once.
-        path = "/v1/leaderboard?since=2025-01-01T00:00:00Z"
-        assert [client.get(path).status_code for _ in range(2)] == [200, 429]
+def test_a_page_has_at_most_200_rows(api, submissions) -> None:
+    submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=201))
+    page = api.get("/v1/jobs?limit=200").json()
+    assert len(page["jobs"]) == 200
+    rest = api.get("/v1/jobs", params={"limit": 200, "cursor": page["next_cursor"]}).json()
+    assert len(rest["jobs"]) == 1
+    for path in ("/v1/jobs", "/v1/leaderboard/changes", "/v1/workers"):
+        answer = api.get(f"{path}?limit=201")
+        assert answer.status_code == 422
+        assert "200" in answer.json()["detail"]
 
 
 @pytest.fixture
@@ -117,7 +54,7 @@ def board(context, submissions) -> None:
 @pytest.mark.ci
 @pytest.mark.usefixtures("board")
 def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(context) -> None:
-    path = "/v1/leaderboard/changes?limit=1000"
+    path = "/v1/leaderboard/changes"
     with (
         changed(context, **WITH_KEYS) as own,
         live_api(own) as url,
@@ -136,8 +73,7 @@ def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(cont
             refused = [one.result() for one in asked if one.done()]
             assert {answer.status_code for answer in refused} == {429}
             assert all(int(answer.headers["retry-after"]) >= 1 for answer in refused)
-            told = [answer.json()["detail"] for answer in refused]
-            assert any("heavy questions" in one and "weighs 10" in one for one in told)
+            assert "you have 1 heavy questions" in refused[0].json()["detail"]
             # Light ones of the same caller too.
             for who in (greedy, other):
                 assert who.ask("GET", "/v1/jobs?limit=20").status_code == 200
@@ -146,17 +82,43 @@ def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(cont
         assert other.ask("GET", path).status_code == 200
 
 
-class Lane:
-    """A lane whose questions last until they are let go."""
+@pytest.mark.usefixtures("board")
+def test_what_looks_through_all_jobs_takes_a_heavy_place(api) -> None:
+    places = api.app.state.services.places
+    taken: list[str] = []
 
-    def __init__(self, **given) -> None:
-        self.limit = ConcurrencyLimit("questions", wait_s=60, in_turns=True, **given)
+    def noting(kind: str, of: Callable[[str], Any]) -> Callable[[str], Any]:
+        def place(who: str) -> Any:
+            taken.append(kind)
+            return of(who)
+
+        return place
+
+    for kind, its in places.items():
+        its.of = noting(kind, its.of)
+    for path, kind in (
+        *((path, "heavy") for path in BOARDS),
+        *(("/v1/jobs", "ordinary"), ("/v1/sweeps", "ordinary"), ("/v1/jobs/job_1", "ordinary")),
+        *(("/v1/leaderboard/export", "exports"), ("/v1/sweeps/sweep_1/results", "exports")),
+        *(("/v1/jobs/job_1/replay", "heavy"), ("/v1/jobs/job_1/scene", "heavy")),
+        ("/v1/jobs/job_1/trajectory", "trajectories"),
+    ):
+        taken.clear()
+        api.get(path)
+        assert taken == [kind], path
+
+
+class Work:
+    """Work of one kind, which lasts until it is let go."""
+
+    def __init__(self, **given: Any) -> None:
+        self.places = Places("questions", **given)
         self.going_on: list[tuple[str, asyncio.Event]] = []
         self.order: list[str] = []
         self.came = asyncio.Event()
 
     async def ask(self, who: str) -> None:
-        async with self.limit.slot(who):
+        async with self.places.of(who):
             done = asyncio.Event()
             self.order.append(who)
             self.going_on.append((who, done))
@@ -168,68 +130,78 @@ class Lane:
             self.came.clear()
             await self.came.wait()
 
-    def end_one(self, who: str | None = None) -> None:
-        index = next(n for n, (of, _) in enumerate(self.going_on) if who in {None, of})
-        self.going_on.pop(index)[1].set()
+    def end_one(self) -> None:
+        self.going_on.pop(0)[1].set()
 
 
-def test_many_keys_have_the_lane_in_turns() -> None:
+def test_callers_take_turns() -> None:
     async def play() -> None:
-        lane = Lane(per_caller=1, total=2)
+        work = Work(each=1, total=2)
         async with asyncio.TaskGroup() as group:
             # Every key of one owner is a caller of its own; together they have two places.
             for who in [*["a"] * 5, *["b"] * 5, "c", "d"]:
-                group.create_task(lane.ask(who))
-            await lane.until(2)
-            assert Counter(lane.order) == {"a": 1, "b": 1}
+                group.create_task(work.ask(who))
+            await work.until(2)
+            assert Counter(work.order) == {"a": 1, "b": 1}
             for number in range(3, 13):
-                lane.end_one()
-                await lane.until(number)
-                going = [who for who, _ in lane.going_on]
+                work.end_one()
+                await work.until(number)
+                going = [who for who, _ in work.going_on]
                 assert len(going) == len(set(going)) <= 2
-            # Nobody had a second turn before all had a first, as far as places allow.
-            assert set(lane.order[:5]) == {"a", "b", "c", "d"}
-            while lane.going_on:
-                lane.end_one()
-        assert not lane.limit._shares
-        assert lane.limit._used == 0
+            # Nobody had a second turn before all had a first.
+            assert set(work.order[:4]) == {"a", "b", "c", "d"}
+            while work.going_on:
+                work.end_one()
+        assert not work.places._own
+        assert work.places._all.borrowed_tokens == 0
 
     asyncio.run(play())
 
 
 def test_whoever_leaves_while_waiting_keeps_no_place() -> None:
     async def play() -> None:
-        lane = Lane(per_caller=1, total=1)
-        first = asyncio.create_task(lane.ask("a"))
-        await lane.until(1)
-        leaving = [asyncio.create_task(lane.ask(who)) for who in ("a", "b", "c")]
-        await asyncio.sleep(0)
-        staying = asyncio.create_task(lane.ask("d"))
-        await asyncio.sleep(0)
+        work = Work(each=1, total=1)
+        first = asyncio.create_task(work.ask("a"))
+        await work.until(1)
+        leaving = [asyncio.create_task(work.ask(who)) for who in ("a", "b", "c")]
+        await asyncio.sleep(0.01)
+        staying = asyncio.create_task(work.ask("d"))
+        await asyncio.sleep(0.01)
         for task in leaving:
             task.cancel()
-        lane.end_one()
+        work.end_one()
         await asyncio.gather(*leaving, return_exceptions=True)
-        await lane.until(2)
-        assert lane.order == ["a", "d"]
-        lane.end_one()
+        await work.until(2)
+        assert work.order == ["a", "d"]
+        work.end_one()
         await asyncio.gather(first, staying)
-        assert not lane.limit._shares
-        assert lane.limit._used == 0
+        assert work.places._all.borrowed_tokens == 0
 
     asyncio.run(play())
 
 
-def test_one_too_many_is_refused_and_told_its_weight() -> None:
+def test_one_too_many_is_refused_by_whose_places_are_taken() -> None:
     async def play() -> None:
-        lane = Lane(per_caller=1, total=1)
-        waiting = [asyncio.create_task(lane.ask("a")) for _ in range(1 + MAX_WAITING)]
-        await lane.until(1)
-        with pytest.raises(ProblemError, match="this one weighs 7") as raised:
-            async with asyncio.timeout(5), lane.limit.slot("a", weight=7):
-                pass
-        assert raised.value.headers == {"Retry-After": "2"}
+        work = Work(each=1, total=1)
+        waiting = [asyncio.create_task(work.ask("a")) for _ in range(1 + MAX_WAITING)]
+        await work.until(1)
+        with pytest.raises(ProblemError, match="you have 1 questions going on") as raised:
+            await work.ask("a")
+        assert (raised.value.status, raised.value.headers) == (429, {"Retry-After": "2"})
         for task in waiting:
+            task.cancel()
+        streams = Work(each=1, total=2, waiting=0)
+        open_ones = [asyncio.create_task(streams.ask(who)) for who in ("a", "b")]
+        await streams.until(2)
+        for who, status in (("a", 429), ("c", 503)):
+            with pytest.raises(ProblemError) as raised:
+                await streams.ask(who)
+            assert raised.value.status == status
+        streams.end_one()
+        await open_ones[0]
+        open_ones[0] = asyncio.create_task(streams.ask("c"))
+        await streams.until(3)
+        for task in open_ones:
             task.cancel()
 
     asyncio.run(play())
@@ -240,7 +212,7 @@ INVENTED = {"track": 422, "task": 422, "category": 422, "model": 200, "sweep": 4
 
 @pytest.mark.usefixtures("board")
 def test_invented_names_fill_no_cache_and_cost_few_statements(api, context) -> None:
-    cache = api.app.state.boards._answers
+    cache = api.app.state.services.boards._answers
     first = api.get("/v1/leaderboard")
     pair = {"first": "builtin/idle", "second": "builtin/idle"}
     with statements_of(context.store.database.engine) as statements:

@@ -30,7 +30,7 @@ def jobs(api, context, open_session) -> list[dict]:
         score = {"detail": f"number {number} of 100%_sure"} | (score if number < 3 else {})
         finish(context, lease, indicator=[0.1, 0.1, 7.5, -2.0][number % 4], **score)
     open_session(task="lift-1", seed=5)
-    return api.get("/v1/jobs", params={"limit": 1000}).json()["jobs"]
+    return api.get("/v1/jobs", params={"limit": 200}).json()["jobs"]
 
 
 def pages(api, limit: int, **params: object) -> list[dict]:

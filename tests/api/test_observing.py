@@ -1,5 +1,6 @@
 """Metrics, the request log and health: what an operator sees, whatever the stores do."""
 
+import asyncio
 import json
 import platform
 import shutil
@@ -22,7 +23,8 @@ from support.servers.live_api import api_client, changed, live_api
 from support.servers.stacks import wait_until
 
 from buildarena_api.http import log as request_log
-from buildarena_api.http.probes import ARTIFACTS_FRESH_S, PATIENCE_S, PartFailedError, Probe
+from buildarena_api.http import parts
+from buildarena_api.http.parts import ARTIFACTS_FRESH_S, PATIENCE_S, Part, PartFailedError
 from buildarena_api.routes.health import FEW_LOST
 from buildarena_backend import __version__
 from buildarena_backend.journal.journal import Usage
@@ -132,7 +134,7 @@ def test_metrics_say_what_the_service_stands_on(api, context) -> None:
         {pool["pool"]: value for pool, value in found[f"database_connections_{name}"]}
         for name in ("used", "limit")
     )
-    assert set(used) == set(most) == {"ordinary", "watching", "exporting"}
+    assert set(used) == set(most) == {"ordinary", "watching"}
     assert all(used[pool] <= most[pool] for pool in most)
     assert only(found, "postgres_size_bytes") > 1e6
     connections = {labels["state"]: n for labels, n in found["postgres_connections"]}
@@ -288,27 +290,37 @@ def test_a_bucket_that_was_always_silent_is_named(context, monkeypatch) -> None:
         assert down(client) == ["artifact_store_up"]
 
 
-def test_a_probe_says_what_was_said_last_and_does_not_wait() -> None:
-    now, answers = [0.0], threading.Event()
-    answers.set()
+def test_a_part_says_what_it_said_last_and_does_not_wait(monkeypatch) -> None:
+    monkeypatch.setattr(parts, "PATIENCE_S", 0.2)
+    silent, asked = threading.Event(), []
 
     def ask() -> int:
-        answers.wait()
-        return 7
+        asked.append(1)
+        if silent.is_set():
+            time.sleep(0.5)
+        return len(asked)
 
-    probe = Probe("part", ask, clock=lambda: now[0])
-    with pytest.raises(PartFailedError, match="has not answered yet"):
-        probe.latest()
-    probe.start()
-    wait_until(lambda: probe.works, 10, "it answered")
-    answers.clear()
-    probe.renewed()
-    wait_until(lambda: probe._begun_at is not None, 10, "it is asked")
-    assert probe.latest() == 7
-    now[0] += PATIENCE_S + 1
-    with pytest.raises(PartFailedError, match="has not answered for 4 s"):
-        probe.latest()
-    answers.set()
-    wait_until(lambda: probe.works, 10, "it answered again")
-    probe.end()
-    probe.join(10)
+    async def play() -> None:
+        part = Part(ask, fresh_s=0.1)
+        with pytest.raises(PartFailedError, match="has not answered yet"):
+            part.latest()
+        await asyncio.gather(*(part.renew() for _ in range(5)))
+        assert part.latest() == 1
+        await part.renew()
+        assert len(asked) == 1, "it is fresh"
+        silent.set()
+        await asyncio.sleep(0.1)
+        begun = time.monotonic()
+        await part.renew()
+        assert time.monotonic() - begun < 0.15
+        assert part.latest() == 1
+        await asyncio.sleep(0.25)
+        with pytest.raises(PartFailedError, match="has not answered for 0 s") as raised:
+            part.latest()
+        assert raised.value.is_silent
+        silent.clear()
+        await asyncio.sleep(0.3)
+        await part.renew()
+        assert part.latest() >= 2, "it answered after all"
+
+    asyncio.run(play())

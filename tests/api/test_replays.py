@@ -270,7 +270,7 @@ def test_scenes_models_and_pictures_are_there_once_something_is_built(
     assert kept.headers["content-security-policy"] == "sandbox"
     assert kept.headers["content-type"] == "image/png"
     monkeypatch.setattr(pictures, "still_png", None)
-    api.app.state.pictures = pictures.ResponseCache(1 << 20)
+    api.app.state.services.pictures._cached.clear()
     assert api.get(f"{path}/thumbnail.png").content == drawn.content
     # Bytes that are no trajectory are a problem and no failure.
     attach(context, job, {"trajectory-0": b"nothing"}, PARQUET)

@@ -23,9 +23,9 @@ from fastapi import FastAPI
 from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
 
-from buildarena_api.http import overload
+from buildarena_api.http import places
+from buildarena_api.http.door import UNANSWERED_S, Server
 from buildarena_api.http.rate_limits import RateLimits
-from buildarena_api.http.serving import UNANSWERED_S, Server
 from buildarena_backend.keepalive import socket_options
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.queue.app import celery_app
@@ -67,7 +67,7 @@ def test_requests_stay_quick_beside_a_stopped_broker_and_jobs_flow_again(
     context, valkey, monkeypatch
 ) -> None:
     # Refusals are held back by up to a second on purpose, which is not what is measured here.
-    monkeypatch.setattr(overload, "HELD_S", (0.0, 0.0))
+    monkeypatch.setattr(places, "HELD_S", (0.0, 0.0))
     url, pid = valkey
     with (
         changed(context, broker_url=url, rate_limit="25/minute") as own,

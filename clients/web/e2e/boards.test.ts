@@ -216,7 +216,7 @@ describe("sweeps", () => {
     await page.getByText("live", { exact: true }).waitFor();
     const reads: string[] = [];
     page.on("request", (request) => {
-      if (request.url().includes("limit=1000")) reads.push(request.url());
+      if (request.url().includes("order=asc")) reads.push(request.url());
     });
     const jobs = await ask<Schemas["JobPage"]>(`/v1/jobs?sweep=${id}`);
     await ask(`/v1/jobs/${jobs.jobs[0]?.id ?? ""}/cancel`, {});

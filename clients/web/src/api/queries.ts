@@ -116,7 +116,21 @@ export const jobSummary = (filters: JobFilters) =>
     refetchInterval: every(2 * LIVE_MS),
   });
 
-export const jobPage = (filters: JobFilters) => client.GET("/v1/jobs", { params: { query: filters } });
+/** Jobs of one page, as many as the service gives. */
+export const PAGE = 200;
+
+export const jobPage = (filters: JobFilters) =>
+  taken(client.GET("/v1/jobs", { params: { query: { ...filters, limit: PAGE } } }));
+
+/** Jobs page after page, as they are asked for. */
+export async function* jobPages(filters: JobFilters): AsyncGenerator<readonly JobView[]> {
+  let cursor: string | undefined;
+  do {
+    const page = await jobPage({ ...filters, cursor });
+    yield page.jobs;
+    cursor = page.next_cursor ?? undefined;
+  } while (cursor !== undefined);
+}
 
 export const job = (id: string) =>
   queryOptions({

@@ -18,7 +18,7 @@ from buildarena_cli.options import (
 from buildarena_cli.terminal.completion import complete_model, complete_sweep, complete_task
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, warn
 
-MAX_LIMIT = 1000
+MAX_LIMIT = 200
 COLUMNS = columns(
     *("job", "task", "model", "seed", "state", "reason", "flags", "indicator", "created"),
     numeric=("seed", "indicator"),

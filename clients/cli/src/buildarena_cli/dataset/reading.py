@@ -15,8 +15,8 @@ from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
 from buildarena_cli.site.asking import ask
 
-PAGE: Final = 1000
-"""Jobs that are listed at once; a page of them has some megabytes."""
+PAGE: Final = 200
+"""Jobs that are listed at once, as many as the service gives."""
 AT_ONCE: Final = 4
 """Jobs that are asked for at once; the service bounds the requests of one caller."""
 AHEAD: Final = 16

@@ -11,7 +11,7 @@ from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
 
-PAGE: Final = 1000
+PAGE: Final = 200
 EVERY: Final = "all"
 CHOICES: Final = (EVERY, "best", "none")
 MAX_SWEEPS: Final = 50

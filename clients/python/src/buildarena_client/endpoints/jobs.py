@@ -28,7 +28,7 @@ if TYPE_CHECKING:
         VerificationView,
     )
 
-PAGE: Final = 1000
+PAGE: Final = 200
 """Jobs that are asked for at once, as many as the service gives."""
 
 
@@ -42,7 +42,7 @@ class Jobs(Sender):
 
         Args:
             limit: How many at most; all by default.
-            page: How many are asked for at once, 1 to 1000.
+            page: How many are asked for at once, 1 to 200.
             filters: Which jobs, and in which order.
         """
         return self._listed("/v1/jobs", "jobs", limit, page, dict(filters))

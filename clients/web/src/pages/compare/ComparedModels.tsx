@@ -2,7 +2,7 @@ import { Stack, Table, Text } from "@mantine/core";
 import { queryOptions, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { client, taken, type Schema } from "../../api/client";
-import { boardQuery, type JobView } from "../../api/queries";
+import { boardQuery, jobPages, type JobView } from "../../api/queries";
 import { number, successes, words } from "../../format";
 import { OutcomeBadge } from "../../parts/Outcome";
 import { Section } from "../../parts/Section";
@@ -24,8 +24,8 @@ const comparison = (first: string, second: string, scope: Scoped) =>
 
 async function endedJobs(model: string, task: string): Promise<JobView[]> {
   const [name, configuration = ""] = model.split("@");
-  const query = { model: name, task, state: "done" as const, limit: 1000 };
-  const { jobs } = await taken(client.GET("/v1/jobs", { params: { query } }));
+  const jobs: JobView[] = [];
+  for await (const page of jobPages({ model: name, task, state: "done" })) jobs.push(...page);
   return jobs.filter((job) => job.configuration.startsWith(configuration));
 }
 

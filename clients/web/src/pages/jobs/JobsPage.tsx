@@ -1,7 +1,6 @@
 import { Button, Group, Stack, Text, Title } from "@mantine/core";
 import { useInfiniteQuery } from "@tanstack/react-query";
 import { getRouteApi, useNavigate } from "@tanstack/react-router";
-import { taken } from "../../api/client";
 import { jobPage } from "../../api/queries";
 import { every, isSite } from "../../api/site";
 import { JobsTable } from "../../parts/JobsTable";
@@ -14,7 +13,6 @@ import { Filters } from "./Filters";
 import { Said } from "./Said";
 
 const route = getRouteApi("/jobs");
-const PAGE = 200;
 const REFRESH_MS = 10_000;
 
 function sortingOf({ sort, order }: JobsSearch): Sorting | null {
@@ -27,7 +25,7 @@ export default function JobsPage() {
   const navigate = useNavigate({ from: "/jobs" });
   const query = useInfiniteQuery({
     queryKey: ["jobs", search],
-    queryFn: ({ pageParam }) => taken(jobPage({ ...search, limit: PAGE, cursor: pageParam })),
+    queryFn: ({ pageParam }) => jobPage({ ...search, cursor: pageParam }),
     initialPageParam: undefined as string | undefined,
     getNextPageParam: (page) => page.next_cursor ?? undefined,
     refetchInterval: (running) => (running.state.data?.pages.length ?? 1) === 1 && every(REFRESH_MS),

@@ -2,10 +2,9 @@ import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useCallback, useEffect, useRef, useState } from "react";
 import { client, taken } from "../../api/client";
 import { useEvents, type ServiceEvent, type StreamState } from "../../api/events";
-import { sweep as sweepQuery, sweepTroubles, type JobView } from "../../api/queries";
+import { jobPages, sweep as sweepQuery, sweepTroubles, type JobView } from "../../api/queries";
 import { LiveJobs, type Moment } from "./live";
 
-const PAGE = 1000;
 /** How often the page is drawn again, and what ended is read, at most. */
 const DRAW_MS = 1_000;
 const READ_MS = 3_000;
@@ -19,18 +18,23 @@ export interface Live {
 
 async function readPages(id: string, take: (page: readonly JobView[]) => void, live: () => boolean): Promise<number> {
   const before = await taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } }));
-  let cursor: string | undefined;
-  do {
-    const page = await taken(
-      client.GET("/v1/jobs", { params: { query: { sweep: id, limit: PAGE, cursor, order: "asc" } } }),
-    );
+  for await (const page of jobPages({ sweep: id, order: "asc" })) {
     if (!live()) return before.last_event;
-    take(page.jobs);
-    cursor = page.next_cursor ?? undefined;
+    take(page);
     // Whoever clicks meanwhile is answered first.
     await new Promise((resolve) => setTimeout(resolve));
-  } while (cursor !== undefined);
+  }
   return before.last_event;
+}
+
+/** Reads the jobs of a sweep that ended last, so many of them at least. */
+async function readEnded(id: string, wanted: number, take: (page: readonly JobView[]) => void): Promise<void> {
+  let read = 0;
+  for await (const page of jobPages({ sweep: id, state: "done", sort: "finished" })) {
+    take(page);
+    read += page.length;
+    if (read >= wanted) return;
+  }
 }
 
 /** The jobs of a sweep: read once, page after page, then kept true by events and by what ended since. */
@@ -73,16 +77,14 @@ export function useLiveJobs(id: string): Live {
   const catchUp = useCallback((): void => {
     reading.current ??= setTimeout(() => {
       reading.current = null;
-      const limit = Math.min(PAGE, Math.max(1, ended.current));
+      const wanted = ended.current;
       ended.current = 0;
       void queries.invalidateQueries({ queryKey: sweepQuery(id).queryKey });
       void queries.invalidateQueries({ queryKey: sweepTroubles(id).queryKey });
-      client
-        .GET("/v1/jobs", { params: { query: { sweep: id, state: "done", sort: "finished", limit } } })
-        .then(({ data }) => {
-          jobs.current.add(data?.jobs ?? []);
-          draw();
-        })
+      readEnded(id, wanted, (page) => {
+        jobs.current.add(page);
+        draw();
+      })
         // The next event brings the next try.
         .catch(() => undefined);
     }, READ_MS);

@@ -59,13 +59,7 @@ class Door:
         most_each: Connections of one.
     """
 
-    def __init__(
-        self,
-        settings: Settings,
-        *,
-        most: int = MAX_CONNECTIONS,
-        most_each: int = MAX_OF_AN_ADDRESS,
-    ) -> None:
+    def __init__(self, settings: Settings, *, most: int, most_each: int) -> None:
         self._most, self._most_each = most, most_each
         self._proxies = Networks(settings.trusted_proxies)
         base = settings.base_path.encode()
@@ -93,7 +87,8 @@ class Door:
 
     def asks_for_health(self, connection: FrontDoor, data: bytes) -> bool:
         """Whether a connection in the anteroom is to be answered; none makes it leave then."""
-        if not data.startswith(self._health) or len(self._answering) >= ANTEROOM:
+        is_whole = data.startswith(self._health) and data.endswith(b"\r\n\r\n")
+        if not is_whole or len(self._answering) >= ANTEROOM:
             return False
         self._anteroom.pop(connection, None)
         self._answering.add(connection)
@@ -153,14 +148,15 @@ class FrontDoor(HttpToolsProtocol):
         if not (self.is_admitted or self._door.asks_for_health(self, data)):
             self.transport.abort()
             return
-        if self._awaits_header and self._deadline is None:
-            self._expect_header(HEADER_S)
-        super().data_received(data)
         if self._awaits_header:
             self._header_bytes += len(data)
-            if self._header_bytes > MAX_HEADER_BYTES and not self.transport.is_closing():
-                self._refuse_header()
-                self.send_400_response("")
+            if self._deadline is None:
+                self._expect_header(HEADER_S)
+        super().data_received(data)
+        # Whatever came is a header's as long as that has no end.
+        if self._header_bytes > MAX_HEADER_BYTES and not self.transport.is_closing():
+            self._refuse_header()
+            self.send_400_response("")
 
     def on_headers_complete(self) -> None:
         """Passes a request on whose header is small enough."""
@@ -236,9 +232,8 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
         settings: The process'.
         more: Further options of uvicorn.
     """
-    door = Door(
-        settings, most=min(MAX_CONNECTIONS, _descriptors() - OWN_DESCRIPTORS - 2 * ANTEROOM)
-    )
+    left = _descriptors() - OWN_DESCRIPTORS - 2 * ANTEROOM
+    door = Door(settings, most=min(MAX_CONNECTIONS, left), most_each=MAX_OF_AN_ADDRESS)
     protocol: Any = partial(FrontDoor, door)
     return uvicorn.Config(
         app,
