@@ -12,6 +12,7 @@ from support.jobs import attach
 from support.stages import work
 
 from buildarena_api.http.negotiation import prefers
+from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import pictures, trials
 from buildarena_backend.replays import chapters
@@ -279,7 +280,7 @@ def test_scenes_models_and_pictures_are_there_once_something_is_built(
 
 
 def test_answers_are_forgotten_when_there_is_no_room() -> None:
-    kept = pictures.ResponseCache(10)
+    kept = ResponseCache(10)
     made: list[str] = []
 
     def get(name: str, size: int = 5) -> int:

@@ -115,7 +115,7 @@ class Settings(BaseSettings):
         int | None,
         Field(
             description="Connections to Postgres that a process keeps for its work; it may open as "
-            "many again for a moment, and an API has 9 more",
+            "many again for a moment, and an API has 4 more",
             ge=1,
             le=100,
         ),
