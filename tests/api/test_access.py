@@ -7,7 +7,7 @@ from support.jobs import execute
 from support.servers.live_api import api_client, changed
 from support.servers.stacks import wait_until
 
-from buildarena_api.http.access import check_binding
+from buildarena_api.access import check_binding
 from buildarena_backend.settings import Settings
 
 METRICS = "a-key-for-prometheus-alone"

@@ -12,7 +12,7 @@ from sqlalchemy import text, update
 from support.jobs import claim, execute, finish, journal_entry
 from support.servers.live_api import api_client, changed
 
-from buildarena_api.leaderboard.filters import _ranked_over
+from buildarena_api.board_filters import _ranked_over
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.boards.trials import TrialFilter
 from buildarena_backend.database.tables import jobs

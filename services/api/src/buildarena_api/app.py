@@ -12,11 +12,11 @@ from fastapi.routing import APIRoute
 from fastapi_offline import FastAPIOffline
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
+from buildarena_api.access import admission, caller_of, known_sender, limited
 from buildarena_api.dashboard.files import read_pages
 from buildarena_api.dashboard.serving import Dashboard, is_page
 from buildarena_api.dependencies import Services
 from buildarena_api.events.hub import EventHub
-from buildarena_api.http.access import admission, caller_of, known_sender, limited
 from buildarena_api.http.bodies import BodyLimitMiddleware
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.locality import LocalOnlyMiddleware

@@ -7,9 +7,9 @@ from typing import Annotated
 
 from fastapi import Depends, Query
 
+from buildarena_api.board_filters import unknown
 from buildarena_api.dependencies import ContextDep, IdPrefix, Track
 from buildarena_api.http.problems import ProblemError
-from buildarena_api.leaderboard.filters import unknown
 from buildarena_api.schemas import AnyJobState, AnyOutcome
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.jobs.filters import JobFilter

@@ -9,8 +9,8 @@ from importlib import import_module
 
 from sqlalchemy.exc import OperationalError
 
+from buildarena_api.access import check_binding
 from buildarena_api.app import POOL_SIZE, POOL_TIMEOUT_S, create_app
-from buildarena_api.http.access import check_binding
 from buildarena_api.http.door import serve, server_config
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.errors import SchemaVersionError, StartupError

@@ -121,31 +121,23 @@ class ApiKeys:
     def check(self, secret: str) -> KeyCheck | None:
         """The key that has this secret, and whether it is still valid; None when nobody has it."""
         digest = secret_hash(secret)
-        return self.check_hashes([digest]).get(digest)
-
-    def check_hashes(self, digests: Sequence[str]) -> dict[str, KeyCheck]:
-        """The keys that have the secrets of these hashes, by hash; what nobody has is left out."""
         expired = (api_keys.c.expires_at <= events.now).label("expired")
         replaced = (api_keys.c.previous_until <= events.now).label("replaced")
         stale = func.coalesce(api_keys.c.used_at < events.now - NOTED_EVERY, True).label("stale")
-        wanted = any_(bound_texts(digests))
-        query = select(
-            *_COLUMNS, api_keys.c.secret_hash, api_keys.c.previous_hash, expired, replaced, stale
-        ).where(or_(api_keys.c.secret_hash == wanted, api_keys.c.previous_hash == wanted))
-        asked, checks, used = set(digests), {}, []
+        query = select(*_COLUMNS, api_keys.c.secret_hash, expired, replaced, stale).where(
+            or_(api_keys.c.secret_hash == digest, api_keys.c.previous_hash == digest)
+        )
         with self._database.transaction() as connection:
-            for row in connection.execute(query):
-                key = value_of(ApiKey, row)
-                for digest in asked & {row.secret_hash, row.previous_hash}:
-                    replaced_one = digest != row.secret_hash and row.replaced
-                    refusal = _refusal(key, expired=row.expired, replaced=replaced_one)
-                    checks[digest] = KeyCheck(key=key, refusal=refusal)
-                    if refusal is None and row.stale:
-                        used.append(key.id)
-            if used:
-                noted = api_keys.c.id == any_(bound_texts(used))
-                connection.execute(update(api_keys).where(noted).values(used_at=events.now))
-        return checks
+            row = connection.execute(query).first()
+            if row is None:
+                return None
+            key = value_of(ApiKey, row)
+            was_replaced = digest != row.secret_hash and bool(row.replaced)
+            refusal = _refusal(key, expired=row.expired, replaced=was_replaced)
+            if refusal is None and row.stale:
+                noted = update(api_keys).where(api_keys.c.id == key.id)
+                connection.execute(noted.values(used_at=events.now))
+        return KeyCheck(key=key, refusal=refusal)
 
     def ended(self, key_ids: Sequence[str]) -> set[str]:
         """Those of the keys that were revoked or suspended, or have expired."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from http import HTTPStatus
-from typing import Any
+from typing import Any, Final
 
 import structlog
-from fastapi import FastAPI, Request
+from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
@@ -24,7 +24,6 @@ from buildarena_backend.errors import (
     EndedKeyError,
     NameTakenError,
     NotOwnedError,
-    StoreError,
     SubmissionError,
     TooManyFilesError,
     TransitionError,
@@ -35,8 +34,16 @@ from buildarena_benchmark import ValidationIssue
 PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")
 """How pydantic spells the values that it expects."""
-RETRY_FILES_S = 5
-"""When a caller may come back whose trials of files found no room."""
+PLAIN: Final[Mapping[type[Exception], tuple[int, int | None]]] = {
+    TransitionError: (409, None),
+    EndedKeyError: (409, None),
+    NotOwnedError: (403, None),
+    NameTakenError: (403, None),
+    TooManyFilesError: (429, 5),
+    UnknownIdError: (404, None),
+    ArtifactMissingError: (404, None),
+}
+"""Status of errors that say all there is to say, and when the caller may come back."""
 MAX_SHOWN = 100
 """Characters of a wrong value that are repeated."""
 
@@ -159,29 +166,22 @@ def add_problem_handlers(app: FastAPI) -> None:
         log.error("unexpected", path=request.url.path, exc_info=error)
         return _answer(500, "something went wrong here; it is in the log")
 
+    for kind, (status, wait_s) in PLAIN.items():
+        app.add_exception_handler(kind, _plain(status, wait_s))
     _add_store_handlers(app)
-    _add_artifact_handlers(app)
+
+
+def _plain(status: int, wait_s: int | None) -> Callable[[Request, Exception], Response]:
+    """Answers an error with what it says itself."""
+    headers = None if wait_s is None else {"Retry-After": str(wait_s)}
+
+    def answer(_: Request, error: Exception) -> Response:
+        return _answer(status, str(error), headers=headers)
+
+    return answer
 
 
 def _add_store_handlers(app: FastAPI) -> None:
-    @app.exception_handler(TransitionError)
-    @app.exception_handler(EndedKeyError)
-    async def on_transition(_: Request, error: StoreError) -> JSONResponse:
-        return _answer(409, str(error))
-
-    @app.exception_handler(NotOwnedError)
-    @app.exception_handler(NameTakenError)
-    async def on_others(_: Request, error: StoreError) -> JSONResponse:
-        return _answer(403, str(error))
-
-    @app.exception_handler(TooManyFilesError)
-    async def on_too_many(_: Request, error: TooManyFilesError) -> JSONResponse:
-        return _answer(429, str(error), headers={"Retry-After": str(RETRY_FILES_S)})
-
-    @app.exception_handler(UnknownIdError)
-    async def on_unknown(_: Request, error: UnknownIdError) -> JSONResponse:
-        return _answer(404, str(error))
-
     @app.exception_handler(DataError)
     async def on_unstorable(_: Request, error: DataError) -> JSONResponse:
         log.info("unstorable", error=str(error.orig))
@@ -192,12 +192,6 @@ def _add_store_handlers(app: FastAPI) -> None:
     async def on_database(_: Request, error: OperationalError | PoolTimeoutError) -> JSONResponse:
         problem = database_problem(error)
         return _answer(problem.status, problem.detail, headers=problem.headers)
-
-
-def _add_artifact_handlers(app: FastAPI) -> None:
-    @app.exception_handler(ArtifactMissingError)
-    async def on_missing(_: Request, error: ArtifactMissingError) -> JSONResponse:
-        return _answer(404, str(error))
 
     @app.exception_handler(ArtifactDamagedError)
     async def on_damaged(_: Request, error: ArtifactDamagedError) -> JSONResponse:

@@ -7,8 +7,8 @@ from typing import Literal
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, Field
 
+from buildarena_api.access import CallerDep
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.access import CallerDep
 from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(prefix="/v1/caller", tags=["keys"])

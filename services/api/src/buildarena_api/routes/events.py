@@ -7,9 +7,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header
 from sse_starlette import EventSourceResponse
 
+from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ServicesDep
 from buildarena_api.events.hub import Channel, EventHub
-from buildarena_api.http.access import CallerDep, limited
 from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(

@@ -12,10 +12,10 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_api.access import limited
+from buildarena_api.board_filters import SelectionDep
 from buildarena_api.dependencies import ServicesDep
-from buildarena_api.http.access import limited
 from buildarena_api.http.problems import problem_responses
-from buildarena_api.leaderboard.filters import SelectionDep
 from buildarena_api.leaderboard.views import Board, Row, board_view
 from buildarena_backend.store import Store
 from buildarena_benchmark import paper_tasks

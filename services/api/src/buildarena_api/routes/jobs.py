@@ -7,9 +7,9 @@ from typing import Annotated, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
+from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import MAX_ROWS, ContextDep, RegistryDep, ServicesDep
 from buildarena_api.http import cursors
-from buildarena_api.http.access import CallerDep, limited
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.job_filters import JobFilterDep, require_known

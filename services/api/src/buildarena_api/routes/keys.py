@@ -8,8 +8,8 @@ from typing import Annotated, Literal, Self
 from fastapi import APIRouter, Depends, Response
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from buildarena_api.access import admin_only
 from buildarena_api.dependencies import ContextDep, ServicesDep
-from buildarena_api.http.access import admin_only
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.schemas import BudgetView
 from buildarena_backend.accounts.keys import ApiKey

@@ -10,12 +10,12 @@ from typing import Annotated, Any, Final, Literal
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_api.access import CallerDep
+from buildarena_api.board_filters import SelectionDep, unknown
 from buildarena_api.dependencies import MAX_ROWS, ContextDep, ServicesDep
-from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import problem_responses
 from buildarena_api.leaderboard.cache import Question
-from buildarena_api.leaderboard.filters import SelectionDep, unknown
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Final
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field
 
+from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.access import CallerDep, limited
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.machine_uploads import (
     MAX_BYTES,

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 
+from buildarena_api.access import Caller, RunnerDep, RunnerRights, limited, runner_of
 from buildarena_api.dependencies import ContextDep, ServicesDep
-from buildarena_api.http.access import Caller, RunnerDep, RunnerRights, limited, runner_of
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.runners.lease_queue import MAX_NAMES, Leased, LeaseQuery
 from buildarena_api.runners.outcomes import stale

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_api.access import Caller, CallerDep
 from buildarena_api.benches import BenchMachineView, machine_view
 from buildarena_api.dependencies import ContextDep, ServicesDep
-from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import JobView
 from buildarena_backend.agents.briefing import LIMITS

@@ -10,9 +10,9 @@ from fastapi import APIRouter, Header, Query, Response
 from pydantic import BaseModel, ConfigDict
 from sqlalchemy.exc import IntegrityError
 
+from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep, IdPrefix, ServicesDep
 from buildarena_api.http import cursors
-from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.schemas import (
     DONE,

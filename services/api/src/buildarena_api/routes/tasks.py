@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import BaseModel, Field, TypeAdapter
 
+from buildarena_api.access import CallerDep
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.access import CallerDep
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_backend.catalog.tasks import CatalogueEntry, TaskChangedError

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Query, Request, Response
 
+from buildarena_api.access import limited
 from buildarena_api.dependencies import ContextDep, ServicesDep
-from buildarena_api.http.access import limited
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.negotiation import prefers
 from buildarena_api.http.problems import ProblemError, problem_responses

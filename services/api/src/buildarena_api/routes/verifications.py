@@ -9,8 +9,8 @@ from typing import Any, Literal
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
+from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.access import Caller, CallerDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import MAX_OPEN, Requested
