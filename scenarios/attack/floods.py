@@ -193,7 +193,8 @@ class _Attacker:
                 f"{method} {path} HTTP/1.1\r\nHost: x\r\nAuthorization: Bearer {self._secret}\r\n"
             )
             writer.write(f"{head}Content-Length: 0\r\nConnection: close\r\n\r\n".encode())
-            self.answers[(await reader.readline()).decode().split()[1]] += 1
+            words = (await reader.readline()).decode().split()
+            self.answers[words[1] if words else "closed"] += 1
             while await reader.read(1 << 16):
                 pass
         finally:
