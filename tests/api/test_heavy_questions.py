@@ -99,7 +99,7 @@ def test_what_looks_through_all_jobs_takes_a_heavy_place(api) -> None:
     for path, kind in (
         *((path, "heavy") for path in BOARDS),
         *(("/v1/jobs", "ordinary"), ("/v1/sweeps", "ordinary"), ("/v1/jobs/job_1", "ordinary")),
-        *(("/v1/leaderboard/export", "exports"), ("/v1/sweeps/sweep_1/results", "exports")),
+        *(("/v1/leaderboard/export", "heavy"), ("/v1/sweeps/sweep_1/results", "heavy")),
         *(("/v1/jobs/job_1/replay", "heavy"), ("/v1/jobs/job_1/scene", "heavy")),
         ("/v1/jobs/job_1/trajectory", "trajectories"),
     ):

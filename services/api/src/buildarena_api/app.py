@@ -88,9 +88,9 @@ ORDINARY = (
     versions,
     workers,
 )
-HEAVY = (replays, transcript_search, pictures, leaderboard)
+HEAVY = (replays, transcript_search, pictures, leaderboard, exports)
 """Routes whose questions take a core for as long as they last."""
-LIMITED_THEMSELVES = (events, exports, machines, trials, jobs, metrics)
+LIMITED_THEMSELVES = (events, machines, trials, jobs, metrics)
 """Routes that say how much of what they answer goes on at once; metrics take no thread."""
 # Those before `jobs` whose artifacts have paths like theirs.
 ROUTES = (*HEAVY, *LIMITED_THEMSELVES, *ORDINARY)

@@ -33,6 +33,7 @@ from buildarena_backend.settings import Settings
 
 MAX_CONNECTIONS: Final = 8_000
 """Connections of a process; fewer where it may not open so many files."""
+MIN_CONNECTIONS: Final = 100
 MAX_OF_AN_ADDRESS: Final = 1_000
 ANTEROOM: Final = 256
 """Connections beyond these that are asked whether they want to know the service's health."""
@@ -232,8 +233,7 @@ def server_config(app: Any, settings: Settings, **more: Any) -> uvicorn.Config:
         settings: The process'.
         more: Further options of uvicorn.
     """
-    left = _descriptors() - OWN_DESCRIPTORS - 2 * ANTEROOM
-    door = Door(settings, most=min(MAX_CONNECTIONS, left), most_each=MAX_OF_AN_ADDRESS)
+    door = Door(settings, most=_room(), most_each=MAX_OF_AN_ADDRESS)
     protocol: Any = partial(FrontDoor, door)
     return uvicorn.Config(
         app,
@@ -260,13 +260,15 @@ def serve(config: uvicorn.Config) -> None:
         sys.exit(3)
 
 
-def _descriptors() -> int:
-    """As many files as the process may open, of which it is given as many as it may have."""
+def _room() -> int:
+    """For how many connections there are descriptors: as many as the process may have are taken."""
+    wanted = MAX_CONNECTIONS + OWN_DESCRIPTORS + 2 * ANTEROOM
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with suppress(ValueError, OSError):
-        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-        return hard
-    return soft
+    unbounded = resource.RLIM_INFINITY
+    most = wanted if hard == unbounded else min(wanted, hard)
+    if soft != unbounded and soft < most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
+    return max(MIN_CONNECTIONS, most - OWN_DESCRIPTORS - 2 * ANTEROOM)
 
 
 def _stop(*_: object) -> None:

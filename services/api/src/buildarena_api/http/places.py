@@ -32,7 +32,6 @@ HEALTH_PATH: Final = "/v1/health"
 Kind = Literal[
     "ordinary",
     "heavy",
-    "exports",
     "files",
     "bodies",
     "streams",
@@ -105,7 +104,6 @@ def usual_places() -> Mapping[Kind, Places]:
         "ordinary": Places("requests", each=8, retry_s=1),
         # Each takes a core and the interpreter for as long as it lasts.
         "heavy": Places("heavy questions", each=1, total=2),
-        "exports": Places("exports", each=1, total=2),
         # One process checks them, one after the other.
         "files": Places("checks of files", each=1, total=2),
         # Each may have 4 MB in memory.

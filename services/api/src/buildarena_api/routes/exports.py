@@ -12,7 +12,6 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.access import limited
 from buildarena_api.board_filters import SelectionDep
 from buildarena_api.dependencies import ServicesDep
 from buildarena_api.http.problems import problem_responses
@@ -27,7 +26,7 @@ from buildarena_benchmark.leaderboard import (
     published_rows,
 )
 
-router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("exports")])
+router = APIRouter(prefix="/v1", tags=["leaderboard"])
 
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",
