@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
+from buildarena_backend.catalog.models import ModelEntry, load_registry
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.failures import ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
-from buildarena_worker.providers.openai.request import RequestWriter
-from buildarena_worker.providers.openai.schema import function_tool
+from buildarena_worker.providers.openai.request import function_tool, request_body
 from buildarena_worker.session.dialogue import OBJECTION
 from buildarena_worker.session.messages import Message, Request, ToolCall
 from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT
@@ -104,23 +104,27 @@ def test_requests_carry_what_kept_ones_carried(subtests) -> None:
     for case in KEPT["requests"]:
         with subtests.test(case=case):
             tools = TOOLS[case["tools"]]
-            for model in case["models"]:
-                writer = RequestWriter(model)
+            for sampling in case["sampling"]:
+                entry = ModelEntry(name="own/m", provider="own", model="m", sampling=sampling)
                 for seed in (case["sent"]["seed"], 77):  # the second has its frame already
                     config = {"decoding": DECODING[case["decoding"]]}
                     request = Request(model_config=config, messages=TALK, tools=tools, seed=seed)
-                    body = json.loads(writer.body(request))
-                    wanted = {**case["sent"], "model": model, "seed": seed}
-                    wanted["messages"] = KEPT["messages"][case["messages"]]
+                    body = json.loads(request_body(entry, request))
+                    wanted = {**case["sent"], "model": "m", "seed": seed}
+                    wanted["messages"] = KEPT["messages"]
                     if tools:
                         wanted["tools"] = KEPT["tools"][case["tools"]]
                     assert body == wanted
 
 
+def test_only_models_that_take_them_are_sent_temperature_and_top_p() -> None:
+    models = load_registry().models.values()
+    assert [entry.name for entry in models if not entry.sampling] == ["openai/gpt-5"]
+
+
 def test_schemas_are_written_as_kept_ones_were() -> None:
     for case in STORED["schemas"]:
-        tool = ToolDefinition(name="t", description="d", parameters=case["given"])
-        function = function_tool(tool)["function"]
+        function = function_tool("t", "d", case["given"])["function"]
         found = {"sent": function["parameters"], "strict": function.get("strict", False)}
         assert found == {"sent": case["sent"], "strict": case["strict"]}, case["given"]
 

@@ -58,6 +58,10 @@ class ModelEntry(BaseModel):
     provider: str
     model: Annotated[str, Field(description="The provider's own name of the snapshot")]
     baseline: bool = False
+    sampling: Annotated[
+        bool,
+        Field(description="Takes temperature and top_p, which OpenAI's reasoning models refuse"),
+    ] = True
     price: Price | None = None
 
 

@@ -1,7 +1,7 @@
 """Answers in OpenAI's chat completions: replies, what they used, and errors.
 
 Written from OpenAI's API reference, and lenient where other providers of this wire differ. What
-each answer means is compared with kept ones in ``tests/worker/providers/openai/test_answers.py``.
+each answer means is compared with kept ones in ``tests/worker/providers/test_openai.py``.
 """
 
 from __future__ import annotations
