@@ -14,7 +14,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment.other_kernels import simulate_with
 from buildarena_geometry import Machine, kernels
 from buildarena_simulation import processor, write_trajectory
-from buildarena_worker import processors
+from buildarena_worker.verify import processors
 from buildarena_worker.wiring import verifier
 
 SPEC = JobSpec(task="support-1", model="builtin/expert", simulator="mujoco")

@@ -9,9 +9,6 @@ from buildarena_backend.accounts.budgets import Shortage
 from buildarena_backend.artifacts.storing import ArtifactInfo, ArtifactStore
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prices import free_models, price_usd
-from buildarena_backend.catalog.prompt_packs import PromptPacks
-from buildarena_backend.catalog.tasks import TaskCatalog
-from buildarena_backend.catalog.tracks import has_data_sheets, worlds_of
 from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRequest
@@ -21,11 +18,10 @@ from buildarena_backend.queue.queues import Queues
 from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage, simulate_queue
 from buildarena_backend.store import Store
-from buildarena_backend.trials.scoring import failure_score, task_of
+from buildarena_backend.trials.scoring import failure_score
 from buildarena_backend.trials.worlds import finish_or_vary
 from buildarena_geometry.machine_files import machine_bytes
 from buildarena_simulation import read_trajectory
-from buildarena_worker.jobs import loop_of, pack_of
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard, Price
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
@@ -43,8 +39,7 @@ from buildarena_worker.session.results import (
 )
 from buildarena_worker.session.session import Session
 from buildarena_worker.session.turn_keeper import TurnKeeper
-from buildarena_worker.workflow import Workflows
-from buildarena_worker.workflow.rounds import run_session
+from buildarena_worker.sessions import Sessions
 
 JSON = "application/json"
 
@@ -56,11 +51,9 @@ class ConstructHandler:
         store: Where jobs and journals are.
         artifacts: Where machines, transcripts and trajectories are.
         queues: Where simulators are notified.
-        tasks: The tasks.
         registry: Models and their prices.
         clients: Answer the sessions' requests.
-        packs: The prompts.
-        workflows: The ways to build.
+        sessions: Runs sessions as their jobs say.
         gate: Lets few sessions work at once.
     """
 
@@ -70,39 +63,26 @@ class ConstructHandler:
         store: Store,
         artifacts: ArtifactStore,
         queues: Queues,
-        tasks: TaskCatalog,
         registry: ModelRegistry,
         clients: ModelClients,
-        packs: PromptPacks,
-        workflows: Workflows,
+        sessions: Sessions,
         gate: ConcurrencyGate,
     ) -> None:
         self._store = store
         self._artifacts = artifacts
         self._queues = queues
-        self._tasks = tasks
         self._registry = registry
         self._clients = clients
-        self._packs = packs
-        self._workflows = workflows
+        self._sessions = sessions
         self._gate = gate
 
     def __call__(self, active: ActiveLease) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
         job = active.lease.job
-        session = Session(
-            task=task_of(job, self._tasks),
-            seed=job.seed,
-            model_config=job.model_config,
-            pack=pack_of(job, self._packs),
-            host=self._host(active),
-            on_turn=TurnKeeper(self._store.turns, active.lease, self._gate),
-            data_sheets=has_data_sheets(job.track_config),
-            worlds=worlds_of(job.track_config),
-        )
-        workflow = self._workflows.find(str(job.track_config["workflow"]))
+        keeper = TurnKeeper(self._store.turns, active.lease, self._gate)
+        session = self._sessions.begin(job, self._host(active), keeper)
         with self._gate.acquired():
-            result = run_session(session, workflow, loop_of(job))
+            result = self._sessions.run(job, session)
         self._move_on(active, session, result)
 
     def _host(self, active: ActiveLease) -> LiveHost:

@@ -55,9 +55,8 @@ def function_tool(name: str, description: str, parameters: dict[str, Any]) -> di
     """
     schema = OpenAIJsonSchemaTransformer(parameters)
     function = {"name": name, "description": description, "parameters": schema.walk()}
-    if schema.is_strict_compatible:
-        function["strict"] = True
-    return {"type": "function", "function": function}
+    strict = {"strict": True} if schema.is_strict_compatible else {}
+    return {"type": "function", "function": function | strict}
 
 
 def write_messages(messages: Sequence[Message]) -> list[dict[str, Any]]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from threading import Lock
+from threading import Semaphore
 
 import structlog
 from sqlalchemy.exc import OperationalError
@@ -12,8 +11,8 @@ from sqlalchemy.exc import OperationalError
 from buildarena_backend.errors import ArtifactStoreError
 from buildarena_backend.results.verifications import Verifications
 from buildarena_backend.states import Verdict
-from buildarena_worker.verification_report import Report, broken_off
-from buildarena_worker.verify import Verifier
+from buildarena_worker.verify.report import Report, broken_off
+from buildarena_worker.verify.verifier import Verifier
 
 AT_ONCE = 2
 """Verifications of one process at once, however many wait."""
@@ -35,16 +34,13 @@ class VerificationRunner:
         self._verifications = verifications
         self._verifier = verifier
         self._threads = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="verifying")
-        self._lock = Lock()
-        self._active = 0
+        self._places = Semaphore(AT_ONCE)
         self._stopping = False
 
     def wake(self) -> None:
         """Has waiting verifications done, unless as many as may be are being done."""
-        with self._lock:
-            if self._active < AT_ONCE and not self._stopping:
-                self._active += 1
-                self._threads.submit(self._do_next)
+        if not self._stopping and self._places.acquire(blocking=False):
+            self._threads.submit(self._process_all)
 
     def stop(self) -> None:
         """Begins no further verification."""
@@ -74,16 +70,12 @@ class VerificationRunner:
         )
         return True
 
-    def _do_next(self) -> None:
+    def _process_all(self) -> None:
         try:
-            processed = self.process_one()
+            while not self._stopping and self.process_one():
+                pass
         except Exception:
             # The reaper notifies again.
             log.exception("verifications_unreadable")
-            processed = False
-        with self._lock, suppress(RuntimeError):
-            if processed and not self._stopping:
-                self._threads.submit(self._do_next)  # refused when the process ends
-                return
-        with self._lock:
-            self._active -= 1
+        finally:
+            self._places.release()

@@ -28,6 +28,10 @@ _COUNTED: Final = (
 )
 
 
+class NotRepeatableError(Exception):
+    """A job can't be made again here; the message says why."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
     """One comparison: what is stored, and what came out now.

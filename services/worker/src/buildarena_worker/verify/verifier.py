@@ -1,0 +1,223 @@
+"""Compares what is stored of a finished job with what comes of making it again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from buildarena_backend.agents.workbench import bench_of, repeated
+from buildarena_backend.artifacts.storing import ArtifactStore
+from buildarena_backend.catalog.tracks import (
+    EXTERNAL_WORKFLOW,
+    FILE_WORKFLOW,
+    has_data_sheets,
+    worlds_of,
+)
+from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError, PermanentError
+from buildarena_backend.jobs.job import Job
+from buildarena_backend.journal.external_calls import ExternalCall
+from buildarena_backend.journal.rollouts import RolloutRecord
+from buildarena_backend.results.results import JobScore
+from buildarena_backend.states import JobState, Outcome
+from buildarena_backend.store import Store
+from buildarena_backend.trials.scoring import (
+    best_rollout,
+    has_counted,
+    rollout_score,
+    task_of,
+    varied_rollouts,
+)
+from buildarena_benchmark import Score, Task, broken_constraint, failed_score
+from buildarena_geometry import Machine
+from buildarena_simulation import read_trajectory
+from buildarena_worker.session.host import ReplayHost
+from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
+from buildarena_worker.sessions import Sessions
+from buildarena_worker.verify.report import (
+    Check,
+    NotRepeatableError,
+    Report,
+    broken_off,
+    compare,
+    score_checks,
+    usage_checks,
+)
+from buildarena_worker.verify.trials import TrialVerifier, Tried, digest_of
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Stored:
+    """What is stored of a job beside its journal: its rollouts, and files' hashes by name."""
+
+    job: Job
+    records: Sequence[RolloutRecord]
+    files: Mapping[str, str]
+
+    @property
+    def exact(self) -> list[RolloutRecord]:
+        """The rollouts in the exact world."""
+        return [record for record in self.records if record.seed is None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Rebuilt:
+    """What building again gave: the last machine, all that were tried, and comparisons."""
+
+    machine: Machine | None
+    tried: Sequence[Tried]
+    checks: Sequence[Check]
+
+
+class Verifier:
+    """Verifies jobs.
+
+    Args:
+        store: Where jobs, journals and rollouts are.
+        artifacts: Where kept trajectories are.
+        sessions: Runs sessions again.
+    """
+
+    def __init__(self, *, store: Store, artifacts: ArtifactStore, sessions: Sessions) -> None:
+        self._store = store
+        self._artifacts = artifacts
+        self._sessions = sessions
+
+    def verify(self, job_id: str) -> Report:
+        """Verifies a job that was scored."""
+        stored = _Stored(
+            job=self._store.jobs.get(job_id),
+            records=self._store.rollouts.read(job_id),
+            files=self._store.jobs.artifacts(job_id),
+        )
+        try:
+            made_again = self._made_again(stored)
+        except (
+            ArtifactMissingError,
+            ArtifactDamagedError,
+            PermanentError,
+            NotRepeatableError,
+        ) as error:
+            made_again = [broken_off(str(error))]
+        return Report([*self._artifact_checks(stored), *made_again])
+
+    def _artifact_checks(self, stored: _Stored) -> list[Check]:
+        """Whether the bytes of every artifact are those that were stored."""
+        named = dict(stored.files)
+        for record in stored.records:
+            named[f"machine of rollout {record.number}"] = record.machine_hash
+            if record.trajectory_hash is not None:
+                named[f"trajectory-{record.number}"] = record.trajectory_hash
+        states = {digest: self._state_of(digest) for digest in set(named.values())}
+        return [
+            compare(f"artifact {name}", digest, states[digest], able=False)
+            for name, digest in sorted(named.items())
+        ]
+
+    def _state_of(self, digest: str) -> str:
+        """The hash of an artifact's bytes, or what is wrong with it."""
+        try:
+            return digest_of(self._artifacts.get(digest))
+        except ArtifactMissingError:
+            return "missing"
+        except ArtifactDamagedError:
+            return "damaged"
+
+    def _made_again(self, stored: _Stored) -> list[Check]:
+        job, workflow = stored.job, stored.job.track_config["workflow"]
+        if job.state != JobState.DONE or job.success is None:
+            return [compare("scored", kept=True, found=False)]
+        task = task_of(job, self._sessions.tasks)
+        if workflow == FILE_WORKFLOW:
+            rebuilt = self._from_file(stored, task)
+        elif workflow == EXTERNAL_WORKFLOW:
+            rebuilt = self._from_calls(stored, task)
+        else:
+            rebuilt = self._from_journal(stored)
+        checks = [*rebuilt.checks, *self._trial_checks(stored, task, rebuilt.tried)]
+        counted: JobScore | Score = failed_score(task, rebuilt.machine)
+        if has_counted(stored.records, task):
+            counted = rollout_score(job, task, stored.records)
+        return checks + score_checks(job, counted)
+
+    def _from_journal(self, stored: _Stored) -> _Rebuilt:
+        """What a session built, run again with the stored replies."""
+        job = stored.job
+        host = ReplayHost(
+            entries=self._store.journal.read(job.id),
+            rollouts=stored.records,
+            limits=job.limits,
+            load_trajectory=lambda digest: read_trajectory(self._artifacts.get(digest)),
+        )
+        session = self._sessions.begin(job, host)
+        result = self._sessions.run(job, session)
+        match result:
+            case Finished():
+                reasons = []
+            case Failed(reason=reason) | LimitReached(limit=reason):
+                reasons = [compare("reason", job.reason, reason)]
+            case Suspended(number=number):
+                raise NotRepeatableError(f"waits for rollout {number}")
+            case _:
+                raise NotRepeatableError(getattr(result, "detail", str(result)))
+        transcript = digest_of(session.transcript.to_json())
+        checks = [
+            compare("transcript", stored.files.get("transcript"), transcript),
+            compare("rollouts", len(stored.exact), len(host.simulated)),
+            *usage_checks(job, host.usage),
+            *reasons,
+        ]
+        return _Rebuilt(machine=session.machine, tried=host.simulated, checks=checks)
+
+    def _from_file(self, stored: _Stored, task: Task) -> _Rebuilt:
+        """The machine of a file; its job is named after it, with the keys that a person held."""
+        named = str(stored.job.model_config.get("model"))
+        machine = Machine.from_document(json.loads(self._artifacts.get(named)))
+        check = compare("machine", stored.files.get("machine"), named)
+        return _of_others(stored, task, check, tests=(), machine=machine)
+
+    def _from_calls(self, stored: _Stored, task: Task) -> _Rebuilt:
+        """What somebody built over the API, whose calls are made again."""
+        with self._store.database.transaction() as connection:
+            calls = self._store.external_calls.read(stored.job.id, connection=connection)
+        bench = bench_of(task, data_sheets=has_data_sheets(stored.job.track_config))
+        made, tests = repeated(calls, bench)
+        check = compare("calls", _feedback_of(calls), _feedback_of(made))
+        _, machine = bench.result() or ("", None)
+        return _of_others(stored, task, check, tests=tests, machine=machine)
+
+    def _trial_checks(self, stored: _Stored, task: Task, machines: Sequence[Tried]) -> list[Check]:
+        """Each trial again, and whether the best machine was tried in all varied worlds."""
+        trials = TrialVerifier(task=task, artifacts=self._artifacts, files=stored.files)
+        tried = list(zip(stored.exact, machines, strict=False))
+        checks = [check for pair in tried for check in trials.checks(*pair)]
+        if not has_counted(stored.records, task):
+            return checks
+        best = best_rollout(stored.records, task)
+        varied = varied_rollouts(stored.records)
+        worlds = 0 if best.trajectory_hash is None else worlds_of(stored.job.track_config)
+        for machine in [machine for record, machine in tried if record is best]:
+            checks.append(compare("worlds", len({record.seed for record in varied}), worlds))
+            checks += [check for record in varied for check in trials.checks(record, machine)]
+        return checks
+
+
+def _of_others(
+    stored: _Stored, task: Task, check: Check, *, tests: Sequence[Machine], machine: Machine | None
+) -> _Rebuilt:
+    """What came about without a session of ours, held to the task's rules."""
+    if machine is None:
+        return _Rebuilt(machine=None, tried=(), checks=[check])
+    checks, job = [check], stored.job
+    if job.outcome != Outcome.LIMIT:
+        broken = broken_constraint(task, machine)
+        kept = None if has_counted(stored.records, task) else job.reason
+        checks.append(compare("reason", kept, None if broken is None else broken[0]))
+    tested = [record for record in stored.exact if not record.final]
+    checks.append(compare("test trials", len(tested), len(tests)))
+    tried = [(each, None) for each in (*tests, machine)]
+    return _Rebuilt(machine=machine, tried=tried, checks=checks)
+
+
+def _feedback_of(calls: Sequence[ExternalCall]) -> list[list[object]]:
+    return [[call.ok, call.reason, call.feedback] for call in calls]
