@@ -8,8 +8,7 @@ import pytest
 from support.providers.stand_in import ProviderStandIn
 
 from buildarena_backend.catalog.models import ModelEntry, Price, ProviderEntry
-from buildarena_worker.providers.provider import ProviderClient
-from buildarena_worker.providers.retries import RetryPolicy
+from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
 
 QUICK = RetryPolicy(attempts=5, first_wait_s=0.01, longest_wait_s=0.05, timeout_s=2.0)
 PRICE = Price(input=2.0, output=8.0, cached=0.5)

@@ -21,8 +21,7 @@ from buildarena_backend.journal.journal import Usage
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.providers.keys import key_report
-from buildarena_worker.providers.provider import ProviderClient
-from buildarena_worker.providers.retries import RetryPolicy
+from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed
 from buildarena_worker.workflow.rounds import Loop

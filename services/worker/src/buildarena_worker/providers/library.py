@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Awaitable, Callable, Sequence
+from itertools import groupby
+from typing import Any, cast
 
 from pydantic_ai.direct import model_request
 from pydantic_ai.exceptions import (
@@ -40,12 +39,7 @@ from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded,
 from buildarena_worker.providers.failures import RETRIED_STATUS, Failure, ProviderError
 from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 
-POOLS = 16
-"""Connection pools per model over httpx at most: it looks at all connections of a pool for each
-request, so that many small pools carry hundreds of open requests at less cost than one large one.
-"""
-SMALL_POOL = 8
-"""Open requests of each pool from which another one is worth the 0.1 s that it takes to make."""
+DECODING = ("temperature", "top_p", "max_tokens")
 FINISH = {"tool_call": "stop", None: "stop"}
 FAILURES: tuple[tuple[type[Exception], Failure], ...] = (
     (ModelContextWindowExceededError, Failure.CONTEXT_OVERFLOW),
@@ -55,31 +49,21 @@ FAILURES: tuple[tuple[type[Exception], Failure], ...] = (
     (ModelQuotaExceededError, Failure.QUOTA_EXCEEDED),
 )
 
-Connected = tuple[Model, Callable[[], Awaitable[Any]]]
-"""A model with connections of its own, and how to close them."""
-
-
-@dataclass(slots=True)
-class _Pool:
-    """A model with connections of its own, and the requests that are open on them."""
-
-    connected: Connected
-    open: int = 0
-
 
 class LibrarySender:
     """Sends through pydantic-ai and the provider's library.
 
     Args:
-        connect: Makes the model, each time with connections of its own.
+        model: The model, as pydantic-ai has it.
+        close: Closes its connections.
         takes_parallel_tool_calls: Whether the provider lets parallel tool calls be turned off.
     """
 
     def __init__(
-        self, connect: Callable[[], Connected], *, takes_parallel_tool_calls: bool
+        self, model: Model, close: Callable[[], Awaitable[Any]], *, takes_parallel_tool_calls: bool
     ) -> None:
-        self._connect = connect
-        self._pools = [_Pool(connect())]
+        self._model = model
+        self.close = close
         self._takes_parallel_tool_calls = takes_parallel_tool_calls
 
     async def send(self, request: Request) -> Completion:
@@ -91,46 +75,21 @@ class LibrarySender:
         received = Received()
         RECEIVED.set(received)
         try:
-            with self._model() as model:
-                response = await model_request(
-                    model,
-                    to_library(request.messages),
-                    model_settings=self._settings(request),
-                    model_request_parameters=request_parameters(request.tools),
-                )
+            response = await model_request(
+                self._model,
+                to_library(request.messages),
+                model_settings=self._settings(request),
+                model_request_parameters=request_parameters(request.tools),
+            )
             return from_library(response)
         except Exception as error:
             received.require_usable()
             raise _translated(error, received) from error
 
-    async def close(self) -> None:
-        """Closes the connections."""
-        for pool in self._pools:
-            _, close = pool.connected
-            await close()
-
-    @contextmanager
-    def _model(self) -> Iterator[Model]:
-        """The model with the fewest open requests."""
-        pool = min(self._pools, key=lambda pool: pool.open)
-        if pool.open >= SMALL_POOL and len(self._pools) < POOLS:
-            pool = _Pool(self._connect())
-            self._pools.append(pool)
-        pool.open += 1
-        try:
-            yield pool.connected[0]
-        finally:
-            pool.open -= 1
-
     def _settings(self, request: Request) -> ModelSettings:
         decoding = request.model_config["decoding"]
-        settings = ModelSettings(seed=request.seed)
-        if "temperature" in decoding:
-            settings["temperature"] = decoding["temperature"]
-        if "top_p" in decoding:
-            settings["top_p"] = decoding["top_p"]
-        if "max_tokens" in decoding:
-            settings["max_tokens"] = decoding["max_tokens"]
+        given = {name: decoding[name] for name in DECODING if name in decoding}
+        settings = cast("ModelSettings", {"seed": request.seed, **given})
         if request.tools and self._takes_parallel_tool_calls:
             settings["parallel_tool_calls"] = False
         return settings
@@ -158,19 +117,14 @@ def _translated(error: Exception, received: Received) -> ProviderError:
 
 def to_library(messages: Sequence[Message]) -> list[ModelMessage]:
     """The conversation in pydantic-ai's form; adjacent messages of one side become one."""
-    messages_: list[ModelMessage] = []
-    requests: list[ModelRequestPart] = []
-    for message in messages:
-        if message.role == "assistant":
-            if requests:
-                messages_.append(ModelRequest(parts=requests))
-                requests = []
-            messages_.append(ModelResponse(parts=_response_parts(message)))
+    sides = groupby(messages, key=lambda message: message.role == "assistant")
+    written: list[ModelMessage] = []
+    for own, said in sides:
+        if own:
+            written += [ModelResponse(parts=_response_parts(message)) for message in said]
         else:
-            requests.append(_request_part(message))
-    if requests:
-        messages_.append(ModelRequest(parts=requests))
-    return messages_
+            written.append(ModelRequest(parts=[_request_part(message) for message in said]))
+    return written
 
 
 def _request_part(message: Message) -> ModelRequestPart:

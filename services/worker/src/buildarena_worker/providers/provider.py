@@ -11,7 +11,8 @@ import math
 import os
 import random
 import time
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import structlog
 
@@ -24,7 +25,6 @@ from buildarena_backend.telemetry.tracing import ERROR_TYPE, note
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.request_loop import RequestLoop
-from buildarena_worker.providers.retries import RetryPolicy
 from buildarena_worker.providers.throttle import Throttle
 from buildarena_worker.session.messages import ONE_REQUEST, Completion, Request
 from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
@@ -37,6 +37,35 @@ OWN_FAILURES = frozenset({Failure.CONTEXT_OVERFLOW, Failure.CONTENT_FILTER})
 """Failures that count as the model's: it is scored for them, and they are not retried."""
 
 REQUESTS = RequestLoop()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RetryPolicy:
+    """How often and how long a request is tried.
+
+    Attributes:
+        attempts: Sendings at most.
+        first_wait_s: Longest wait after the first failure; doubles with each.
+        longest_wait_s: No wait is longer, whatever a provider asks for.
+        timeout_s: Time for one sending, connection included.
+    """
+
+    attempts: int = 6
+    first_wait_s: float = 1.0
+    longest_wait_s: float = 60.0
+    timeout_s: float = 600.0
+
+    def wait_s(self, failures: int, headers: Mapping[str, str] | None, rng: random.Random) -> float:
+        """How long to wait after this many failures.
+
+        What the provider asks for in Retry-After counts; otherwise a random part of a doubling
+        wait, so that workers do not come back all at once.
+        """
+        asked = _retry_after(headers)
+        if asked is not None:
+            return min(asked, self.longest_wait_s)
+        ceiling = min(self.longest_wait_s, self.first_wait_s * 2 ** (failures - 1))
+        return rng.uniform(ceiling / 2, ceiling)
 
 
 class ProviderClient:
@@ -157,6 +186,17 @@ class ProviderClient:
             cached_tokens=usage.cached_tokens,
         )
         return replace(usage, cost_usd=cost_usd)
+
+
+def _retry_after(headers: Mapping[str, str] | None) -> float | None:
+    if headers is None:
+        return None
+    for name, scale in (("retry-after-ms", 0.001), ("retry-after", 1.0)):
+        try:
+            return max(0.0, float(headers[name]) * scale)
+        except (KeyError, ValueError):
+            continue
+    return None
 
 
 def _key_of(entry: ModelEntry, provider: ProviderEntry) -> str:

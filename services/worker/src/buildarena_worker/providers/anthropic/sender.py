@@ -8,21 +8,17 @@ from pydantic_ai.providers.anthropic import AnthropicProvider
 
 from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
 from buildarena_worker.providers.bounded_http import BoundedClient
-from buildarena_worker.providers.library import Connected, LibrarySender
+from buildarena_worker.providers.library import LibrarySender
 
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
     """The sender of a model."""
-
-    def connect() -> Connected:
-        client = AsyncAnthropic(
-            base_url=provider.base_url,
-            api_key=key,
-            max_retries=0,
-            http_client=BoundedClient(timeout=None),  # the retry policy's own timeout rules
-            timeout=None,
-        )
-        model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
-        return model, client.close
-
-    return LibrarySender(connect, takes_parallel_tool_calls=True)
+    client = AsyncAnthropic(
+        base_url=provider.base_url,
+        api_key=key,
+        max_retries=0,
+        http_client=BoundedClient(timeout=None),  # the retry policy's own timeout rules
+        timeout=None,
+    )
+    model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
+    return LibrarySender(model, client.close, takes_parallel_tool_calls=True)

@@ -7,15 +7,12 @@ from pydantic_ai.providers.google import GoogleProvider
 
 from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
 from buildarena_worker.providers.bounded_http import BoundedClient
-from buildarena_worker.providers.library import Connected, LibrarySender
+from buildarena_worker.providers.library import LibrarySender
 
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
     """The sender of a model."""
-
-    def connect() -> Connected:
-        http = BoundedClient(timeout=None)  # the retry policy's own timeout rules
-        google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
-        return GoogleModel(entry.model, provider=google), http.aclose
-
-    return LibrarySender(connect, takes_parallel_tool_calls=False)
+    http = BoundedClient(timeout=None)  # the retry policy's own timeout rules
+    google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
+    model = GoogleModel(entry.model, provider=google)
+    return LibrarySender(model, http.aclose, takes_parallel_tool_calls=False)
