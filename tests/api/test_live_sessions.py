@@ -17,7 +17,7 @@ from buildarena_backend.journal import transcript_search
 from buildarena_backend.journal.journal import Usage
 from buildarena_backend.journal.turns import TurnResult
 from buildarena_backend.leases.leases import Lease
-from buildarena_worker.session.turn_keeper import TurnKeeper
+from buildarena_worker.construct import TurnKeeper
 
 START = {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0], "note": ""}
 ATTACH = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block", "note": ""}

@@ -17,8 +17,9 @@ from buildarena_benchmark import Task, builtin_tasks
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
-from buildarena_worker.session.host import LiveHost, ReplayHost
+from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import ModelClient
+from buildarena_worker.session.requester import Requester
 from buildarena_worker.session.results import (
     Finished,
     SessionResult,
@@ -96,24 +97,23 @@ class Player:
         if client is None and not offline:
             client = ModelClients(self.registry).for_config(config)
         written = list(entries)
-        host: Any = ReplayHost(
-            entries=list(entries),
-            rollouts=rollouts,
-            limits=limits or {},
-            load_trajectory=trajectories.__getitem__,
-        )
-        gate = ConcurrencyGate()
+        gate, requester = ConcurrencyGate(), None
         if client is not None:
             active = ActiveLease(lease=None, budgeted=False, lost=lost)  # type: ignore[arg-type]
-            host = LiveHost(
-                replay=host,
+            requester = Requester(
                 client=client,
                 journal=StoredInMemory(written, append),  # type: ignore[arg-type]
                 active=active,
                 guard=BudgetGuard(budgets, active, lambda *_: Decimal()),
                 gate=gate,
-                first_wait_s=0.001,
             )
+        host = JournalHost(
+            entries=list(entries),
+            rollouts=rollouts,
+            limits=limits or {},
+            load_trajectory=trajectories.__getitem__,
+            requester=requester,
+        )
         session = Session(
             task=(builtin_tasks()[task] if isinstance(task, str) else task).drawn(seed),
             seed=seed,

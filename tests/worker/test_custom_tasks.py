@@ -24,7 +24,7 @@ from buildarena_backend.submission.submission import Submissions
 from buildarena_backend.trials.installed_simulators import announced, installed_simulators
 from buildarena_benchmark import builtin_tasks, parse_custom_task
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.session.host import ReplayHost
+from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import Completion
 from buildarena_worker.session.session import Session
 from buildarena_worker.wiring import verifier
@@ -160,7 +160,7 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(
 def test_a_prompt_pack_without_the_task_uses_the_tasks_own_words() -> None:
     pack = replace(PromptPacks().load("default"), statements={"support-1": "Of another task."})
     task = parse_custom_task(EXAMPLE, origin="task")
-    host = ReplayHost(entries=[], rollouts=[], limits={}, load_trajectory={}.__getitem__)
+    host = JournalHost(entries=[], rollouts=[], limits={}, load_trajectory={}.__getitem__)
     session = Session(task=task, seed=0, model_config={}, pack=pack, host=host)
     assert session.statement == task.statement.strip()
 

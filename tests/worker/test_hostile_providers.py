@@ -164,7 +164,7 @@ def chat(**changes: object) -> bytes:
 
 def test_garbage_forever_ends_as_errored(context, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("buildarena_worker.session.host.OUTAGE_DELAY_S", 0.0)
-    monkeypatch.setattr("buildarena_worker.session.host.FIRST_WAIT_S", 0.001)
+    monkeypatch.setattr("buildarena_worker.session.requester.FIRST_WAIT_S", 0.001)
     context.store.leases.max_faults = 3
     with stuck("garbage") as bad, crew(context, tmp_path, bad=bad) as workers:
         job = workers.ended(workers.submit("bad"))

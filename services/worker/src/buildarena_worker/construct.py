@@ -12,6 +12,8 @@ from buildarena_backend.catalog.prices import free_models, price_usd
 from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRequest
+from buildarena_backend.journal.transcript import ModelTurn
+from buildarena_backend.journal.turns import TurnResult, Turns
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.queue.queues import Queues
@@ -25,7 +27,8 @@ from buildarena_simulation import read_trajectory
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.budget_guard import BudgetGuard, Price
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
-from buildarena_worker.session.host import LiveHost, ReplayHost
+from buildarena_worker.session.host import JournalHost
+from buildarena_worker.session.requester import Requester
 from buildarena_worker.session.results import (
     BudgetExhausted,
     Diverged,
@@ -38,10 +41,39 @@ from buildarena_worker.session.results import (
     Suspended,
 )
 from buildarena_worker.session.session import Session
-from buildarena_worker.session.turn_keeper import TurnKeeper
 from buildarena_worker.sessions import Sessions
 
 JSON = "application/json"
+
+
+class TurnKeeper:
+    """Keeps each turn of a job once, however often its session is run again.
+
+    Args:
+        turns: Where turns are kept.
+        lease: The lease that the session runs under.
+        gate: Where the session gives up its place while the database writes.
+    """
+
+    def __init__(self, turns: Turns, lease: Lease, gate: ConcurrencyGate) -> None:
+        self._turns = turns
+        self._gate = gate
+        self._lease = lease
+        self._kept = 0 if lease.first else turns.count(lease.job.id)
+
+    def __call__(self, turn: ModelTurn, sequence: int) -> None:
+        """Keeps a turn, unless an earlier run of the session did."""
+        if turn.index < self._kept:
+            return
+        results = [(action.ok, action.reason, action.feedback) for action in turn.actions]
+        result = TurnResult(
+            index=turn.index,
+            sequence=sequence,
+            sub_structure=turn.sub_structure,
+            results=results,
+        )
+        with self._gate.released():
+            self._turns.append(self._lease, result)
 
 
 class ConstructHandler:
@@ -85,22 +117,21 @@ class ConstructHandler:
             result = self._sessions.run(job, session)
         self._move_on(active, session, result)
 
-    def _host(self, active: ActiveLease) -> LiveHost:
+    def _host(self, active: ActiveLease) -> JournalHost:
         lease, job = active.lease, active.lease.job
-        replay = ReplayHost(
+        return JournalHost(
             entries=[] if lease.first else self._store.journal.read(job.id),
             rollouts=[] if lease.first else self._store.rollouts.read(job.id),
             limits=job.limits,
             load_trajectory=lambda digest: read_trajectory(self._artifacts.get(digest)),
-        )
-        return LiveHost(
-            replay=replay,
-            client=self._clients.for_config(job.model_config),
-            journal=self._store.journal,
-            active=active,
-            guard=BudgetGuard(self._store.budgets, active, self._price_of(job)),
-            gate=self._gate,
-            owner=job.owner or "",
+            requester=Requester(
+                client=self._clients.for_config(job.model_config),
+                journal=self._store.journal,
+                active=active,
+                guard=BudgetGuard(self._store.budgets, active, self._price_of(job)),
+                gate=self._gate,
+                owner=job.owner or "",
+            ),
         )
 
     def _move_on(self, active: ActiveLease, session: Session, result: SessionResult) -> None:

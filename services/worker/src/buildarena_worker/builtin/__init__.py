@@ -12,8 +12,7 @@ from decimal import Decimal
 from buildarena_backend.errors import PermanentError
 from buildarena_backend.journal.journal import Usage
 from buildarena_worker.builtin import expert, idle, random_builder
-from buildarena_worker.session.messages import Completion, Request
-from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
+from buildarena_worker.session.messages import UNBOUNDED, Completion, Request, RequestOptions
 
 MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
 CHARACTERS_PER_TOKEN = 4

@@ -26,8 +26,13 @@ from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
 from buildarena_worker.providers.request_loop import RequestLoop
 from buildarena_worker.providers.throttle import Throttle
-from buildarena_worker.session.messages import ONE_REQUEST, Completion, Request
-from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
+from buildarena_worker.session.messages import (
+    ONE_REQUEST,
+    UNBOUNDED,
+    Completion,
+    Request,
+    RequestOptions,
+)
 
 log = structlog.get_logger(__name__)
 

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Coroutine
 from typing import Any, TypeVar
 
-from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
+from buildarena_worker.session.messages import UNBOUNDED, RequestOptions
 
 Result = TypeVar("Result")
 

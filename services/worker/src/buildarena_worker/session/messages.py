@@ -7,14 +7,16 @@ provider's or a library's does.
 from __future__ import annotations
 
 import json
+import math
+import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from buildarena_backend.ids import content_hash
 from buildarena_backend.journal.journal import JournalEntry, Usage
+from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_geometry import ToolDefinition
-from buildarena_worker.session.request_options import UNBOUNDED, RequestOptions
 
 ONE_REQUEST = Usage(requests=1)
 
@@ -139,6 +141,26 @@ class Completion:
             provider_request_id=entry.provider_request_id,
             sequence=entry.sequence,
         )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RequestOptions:
+    """What ends the wait for an answer; nothing by default.
+
+    Attributes:
+        within_s: The seconds that the job's limit leaves for it.
+        active: The lease that it is wanted under.
+        owner: Whose request it is; empty for the operator's.
+        sent: Set as soon as the request may cost something.
+    """
+
+    within_s: float = math.inf
+    active: ActiveLease | None = None
+    owner: str = ""
+    sent: threading.Event = field(default_factory=threading.Event)
+
+
+UNBOUNDED = RequestOptions()
 
 
 class ModelClient(Protocol):

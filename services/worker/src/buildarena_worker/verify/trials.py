@@ -90,7 +90,8 @@ class TrialVerifier:
         except (MachineNotSimulable, MachineNotPlayableError) as error:
             repeated, digest = failed_score(self.task, machine), None
             if isinstance(error, ControllerFailed):
-                kernels, failure = kernels_for(record)[0], str(error)
+                failure = str(error)
+                kernels = None if record.engine == BESIEGE else kernels_for(record)[0]
         else:
             repeated = score(self.task, machine, trajectory)
             digest = digest_of(_written_as(kept, trajectory))

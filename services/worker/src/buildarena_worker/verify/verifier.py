@@ -31,7 +31,7 @@ from buildarena_backend.trials.scoring import (
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score
 from buildarena_geometry import Machine
 from buildarena_simulation import read_trajectory
-from buildarena_worker.session.host import ReplayHost
+from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.results import Failed, Finished, LimitReached, Suspended
 from buildarena_worker.sessions import Sessions
 from buildarena_worker.verify.report import (
@@ -143,7 +143,7 @@ class Verifier:
     def _from_journal(self, stored: _Stored) -> _Rebuilt:
         """What a session built, run again with the stored replies."""
         job = stored.job
-        host = ReplayHost(
+        host = JournalHost(
             entries=self._store.journal.read(job.id),
             rollouts=stored.records,
             limits=job.limits,
