@@ -20,8 +20,12 @@ from buildarena_simulation import simulate
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.wiring import verification_runner
-from buildarena_worker.workflow.control import PROGRAM_TURNS
-from buildarena_worker.workflow.traces import MAX_ANSWERS, MAX_SENSES, rendered_piloting
+from buildarena_worker.workflow.control import (
+    MAX_ANSWERS,
+    MAX_SENSES,
+    PROGRAM_TURNS,
+    rendered_piloting,
+)
 
 TASK = "landing-1"
 FALLS = "function control() return {} end"

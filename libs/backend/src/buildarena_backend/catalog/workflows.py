@@ -33,22 +33,13 @@ class WorkflowSource:
     one_structure: bool = False
 
 
+_BUILTIN: Final = "buildarena_worker.workflow.builtin"
 BUILTIN: Final = (
+    WorkflowSource(name="five-role", place=_BUILTIN, class_name="FiveRole"),
     WorkflowSource(
-        name="five-role", place="buildarena_worker.workflow.five_role", class_name="FiveRole"
+        name="guidance-builder", place=_BUILTIN, class_name="GuidanceBuilder", one_structure=True
     ),
-    WorkflowSource(
-        name="guidance-builder",
-        place="buildarena_worker.workflow.guidance_builder",
-        class_name="GuidanceBuilder",
-        one_structure=True,
-    ),
-    WorkflowSource(
-        name="builder",
-        place="buildarena_worker.workflow.builder",
-        class_name="Builder",
-        one_structure=True,
-    ),
+    WorkflowSource(name="builder", place=_BUILTIN, class_name="Builder", one_structure=True),
 )
 DEFAULT_WORKFLOW: Final = BUILTIN[0].name
 

@@ -176,7 +176,7 @@ class Dialogue:
     def _hear(self, messages: list[Message], received: Sequence[str]) -> None:
         """Adds what was received; a role that spoke last and received nothing is told to go on."""
         if not received and messages[-1].role == "assistant":
-            received = [self._session.pack.say("go_on")]
+            received = [self._session.say("go_on")]
         if received:
             messages.append(Message(role="user", text="\n\n".join(received)))
 

@@ -82,6 +82,10 @@ class Session:
         statement = self.pack.statements.get(self.task.name, self.task.statement)
         return "\n\n".join([statement.strip(), *self._given, *self.additions])
 
+    def say(self, message: str, **values: str) -> str:
+        """One of the pack's messages about the task, with its places filled."""
+        return self.pack.say(message, task=self.task.name, **values)
+
     @property
     def _given(self) -> list[str]:
         """The machine that the task gives, as the tools tell it."""

@@ -73,9 +73,8 @@ def analyse(
     Returns:
         The advice, or its last text when it used up its turns.
     """
-    opening = session.pack.say(
+    opening = session.say(
         "analyse",
-        task=session.task.name,
         statement=session.statement,
         round=str(number),
         result=result,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
@@ -16,34 +16,32 @@ from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.feedback.modules import module_text
 from buildarena_geometry.feedback.words import point
 from buildarena_geometry.json_texts import read_json
+from buildarena_simulation import Piloting
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.controllers.pilot import named_in
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_worker.session.dialogue import Dialogue, Role
 from buildarena_worker.session.results import ConstructionFailedError
 from buildarena_worker.session.session import Session
-from buildarena_worker.workflow.traces import rendered_piloting, rendered_trace
 
 ATTEMPTS = 3
 """Attempts of a transport session; the best counts. Source: the paper's task details."""
 PROGRAM_TURNS = 5
 """Answers the controller may need for one attempt; an unreadable one costs a turn, not a trial."""
+STILL: Final = 0.02
+"""Closer than this to where it ends, it has stopped, units."""
+ROWS_PER_S: Final = 2
+MAX_SENSES: Final = 24
+MAX_ANSWERS: Final = 12
 _KEEP = re.compile(r"\A[\s*_`'\"]*KEEP[\s*_`'\".!]*\Z")
 """An answer that keeps the best trial instead of trying again."""
 _WHERE_PROGRAMS_STAND = "a program stands between a line of ```lua and one of ```"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Program:
-    """What the controller answered.
-
-    Attributes:
-        machine: The machine with it.
-        presses: The key presses; None where the machine has a controller, which acts in their
-            place.
-    """
-
-    machine: Machine
-    presses: Sequence[KeyPress] | None
+_Program = tuple[Machine, Sequence[KeyPress] | None]
+"""A machine with what the controller answered, and its key presses; None for a program, which acts
+in their place."""
 
 
 class _ProgramError(ValueError):
@@ -83,12 +81,12 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
             break
         if program is None:
             break
-        session.machine = program.machine
+        session.machine, presses = program
         session.tested = task.tests > 0
         last = attempt == attempts
         if task.tests and not last:
             session.tests_used += 1
-        record = session.host.simulate(program.machine, program.presses, final=final and last)
+        record = session.host.simulate(session.machine, presses, final=final and last)
         records.append(record)
         if not last:
             dialogue.remark(controller, _outcome(session, record, attempt))
@@ -97,18 +95,17 @@ def drive(session: Session, machine: Machine, *, final: bool) -> RolloutRecord:
 
 def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
     """The controller, and the dialogue in which it reads of a machine."""
-    pack, task = session.pack, session.task
-    opening = pack.say(
+    task = session.task
+    opening = session.say(
         "control",
-        task=task.name,
         statement=session.statement,
-        plan=session.plan or pack.say("no_plan"),
+        plan=session.plan or session.say("no_plan"),
         machine=_unpowered(machine),
         powered=_powered(machine),
         modules=driven_modules(session, machine),
     )
     if task.takes_programs:
-        opening += "\n\n" + pack.say(
+        opening += "\n\n" + session.say(
             "control_programs",
             contract=programs_told(task),
             mass=f"{float(machine.mass):g}",
@@ -116,9 +113,9 @@ def _dialogue(session: Session, machine: Machine) -> tuple[Dialogue, Role]:
         )
     if task.tests:
         left = task.tests - session.tests_used
-        opening += "\n\n" + pack.say("control_tests", tests=str(left))
+        opening += "\n\n" + session.say("control_tests", tests=str(left))
     dialogue = Dialogue(session, phase="control", opening=opening)
-    return dialogue, Role(name="controller", system=pack.roles["controller"])
+    return dialogue, Role(name="controller", system=session.pack.roles["controller"])
 
 
 def _succeeded(records: Sequence[RolloutRecord]) -> bool:
@@ -130,7 +127,7 @@ def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
     frame = "control_success" if _succeeded([record]) else "control_again"
     tests = session.task.tests
     trajectory = session.host.trajectory(record)
-    said = session.pack.say(
+    said = session.say(
         "control_tested" if tests else frame,
         trial=str(attempt),
         trials=str(tests or ATTEMPTS),
@@ -141,7 +138,7 @@ def _outcome(session: Session, record: RolloutRecord, attempt: int) -> str:
     if trajectory is None or trajectory.piloting is None or session.machine is None:
         return said
     table = rendered_piloting(trajectory.piloting, session.machine.controller)
-    return f"{said}\n\n{session.pack.say('program_trace', trace=table)}"
+    return f"{said}\n\n{session.say('program_trace', trace=table)}"
 
 
 def driven_modules(session: Session, machine: Machine) -> str:
@@ -175,7 +172,7 @@ def _program(
             return _read_answer(machine, text, programs=session.task.takes_programs)
         except _ProgramError as unusable:
             error = unusable
-            dialogue.remark(controller, session.pack.say("program_again", error=str(error)))
+            dialogue.remark(controller, session.say("program_again", error=str(error)))
     raise error
 
 
@@ -216,7 +213,7 @@ def _read_answer(machine: Machine, text: str, *, programs: bool) -> _Program:
         outcome = driven.act("set_controller", {"program": written})
         if not outcome.ok:
             raise _ProgramError(outcome.text)
-        return _Program(machine=driven, presses=None)
+        return driven, None
     try:
         return _read_keys(driven, text)
     except _ProgramError as error:
@@ -261,7 +258,7 @@ def _read_keys(driven: Machine, text: str) -> _Program:
         outcome = driven.act("add_control_sequence", _press(press))
         if not outcome.ok:
             raise _ProgramError(f"control_sequence[{index}]: {outcome.text}")
-    return _Program(machine=driven, presses=driven.control_sequence)
+    return driven, driven.control_sequence
 
 
 def _binding(entry: object) -> tuple[object, object, list[object]]:
@@ -292,3 +289,43 @@ def _json_object(text: str) -> dict[str, Any]:
     if not isinstance(data, dict):
         raise _ProgramError("the answer must be one JSON object")
     return data
+
+
+def rendered_trace(trace: Sequence[Sequence[float]]) -> str:
+    """Rows of time and position; where nothing moves any more, one line says so.
+
+    Args:
+        trace: Rows of time, seconds, and x, y, z, units.
+    """
+    moving = len(trace)
+    while moving > 1 and math.dist(trace[moving - 2][1:], trace[-1][1:]) < STILL:
+        moving -= 1
+    rows = [", ".join(f"{value:.2f}" for value in row) for row in trace[:moving]]
+    if moving < len(trace):
+        rows.append(f"It stays there until {trace[-1][0]:g} s.")
+    return "\n".join(rows) or "(none)"
+
+
+def rendered_piloting(piloting: Piloting, program: str) -> str:
+    """A table of what a program sensed and asked for, twice a second.
+
+    Of senses those are in it whose names the program has in its text, the first ones where they
+    are many.
+
+    Args:
+        piloting: What it sensed and asked for.
+        program: Its text.
+    """
+    named = named_in(program, piloting.sense_names)[:MAX_SENSES]
+    senses = [piloting.sense_names.index(name) for name in named]
+    heads = ["t", *named, *piloting.action_names[:MAX_ANSWERS]]
+    rows = []
+    ticks = len(piloting.answers) - 1
+    for k in range(ticks):
+        tick = round(k * SAMPLE_RATE_HZ / ROWS_PER_S)
+        if tick >= ticks:
+            break
+        figures = [*piloting.senses[tick, senses], *piloting.answers[tick, :MAX_ANSWERS]]
+        told = ", ".join(f"{value:.2f}" for value in figures)
+        rows.append(f"{tick / SAMPLE_RATE_HZ:g}, {told}")
+    return "\n".join([", ".join(heads), *rows])

@@ -46,16 +46,10 @@ def plan_phase(session: Session) -> Plan:
     Raises:
         ConstructionFailedError: No usable plan within the turns.
     """
-    pack, task = session.pack, session.task
-    limits = task.constraints
-    opening = pack.say(
-        "plan",
-        task=task.name,
-        statement=session.statement,
-        modules=modules_of(session),
-    )
+    limits = session.task.constraints
+    opening = session.say("plan", statement=session.statement, modules=modules_of(session))
     dialogue = Dialogue(session, phase="plan", opening=opening)
-    planner = looking_up(session, Role(name="planner", system=pack.roles["planner"]))
+    planner = looking_up(session, Role(name="planner", system=session.pack.roles["planner"]))
     error = PlanError("nothing was said")
     for _ in range(PLAN_TURNS):
         text = speak(dialogue, planner).text
@@ -64,7 +58,7 @@ def plan_phase(session: Session) -> Plan:
             _check_plan(plan, limits.min_sub_structures, limits.max_sub_structures)
         except PlanError as unusable:
             error = unusable
-            dialogue.remark(planner, pack.say("plan_again", error=str(error)))
+            dialogue.remark(planner, session.say("plan_again", error=str(error)))
         else:
             session.plan = plan.text
             return plan
@@ -91,10 +85,8 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
     Raises:
         ConstructionFailedError: An objection, or no agreement within the turn limit.
     """
-    pack, task = session.pack, session.task
-    opening = pack.say(
+    opening = session.say(
         "draft",
-        task=task.name,
         statement=session.statement,
         modules=planned_modules(session, f"{plan.text}\n{part.text}"),
         plan=plan.text,
@@ -102,15 +94,15 @@ def draft_phase(session: Session, plan: Plan, part: SubStructure) -> str:
         sub_structure=part.text,
     )
     dialogue = Dialogue(session, phase="draft", opening=opening, sub_structure=part.name)
-    drafter = looking_up(session, Role(name="drafter", system=pack.roles["drafter"]))
+    drafter = looking_up(session, Role(name="drafter", system=session.pack.roles["drafter"]))
     reviewer = looking_up(
-        session, Role(name="reviewer", system=pack.roles["reviewer"], tools=[OBJECTION])
+        session, Role(name="reviewer", system=session.pack.roles["reviewer"], tools=[OBJECTION])
     )
     for turn in range(DRAFT_TURNS):
         if turn % 2 == 0:
             speak(dialogue, drafter)
         elif terminates(speak(dialogue, reviewer)):
-            dialogue.remark(drafter, pack.say("blueprint", name=part.name))
+            dialogue.remark(drafter, session.say("blueprint", name=part.name))
             return speak(dialogue, drafter).text
     raise ConstructionFailedError(
         "turn_limit", f"no agreed drawing of {part.name} within {DRAFT_TURNS} turns"
@@ -132,11 +124,10 @@ def build_phase(
         ConstructionFailedError: An objection, or the turn limit.
     """
     machine = session.new_machine()
-    pack, task = session.pack, session.task
-    opening = pack.say("build", task=task.name, name=part.name)
-    brief = pack.say(
+    task = session.task
+    opening = session.say("build", name=part.name)
+    brief = session.say(
         "guide_build",
-        task=task.name,
         name=part.name,
         blueprint=blueprint,
         modules=modules or parts_of(task, f"{part.text}\n{blueprint}"),
@@ -159,13 +150,12 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
     """
     if not any(block.module.spins for block in machine.blocks.values()):
         return machine
-    pack, task = session.pack, session.task
+    task = session.task
     refined = machine.copy()
     summary = machine.act("get_machine_summary", {}).text
-    opening = pack.say("refine", task=task.name, name=part.name, summary=summary)
-    brief = pack.say(
+    opening = session.say("refine", name=part.name, summary=summary)
+    brief = session.say(
         "guide_refine",
-        task=task.name,
         name=part.name,
         blueprint=blueprint,
         summary=summary,
@@ -189,16 +179,15 @@ def refine_phase(session: Session, machine: Machine, part: SubStructure, bluepri
 def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]) -> Machine:
     """Lets builder and guidance put the sub-structures together."""
     assembly = session.new_machine(machines)
-    pack, task = session.pack, session.task
+    task = session.task
     parts = "\n\n".join(
         f"### {name}\n\n{machine.act('get_machine_summary', {}).text}"
         for name, machine in machines.items()
     )
     connectors = ", ".join(connectors_of(task))
-    opening = pack.say("assemble", task=task.name, parts=", ".join(machines), connectors=connectors)
-    brief = pack.say(
+    opening = session.say("assemble", parts=", ".join(machines), connectors=connectors)
+    brief = session.say(
         "guide_assemble",
-        task=task.name,
         statement=session.statement,
         plan=plan.text,
         sub_structures=parts,
@@ -213,18 +202,12 @@ def assemble_phase(session: Session, plan: Plan, machines: Mapping[str, Machine]
 
 def solo_phase(session: Session) -> Machine:
     """Lets one role design and build alone."""
-    pack, task = session.pack, session.task
-    machine = session.new_machine()
-    opening = pack.say(
-        "build_solo",
-        task=task.name,
-        statement=session.statement,
-        modules=modules_of(session),
-    )
+    task, machine = session.task, session.new_machine()
+    opening = session.say("build_solo", statement=session.statement, modules=modules_of(session))
     dialogue = Dialogue(session, phase="build", opening=opening)
     role = Role(
         name="builder",
-        system=pack.roles["solo"],
+        system=session.pack.roles["solo"],
         tools=[*tools_named(building(task)), *lookups(task), OBJECTION],
         act=session.acting(machine),
     )
@@ -292,3 +275,13 @@ def _alternate(dialogue: Dialogue, roles: Sequence[Role], *, ends: Role, what: s
 def steps_in(text: str) -> int:
     """How many steps a role is given: the lines with a number before them, or one."""
     return max(1, min(len(_STEP.findall(text)), MAX_STEPS))
+
+
+def require_started(machine: Machine) -> None:
+    """Checks that there is a machine to go on with.
+
+    Raises:
+        ConstructionFailedError: Nothing was started.
+    """
+    if not machine.started:
+        raise ConstructionFailedError("empty_machine", "no machine was started")

@@ -7,10 +7,25 @@ import importlib.util
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
+from typing import Protocol
 
 from buildarena_backend.catalog.workflows import WorkflowSource, workflow_sources
 from buildarena_backend.errors import PermanentError, StartupError
-from buildarena_worker.workflow.base import Workflow
+from buildarena_geometry import Machine
+from buildarena_worker.session.session import Session
+
+
+class Workflow(Protocol):
+    """A way to build. It may use the session only, so that a replay does the same again."""
+
+    name: str
+
+    def build(self, session: Session) -> Machine:
+        """Builds the machine of the session's task.
+
+        Raises:
+            ConstructionFailedError: The model gave up or broke the rules.
+        """
 
 
 class Workflows:

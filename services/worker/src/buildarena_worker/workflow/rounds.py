@@ -11,15 +11,19 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TypeVar
 
+from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
+from buildarena_benchmark import Task, builtin_tasks
 from buildarena_geometry import Machine
+from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.session.results import Failed, Finished, SessionEnded, SessionResult
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.analyst import analyse
-from buildarena_worker.workflow.base import Workflow
 from buildarena_worker.workflow.control import drive
-from buildarena_worker.workflow.examples import example_for
+from buildarena_worker.workflow.registry import Workflow
+
+EXAMPLE_SEED = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +60,7 @@ def run_session(session: Session, workflow: Workflow, loop: Loop) -> SessionResu
             if session.tested:
                 return failure  # another round would begin with as many test trials again
             session.additions.append(
-                session.pack.say("round_failed", round=str(number), reason=failure.detail)
+                session.say("round_failed", round=str(number), reason=failure.detail)
             )
             continue
         if not isinstance(played, _Round):
@@ -102,7 +106,26 @@ def _one_round(session: Session, workflow: Workflow, *, final: bool) -> _Round:
 def _report(session: Session, played: _Round, number: int, loop: Loop) -> None:
     """Adds a failed round's result, and the analyst's advice, to what the next round reads."""
     result = session.told(played.record, session.host.trajectory(played.record))
-    session.additions.append(session.pack.say("round_result", round=str(number), result=result))
+    session.additions.append(session.say("round_result", round=str(number), result=result))
     if loop.analyst:
         advice = analyse(session, played.machine, played.record, number=number, result=result)
-        session.additions.append(session.pack.say("advice", round=str(number), advice=advice))
+        session.additions.append(session.say("advice", round=str(number), advice=advice))
+
+
+def example_for(task: Task, pack: PromptPack) -> str:
+    """An example of the task's kind: the expert's design for the first level of its category.
+
+    A task of a category of its own gets the example of the first other task that is scored like it,
+    and the first example of all if none is.
+    """
+    name = f"{task.category}-1"
+    if name not in DESIGNS:
+        others = [name for name in DESIGNS if name != task.name]
+        alike = [name for name in others if builtin_tasks()[name].scorer == task.scorer]
+        name = next(iter(alike or DESIGNS))
+    part = next(iter(DESIGNS[name](EXAMPLE_SEED).parts.values()))
+    actions = "\n".join(
+        f"{number}. {action}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
+        for number, (action, arguments) in enumerate(part.actions, start=1)
+    )
+    return pack.say("example", example_task=name, actions=actions)
