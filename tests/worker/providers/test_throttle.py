@@ -14,7 +14,7 @@ import pytest
 from redis import Redis
 
 from buildarena_worker.providers import throttle as throttle_module
-from buildarena_worker.providers.request_loop import RequestLoop
+from buildarena_worker.providers.provider import RequestLoop
 from buildarena_worker.providers.throttle import Throttle
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from decimal import Decimal
 from typing import assert_never
 
@@ -17,7 +18,6 @@ from buildarena_backend.journal.turns import TurnResult, Turns
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.active_lease import ActiveLease
 from buildarena_backend.queue.queues import Queues
-from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import AttemptResult, JobState, Outcome, Stage, simulate_queue
 from buildarena_backend.store import Store
 from buildarena_backend.trials.scoring import failure_score
@@ -65,21 +65,21 @@ class TurnKeeper:
         """Keeps a turn, unless an earlier run of the session did."""
         if turn.index < self._kept:
             return
-        results = [(action.ok, action.reason, action.feedback) for action in turn.actions]
         result = TurnResult(
             index=turn.index,
             sequence=sequence,
             sub_structure=turn.sub_structure,
-            results=results,
+            results=[(action.ok, action.reason, action.feedback) for action in turn.actions],
         )
         with self._gate.released():
             self._turns.append(self._lease, result)
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ConstructHandler:
     """Runs construction sessions.
 
-    Args:
+    Attributes:
         store: Where jobs and journals are.
         artifacts: Where machines, transcripts and trajectories are.
         queues: Where simulators are notified.
@@ -89,47 +89,36 @@ class ConstructHandler:
         gate: Lets few sessions work at once.
     """
 
-    def __init__(
-        self,
-        *,
-        store: Store,
-        artifacts: ArtifactStore,
-        queues: Queues,
-        registry: ModelRegistry,
-        clients: ModelClients,
-        sessions: Sessions,
-        gate: ConcurrencyGate,
-    ) -> None:
-        self._store = store
-        self._artifacts = artifacts
-        self._queues = queues
-        self._registry = registry
-        self._clients = clients
-        self._sessions = sessions
-        self._gate = gate
+    store: Store
+    artifacts: ArtifactStore
+    queues: Queues
+    registry: ModelRegistry
+    clients: ModelClients
+    sessions: Sessions
+    gate: ConcurrencyGate
 
     def __call__(self, active: ActiveLease) -> None:
         """Runs the job's session as far as it gets: to a simulation, or to its end."""
         job = active.lease.job
-        keeper = TurnKeeper(self._store.turns, active.lease, self._gate)
-        session = self._sessions.begin(job, self._host(active), keeper)
-        with self._gate.acquired():
-            result = self._sessions.run(job, session)
+        keeper = TurnKeeper(self.store.turns, active.lease, self.gate)
+        session = self.sessions.begin(job, self._host(active), keeper)
+        with self.gate.acquired():
+            result = self.sessions.run(job, session)
         self._move_on(active, session, result)
 
     def _host(self, active: ActiveLease) -> JournalHost:
         lease, job = active.lease, active.lease.job
         return JournalHost(
-            entries=[] if lease.first else self._store.journal.read(job.id),
-            rollouts=[] if lease.first else self._store.rollouts.read(job.id),
+            entries=[] if lease.first else self.store.journal.read(job.id),
+            rollouts=[] if lease.first else self.store.rollouts.read(job.id),
             limits=job.limits,
-            load_trajectory=lambda digest: read_trajectory(self._artifacts.get(digest)),
+            load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
             requester=Requester(
-                client=self._clients.for_config(job.model_config),
-                journal=self._store.journal,
+                client=self.clients.for_config(job.model_config),
+                journal=self.store.journal,
                 active=active,
-                guard=BudgetGuard(self._store.budgets, active, self._price_of(job)),
-                gate=self._gate,
+                guard=BudgetGuard(self.store.budgets, active, self._price_of(job)),
+                gate=self.gate,
                 owner=job.owner or "",
             ),
         )
@@ -158,7 +147,7 @@ class ConstructHandler:
                 assert_never(result)
 
     def _price_of(self, job: Job) -> Price:
-        entry = self._registry.models.get(job.model)
+        entry = self.registry.models.get(job.model)
 
         def price(input_tokens: int, output_tokens: int) -> Decimal:
             if entry is None:
@@ -171,8 +160,8 @@ class ConstructHandler:
 
     def _hand_back(self, lease: Lease, shortage: Shortage) -> None:
         """Hands the job back as it is and stops the sweep whose budget is exhausted."""
-        with self._store.lifecycle.command() as connection:
-            self._store.leases.advance(
+        with self.store.lifecycle.command() as connection:
+            self.store.leases.advance(
                 lease,
                 to=JobState.QUEUED,
                 connection=connection,
@@ -181,16 +170,15 @@ class ConstructHandler:
                 detail=shortage.detail,
             )
             # Dollars that are used up keep nobody from what costs none.
-            free = free_models(self._registry) if shortage.limit == "max_cost_usd" else ()
-            self._store.lifecycle.exhaust(
+            free = free_models(self.registry) if shortage.limit == "max_cost_usd" else ()
+            self.store.lifecycle.exhaust(
                 shortage.budget_id, shortage.detail, connection=connection, free_models=free
             )
 
     def _suspend(self, lease: Lease, session: Session, suspended: Suspended) -> None:
         """Keeps the machine and hands the job to its simulator, all in one transaction."""
-        job = lease.job
-        machine = self._artifacts.put(machine_bytes(suspended.machine), JSON)
-        transcript = self._artifacts.put(session.transcript.to_json(), JSON)
+        job, machine = lease.job, self.artifacts.put(machine_bytes(suspended.machine), JSON)
+        made = {**self._made(session), "machine": machine}
         engine = str(job.track_config["simulator"])
         controls = None
         if suspended.controls is not None:
@@ -206,18 +194,14 @@ class ConstructHandler:
             controls=controls,
         )
         queue = simulate_queue(engine)
-        with self._store.database.transaction() as connection:
-            made = {"machine": machine, "transcript": transcript}
-            self._store.results.attach(job.id, made, connection=connection)
-            self._store.rollouts.request(job.id, request, connection=connection)
-            self._store.leases.queue_again(
-                lease,
-                stage=Stage.SIMULATE,
-                queue=queue,
-                connection=connection,
-                **_counts(session),
+        with self.store.database.transaction() as connection:
+            self.store.results.attach(job.id, made, connection=connection)
+            self.store.rollouts.request(job.id, request, connection=connection)
+            counts = _counts(session)
+            self.store.leases.queue_again(
+                lease, stage=Stage.SIMULATE, queue=queue, connection=connection, **counts
             )
-        self._queues.wake(queue)
+        self.queues.wake(queue)
 
     def _fail(
         self, lease: Lease, session: Session, outcome: Outcome, reason: str, detail: str
@@ -226,35 +210,28 @@ class ConstructHandler:
         score = failure_score(
             lease.job, session.task, session.machine, outcome=outcome, reason=reason, detail=detail
         )
-        self._write_end(lease, session, score)
+        made = self._made(session)
+        with self.store.database.transaction() as connection:
+            self.store.results.attach(lease.job.id, made, connection=connection)
+            self.store.results.finish(lease, score, connection=connection, **_counts(session))
 
     def _finish(self, lease: Lease, session: Session) -> None:
         """Ends a session whose machine was tried; its job may have varied worlds before it."""
-        made, records = self._made(session), self._store.rollouts.read(lease.job.id)
-        with self._store.database.transaction() as connection:
-            self._store.results.attach(lease.job.id, made, connection=connection)
+        made, records = self._made(session), self.store.rollouts.read(lease.job.id)
+        with self.store.database.transaction() as connection:
+            self.store.results.attach(lease.job.id, made, connection=connection)
+            counts, task = _counts(session), session.task
             queue = finish_or_vary(
-                self._store,
-                lease,
-                records,
-                task=session.task,
-                connection=connection,
-                **_counts(session),
+                self.store, lease, records, task=task, connection=connection, **counts
             )
         if queue is not None:
-            self._queues.wake(queue)
-
-    def _write_end(self, lease: Lease, session: Session, score: JobScore) -> None:
-        made = self._made(session)
-        with self._store.database.transaction() as connection:
-            self._store.results.attach(lease.job.id, made, connection=connection)
-            self._store.results.finish(lease, score, connection=connection, **_counts(session))
+            self.queues.wake(queue)
 
     def _made(self, session: Session) -> dict[str, ArtifactInfo]:
         """What a session ends with, kept."""
-        made = {"transcript": self._artifacts.put(session.transcript.to_json(), JSON)}
+        made = {"transcript": self.artifacts.put(session.transcript.to_json(), JSON)}
         if session.machine is not None and session.machine.started:
-            made["machine"] = self._artifacts.put(machine_bytes(session.machine), JSON)
+            made["machine"] = self.artifacts.put(machine_bytes(session.machine), JSON)
         return made
 
 

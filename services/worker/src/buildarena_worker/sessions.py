@@ -10,6 +10,7 @@ from buildarena_backend.catalog.tracks import has_data_sheets, worlds_of
 from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.trials.scoring import task_of
+from buildarena_benchmark.environment.briefing import worlds_told
 from buildarena_worker.session.host import SessionHost
 from buildarena_worker.session.results import SessionResult
 from buildarena_worker.session.session import OnTurn, Session
@@ -37,6 +38,7 @@ class Sessions:
         Raises:
             PermanentError: Its task or its prompts have changed, or are not on this worker.
         """
+        worlds = worlds_of(job.track_config)
         return Session(
             task=task_of(job, self.tasks),
             seed=job.seed,
@@ -45,7 +47,7 @@ class Sessions:
             host=host,
             on_turn=on_turn,
             data_sheets=has_data_sheets(job.track_config),
-            worlds=worlds_of(job.track_config),
+            additions=[worlds_told(worlds)] if worlds else [],
         )
 
     def run(self, job: Job, session: Session) -> SessionResult:

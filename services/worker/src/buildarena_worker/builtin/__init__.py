@@ -11,10 +11,16 @@ from decimal import Decimal
 
 from buildarena_backend.errors import PermanentError
 from buildarena_backend.journal.journal import Usage
-from buildarena_worker.builtin import expert, idle, random_builder
+from buildarena_worker.builtin import expert, random_builder
 from buildarena_worker.session.messages import UNBOUNDED, Completion, Request, RequestOptions
 
-MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": idle.reply}
+
+def _idle(_: Request) -> Completion:
+    """Ends whatever it is asked to do: its scores are the floor."""
+    return Completion(text="TERMINATE")
+
+
+MODELS = {"expert": expert.reply, "random": random_builder.reply, "idle": _idle}
 CHARACTERS_PER_TOKEN = 4
 """A common rule of thumb for English text; built-in models have no tokenizer."""
 

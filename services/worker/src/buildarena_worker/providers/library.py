@@ -140,14 +140,12 @@ def _request_part(message: Message) -> ModelRequestPart:
 
 
 def _response_parts(message: Message) -> list[ModelResponsePart]:
-    parts: list[ModelResponsePart] = []
-    if message.text:
-        parts.append(TextPart(content=message.text))
-    parts += [
+    text = [TextPart(content=message.text)] if message.text else []
+    calls = [
         ToolCallPart(tool_name=call.name, args=call.arguments_json, tool_call_id=call.id)
         for call in message.calls
     ]
-    return parts
+    return [*text, *calls]
 
 
 def request_parameters(tools: Sequence[ToolDefinition]) -> ModelRequestParameters:

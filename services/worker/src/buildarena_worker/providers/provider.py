@@ -10,9 +10,11 @@ import asyncio
 import math
 import os
 import random
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Coroutine, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import structlog
 
@@ -24,7 +26,6 @@ from buildarena_backend.secret_files import SUFFIX, SecretFileError, read_secret
 from buildarena_backend.telemetry.tracing import ERROR_TYPE, note
 from buildarena_worker.providers.failures import Failure, ProviderError
 from buildarena_worker.providers.registry import sender_for
-from buildarena_worker.providers.request_loop import RequestLoop
 from buildarena_worker.providers.throttle import Throttle
 from buildarena_worker.session.messages import (
     ONE_REQUEST,
@@ -40,6 +41,59 @@ OUTAGE_DELAY_S = 30.0
 """How long a job waits after its provider failed through all retries."""
 OWN_FAILURES = frozenset({Failure.CONTEXT_OVERFLOW, Failure.CONTENT_FILTER})
 """Failures that count as the model's: it is scored for them, and they are not retried."""
+
+Result = TypeVar("Result")
+
+
+class RequestLoop:
+    """An event loop in a thread of its own, started by the first of many threads that need it."""
+
+    def __init__(self) -> None:
+        self._loop: asyncio.AbstractEventLoop | None = None
+        # Sessions start all at once. Without it several of them make a loop each, and clients
+        # fail because their locks belong to another loop.
+        self._starting = threading.Lock()
+
+    def run(self, work: Coroutine[Any, Any, Result], options: RequestOptions = UNBOUNDED) -> Result:
+        """The result of work on the loop; the calling thread waits for it.
+
+        Args:
+            work: What is to be done.
+            options: The lease that it is done under, and whether it may cost something by now.
+
+        Raises:
+            CancelledError: The lease was lost, and the work ended at once, wherever it waited; or
+                its worker stops, and nothing had been sent yet.
+        """
+        loop, active = self._started(), options.active
+        if active is None:
+            return asyncio.run_coroutine_threadsafe(work, loop).result()
+        begun: asyncio.Future[asyncio.Task[Result]] = asyncio.Future(loop=loop)
+
+        async def run() -> Result:
+            task = asyncio.ensure_future(work)
+            begun.set_result(task)
+            return await task
+
+        async def give_up() -> None:
+            # Here nothing is sent between the question and the end.
+            task = await begun
+            if active.lost or not options.sent.is_set():
+                task.cancel()
+
+        future = asyncio.run_coroutine_threadsafe(run(), loop)
+        with active.calling(lambda: asyncio.run_coroutine_threadsafe(give_up(), loop)):
+            return future.result()
+
+    def _started(self) -> asyncio.AbstractEventLoop:
+        with self._starting:
+            if self._loop is None:
+                self._loop = asyncio.new_event_loop()
+                threading.Thread(
+                    target=self._loop.run_forever, name="model-requests", daemon=True
+                ).start()
+            return self._loop
+
 
 REQUESTS = RequestLoop()
 

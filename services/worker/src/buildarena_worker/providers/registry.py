@@ -1,8 +1,9 @@
 """The protocols of providers by name: each folder here, and other distributions'.
 
-A protocol's module `sender` has `create_sender`. A distribution adds a protocol by an entry point
-in the group `buildarena.providers`, which names such a module. Each is imported when a model needs
-it.
+A protocol's module `sender` has `create_sender`, which makes the sender of a model from its entry,
+its provider's and the API key, "none" where the provider needs none. A distribution adds a protocol
+by an entry point in the group `buildarena.providers`, which names such a module. Each is imported
+when a model needs it.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib import import_module, metadata
 from types import MappingProxyType
-from typing import Final, Protocol, cast
+from typing import Final, Protocol
 
 from buildarena_backend.catalog.models import (
     BUILTIN_PROTOCOL,
@@ -39,19 +40,6 @@ class Sender(Protocol):
 
     async def close(self) -> None:
         """Closes the connections."""
-
-
-class SenderModule(Protocol):
-    """What the registry wants of a protocol's module."""
-
-    def create_sender(self, entry: ModelEntry, provider: ProviderEntry, key: str) -> Sender:
-        """The sender of a model.
-
-        Args:
-            entry: The model.
-            provider: How its provider is reached.
-            key: The API key; "none" where the provider needs none.
-        """
 
 
 @cache
@@ -91,4 +79,5 @@ def sender_for(entry: ModelEntry, provider: ProviderEntry, key: str) -> Sender:
             f"this worker does not speak the protocol {provider.protocol!r}",
             reason="unknown_protocol",
         )
-    return cast("SenderModule", import_module(module)).create_sender(entry, provider, key)
+    sender: Sender = import_module(module).create_sender(entry, provider, key)
+    return sender

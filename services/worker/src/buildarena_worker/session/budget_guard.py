@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from decimal import Decimal
 
 from buildarena_backend.accounts.budgets import Budgets, Need, Shortage
@@ -34,20 +35,20 @@ def require_open(active: ActiveLease) -> None:
         raise SessionEnded(Drained())
 
 
+@dataclass(frozen=True, slots=True)
 class BudgetGuard:
     """Reserves the means of one job's requests.
 
-    Args:
+    Attributes:
         budgets: Where budgets are.
         active: The lease on the job. A budget that its sweep is given meanwhile takes effect with
             the next heartbeat.
         price: What tokens of the job's model cost.
     """
 
-    def __init__(self, budgets: Budgets, active: ActiveLease, price: Price) -> None:
-        self._budgets = budgets
-        self._active = active
-        self._price = price
+    budgets: Budgets
+    active: ActiveLease
+    price: Price
 
     def reserve(self, request: Request) -> None:
         """Reserves what a request may cost; waits while open requests may give back enough.
@@ -55,27 +56,27 @@ class BudgetGuard:
         Raises:
             SessionEnded: No budget is left for it, or the lease is over.
         """
-        if not self._active.budgeted:
+        if not self.active.budgeted:
             return
         need = self._need(request)
         while (shortage := self._reserved(need)) is not None:
             if not shortage.temporary:
                 raise SessionEnded(BudgetExhausted(shortage=shortage))
-            require_open(self._active)
-            self._active.wait(WAIT_S)
+            require_open(self.active)
+            self.active.wait(WAIT_S)
 
     def sent(self, request: Request) -> Usage:
         """What a request that was broken off cost, as far as can be said: what was sent."""
         tokens = _sent_tokens(request)
-        return Usage(requests=1, input_tokens=tokens, cost_usd=self._price(tokens, 0))
+        return Usage(requests=1, input_tokens=tokens, cost_usd=self.price(tokens, 0))
 
     def charge_lost(self, usage: Usage) -> None:
         """Counts a reply that was paid for but came after the lease had ended."""
-        self._budgets.charge_lost(self._active.lease, usage)
+        self.budgets.charge_lost(self.active.lease, usage)
 
     def _reserved(self, need: Need) -> Shortage | None:
         try:
-            return self._budgets.reserve(self._active.lease, need)
+            return self.budgets.reserve(self.active.lease, need)
         except StaleLeaseError as stale:
             raise SessionEnded(Superseded()) from stale
 
@@ -83,7 +84,7 @@ class BudgetGuard:
         given = request.model_config["decoding"].get("max_tokens")
         output = OUTPUT_TOKENS if given is None else int(given)
         sent = _sent_tokens(request)
-        return Need(cost_usd=self._price(sent, output), tokens=sent + output)
+        return Need(cost_usd=self.price(sent, output), tokens=sent + output)
 
 
 def _sent_tokens(request: Request) -> int:

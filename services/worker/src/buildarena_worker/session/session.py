@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
 from buildarena_benchmark import Score, Task, broken_constraint
-from buildarena_benchmark.environment.briefing import catalogue_told, worlds_told
+from buildarena_benchmark.environment.briefing import catalogue_told
 from buildarena_benchmark.environment.given import acting
 from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Catalogue, Machine, Outcome, ToolDefinition
@@ -29,10 +30,11 @@ MAX_CONVERSATION = 2_000_000
 conversations fit into its memory."""
 
 
+@dataclass(slots=True, kw_only=True, eq=False)
 class Session:
     """The state that a workflow's steps share.
 
-    Args:
+    Attributes:
         task: What is to be built.
         seed: The job's seed.
         model_config: The job's model configuration.
@@ -40,41 +42,26 @@ class Session:
         host: Where answers come from.
         on_turn: Takes every turn, those of stored replies included.
         data_sheets: Whether roles are told the numbers of modules and world.
-        worlds: In how many varied worlds what is built is scored.
-
-    Attributes:
         additions: What follows the task's statement: varied worlds, an example, results of rounds.
         machine: What is being built.
+        plan: What the plan says of the whole machine, "" without one.
         tested: Whether a trial of a task with test trials was asked for.
         tests_used: The test trials that were.
-        plan: What the plan says of the whole machine, "" without one.
     """
 
-    def __init__(
-        self,
-        *,
-        task: Task,
-        seed: int,
-        model_config: Mapping[str, Any],
-        pack: PromptPack,
-        host: SessionHost,
-        on_turn: OnTurn | None = None,
-        data_sheets: bool = True,
-        worlds: int = 0,
-    ) -> None:
-        self.task = task
-        self.data_sheets = data_sheets
-        self.seed = seed
-        self.pack = pack
-        self.host = host
-        self.transcript = Transcript()
-        self.additions = [worlds_told(worlds)] if worlds else []
-        self.machine: Machine | None = None
-        self.plan = ""
-        self.tested = False
-        self.tests_used = 0
-        self._model_config = model_config
-        self._on_turn = on_turn
+    task: Task
+    seed: int
+    model_config: Mapping[str, Any]
+    pack: PromptPack
+    host: SessionHost
+    on_turn: OnTurn | None = None
+    data_sheets: bool = True
+    additions: list[str] = field(default_factory=list)
+    transcript: Transcript = field(default_factory=Transcript)
+    machine: Machine | None = None
+    plan: str = ""
+    tested: bool = False
+    tests_used: int = 0
 
     @property
     def statement(self) -> str:
@@ -144,7 +131,7 @@ class Session:
                 f"the {role}'s conversation is longer than {MAX_CONVERSATION:,} characters",
             )
         request = Request(
-            model_config=self._model_config,
+            model_config=self.model_config,
             messages=messages,
             tools=tools,
             seed=self.seed,
@@ -194,8 +181,8 @@ class Session:
             tries=completion.attempts,
         )
         self.transcript.turns.append(turn)
-        if self._on_turn is not None:
-            self._on_turn(turn, completion.sequence)
+        if self.on_turn is not None:
+            self.on_turn(turn, completion.sequence)
 
     def breaks_rules(self, machine: Machine) -> bool:
         """Whether a machine breaks one of the task's constraints."""

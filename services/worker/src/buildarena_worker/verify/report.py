@@ -19,13 +19,7 @@ from buildarena_simulation.controllers.program import blames_clock
 
 SCORED: Final = ("success", "indicator", "metrics", "flags")
 """Figures of a score that are compared."""
-_COUNTED: Final = (
-    "requests",
-    "input_tokens",
-    "output_tokens",
-    "cached_tokens",
-    "reasoning_tokens",
-)
+_TOKENS: Final = ("input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
 
 
 class NotRepeatableError(Exception):
@@ -126,7 +120,9 @@ def score_checks(job: Job, counted: JobScore | Score) -> list[Check]:
 
 def usage_checks(job: Job, usage: Usage) -> list[Check]:
     """Whether what a job took and cost is what its replies did."""
-    checks = [compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in _COUNTED]
+    checks = [
+        compare(f"usage: {n}", getattr(job, n), getattr(usage, n)) for n in ("requests", *_TOKENS)
+    ]
     checks.append(compare("usage: cost_usd", f"{job.cost_usd:f}", f"{usage.cost_usd:.6f}"))
     return checks
 

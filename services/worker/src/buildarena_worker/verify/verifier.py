@@ -69,26 +69,26 @@ class _Rebuilt:
     checks: Sequence[Check]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Verifier:
     """Verifies jobs.
 
-    Args:
+    Attributes:
         store: Where jobs, journals and rollouts are.
         artifacts: Where kept trajectories are.
         sessions: Runs sessions again.
     """
 
-    def __init__(self, *, store: Store, artifacts: ArtifactStore, sessions: Sessions) -> None:
-        self._store = store
-        self._artifacts = artifacts
-        self._sessions = sessions
+    store: Store
+    artifacts: ArtifactStore
+    sessions: Sessions
 
     def verify(self, job_id: str) -> Report:
         """Verifies a job that was scored."""
         stored = _Stored(
-            job=self._store.jobs.get(job_id),
-            records=self._store.rollouts.read(job_id),
-            files=self._store.jobs.artifacts(job_id),
+            job=self.store.jobs.get(job_id),
+            records=self.store.rollouts.read(job_id),
+            files=self.store.jobs.artifacts(job_id),
         )
         try:
             made_again = self._made_again(stored)
@@ -117,7 +117,7 @@ class Verifier:
     def _state_of(self, digest: str) -> str:
         """The hash of an artifact's bytes, or what is wrong with it."""
         try:
-            return digest_of(self._artifacts.get(digest))
+            return digest_of(self.artifacts.get(digest))
         except ArtifactMissingError:
             return "missing"
         except ArtifactDamagedError:
@@ -127,7 +127,7 @@ class Verifier:
         job, workflow = stored.job, stored.job.track_config["workflow"]
         if job.state != JobState.DONE or job.success is None:
             return [compare("scored", kept=True, found=False)]
-        task = task_of(job, self._sessions.tasks)
+        task = task_of(job, self.sessions.tasks)
         if workflow == FILE_WORKFLOW:
             rebuilt = self._from_file(stored, task)
         elif workflow == EXTERNAL_WORKFLOW:
@@ -144,13 +144,13 @@ class Verifier:
         """What a session built, run again with the stored replies."""
         job = stored.job
         host = JournalHost(
-            entries=self._store.journal.read(job.id),
+            entries=self.store.journal.read(job.id),
             rollouts=stored.records,
             limits=job.limits,
-            load_trajectory=lambda digest: read_trajectory(self._artifacts.get(digest)),
+            load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
         )
-        session = self._sessions.begin(job, host)
-        result = self._sessions.run(job, session)
+        session = self.sessions.begin(job, host)
+        result = self.sessions.run(job, session)
         match result:
             case Finished():
                 reasons = []
@@ -172,14 +172,14 @@ class Verifier:
     def _from_file(self, stored: _Stored, task: Task) -> _Rebuilt:
         """The machine of a file; its job is named after it, with the keys that a person held."""
         named = str(stored.job.model_config.get("model"))
-        machine = Machine.from_document(json.loads(self._artifacts.get(named)))
+        machine = Machine.from_document(json.loads(self.artifacts.get(named)))
         check = compare("machine", stored.files.get("machine"), named)
         return _of_others(stored, task, check, tests=(), machine=machine)
 
     def _from_calls(self, stored: _Stored, task: Task) -> _Rebuilt:
         """What somebody built over the API, whose calls are made again."""
-        with self._store.database.transaction() as connection:
-            calls = self._store.external_calls.read(stored.job.id, connection=connection)
+        with self.store.database.transaction() as connection:
+            calls = self.store.external_calls.read(stored.job.id, connection=connection)
         bench = bench_of(task, data_sheets=has_data_sheets(stored.job.track_config))
         made, tests = repeated(calls, bench)
         check = compare("calls", _feedback_of(calls), _feedback_of(made))
@@ -188,7 +188,7 @@ class Verifier:
 
     def _trial_checks(self, stored: _Stored, task: Task, machines: Sequence[Tried]) -> list[Check]:
         """Each trial again, and whether the best machine was tried in all varied worlds."""
-        trials = TrialVerifier(task=task, artifacts=self._artifacts, files=stored.files)
+        trials = TrialVerifier(task=task, artifacts=self.artifacts, files=stored.files)
         tried = list(zip(stored.exact, machines, strict=False))
         checks = [check for pair in tried for check in trials.checks(*pair)]
         if not has_counted(stored.records, task):

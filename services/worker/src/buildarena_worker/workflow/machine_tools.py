@@ -22,33 +22,13 @@ from buildarena_geometry.feedback.modules import modules_in_short as catalogue_i
 from buildarena_worker.session.session import Session
 
 QUERIES = ("get_machine_summary", "get_block_details")
-BUILD = (
-    "start",
-    "attach_block_to",
-    "connect_blocks",
-    "remove_block",
-    "reset",
-    "twist_block",
-    "shift_block",
-    "flip_spin",
-    *QUERIES,
-)
+REFINE = ("twist_block", "shift_block", "flip_spin", *QUERIES)
+BUILD = ("start", "attach_block_to", "connect_blocks", "remove_block", "reset", *REFINE)
 MEND = ("change_control_key", "review_powered_blocks", "review_control_config")
 """What a machine with keys that a task gives takes besides."""
-REFINE = ("twist_block", "shift_block", "flip_spin", *QUERIES)
-ASSEMBLE = (
-    "add_machine",
-    "shift_machine",
-    "rotate_machine",
-    "remove_machine",
-    "connect_blocks",
-    "attach_block_to",
-    "remove_block",
-    "twist_block",
-    "shift_block",
-    "flip_spin",
-    *QUERIES,
-)
+MACHINES = ("add_machine", "shift_machine", "rotate_machine", "remove_machine")
+JOIN = ("connect_blocks", "attach_block_to", "remove_block")
+ASSEMBLE = (*MACHINES, *JOIN, *REFINE)
 
 
 def building(task: Task) -> Sequence[str]:
