@@ -133,7 +133,8 @@ class Throttle:
         """Gives all slots back and closes the connection."""
         if self._renewing is not None:
             self._renewing.cancel()
-        for id_, owner in self._open.items():
+            await asyncio.gather(self._renewing, return_exceptions=True)
+        for id_, owner in list(self._open.items()):
             await self._ask(_GIVE, owner, id_, self._start, "keep")
         if self._store is not None:
             await self._store.aclose()
