@@ -8,7 +8,7 @@ from support.servers.stacks import wait_until
 from support.stages import work
 
 from buildarena_api.app import create_app
-from buildarena_api.http import probes
+from buildarena_api.http import parts
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.process.context import Context
@@ -69,7 +69,7 @@ def test_a_failing_store_delays_jobs_and_loses_none(context, submissions, folder
 def test_health_says_that_the_store_fails_and_that_it_works_again(
     context, folder, monkeypatch
 ) -> None:
-    monkeypatch.setattr(probes, "ARTIFACTS_FRESH_S", 0.0)
+    monkeypatch.setattr(parts, "ARTIFACTS_FRESH_S", 0.0)
     with TestClient(create_app(context, load_registry()), base_url="http://127.0.0.1") as api:
 
         def check() -> dict[str, object]:

@@ -6,11 +6,12 @@ in the schema's metadata under the key `buildarena.trajectory`, as in the Parque
 """
 
 import io
-from typing import Final
-
-import pyarrow as pa
+from typing import TYPE_CHECKING, Final
 
 from buildarena_simulation.errors import TrajectoryFormatError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 MEDIA_TYPE: Final = "application/vnd.apache.arrow.stream"
 SERIES: Final = ("time_s", "cargo_mass")

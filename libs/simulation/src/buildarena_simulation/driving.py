@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isnan
+from typing import TYPE_CHECKING
 
-from buildarena_geometry import Machine
 from buildarena_simulation.constants import DEFAULT_ENGINE
 from buildarena_simulation.controllers.pilot import Pilot
 from buildarena_simulation.errors import ControllerFailed
 from buildarena_simulation.machine import bindings_of, part_ids, structure_of
 from buildarena_simulation.rollout import Rollout, require_engine
 from buildarena_simulation.scenario import Scenario
-from buildarena_simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation.trajectory import Trajectory
 
 
 def pilot_of(machine: Machine, scenario: Scenario, seed: int | None = None) -> Pilot:

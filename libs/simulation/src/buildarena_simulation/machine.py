@@ -1,14 +1,12 @@
 """From a machine of the geometry library to the arrays the simulation works on."""
 
 from collections.abc import Mapping, Sequence
-from typing import TypedDict
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
-from buildarena_geometry import Block, Connector, Joint, Machine
-from buildarena_geometry.blocks import FaceRef
 from buildarena_geometry.modules.joints import MOVING_JOINTS, UP, MovingJoint
-from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
+from buildarena_geometry.modules.solids import Ball, Cylinder
 from buildarena_simulation.constants import MAX_PARTS, JointKind
 from buildarena_simulation.control import Bindings
 from buildarena_simulation.errors import MachineNotSimulable
@@ -20,6 +18,11 @@ from buildarena_simulation.structure.model import (
     ShapeKind,
     Structure,
 )
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Block, Connector, Joint, Machine
+    from buildarena_geometry.blocks import FaceRef
+    from buildarena_geometry.modules.solids import Solid
 
 
 def structure_of(machine: "Machine") -> Structure:

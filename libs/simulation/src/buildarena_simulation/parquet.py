@@ -8,10 +8,9 @@ is not a series (ids, joint peaks, breaks, settings) is JSON in the schema's met
 import io
 import json
 from dataclasses import asdict
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import pyarrow as pa
 from numpy.typing import NDArray
 
 from buildarena_simulation.errors import TrajectoryFormatError
@@ -23,6 +22,9 @@ from buildarena_simulation.trajectory import (
     Piloting,
     Trajectory,
 )
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 SCHEMA_VERSION: Final = 3
 PILOTED_SCHEMA: Final = 4

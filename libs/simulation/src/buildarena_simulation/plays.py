@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-from buildarena_geometry import Machine
 from buildarena_simulation.constants import DEFAULT_ENGINE
 from buildarena_simulation.control import KeyHold
 from buildarena_simulation.controllers.pilot import ProgramPilot
@@ -16,6 +16,9 @@ from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.trajectory import Trajectory
 from buildarena_simulation.trial import Decision
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
 
 
 def simulate(

@@ -2,11 +2,11 @@
 
 import itertools
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_simulation.breaking import BreakingModel
 from buildarena_simulation.control import heated_cannons
 from buildarena_simulation.engines.base import CargoPose, quaternion_of
 from buildarena_simulation.errors import MachineNotSimulable
@@ -24,6 +24,9 @@ from buildarena_simulation.trajectory import (
     rounded_positions,
     rounded_quaternions,
 )
+
+if TYPE_CHECKING:
+    from buildarena_simulation.breaking import BreakingModel
 
 
 class Recorder:

@@ -3,11 +3,10 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_geometry import Machine
 from buildarena_simulation.controllers.answers import near_names
 from buildarena_simulation.controllers.pilot import Pilot, named_in
 from buildarena_simulation.controllers.program import Program
@@ -19,7 +18,10 @@ from buildarena_simulation.offered import Senses
 from buildarena_simulation.placement import motion_at, start_of
 from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.structure.clusters import find_clusters
-from buildarena_simulation.structure.model import Structure
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation.structure.model import Structure
 
 MAX_TICKS: Final = 20
 MAX_REHEARSAL_S: Final = 0.2

@@ -2,11 +2,13 @@
 
 import difflib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from buildarena_simulation.control import Bindings, channel
 from buildarena_simulation.errors import ControllerFailed
-from buildarena_simulation.structure.model import Structure
+
+if TYPE_CHECKING:
+    from buildarena_simulation.structure.model import Structure
 
 _NEAR: Final = 3
 

@@ -11,12 +11,14 @@ from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Final, Protocol, cast
+from typing import TYPE_CHECKING, Final, Protocol, cast
 
 from buildarena_simulation import engines
 from buildarena_simulation.constants import DEFAULT_ENGINE
-from buildarena_simulation.engines.base import Engine, World
 from buildarena_simulation.errors import SimulationError, UnknownEngineError
+
+if TYPE_CHECKING:
+    from buildarena_simulation.engines.base import Engine, World
 
 GROUP: Final = "buildarena.engines"
 

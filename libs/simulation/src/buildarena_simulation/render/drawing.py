@@ -1,14 +1,16 @@
 """Draws pictures of a scene with Pillow: painter's order, flat shading, no graphics card."""
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from PIL.Image import Image
-from PIL.ImageDraw import ImageDraw
 
 from buildarena_simulation.render.camera import Camera
 from buildarena_simulation.render.scene import Color, Picture
 from buildarena_simulation.structure.model import FloatArray
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+    from PIL.ImageDraw import ImageDraw
 
 _SKY: Final[Color] = (226, 233, 239)
 _GROUND: Final[Color] = (205, 211, 200)

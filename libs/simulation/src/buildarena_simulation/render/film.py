@@ -3,20 +3,23 @@
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from PIL.Image import Image
 
-from buildarena_geometry import Machine
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 from buildarena_simulation.render.camera import Camera
 from buildarena_simulation.render.drawing import draw
 from buildarena_simulation.render.planet import Flight
 from buildarena_simulation.render.scene import Scene
 from buildarena_simulation.rollout import world_of
-from buildarena_simulation.scenario import Scenario
-from buildarena_simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+    from buildarena_geometry import Machine
+    from buildarena_simulation.scenario import Scenario
+    from buildarena_simulation.trajectory import Trajectory
 
 FORMATS: Final = ("mp4", "gif", "png")
 

@@ -1,13 +1,16 @@
 """A flight round a planet as pictures of flat ground that rolls by, with a map of the path."""
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from PIL.ImageDraw import ImageDraw
 
 from buildarena_simulation.render.scene import Color, Picture
 from buildarena_simulation.structure.model import FloatArray
-from buildarena_simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+    from buildarena_simulation.trajectory import Trajectory
 
 _PLANET: Final[Color] = (205, 211, 200)
 _RIM: Final[Color] = (120, 132, 118)

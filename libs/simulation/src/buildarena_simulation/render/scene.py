@@ -3,20 +3,22 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_geometry import Machine
 from buildarena_geometry.export.meshes import polygons
 from buildarena_geometry.modules.solids import Ball, Box, Cylinder, Solid
 from buildarena_geometry.rotations import ORIGIN
 from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.machine import structure_of
-from buildarena_simulation.scenario import Mark, Scenario
 from buildarena_simulation.structure.model import FloatArray, Shape, ShapeKind
 from buildarena_simulation.terrain import shape_of
-from buildarena_simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation.scenario import Mark, Scenario
+    from buildarena_simulation.trajectory import Trajectory
 
 Color = tuple[int, int, int]
 

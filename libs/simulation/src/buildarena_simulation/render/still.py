@@ -1,19 +1,21 @@
 """One picture of a machine at a moment of its trial."""
 
 import io
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from buildarena_geometry import Machine
 from buildarena_simulation.engines.base import quaternion_of
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.placement import start_of
 from buildarena_simulation.render.camera import Camera
 from buildarena_simulation.render.drawing import draw
 from buildarena_simulation.render.scene import Scene
-from buildarena_simulation.scenario import Scenario
 from buildarena_simulation.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from buildarena_geometry import Machine
+    from buildarena_simulation.scenario import Scenario
 
 SIZE: Final = (480, 320)
 """Width and height of a picture, pixels."""
