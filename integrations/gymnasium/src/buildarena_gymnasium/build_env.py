@@ -43,7 +43,7 @@ class BuildEnv(gymnasium.Env[str, str]):
         simulator: Name of the engine that tries machines.
         steps: Actions that an episode may have.
         rounds: How often a builder may submit; a successful trial ends the episode.
-        rewards: Weights by the names of `buildarena_benchmark.environment.rewards`; success alone by default.
+        rewards: Weights by the names of the environment's rewards; success alone by default.
         reference: The indicator that is worth 1; the task's reference where there is one.
         varied_start: Whether each episode starts machine and cargo a little elsewhere, drawn from
             the environment's random numbers; by default all start exactly, as in the service.

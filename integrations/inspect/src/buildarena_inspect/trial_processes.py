@@ -18,7 +18,7 @@ TRIES: Final = 2
 def try_machine(
     task: Task, machine: Machine, simulator: str = DEFAULT_ENGINE, *, seed: int | None = None
 ) -> Trial:
-    """As `buildarena_benchmark.environment.try_machine`, in a warm process; waits where all are busy.
+    """As the environment's `try_machine`, in a warm process; waits where all are busy.
 
     Raises:
         SimulationError: The engine failed or ended its process, which says nothing of the machine.

@@ -59,7 +59,7 @@ def load_environment(
     Args:
         tasks: Names of tasks, or one; all by default.
         simulator: Name of the engine that tries machines.
-        rewards: Weights by the names of `buildarena_benchmark.environment.rewards`; success alone by default.
+        rewards: Weights by the names of the environment's rewards; success alone by default.
         processes: Processes that try machines; by default one for each core.
         trial_timeout_s: Seconds after which a trial is broken off.
         until_decided: Ends trials when they are decided, as in `BuildTaskConfig`.

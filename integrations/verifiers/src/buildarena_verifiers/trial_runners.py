@@ -23,7 +23,7 @@ class TrialRunner:
     Args:
         processes: How many; None for one for each core that this process may use.
         timeout_s: Seconds after which a trial is broken off.
-        whole: False ends each trial when it is decided, see `buildarena_benchmark.environment.try_machine`.
+        whole: False ends each trial when it is decided, see the environment's `try_machine`.
     """
 
     def __init__(self, processes: int | None, timeout_s: float, whole: bool) -> None:
