@@ -175,7 +175,7 @@ def _brought_before(wanted: dict[str, Any], service: Client) -> str | None:
     model = f"agent/{wanted['agent']}"
     cursor: dict[str, str] = {}
     while True:
-        page = service.get("/v1/jobs", task=wanted["task"], model=model, limit="1000", **cursor)
+        page = service.get("/v1/jobs", task=wanted["task"], model=model, limit="200", **cursor)
         for job in page["jobs"]:
             if job["seed"] == wanted["seed"] and f"/{wanted['simulator']}-" in job["track"]:
                 return str(job["id"])
