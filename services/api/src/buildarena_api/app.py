@@ -115,6 +115,7 @@ def create_app(context: Context, registry: ModelRegistry) -> FastAPI:
         reaper.start()
         services.runners.start()
         yield
+        await services.parts.settle()
         reaper.stop()
         services.runners.close()
         await services.hub.close()

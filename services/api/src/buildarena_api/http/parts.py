@@ -57,17 +57,17 @@ class Part(Generic[T]):
     def __init__(self, ask: Callable[[], T], *, fresh_s: float = 0.0) -> None:
         self._ask, self._fresh_s = ask, fresh_s
         self._thread = CapacityLimiter(1)
-        self._asking: asyncio.Task[None] | None = None
+        self.asking: asyncio.Task[None] | None = None
         self._heard_at = -math.inf
         self._verdict: T | PartFailedError = PartFailedError("has not answered yet")
 
     async def renew(self) -> None:
         """Asks the part, and gives it a moment to answer; all of its time if never heard of."""
         age_s = time.monotonic() - self._heard_at
-        if self._asking is None and age_s >= self._fresh_s:
-            self._asking = asyncio.create_task(self._ask_it())
-        if self._asking is not None:
-            await asyncio.wait([self._asking], timeout=MOMENT_S if age_s < OLD_S else PATIENCE_S)
+        if self.asking is None and age_s >= self._fresh_s:
+            self.asking = asyncio.create_task(self._ask_it())
+        if self.asking is not None:
+            await asyncio.wait([self.asking], timeout=MOMENT_S if age_s < OLD_S else PATIENCE_S)
 
     def latest(self) -> T:
         """What the part last said, at once.
@@ -101,7 +101,7 @@ class Part(Generic[T]):
             failed.__cause__ = error
             self._hear(failed)
         finally:
-            self._asking = None
+            self.asking = None
 
     def _hear(self, verdict: T | PartFailedError) -> None:
         self._verdict, self._heard_at = verdict, time.monotonic()
@@ -131,6 +131,12 @@ class Parts:
         self.broker = Part(self._ask_broker)
         self.artifacts = Part(probed.probe, fresh_s=ARTIFACTS_FRESH_S)
         self.figures: Part[MetricValues] = Part(context.store.metrics.read, fresh_s=FIGURES_FRESH_S)
+
+    async def settle(self) -> None:
+        """Waits for the questions that are being asked, for a moment: they use connections."""
+        parts = (self.database, self.broker, self.artifacts, self.figures)
+        if asking := [part.asking for part in parts if part.asking is not None]:
+            await asyncio.wait(asking, timeout=1.0)
 
     async def renew(self) -> None:
         """Gives all parts a moment for a fresh answer."""
