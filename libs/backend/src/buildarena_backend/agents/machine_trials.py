@@ -5,14 +5,13 @@ from __future__ import annotations
 from hashlib import sha256
 from typing import Final
 
-from buildarena_backend.agents.submission import chosen_task, submit_machine
+from buildarena_backend.agents.submission import chosen_task, single_job, submit_machine
 from buildarena_backend.catalog.tracks import file_track
 from buildarena_backend.jobs.files import require_room
-from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
+from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import FILE_PROVIDER
 from buildarena_backend.sweeps.claims import add_claim
-from buildarena_backend.telemetry.tracing import current_traceparent
 from buildarena_backend.trials.known_simulators import simulation_version
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
@@ -51,21 +50,13 @@ def request_trial(
     """
     chosen = chosen_task(context, task, simulator)
     digest = sha256(machine_bytes(machine)).hexdigest()
-    name = f"file/{digest[:NAME_LENGTH]}"
-    config = {"name": name, "provider": FILE_PROVIDER, "model": digest}
+    config = {
+        "name": f"file/{digest[:NAME_LENGTH]}",
+        "provider": FILE_PROVIDER,
+        "model": digest,
+    }
     track = file_track(simulator, simulation_version(context, simulator))
-    new = NewJobs(
-        task=task,
-        task_version=chosen.version,
-        model_hash=configuration_hash(config, {}),
-        track=track.id,
-        seeds=[seed],
-        model=name,
-        model_config=config,
-        track_config=track.as_config(),
-        owner=owner,
-        traceparent=current_traceparent(),
-    )
+    new = single_job(chosen, config, track, seed=seed, owner=owner)
     (job_id,) = new.job_ids
     queue = None
     with context.store.lifecycle.submission() as connection:

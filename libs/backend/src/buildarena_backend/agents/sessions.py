@@ -17,7 +17,7 @@ from buildarena_backend.agents.briefing import (
     briefing,
     briefing_digest,
 )
-from buildarena_backend.agents.submission import chosen_task, submit_machine
+from buildarena_backend.agents.submission import chosen_task, single_job, submit_machine
 from buildarena_backend.agents.trying import TriedOnce, request_test, trials_of
 from buildarena_backend.agents.turn_views import turn_of_call
 from buildarena_backend.agents.workbench import TEST, Workbench, check_arguments, rebuild
@@ -28,13 +28,12 @@ from buildarena_backend.catalog.tracks import (
     worlds_of,
 )
 from buildarena_backend.errors import PipelineError, SubmissionError, UnknownIdError
-from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
+from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.external_calls import ExternalCall
 from buildarena_backend.journal.transcript import Transcript
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import EXTERNAL_PROVIDER, EXTERNAL_QUEUE, JobState
-from buildarena_backend.telemetry.tracing import current_traceparent
 from buildarena_backend.trials.known_simulators import (
     drawn_issues,
     simulation_version,
@@ -161,20 +160,8 @@ class ExternalSessions:
             data_sheets=data_sheets,
             worlds=worlds_here(self._context, simulator, worlds),
         )
-        model = f"{kind}/{agent}"
-        config = {"name": model, "provider": EXTERNAL_PROVIDER, "model": agent}
-        new = NewJobs(
-            task=task,
-            task_version=chosen.version,
-            model_hash=configuration_hash(config, {}),
-            track=track.id,
-            seeds=[seed],
-            model=model,
-            model_config=config,
-            track_config=track.as_config(),
-            owner=owner,
-            traceparent=current_traceparent(),
-        )
+        config = {"name": f"{kind}/{agent}", "provider": EXTERNAL_PROVIDER, "model": agent}
+        new = single_job(chosen, config, track, seed=seed, owner=owner)
         (job_id,) = new.job_ids
         # Refused inside the transaction, so that nothing of it stays.
         with self._context.store.database.transaction() as connection:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 from sqlalchemy import Connection
 
+from buildarena_backend.catalog.tracks import Track
 from buildarena_backend.errors import SubmissionError
+from buildarena_backend.jobs.job import NewJobs, configuration_hash
 from buildarena_backend.journal.rollouts import RolloutRequest
 from buildarena_backend.journal.transcript import Transcript
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import Outcome, Stage, simulate_queue
+from buildarena_backend.telemetry.tracing import current_traceparent
 from buildarena_backend.trials.known_simulators import simulator_issues
 from buildarena_backend.trials.scoring import failure_score, task_of
 from buildarena_benchmark import Task, ValidationIssue, broken_constraint
@@ -46,6 +49,32 @@ def chosen_task(
     if issues or chosen is None:
         raise SubmissionError(issues)
     return chosen
+
+
+def single_job(
+    task: Task, config: Mapping[str, Any], track: Track, *, seed: int, owner: str | None
+) -> NewJobs:
+    """One job to be added, without limits and paid for by no sweep.
+
+    Args:
+        task: Its task.
+        config: What stands for the model's configuration; ``name`` is what boards show.
+        track: Its track.
+        seed: Its seed.
+        owner: Id of the API key; None for the operator.
+    """
+    return NewJobs(
+        task=task.name,
+        task_version=task.version,
+        model_hash=configuration_hash(config, {}),
+        track=track.id,
+        seeds=[seed],
+        model=config["name"],
+        model_config=config,
+        track_config=track.as_config(),
+        owner=owner,
+        traceparent=current_traceparent(),
+    )
 
 
 def submit_machine(
