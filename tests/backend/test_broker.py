@@ -26,11 +26,10 @@ from support.servers.stacks import wait_until
 
 from buildarena_api.http import places
 from buildarena_api.http.door import UNANSWERED_S, Server
-from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.http.rate_limits import CircuitBreaker, RateLimits
 from buildarena_backend.keepalive import socket_options
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.queue.app import celery_app
-from buildarena_backend.queue.breakers import AsyncCircuitBreaker
 from buildarena_backend.queue.queues import MAX_WAITING, Queues
 from buildarena_backend.queue.watchdog import ConsumerWatchdog, reconnect
 from buildarena_cli.local import EmbeddedValkey, free_port
@@ -256,7 +255,7 @@ def test_a_breaker_is_open_until_a_probe_is_answered_and_ends_though_one_swallow
         return True
 
     async def main() -> None:
-        breaker = AsyncCircuitBreaker(probe, period_s=SOON_S)
+        breaker = CircuitBreaker(probe, period_s=SOON_S)
         assert not breaker.is_open
         breaker.failed()
         breaker.failed()
@@ -268,7 +267,7 @@ def test_a_breaker_is_open_until_a_probe_is_answered_and_ends_though_one_swallow
         await breaker.close()
         breaker.failed()
         assert not breaker.is_open
-        own = AsyncCircuitBreaker(stubborn, period_s=SOON_S)
+        own = CircuitBreaker(stubborn, period_s=SOON_S)
         own.failed()
         async with asyncio.timeout(5):
             await probing.wait()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import Any
 
 import structlog
@@ -17,14 +20,60 @@ from redis.asyncio.retry import Retry
 from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 
-from buildarena_backend.queue.breakers import AsyncCircuitBreaker
-
 TIMEOUT_S = 0.3
 """How long a request waits for its count; the store is not asked again until it answers."""
+PROBE_S = 1.0
 GROUP = "buildarena"
 
-
 log = structlog.get_logger(__name__)
+
+
+class CircuitBreaker:
+    """Says to the coroutines of one event loop whether a server may be asked.
+
+    One that failed is not asked again until a probe finds it well.
+
+    Args:
+        probe: Asks the server something small; returns whether it answers. It is awaited in a task
+            that lives only while the breaker is open.
+        period_s: Seconds before each probe.
+    """
+
+    def __init__(self, probe: Callable[[], Awaitable[bool]], *, period_s: float = PROBE_S) -> None:
+        self._probe = probe
+        self._period_s = period_s
+        self._closed = False
+        self._task: asyncio.Task[None] | None = None
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the server failed and has not answered since."""
+        return self._task is not None
+
+    def failed(self) -> None:
+        """Notes a failure: nobody asks from now on."""
+        if self._task is None and not self._closed:
+            self._task = asyncio.create_task(self._watch())
+
+    async def close(self) -> None:
+        """Ends the probes."""
+        self._closed = True
+        task = self._task
+        if task is not None:
+            task.cancel()
+            with suppress(asyncio.CancelledError):
+                await task
+
+    async def _watch(self) -> None:
+        # A probe may swallow its cancellation, as that of the library of rate limits does.
+        while not self._closed:
+            await asyncio.sleep(self._period_s)
+            try:
+                if await self._probe():
+                    break
+            except Exception:
+                log.exception("probe_failed")
+        self._task = None
 
 
 class RateLimits:
@@ -48,7 +97,7 @@ class RateLimits:
         self._storage = RedisStorage(f"async+{broker_url}", implementation="redispy", **handed_on)
         self._shared = SharedLimiter(self._storage)
         self._own = OwnLimiter(MemoryStorage())
-        self._breaker = AsyncCircuitBreaker(self._storage.check)
+        self._breaker = CircuitBreaker(self._storage.check)
         self.spelled = rate.replace("/", " per ")
 
     async def hit(self, who: str) -> int | None:
