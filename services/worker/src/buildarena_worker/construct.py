@@ -82,7 +82,7 @@ class ConstructHandler:
     Attributes:
         store: Where jobs and journals are.
         artifacts: Where machines, transcripts and trajectories are.
-        queues: Where simulators are notified.
+        queues: Where simulators are woken.
         registry: Models and their prices.
         clients: Answer the sessions' requests.
         sessions: Runs sessions as their jobs say.

@@ -157,8 +157,13 @@ class Jobs:
         Returns:
             The ids that were cancelled by this call.
         """
-        ended = {"outcome": Outcome.CANCELLED, "finished_at": events.now}
-        return self._revoke(ids, JobState.DONE, ended, connection)
+        return self._revoke(
+            ids,
+            JobState.DONE,
+            connection=connection,
+            outcome=Outcome.CANCELLED,
+            finished_at=events.now,
+        )
 
     def hold(self, ids: Sequence[str], *, connection: Connection) -> list[str]:
         """Puts jobs that have not ended on hold, also those that somebody works on.
@@ -166,10 +171,10 @@ class Jobs:
         Returns:
             The ids that were put on hold by this call.
         """
-        return self._revoke(ids, JobState.ON_HOLD, {}, connection)
+        return self._revoke(ids, JobState.ON_HOLD, connection=connection)
 
     def _revoke(
-        self, ids: Sequence[str], to: JobState, values: dict[str, Any], connection: Connection
+        self, ids: Sequence[str], to: JobState, *, connection: Connection, **values: Any
     ) -> list[str]:
         """Moves jobs that have not ended, with an end to the lease that somebody may have."""
         rows = connection.execute(

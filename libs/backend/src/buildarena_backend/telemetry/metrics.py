@@ -48,11 +48,6 @@ class ModelUse:
     output_tokens: int
     cost_usd: float
 
-    @classmethod
-    def none(cls, model: str) -> ModelUse:
-        """Of a model that was not asked yet."""
-        return cls(model=model, requests=0, input_tokens=0, output_tokens=0, cost_usd=0.0)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StageTimes:
@@ -104,7 +99,7 @@ class MetricValues:
 
 
 class Metrics:
-    """Counts the service's figures over all jobs: who asks often keeps the answer."""
+    """Reads the service's figures; each read counts over all jobs, so callers cache the result."""
 
     def __init__(self, database: Database) -> None:
         self._database = database

@@ -73,7 +73,7 @@ class TrialRepository:
     Args:
         store: Where jobs and rollouts are.
         artifacts: Where machines and trajectories are.
-        queues: Where construct workers are notified.
+        queues: Where construct workers are woken.
         tasks: The tasks.
         audited_shares: Of simulators whose trials a verification can repeat, the share of the
             trials by runners that is verified before it counts, 0 to 1.

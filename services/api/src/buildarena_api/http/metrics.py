@@ -134,7 +134,7 @@ class ServiceMetrics(Collector):
             if isinstance(engine.pool, QueuePool)
         }
         used = {name: pool.checkedout() for name, pool in pools.items()}
-        # Pools may grow to twice their size (`buildarena_backend.Database`).
+        # Pools may grow to twice their size (`buildarena_backend.database.database.Database`).
         most = {name: 2 * pool.size() for name, pool in pools.items()}
         what = "Connections of this process in use."
         yield _gauges("database_connections_used", what, used, "pool")
