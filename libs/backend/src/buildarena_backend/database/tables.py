@@ -97,8 +97,8 @@ jobs = Table(
     count_column("actions"),
     count_column("refused_actions"),
     Column("refusals", JSONB),
-    # What it was imported from, if it was; whether a runner ran one of its trials; whether its
-    # score waits for a verification, and what the last one that could tell said, and when.
+    # Whether a runner ran one of its trials; whether its score waits for a verification, and what
+    # the last one that could tell said, and when.
     Column("by_runner", Boolean, nullable=False, server_default=text("false")),
     Column("audit", Text),
     time_column("verified_at"),
@@ -107,19 +107,16 @@ jobs = Table(
     time_column("finished_at"),
     # What makes a job unique is in its id: see `JobKey`.
 )
+_QUEUED = jobs.c.state == JobState.QUEUED
 Index(
     "ix_jobs_waiting",
     jobs.c.queue,
     func.coalesce(jobs.c.owner, text("''")),
     jobs.c.created_at,
     jobs.c.id,
-    postgresql_where=jobs.c.state == JobState.QUEUED,
+    postgresql_where=_QUEUED,
 )
-Index(
-    "ix_jobs_recovered",
-    jobs.c.queue,
-    postgresql_where=(jobs.c.state == JobState.QUEUED) & (jobs.c.faults > 0),
-)
+Index("ix_jobs_recovered", jobs.c.queue, postgresql_where=_QUEUED & (jobs.c.faults > 0))
 Index("ix_jobs_running", jobs.c.id, postgresql_where=jobs.c.state == JobState.RUNNING)
 Index("ix_jobs_cell", jobs.c.track, jobs.c.task, jobs.c.model_hash, jobs.c.model)
 # One for each order of lists, and for what lists are narrowed down by.
@@ -139,19 +136,8 @@ Index(
     postgresql_ops={"flags": "jsonb_path_ops"},
     postgresql_where=jobs.c.flags.is_not(None),
 )
-Index(
-    "ix_jobs_oldest",
-    jobs.c.queue,
-    jobs.c.created_at,
-    jobs.c.id,
-    postgresql_where=jobs.c.state == JobState.QUEUED,
-)
-Index(
-    "ix_jobs_available",
-    jobs.c.queue,
-    jobs.c.available_at,
-    postgresql_where=jobs.c.state == JobState.QUEUED,
-)
+Index("ix_jobs_oldest", jobs.c.queue, jobs.c.created_at, jobs.c.id, postgresql_where=_QUEUED)
+Index("ix_jobs_available", jobs.c.queue, jobs.c.available_at, postgresql_where=_QUEUED)
 Index("ix_jobs_payer", jobs.c.payer, postgresql_where=jobs.c.state != JobState.DONE)
 Index("ix_jobs_owner", jobs.c.owner, postgresql_where=jobs.c.state != JobState.DONE)
 
@@ -373,7 +359,6 @@ board_changes = Table(
 Index("ix_board_changes_transaction", board_changes.c.transaction)
 Index("ix_board_changes_track", board_changes.c.track, board_changes.c.id)
 
-
 events = Table(
     "events",
     metadata,
@@ -393,7 +378,6 @@ Index(
     postgresql_where=events.c.kind == TURN,
     _table=events,
 )
-
 
 workers = Table(
     "workers",
