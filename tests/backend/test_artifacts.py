@@ -1,6 +1,7 @@
 """Bytes by their hash, in a folder or a bucket; of them only what nothing refers to is removed."""
 
 import hashlib
+import io
 import os
 import time
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from support.jobs import attach, execute
 
 from buildarena_backend.artifacts.collecting import LOCK, GarbageCollector
 from buildarena_backend.artifacts.storing import ArtifactStore
-from buildarena_backend.artifacts.uploads import UploadedFile, Uploads
+from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
 
 DAY_S = 86_400
@@ -76,9 +77,8 @@ def test_bytes_come_back_from_a_bucket_and_lost_and_damaged_ones_are_noticed(
         monkeypatch.delenv(name)
     # Without credentials the store is asked for some at an address of the cloud, which takes long.
     monkeypatch.setenv("AWS_METADATA_ENDPOINT", "http://127.0.0.1:9")
-    file = UploadedFile(sha256=hashlib.sha256(b"a piece").hexdigest(), size=7)
     uploads = Uploads("s3://arena/artifacts", options)
-    assert uploads.append(("job_0a", 1), file, 0, b"a piece") == 7
+    uploads.keep(("job_0a", 1), "a" * 64, io.BytesIO(b"a file"))
     assert uploads.leases() == {("job_0a", 1)}
 
 

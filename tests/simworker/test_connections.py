@@ -1,9 +1,11 @@
-"""Connections that break and an API that is away cost time only; files come in pieces."""
+"""Connections that break and an API that is away cost time only; files are bounded."""
 
 import hashlib
+import io
 import os
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 
 import httpx
@@ -15,17 +17,18 @@ from support.servers.flaky_proxy import flaky_proxy
 from support.servers.live_api import changed, live_api
 from support.servers.runner_rig import MUJOCO, Caller, ended, runner_key, slot, waiting
 
+from buildarena_api.routes import runner
 from buildarena_api.runners.outcomes import drop_dead_uploads
 from buildarena_backend.artifacts import uploads
-from buildarena_backend.artifacts.uploads import UploadedFile, Uploads
+from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.errors import UploadError
 from buildarena_backend.keepalive import socket_options
+from buildarena_backend.leases.runner_leases import JobToken
 from buildarena_backend.trials.simulator import File, TrialResult
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote import api as remote_api
 from buildarena_simworker.remote.api import RunnerApi, tls_context
 
-PIECE = uploads.PIECE_BYTES
 LEASE = ("job_0a", 3)
 
 
@@ -43,7 +46,9 @@ def short_pauses(monkeypatch) -> None:
     monkeypatch.setattr(remote_api, "LONGEST_PAUSE_S", 0.2)
 
 
-def test_uploads_go_on_where_they_were_cut_and_lost_answers_do_nothing_twice(context, url) -> None:
+def test_uploads_that_are_cut_are_sent_again_and_lost_answers_do_nothing_twice(
+    context, url
+) -> None:
     job = waiting(context)
     with (
         flaky_proxy(url) as proxy,
@@ -133,68 +138,33 @@ def store(tmp_path) -> Uploads:
     return Uploads(tmp_path)
 
 
-def file_of(data: bytes) -> UploadedFile:
-    return UploadedFile(sha256=hashlib.sha256(data).hexdigest(), size=len(data))
+def send(store: Uploads, data: bytes, lease: JobToken = LEASE) -> str:
+    sha256 = hashlib.sha256(data).hexdigest()
+    store.keep(lease, sha256, io.BytesIO(data))
+    return sha256
 
 
-def pieces(data: bytes) -> list[tuple[int, bytes]]:
-    return [(at, data[at : at + PIECE]) for at in range(0, len(data), PIECE)]
-
-
-def test_a_file_is_received_in_pieces_however_often_each_comes(store) -> None:
-    for size in (0, 1, PIECE - 1, PIECE, PIECE + 1, 2 * PIECE, 2 * PIECE + 5):
-        data = os.urandom(size)
-        file = file_of(data)
-        assert store.offset(LEASE, file) == 0
-        for at, piece in pieces(data) or [(0, b"")]:
-            for _ in range(2):
-                assert store.append(LEASE, file, at, piece) == at + len(piece)
-        assert store.take(LEASE, file) == data
+def test_a_file_that_is_sent_twice_is_kept_once_and_ends_with_its_lease(store) -> None:
+    for data in (b"", b"a", os.urandom(3 << 20)):
+        digests = {send(store, data) for _ in range(2)}
+        assert store.take(LEASE, *digests) == data
         store.drop(LEASE)
         assert store.leases() == set()
-        with pytest.raises(UploadError, match="only 0 of" if size else "not all"):
-            store.take(LEASE, file)
-
-
-def test_pieces_that_do_not_fit_and_other_bytes_than_the_hash_says_are_refused(store) -> None:
-    file = file_of(bytes(2 * PIECE + 7))
-    for offset, length, says in [
-        (PIECE, PIECE, "0 bytes were received: go on there"),
-        (1, PIECE - 1, "pieces begin at multiples"),
-        (4 * PIECE, 0, "no piece"),
-        (0, PIECE - 1, "has 1,048,576, not 1,048,575"),
-        (0, PIECE + 1, "has 1,048,576, not 1,048,577"),
-    ]:
-        with pytest.raises(UploadError, match=says):
-            store.append(LEASE, file, offset, bytes(length))
-    assert store.leases() == set()
-    data = os.urandom(PIECE + 3)
-    for at, piece in pieces(data[::-1]):
-        store.append(LEASE, file_of(data), at, piece)
-    with pytest.raises(UploadError, match="send it again"):
-        store.take(LEASE, file_of(data))
-    for at, piece in pieces(data):
-        store.append(LEASE, file_of(data), at, piece)
-    assert store.take(LEASE, file_of(data)) == data
+        with pytest.raises(UploadError, match="was not uploaded under this lease"):
+            store.take(LEASE, *digests)
 
 
 def test_what_is_uploaded_under_a_lease_is_bounded(store, monkeypatch) -> None:
-    for name, most in (("MAX_FILE_BYTES", 10), ("MAX_LEASE_BYTES", 25), ("MAX_LEASE_FILES", 3)):
+    for name, most in (("MAX_LEASE_BYTES", 25), ("MAX_LEASE_FILES", 3)):
         monkeypatch.setattr(uploads, name, most)
-
-    def send(data: bytes, lease: tuple[str, int] = LEASE) -> None:
-        store.append(lease, file_of(data), 0, data)
-
-    with pytest.raises(UploadError, match="at most 10 bytes"):
-        send(bytes(11))
-    send(b"a" * 10)
-    send(b"b" * 10)
+    for data in (b"a" * 10, b"b" * 10, b"a" * 10):
+        send(store, data)
     with pytest.raises(UploadError, match="at most 25 bytes"):
-        send(b"c" * 10)
-    send(b"d")
+        send(store, b"c" * 10)
+    send(store, b"d")
     with pytest.raises(UploadError, match="at most 3 files"):
-        send(b"e")
-    send(b"e", ("job_0a", 4))  # another lease has its own
+        send(store, b"e")
+    send(store, b"e", ("job_0a", 4))  # another lease has its own
     assert store.leases() == {LEASE, ("job_0a", 4)}
 
 
@@ -219,24 +189,24 @@ def test_uploads_of_leases_that_ended_are_removed(context, url) -> None:
     assert kept.leases() == {(live["job_id"], live["token"])}
 
 
-def test_requests_for_uploads_are_bounded(context, url) -> None:
+def test_requests_for_uploads_are_bounded(context, url, monkeypatch) -> None:
     waiting(context)
     caller = Caller(url, runner_key(context)[1])
     lease = caller.lease()
 
-    def put(sha256: str, content: bytes = b"x", **params: int) -> httpx.Response:
+    def put(sha256: str, content: bytes | Iterator[bytes]) -> int:
         path = caller.at(lease, f"/uploads/{sha256}")
-        return caller.ask("PUT", path, params=params, content=content)
+        return caller.ask("PUT", path, content=content).status_code
 
-    for wrong in (
-        {"size": uploads.MAX_FILE_BYTES + 1, "offset": 0},
-        *({"size": -1, "offset": 0}, {"size": 5}, {"size": 5, "offset": -1}),
-    ):
-        assert put("a" * 64, **wrong).status_code == 422, wrong
-    assert put("a" * 64, bytes(5 << 20), size=9 << 20, offset=0).status_code == 413
     # Bytes that look like deep JSON are bytes.
     brackets = b"[" * 1000
-    sent = put(hashlib.sha256(brackets).hexdigest(), brackets, size=1000, offset=0)
-    assert sent.json() == {"offset": 1000, "whole": True}
+    digest = hashlib.sha256(brackets).hexdigest()
+    monkeypatch.setattr(runner, "MAX_FILE_BYTES", 1000)
+    assert put(digest, brackets) == 204
+    assert put(digest, brackets[1:]) == 422
+    assert put(digest, brackets + b"[") == 413
+    assert put(digest, iter([brackets, b"["])) == 413, "whatever its length says"
     for sha256 in ("A" * 64, "a" * 63, "a" * 65, "..%2f" + "a" * 60, "g" * 64):
-        assert put(sha256, size=1, offset=0).status_code == 404, sha256
+        assert put(sha256, b"x") in {404, 422}, sha256
+    caller.ask("POST", caller.at(lease, "/hand-back"))
+    assert put(digest, brackets) == 409

@@ -169,19 +169,12 @@ class Caller:
     def at(self, lease: dict[str, Any], path: str = "") -> str:
         return f"/leases/{lease['job_id']}/{lease['token']}{path}"
 
-    def upload(self, lease: dict[str, Any], data: bytes, **more: Any) -> dict[str, Any]:
-        """Uploads a file in pieces; what requests name it by."""
-        sha256 = more.get("sha256") or hashlib.sha256(data).hexdigest()
-        offset = 0
-        while True:
-            params = {"size": len(data), "offset": offset}
-            piece = data[offset : offset + (1 << 20)]
-            path = self.at(lease, f"/uploads/{sha256}")
-            answer = self.ask("PUT", path, params=params, content=piece)
-            assert answer.status_code == 200, answer.text
-            offset = answer.json()["offset"]
-            if answer.json()["whole"]:
-                return {"sha256": sha256, "size": len(data)}
+    def upload(self, lease: dict[str, Any], data: bytes) -> str:
+        """Uploads a file; the hash that requests name it by."""
+        sha256 = hashlib.sha256(data).hexdigest()
+        answer = self.ask("PUT", self.at(lease, f"/uploads/{sha256}"), content=data)
+        assert answer.status_code == 204, answer.text
+        return sha256
 
     def outcome(self, lease: dict[str, Any], data: bytes | None, **more: Any) -> httpx.Response:
         """The answer to an outcome."""

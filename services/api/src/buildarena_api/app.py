@@ -219,7 +219,7 @@ def _add_middleware(app: FastAPI, services: Services) -> None:
     app.add_middleware(
         BodyLimitMiddleware,
         documents={tasks.PATH, machines.CHECK_PATH, machines.TRIAL_PATH},
-        pieces=runner.is_piece,
+        is_upload=runner.is_upload,
         most=runner.max_request_bytes,
         admit=admission(services),
         places=services.places["bodies"],

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 from collections.abc import Awaitable, Callable, Collection
 from contextlib import AbstractAsyncContextManager, nullcontext, suppress
-from typing import Final
+from typing import IO, Final
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from buildarena_api.http.places import Places
@@ -21,6 +23,8 @@ SMALL_BYTES: Final = 64 * 1024
 """A larger body takes a place, until it is answered."""
 BODY_S: Final = 120.0
 """How long a body may take to come."""
+FILE_S: Final = 600.0
+"""How long an uploaded file may take to come."""
 DRAIN_BYTES: Final = 256 * 1024
 DRAIN_S: Final = 0.5
 SECURITY_HEADERS = {
@@ -42,7 +46,7 @@ class BodyLimitMiddleware:
     Args:
         app: The application.
         documents: Paths of routes that read something else than JSON, and bound its depth.
-        pieces: Whether a path is one of a route that takes pieces of files.
+        is_upload: Whether a path is one of a route that reads the body itself, with `receive_file`.
         max_bytes: Largest request body accepted.
         most: The largest that some routes take, by path: None where it is `max_bytes`.
         admit: Refuses a request from its headers, before anything of its body is read.
@@ -54,7 +58,7 @@ class BodyLimitMiddleware:
         app: ASGIApp,
         *,
         documents: Collection[str] = (),
-        pieces: Callable[[str], bool] = lambda _: False,
+        is_upload: Callable[[str], bool] = lambda _: False,
         max_bytes: int = MAX_BYTES,
         most: Callable[[str], int | None] = lambda _: None,
         admit: Admit,
@@ -63,7 +67,7 @@ class BodyLimitMiddleware:
         self._app = app
         self._most, self._admit, self._places = most, admit, places
         self._documents = frozenset(documents)
-        self._pieces = pieces
+        self._is_upload = is_upload
         self._max_bytes = max_bytes
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -77,7 +81,8 @@ class BodyLimitMiddleware:
             await self._app(scope, receive, safe_send)
             return
         try:
-            async with self._place(await self._admit(scope), headers):
+            who = await self._admit(scope)
+            async with self._place(scope["path"], who, headers):
                 await self._pass_whole(scope, headers, receive, safe_send)
         except ProblemError as error:
             await _drain(receive)
@@ -86,10 +91,10 @@ class BodyLimitMiddleware:
         except ConnectionError:
             log.info("body_cut_off", path=scope["path"])
 
-    def _place(self, who: str, headers: Headers) -> AbstractAsyncContextManager[None]:
+    def _place(self, path: str, who: str, headers: Headers) -> AbstractAsyncContextManager[None]:
         length = headers.get("content-length", "")
         is_small = length.isdigit() and int(length) <= SMALL_BYTES
-        return nullcontext() if is_small else self._places.of(who)
+        return nullcontext() if is_small or self._is_upload(path) else self._places.of(who)
 
     async def _pass_whole(
         self, scope: Scope, headers: Headers, receive: Receive, send: Send
@@ -99,19 +104,19 @@ class BodyLimitMiddleware:
         length = headers.get("content-length")
         if length is not None and length.isdigit() and int(length) > most:
             raise _too_large(most)
+        if self._is_upload(path):
+            await self._app(scope, receive, send)
+            return
         try:
             async with asyncio.timeout(BODY_S):
                 body = await _read(receive, most)
         except TimeoutError as error:
             raise ProblemError(408, f"the body did not come within {BODY_S:g} s") from error
-        if not self._is_no_json(path) and is_too_deep(body):
+        if path not in self._documents and is_too_deep(body):
             detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
             await send_problem(send, 422, detail)
         else:
             await self._app(scope, _replay(body, receive), send)
-
-    def _is_no_json(self, path: str) -> bool:
-        return path in self._documents or self._pieces(path)
 
 
 def _has_body(headers: Headers) -> bool:
@@ -136,6 +141,28 @@ async def _read(receive: Receive, most: int) -> bytes:
         body += piece
         if not message.get("more_body", False):
             return bytes(body)
+
+
+async def receive_file(request: Request, file: IO[bytes], *, max_bytes: int) -> str:
+    """Write a request's body to a file as it comes, and return its SHA-256.
+
+    Raises:
+        ProblemError: It is too large, takes longer than `FILE_S`, or is cut off.
+    """
+    digest, size = hashlib.sha256(), 0
+    try:
+        async with asyncio.timeout(FILE_S):
+            async for part in request.stream():
+                size += len(part)
+                if size > max_bytes:
+                    raise _too_large(max_bytes)
+                digest.update(part)
+                file.write(part)
+    except TimeoutError as error:
+        raise ProblemError(408, f"the file did not come within {FILE_S:g} s") from error
+    except ClientDisconnect as error:
+        raise ProblemError(400, "the file was cut off") from error
+    return digest.hexdigest()
 
 
 async def _drain(receive: Receive) -> None:

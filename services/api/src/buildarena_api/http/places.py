@@ -38,6 +38,7 @@ Kind = Literal[
     "trajectories",
     "runner_waits",
     "runner_outcomes",
+    "uploads",
 ]
 
 
@@ -114,6 +115,8 @@ def usual_places() -> Mapping[Kind, Places]:
         "runner_waits": Places("waits for a trial", each=64, total=1000, waiting=0),
         # One may have a hundred megabytes in memory until it is scored.
         "runner_outcomes": Places("outcomes", each=2, total=3),
+        # Each has up to 48 MB on the disk.
+        "uploads": Places("uploads", each=2, total=24),
     }
 
 

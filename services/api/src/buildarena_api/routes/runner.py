@@ -8,12 +8,15 @@ over; docs/runners.md tells the whole of it. The score is found here, never sent
 
 from __future__ import annotations
 
+from tempfile import TemporaryFile
 from typing import Annotated, Any, Final
 
-from fastapi import APIRouter, Depends, Path, Query, Request, Response
+from fastapi import APIRouter, Depends, Path, Request, Response
+from fastapi.concurrency import run_in_threadpool
 
 from buildarena_api.access import Caller, RunnerDep, RunnerRights, limited, runner_of
 from buildarena_api.dependencies import ContextDep, ServicesDep
+from buildarena_api.http.bodies import receive_file
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.runners.lease_queue import MAX_NAMES, Leased, LeaseQuery
 from buildarena_api.runners.outcomes import stale
@@ -25,16 +28,10 @@ from buildarena_api.runners.views import (
     LeasedTrial,
     LeaseRequest,
     Outcome,
-    Received,
     RunnerAbout,
     RunnerFacts,
 )
-from buildarena_backend.artifacts.uploads import (
-    MAX_FILE_BYTES,
-    MAX_LEASE_BYTES,
-    PIECE_BYTES,
-    UploadedFile,
-)
+from buildarena_backend.artifacts.uploads import MAX_FILE_BYTES, MAX_LEASE_BYTES
 from buildarena_backend.errors import PermanentError, StaleLeaseError, UploadError
 from buildarena_backend.leases.runner_leases import JobToken, runner_prefix
 from buildarena_backend.process.context import Context
@@ -51,18 +48,20 @@ _ORDINARY = limited("ordinary", caller=runner_of)
 
 
 MAX_REQUEST_BYTES: Final = 64 * 1024
-"""The largest request of a runner that is no piece of a file."""
+"""Largest request of a runner but for an upload."""
 
 
-def is_piece(path: str) -> bool:
-    """Whether a path is that of a piece of a file."""
+def is_upload(path: str) -> bool:
+    """Whether a path takes an uploaded file."""
     return path.startswith(f"{PREFIX}/leases/") and "/uploads/" in path
 
 
 def max_request_bytes(path: str) -> int | None:
     """The largest request that a path takes, if it is a runner's."""
+    if is_upload(path):
+        return MAX_FILE_BYTES
     is_runners = path == PREFIX or path.startswith(PREFIX + "/")
-    return MAX_REQUEST_BYTES if is_runners and not is_piece(path) else None
+    return MAX_REQUEST_BYTES if is_runners else None
 
 
 def _named(
@@ -72,20 +71,7 @@ def _named(
     return job_id, token
 
 
-def _file(
-    sha256: Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="Of the whole file")],
-    size: Annotated[int, Query(ge=0, le=MAX_FILE_BYTES, description="Of the whole file, bytes")],
-) -> UploadedFile:
-    return UploadedFile(sha256=sha256, size=size)
-
-
-async def _piece(request: Request) -> bytes:
-    return await request.body()
-
-
 NamedDep = Annotated[JobToken, Depends(_named)]
-FileDep = Annotated[UploadedFile, Depends(_file)]
-PieceDep = Annotated[bytes, Depends(_piece)]
 
 
 @router.get("", dependencies=[_ORDINARY], responses=problem_responses(503))
@@ -97,7 +83,6 @@ def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerFacts:
         simulators=allowed,
         versions={name: known[name].version for name in allowed if name in known},
         lease_s=context.settings.lease_s,
-        piece_bytes=PIECE_BYTES,
         max_file_bytes=MAX_FILE_BYTES,
         max_lease_bytes=MAX_LEASE_BYTES,
     )
@@ -199,28 +184,11 @@ def get_leased_trial(named: NamedDep, caller: RunnerDep, context: ContextDep) ->
         raise stale(named) from error
 
 
-@router.get(
-    "/leases/{job_id}/{token}/uploads/{sha256}",
-    dependencies=[_ORDINARY],
-    responses=problem_responses(404, 409, 422, 503),
-)
-def get_received(
-    named: NamedDep,
-    file: FileDep,
-    caller: RunnerDep,
-    context: ContextDep,
-    services: ServicesDep,
-) -> Received:
-    """How much of a file has been received: after a lost connection, go on there."""
-    _require_live(context, named, caller)
-    offset = services.runners.uploads.offset(named, file)
-    return Received(offset=offset, whole=offset == file.size)
-
-
 @router.put(
     "/leases/{job_id}/{token}/uploads/{sha256}",
-    dependencies=[limited("runner_outcomes", caller=runner_of)],
-    responses=problem_responses(404, 409, 413, 422, 503),
+    status_code=204,
+    dependencies=[limited("uploads", caller=runner_of)],
+    responses=problem_responses(404, 408, 409, 413, 422, 503),
     openapi_extra={
         "requestBody": {
             "required": True,
@@ -228,26 +196,22 @@ def get_received(
         }
     },
 )
-def send_piece(
-    *,
+async def upload_file(
     named: NamedDep,
-    file: FileDep,
-    offset: Annotated[
-        int, Query(ge=0, le=MAX_FILE_BYTES, description="Where the piece begins in the file")
-    ],
-    piece: PieceDep,
+    sha256: Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="Of the whole file")],
+    request: Request,
     caller: RunnerDep,
     services: ServicesDep,
-) -> Received:
-    """Takes a piece of a file; one that was received before changes nothing."""
-    _require_live(services.context, named, caller)
-    try:
-        received = services.runners.uploads.append(named, file, offset, piece)
-    except UploadError as error:
-        raise ProblemError(
-            422, str(error), errors=[ValidationIssue(path="offset", message=str(error))]
-        ) from error
-    return Received(offset=received, whole=received == file.size)
+) -> None:
+    """Takes a whole file; one that was received before changes nothing."""
+    await run_in_threadpool(_require_live, services.context, named, caller)
+    with TemporaryFile() as file:
+        if await receive_file(request, file, max_bytes=MAX_FILE_BYTES) != sha256:
+            raise ProblemError(422, "the file's SHA-256 is not the one in the path: send it again")
+        try:
+            await run_in_threadpool(services.runners.uploads.keep, named, sha256, file)
+        except UploadError as error:
+            raise ProblemError(422, str(error)) from error
 
 
 @router.post(

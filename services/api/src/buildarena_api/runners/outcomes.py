@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, Literal
 
 import structlog
@@ -12,7 +12,7 @@ from buildarena_api.runners.checking import shared_checker
 from buildarena_api.runners.views import Fault, NamedFile, Outcome
 from buildarena_backend.artifacts.kinds import EVIDENCE
 from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
-from buildarena_backend.artifacts.uploads import UploadedFile, Uploads
+from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.database.text import clean
 from buildarena_backend.errors import StaleLeaseError, UploadError
 from buildarena_backend.leases.leases import Lease
@@ -84,8 +84,9 @@ class Outcomes:
         def end(lease: Lease) -> None:
             try:
                 number = self._trials.due(lease.job).request.number
-                _require_small(said.files)
-                self._trials.keep_evidence(lease.job, self._files(named, number, said.files))
+                files = self._files(named, number, said.files)
+                _require_small(files)
+                self._trials.keep_evidence(lease.job, files)
             except UploadError as error:
                 raise ProblemError(422, str(error)) from error
             detail = str(clean(said.detail))[:LONGEST_DETAIL]
@@ -137,9 +138,8 @@ class Outcomes:
                 log=None if log_file is None else log_file.data,
             )
         else:
-            file = UploadedFile(sha256=said.trajectory.sha256, size=said.trajectory.size)
             trajectory = self._checker.checked(
-                self._uploads.take(named, file),
+                self._uploads.take(named, said.trajectory),
                 simulator=simulator,
                 version=version,
                 machine=due.machine,
@@ -173,13 +173,13 @@ class Outcomes:
                 raise UploadError(
                     f"{one.name}: files of this trial are named KIND-{number}.ENDING, each once"
                 )
-            data = self._uploads.take(named, UploadedFile(sha256=one.sha256, size=one.size))
+            data = self._uploads.take(named, one.sha256)
             found[one.name] = File(data=data, media_type=EVIDENCE[ending])
         return found
 
 
-def _require_small(files: Sequence[NamedFile]) -> None:
-    size = sum(file.size for file in files)
+def _require_small(files: Mapping[str, File]) -> None:
+    size = sum(len(file.data) for file in files.values())
     if size > MAX_EVIDENCE_BYTES:
         raise UploadError(
             f"what shows a fault has at most {MAX_EVIDENCE_BYTES:,} bytes, these files {size:,}"

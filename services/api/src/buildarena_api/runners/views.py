@@ -9,7 +9,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from buildarena_backend.artifacts.kinds import EVIDENCE_NAME
-from buildarena_backend.artifacts.uploads import MAX_FILE_BYTES, MAX_LEASE_FILES
+from buildarena_backend.artifacts.uploads import MAX_LEASE_FILES
 from buildarena_backend.settings import SimulatorName
 from buildarena_backend.trials.trials import FaultReason
 from buildarena_simulation import ALL_ENGINES
@@ -47,7 +47,6 @@ Facts = Annotated[
 ]
 Version = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="64 hex digits")]
-Size = Annotated[int, Field(ge=0, le=MAX_FILE_BYTES, description="Bytes")]
 
 
 class _Document(BaseModel):
@@ -99,8 +98,7 @@ class RunnerFacts(BaseModel):
         description="The versions for which the service takes jobs, by simulator"
     )
     lease_s: float = Field(description="A lease ends so long after its last heartbeat")
-    piece_bytes: int = Field(description="The length of all pieces of an upload but the last")
-    max_file_bytes: int
+    max_file_bytes: int = Field(description="Largest file that can be uploaded")
     max_lease_bytes: int = Field(description="Most bytes that are uploaded under one lease")
 
 
@@ -143,23 +141,10 @@ class HeartbeatAnswer(BaseModel):
     lost: list[HeldLease]
 
 
-class Received(BaseModel):
-    """How much of a file has been received."""
-
-    offset: int = Field(description="Bytes received from its start: where the next piece begins")
-    whole: bool
-
-
-class SentFile(_Document):
-    """A file that was uploaded."""
+class NamedFile(_Document):
+    """An uploaded file to be kept with the job."""
 
     sha256: Sha256
-    size: Size
-
-
-class NamedFile(SentFile):
-    """A file to be kept with the job."""
-
     name: Annotated[
         str,
         Field(
@@ -191,9 +176,9 @@ EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ALL_ENGINE
 class Outcome(_Document):
     """What came of a trial; its score is found here."""
 
-    trajectory: SentFile | None = Field(
-        description="The Parquet file; null when the simulator refused the machine, or its program "
-        "failed: `versions.refused` says why"
+    trajectory: Sha256 | None = Field(
+        description="SHA-256 of the uploaded Parquet file; null when the simulator refused the "
+        "machine, or its program failed: `versions.refused` says why"
     )
     versions: Facts = Field(description="Everything about the simulator that can change it")
     wall_s: Seconds = Field(description="How long the trial took")
@@ -210,16 +195,6 @@ class Fault(_Document):
         default=False,
         description="Whether no attempt of this key's runners can mend it: they get the job no "
         "more, and it ends when a runner of another key says the same",
-    )
-    delay_s: Annotated[float, Field(ge=0, le=300, allow_inf_nan=False, deprecated=True)] = Field(
-        default=2.0,
-        description="Without effect: the key gets the job again after 2 s, and twice "
-        "as long after each further fault, 300 s at most; others may have it at once",
-    )
-    endless: bool = Field(
-        default=False,
-        deprecated=True,
-        description="Without effect: a key counts once against a job, however often it fails",
     )
     files: Files = []
 

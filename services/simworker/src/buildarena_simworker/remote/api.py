@@ -37,6 +37,8 @@ LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 BUSY: Final = (429, 500, 502, 503, 504)
 """Answers after which the same request may be taken: the service is busy or restarts."""
 GONE: Final = 409
+PART_BYTES: Final = 1 << 18
+"""A file is sent in parts of this size, each within `TIMEOUT_S`."""
 
 log = structlog.get_logger(__name__)
 
@@ -132,14 +134,12 @@ class RunnerApi:
             transport=None if getproxies() else direct,
         )
         self._stopping, self._over, self._never = stopping, over or stopping, threading.Event()
-        self._chunk_bytes = 1 << 20
 
     def facts(self, *, retry_for_s: float | None = None) -> dict[str, Any]:
         """Key, versions and limits from the API; waits until it answers."""
         facts: dict[str, Any] = self._json(
             "GET", "/v1/runner", retry_for_s=retry_for_s, until=self._stopping
         )
-        self._chunk_bytes = int(facts["piece_bytes"])
         return facts
 
     def lease(self, about: Mapping[str, Any], wait_s: float) -> dict[str, Any] | None:
@@ -164,18 +164,14 @@ class RunnerApi:
         )
         return {HeldLease(**lost) for lost in answer["lost"]}
 
-    def upload(self, lease: HeldLease, data: bytes) -> dict[str, Any]:
-        """Uploads a file from where it was broken off; returns how requests name it."""
+    def upload(self, lease: HeldLease, data: bytes) -> str:
+        """Upload a file and return its SHA-256, by which requests name it."""
         sha256 = hashlib.sha256(data).hexdigest()
-        path = f"{lease.path}/uploads/{sha256}"
-        offset, whole = 0, False
-        while not whole:
-            chunk = data[offset : offset + self._chunk_bytes]
-            params: dict[str, Any] = {"size": len(data), "offset": offset}
-            # A chunk that was received although its answer was lost may be sent again.
-            received = self._json("PUT", path, params=params, content=chunk)
-            offset, whole = int(received["offset"]), bool(received["whole"])
-        return {"sha256": sha256, "size": len(data)}
+        # A list can be sent again where an iterator could not.
+        parts = [data[at : at + PART_BYTES] for at in range(0, len(data), PART_BYTES)]
+        headers = {"Content-Length": str(len(data))}
+        self._json("PUT", f"{lease.path}/uploads/{sha256}", content=parts, headers=headers)
+        return sha256
 
     def end(
         self,

@@ -189,7 +189,9 @@ class LeasedOverHttp:
 
     def _uploaded(self, files: Mapping[str, File]) -> list[dict[str, Any]]:
         lease = self._active.lease
-        return [{"name": name, **self._api.upload(lease, f.data)} for name, f in files.items()]
+        return [
+            {"name": name, "sha256": self._api.upload(lease, f.data)} for name, f in files.items()
+        ]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
