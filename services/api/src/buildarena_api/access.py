@@ -148,7 +148,9 @@ async def runner_of(
 async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None) -> Caller:
     """Who sent the request, counted; what they may do is not looked at."""
     services = services_of(request)
-    caller = _reader_of_metrics(request, services.context.settings, given)
+    # Of a request with a body, admission has found it out.
+    caller = getattr(request.state, "caller", None)
+    caller = caller or _reader_of_metrics(request, services.context.settings, given)
     caller = caller or await _identified(services, request.scope, given)
     request.state.caller = caller
     await _count(services.rate_limits, _name(caller, request.scope))
@@ -173,10 +175,12 @@ def admission(services: Services) -> Admit:
         secret = _secret(scope)
         given = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
         try:
-            return _name(await _identified(services, scope, given or None), scope)
+            caller = await _identified(services, scope, given or None)
         except (OperationalError, PoolTimeoutError) as error:
             # Before the routes, whose handlers answer the same.
             raise database_problem(error) from error
+        scope.setdefault("state", {})["caller"] = caller
+        return _name(caller, scope)
 
     return admit
 
