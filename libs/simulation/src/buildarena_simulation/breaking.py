@@ -153,7 +153,7 @@ class BreakingModel:
             joint = self._structure.members.names[member]
             self._events.append(Event(time_s=round(time_s, 6), what="decoupled", joint=joint))
         if held.any():
-            self._fall_apart(engine)
+            self._fall_apart(engine, released=True)
         return held
 
     def all_events(self) -> tuple[Event, ...]:
@@ -213,19 +213,19 @@ class BreakingModel:
             )
         )
 
-    def _fall_apart(self, engine: Engine) -> None:
+    def _fall_apart(self, engine: Engine, *, released: bool = False) -> None:
         after = find_clusters(self._structure, self.holds)
         if _same(self.clusters, after):
             self._loads.rebuild(after, self.motion)
         else:
-            self._enter(engine, after)
+            self._enter(engine, after, released=released)
 
-    def _enter(self, engine: Engine, after: Clusters) -> None:
+    def _enter(self, engine: Engine, after: Clusters, *, released: bool = False) -> None:
         self.motion = self.motion.after_break(self.clusters, after)
         self.clusters = after
         self._around.enter(self._structure, after)
         engine.enter(after, self.motion)
-        self._loads.rebuild(after, self.motion)
+        self._loads.rebuild(after, self.motion, released=released)
 
 
 def giving_way_together(ratio: FloatArray, members: Members) -> list[int]:

@@ -13,6 +13,7 @@ import numpy as np
 from buildarena_simulation.constants import GRAVITY, LOAD_FILTER_S
 from buildarena_simulation.structure.clusters import Clusters
 from buildarena_simulation.structure.contacts import PointForces
+from buildarena_simulation.structure.free_directions import FreeDirections
 from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.stiffness import StiffnessModel
@@ -88,8 +89,17 @@ class LoadModel:
         self._weights = structure.masses * (self._weights / self._structure.masses)
         self._structure = structure
 
-    def rebuild(self, clusters: Clusters, motion: Motion) -> None:
-        """Takes over the clusters left after a break; filtered loads are carried along."""
+    def rebuild(self, clusters: Clusters, motion: Motion, *, released: bool = False) -> None:
+        """Take over the clusters left after a break or a release; filtered loads are carried along.
+
+        Args:
+            clusters: The clusters now.
+            motion: Their motion.
+            released: Whether a joint was made to let go. What held the freed pieces is in no
+                filter, and the load that it bore would come back as a blow: their filters start
+                anew. The heaviest piece keeps its own, or a bridge could shed weights to forget
+                its load.
+        """
         before = self._root_rotation[self._clusters.cluster_of]
         source = np.array([self._clusters.cluster_of[ids[0]] for ids in clusters.blocks])
         inertial_before = self._root_rotation[source]
@@ -100,6 +110,10 @@ class LoadModel:
         self._wrenches = turned_wrenches(turn, self._wrenches)
         turn = self._root_rotation.transpose(0, 2, 1) @ inertial_before
         self._inertial = turned_wrenches(turn, inertial) * share[:, None]
+        if released:
+            freed = _lighter_pieces(source, clusters.mass)
+            self._inertial[freed] = 0.0
+            self._wrenches[freed[clusters.cluster_of]] = 0.0
 
     def evaluate(
         self,
@@ -174,6 +188,7 @@ class LoadModel:
         self._arm = structure.centers_of_mass - clusters.center_of_mass[clusters.cluster_of]
         self._columns = columns_of(clusters.cluster_of, 6)
         self._compliance = np.asarray(np.linalg.inv(clusters.inertia), dtype=np.float64)
+        self._free = FreeDirections(structure, clusters)
         self._sliding = np.array(
             [s >= 0 and structure.parts[s].physics.joint_type == "slider" for s in clusters.seated]
         )
@@ -243,6 +258,7 @@ class LoadModel:
             hinge = joints.points[seated]
             transmitted = needed[:, :3]
             at_hinge = needed[:, 3:] - cross(hinge - clusters.center_of_mass[level], transmitted)
+            self._free.bound(level, motion, transmitted, at_hinge)
             wrenches[outer, :3] += transmitted
             wrenches[outer, 3:] += at_hinge + cross(
                 hinge - structure.centers_of_mass[outer], transmitted
@@ -310,3 +326,17 @@ class LoadModel:
         np.multiply(structure.masses[:, None], a + cross(alpha, self._arm), out=needed[:, :3])
         needed[:, 3:] = turned(structure.inertias, alpha)
         return wrenches - needed
+
+
+def _lighter_pieces(source: IntArray, mass: FloatArray) -> BoolArray:
+    """(C,) which clusters are a piece of an earlier one, but not its heaviest.
+
+    Args:
+        source: (C,) the earlier cluster that each was part of.
+        mass: (C,) of each.
+    """
+    order = np.argsort(-mass, kind="stable")
+    heaviest = order[np.unique(source[order], return_index=True)[1]]
+    lighter = np.ones(len(mass), dtype=bool)
+    lighter[heaviest] = False
+    return lighter

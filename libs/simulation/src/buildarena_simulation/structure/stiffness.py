@@ -5,13 +5,25 @@ clusters are solved at once: the first block of each is its ground, whose reacti
 the loads are self-equilibrated.
 """
 
-from collections.abc import Sequence
-from typing import Protocol
+from collections.abc import Iterator, Sequence
+from typing import Final, Protocol
 
 import numpy as np
 
+from buildarena_geometry.modules.joints import MOVING_JOINTS
 from buildarena_simulation.structure.clusters import Clusters
-from buildarena_simulation.structure.model import BoolArray, FloatArray, IntArray, Structure
+from buildarena_simulation.structure.free_directions import free_strains
+from buildarena_simulation.structure.model import (
+    JOINT_KINDS,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Structure,
+)
+
+_LEFT: Final = 1e-4
+"""Share of a joint's stiffness that is left in its free directions: loops of joints that the rest
+does not hold still are rigid here."""
 
 
 class StiffnessModel:
@@ -34,6 +46,8 @@ class StiffnessModel:
             strain[:, :3, side + 3 : side + 6] = -sign * frame @ _cross_matrices(arm)
             strain[:, 3:, side + 3 : side + 6] = sign * frame
         self._stress = members.stiffness[:, :, None] * strain
+        for member, springs in _springs_that_give_way(structure):
+            self._stress[member] = springs @ strain[member]
         self._element = strain.transpose(0, 2, 1) @ self._stress
 
     def factorize(self, clusters: Clusters, holds: BoolArray) -> "MemberForces":
@@ -171,6 +185,21 @@ class MemberForces:
         first, second = displacement.take(self._first, 0), displacement.take(self._second, 0)
         ends = np.concatenate([first, second], axis=1)
         return np.asarray((self._stress @ ends[:, :, None])[:, :, 0])
+
+
+def _springs_that_give_way(structure: Structure) -> Iterator[tuple[int, FloatArray]]:
+    """Moving joints without a drive, and their springs, (6, 6), that yield where they are free."""
+    members = structure.members
+    for member, block in enumerate(members.second.tolist()):
+        part = structure.parts[block]
+        if JOINT_KINDS[members.kind[member]] not in MOVING_JOINTS:
+            continue
+        springs = np.diag(members.stiffness[member])
+        free = free_strains(members, member, part)
+        if free.size:
+            resisted = springs @ free
+            given = resisted @ np.linalg.solve(free.T @ resisted, resisted.T)
+            yield member, springs - (1.0 - _LEFT) * given
 
 
 def _cross_matrices(vectors: FloatArray) -> FloatArray:

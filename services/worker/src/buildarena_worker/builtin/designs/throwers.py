@@ -162,12 +162,12 @@ def catapult_draft(shape: Shape = Shape()) -> tuple[Draft, list[str], str]:
     _stays(draft, beam, post, west)
     swivel = draft.attach(post[-1], EAST, "Swivel")
     draft.do("twist_block", block_id=swivel, angle=-lean)
-    back, ahead, above, below = (_leaning(way, lean) for way in (SOUTH, NORTH, UP, DOWN))
+    back, ahead, above, below = (leaning(way, lean) for way in (SOUTH, NORTH, UP, DOWN))
     hub = draft.attach(swivel, EAST)
     arm, tail = draft.row(hub, back, shape.arm), draft.row(hub, ahead, shape.tail)
     tip = draft.attach(arm[-1], EAST)
     draft.do("twist_block", block_id=tip, angle=-shape.cup_deg)
-    out = _leaning(UP, lean + shape.cup_deg)
+    out = leaning(UP, lean + shape.cup_deg)
     boulder = draft.attach(draft.attach(tip, out, "Bomb Holder"), out, "Boulder")
     mast = draft.row(hub, above, 2)[-1]
     for end, way in ((arm[3], back), (tail[-1], ahead)):
@@ -215,7 +215,7 @@ def _stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
         draft.connect(beam[_FRONT + 1], beam[_FRONT + 5], side)
 
 
-def _leaning(way: Direction, angle_deg: float) -> Direction:
+def leaning(way: Direction, angle_deg: float) -> Direction:
     """A direction turned about the axis to the east: what looked south looks down a little."""
     x, y, z = way
     cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
