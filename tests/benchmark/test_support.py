@@ -127,6 +127,23 @@ def test_a_bridge_that_sinks_onto_a_tower(tasks, car) -> None:
         assert score(tasks["support-1"], car, sunk).success == spans
 
 
+def test_a_crash_onto_the_floor_after_the_break_that_starts_it_does_not_count(tasks, car) -> None:
+    fallen = _carried(car, fall_at=15.6)
+    for breaks_at, crashes_at, spans in (
+        (15.2, 15.3, True),
+        (None, 15.3, False),
+        (8.0, 8.1, False),
+    ):
+        floor = np.where(fallen.time_s > crashes_at, 20.0, 0.0)
+        crashed = _shared(fallen, floor=floor, south=0.5 - floor / 2, until=15.6)
+        if breaks_at is not None:
+            broken = Break(
+                time_s=breaks_at, joint="1-2", kind="attachment", ratio=1.1, cargo_mass=None
+            )
+            crashed = replace(crashed, breaks=(broken,))
+        assert score(tasks["support-1"], car, crashed).success == spans, breaks_at
+
+
 def test_a_cargo_stays_near_the_middle(tasks, car, subtests) -> None:
     for name, most in (("support-1", 1.0), ("support-2", 1.25), ("support-3", 2.5)):
         for share, way in product((0.95, 1.05), (1, -1)):

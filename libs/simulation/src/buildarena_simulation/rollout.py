@@ -37,7 +37,7 @@ from buildarena_simulation.threads import single_threaded
 from buildarena_simulation.trajectory import Trajectory
 from buildarena_simulation.trial import Decision, Trial
 
-SIMULATION_VERSION: Final = "8"
+SIMULATION_VERSION: Final = "9"
 """Version of the shared model: rises with every change that can move a trajectory."""
 
 

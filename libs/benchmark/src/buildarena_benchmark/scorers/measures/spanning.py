@@ -53,8 +53,8 @@ class Span:
     """Where the load went; shares of sums over the time the cargo was carried.
 
     Attributes:
-        floor: The floor's share of the vertical force on the machine.
-        least_terrain: The share of the side whose terrain bore less.
+        floor: The floor's share of the vertical force on the machine, until a collapse begins.
+        least_terrain: The share of the side whose terrain bore less, likewise.
         floor_growth: What the floor takes up of each further unit of load, before a collapse.
         least_growth: What the side that takes up less does.
         carried: The machine's share of the force that held the cargo up.
@@ -159,15 +159,16 @@ def measure_span(
     if bearing is None or sides is None:
         return None
     until = len(trajectory.time_s) if decided is None else decided + 1
-    standing = slice(_standing(trajectory.time_s, bearing.cargo, decided))
+    last = _standing(trajectory.time_s, bearing.cargo, decided)
+    standing, whole = slice(last), slice(_first_break(trajectory, last, until))
     ground = bearing.ground[:until].astype(np.float64)
     terrain = bearing.terrain[:until].astype(np.float64)
     load = bearing.cargo[:until].astype(np.float64)
-    total = max(float(ground.sum() + terrain.sum()), 0.0)
-    sums = [float(terrain[:, side].sum()) for side in sides]
+    total = max(float(ground[whole].sum() + terrain[whole].sum()), 0.0)
+    sums = [float(terrain[whole][:, side].sum()) for side in sides]
     growths = [_growth(terrain[standing][:, side].sum(axis=1), load[standing]) for side in sides]
     return Span(
-        floor=_share(float(ground.sum()), total),
+        floor=_share(float(ground[whole].sum()), total),
         least_terrain=_share(min(sums), total),
         floor_growth=_growth(ground[standing], load[standing]),
         least_growth=min(growths),
@@ -183,6 +184,20 @@ def _standing(time_s: NDArray[np.float64], load: NDArray[np.float32], decided: i
     carried_s = float(time_s[decided] - time_s[touching[0]]) if len(touching) else 0.0
     ended_s = float(time_s[decided]) - min(COLLAPSE_S, carried_s / 2)
     return int(np.searchsorted(time_s, ended_s, side="right"))
+
+
+def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
+    """How many samples there are before the break that starts a collapse, if one does.
+
+    Args:
+        trajectory: The trial.
+        standing: Samples before a collapse may begin.
+        until: Samples until the load is decided.
+    """
+    if standing >= until:
+        return until
+    times = [one.time_s for one in trajectory.breaks if one.time_s >= trajectory.time_s[standing]]
+    return min(int(np.searchsorted(trajectory.time_s, min(times, default=np.inf))), until)
 
 
 def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
