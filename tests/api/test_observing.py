@@ -3,7 +3,6 @@
 import asyncio
 import json
 import platform
-import shutil
 import threading
 import time
 from collections.abc import Iterator
@@ -24,7 +23,7 @@ from support.servers.stacks import wait_until
 
 from buildarena_api.http import log as request_log
 from buildarena_api.http import parts
-from buildarena_api.http.parts import ARTIFACTS_FRESH_S, PATIENCE_S, Part, PartFailedError
+from buildarena_api.http.parts import PATIENCE_S, Part, PartFailedError
 from buildarena_api.routes.health import FEW_LOST
 from buildarena_backend import __version__
 from buildarena_backend.journal.journal import Usage
@@ -207,18 +206,6 @@ def test_health_names_workers_that_are_missing_wrong_or_silent(api, context, swe
     assert found["budgets"]["detail"] == "1 sweeps wait for a larger one"
 
 
-@pytest.mark.ci
-def test_metrics_notice_an_artifact_store_that_fails(api, context) -> None:
-    folder = context.settings.data / "artifacts"
-    shutil.rmtree(folder)
-    folder.write_text("no folder")
-    wait_until(
-        lambda: only(samples(api), "artifact_store_up") == 0,
-        4 * ARTIFACTS_FRESH_S,
-        "the store is asked again",
-    )
-
-
 @contextmanager
 def service_behind(context, part: str, monkeypatch) -> Iterator[tuple[httpx.Client, HushedProxy]]:
     """The API, with a proxy that can fall silent before one of its stores."""
@@ -279,15 +266,6 @@ def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part, m
         wait_until(lambda: checks(client)[part]["ok"], 20, f"{part} is known to work again")
         for thread in hanging:
             thread.join(40)
-
-
-@pytest.mark.ci
-def test_a_bucket_that_was_always_silent_is_named(context, monkeypatch) -> None:
-    with service_behind(context, "artifacts", monkeypatch) as (client, proxy):
-        proxy.hush()
-        wait_until(lambda: not checks(client)["artifacts"]["ok"], 3 * PATIENCE_S, "it is known")
-        assert client.get("/v1/health").status_code == 200
-        assert down(client) == ["artifact_store_up"]
 
 
 def test_a_part_says_what_it_said_last_and_does_not_wait(monkeypatch) -> None:

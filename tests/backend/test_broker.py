@@ -6,33 +6,25 @@ import asyncio
 import os
 import queue
 import signal
-import socket
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import httpx
-import psutil
 import pytest
-import uvicorn
 import uvloop
 from celery.signals import task_received
-from fastapi import FastAPI
 from redis.asyncio import Redis
 from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
 
 from buildarena_api.http import places
-from buildarena_api.http.door import UNANSWERED_S, Server
 from buildarena_api.http.rate_limits import CircuitBreaker, RateLimits
-from buildarena_backend.keepalive import socket_options
 from buildarena_backend.process.active_lease import LeaseKeeper
-from buildarena_backend.queue.app import celery_app
 from buildarena_backend.queue.queues import MAX_WAITING, Queues
 from buildarena_backend.queue.watchdog import ConsumerWatchdog, reconnect
-from buildarena_cli.local import EmbeddedValkey, free_port
+from buildarena_cli.local import EmbeddedValkey
 from buildarena_worker.providers import throttle as throttle_module
 from buildarena_worker.providers.throttle import Throttle
 
@@ -160,41 +152,6 @@ def test_no_more_messages_are_sent_than_are_enough(context) -> None:
         context.queues.wake("construct", 3)
         context.queues.settle()
         assert context.queues.waiting("construct") == MAX_WAITING
-
-
-def has_options(sock: socket.socket, **more: int) -> None:
-    for level, name, value in socket_options(**more):
-        assert sock.getsockopt(level, name) == value
-
-
-def test_consumers_give_up_dead_links(broker_url) -> None:
-    app = celery_app(broker_url)
-    with app.connection_for_read() as connection, connection.channel() as channel:
-        one = channel.pool.get_connection()
-        has_options(one._sock)
-        channel.pool.release(one)
-    app.close()
-
-
-def test_the_api_gives_up_clients_that_are_gone() -> None:
-    def accepted(client_port: int) -> socket.socket | None:
-        """A handle of this process' own end of a client's connection."""
-        for one in psutil.Process().net_connections("tcp"):
-            if one.raddr and one.raddr.port == client_port:
-                return socket.socket(fileno=os.dup(one.fd))
-        return None
-
-    port = free_port()
-    server = Server(uvicorn.Config(FastAPI(), port=port, log_config=None, loop="uvloop"))
-    thread = threading.Thread(target=server.run)
-    thread.start()
-    wait_until(lambda: server.started, 10, "it listens")
-    with socket.create_connection(("127.0.0.1", port)) as client:
-        inner = wait_until(lambda: accepted(client.getsockname()[1]), 5, "it is accepted")
-        has_options(inner, unanswered_s=UNANSWERED_S)
-        inner.close()
-    server.should_exit = True
-    thread.join()
 
 
 def test_a_connection_that_ended_unseen_leaves_a_request_to_the_own_count(broker_url) -> None:

@@ -5,20 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import threading
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
 
-from buildarena_backend.catalog.models import ModelEntry, ProviderEntry
-from buildarena_backend.errors import PermanentError, StartupError
-from buildarena_backend.process.context import open_context
+from buildarena_backend.errors import StartupError
 from buildarena_backend.secret_files import MAX_BYTES, read_secret
 from buildarena_backend.settings import ARTIFACT_CREDENTIALS, SECRETS, load_settings
-from buildarena_cli.client import Client
-from buildarena_cli.errors import CommandError
 from buildarena_cli.local.stack import Stack
-from buildarena_worker.providers.provider import ProviderClient
 
 SECRET = "a-secret-of-some-length"
 URLS = {
@@ -106,60 +99,6 @@ def test_a_wrong_setting_is_named_a_secret_never_shown_and_an_empty_one_none(
         monkeypatch.setenv(f"BUILDARENA_{name}", "")
     found = load_settings()
     assert (found.admin_keys, found.otlp_endpoint) == ((SECRET,), None)
-
-
-def test_an_artifact_store_signs_with_the_credentials_of_files(settings, kept, monkeypatch) -> None:
-    signatures: list[str] = []
-
-    class Bucket(BaseHTTPRequestHandler):
-        """Takes whatever is put, and notes with whose signature."""
-
-        def do_PUT(self) -> None:
-            self.rfile.read(int(self.headers["Content-Length"]))
-            signatures.append(self.headers["Authorization"])
-            self.send_response(200)
-            self.send_header("ETag", '"1"')
-            self.send_header("Content-Length", "0")
-            self.end_headers()
-
-        def log_message(self, *_: object) -> None: ...
-
-    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-        monkeypatch.setenv(f"{name}_FILE", kept(f"{name.lower()}-by-file\n", name))
-    with ThreadingHTTPServer(("127.0.0.1", 0), Bucket) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.01,))
-        thread.start()
-        monkeypatch.setenv("AWS_ENDPOINT", f"http://127.0.0.1:{server.server_port}")
-        monkeypatch.setenv("AWS_ALLOW_HTTP", "true")
-        monkeypatch.setenv("AWS_REGION", "us-east-1")
-        given = settings.model_dump() | {"artifacts_url": "s3://arena/artifacts"}
-        context = open_context(load_settings(**given))
-        context.artifacts.put(b"a bridge", "application/json")
-        context.close()
-        server.shutdown()
-        thread.join()
-    (signature,) = signatures
-    assert "Credential=aws_access_key_id-by-file/" in signature
-
-
-def test_keys_of_a_provider_and_of_the_command_line_can_stand_in_files(kept, monkeypatch) -> None:
-    entry = ModelEntry(name="x/y", provider="x", model="y")
-    provider = ProviderEntry(protocol="openai", base_url="http://127.0.0.1:9", key="X_API_KEY")
-    with pytest.raises(PermanentError, match="X_API_KEY or X_API_KEY_FILE"):
-        ProviderClient(entry, provider)
-    monkeypatch.setenv("X_API_KEY_FILE", kept("shh\n"))
-    client = ProviderClient(entry, provider)
-    assert client._key == "shh"
-    client.close()
-    monkeypatch.setenv("X_API_KEY", "other")
-    with pytest.raises(PermanentError, match="X_API_KEY and X_API_KEY_FILE are both set"):
-        ProviderClient(entry, provider)
-    monkeypatch.setenv("BUILDARENA_KEY_FILE", kept("ba_key\n"))
-    own = Client("http://127.0.0.1:9")
-    assert own._api._transport._http.headers["Authorization"] == "Bearer ba_key"
-    monkeypatch.setenv("BUILDARENA_KEY", "other")
-    with pytest.raises(CommandError, match="BUILDARENA_KEY and BUILDARENA_KEY_FILE are both set"):
-        Client("http://127.0.0.1:9")
 
 
 @pytest.mark.ci

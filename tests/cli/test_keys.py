@@ -1,20 +1,14 @@
 """Keys, budgets and the database's roles as operators and researchers use them."""
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 import yaml
-from sqlalchemy import make_url, text
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import changed, live_api
 from typer.testing import CliRunner, Result
 
-from buildarena_backend.database.database import Database
 from buildarena_cli.errors import CommandError
 from buildarena_cli.main import app
 
@@ -72,24 +66,6 @@ def test_running_a_file_again_takes_the_sweep_up_with_another_budget(call, tmp_p
     assert "$0.00 of $3.00" in call("sweep", "status", first["id"], key=key).stdout
 
 
-def test_a_key_is_rotated_with_what_it_owns(call) -> None:
-    key = made(call, "--scope", "submit")
-    submit = ("job", "submit", "lift-1", "builtin/idle", "--json")
-    first = json.loads(call(*submit, key=key["secret"]).stdout)
-    rotate = ("admin", "key", "rotate", key["id"], "--json", "--overlap")
-    done = json.loads(call(*rotate, "30m").stdout)
-    assert done["id"] == key["id"]
-    assert done["secret"] != key["secret"]
-    for secret in (key["secret"], done["secret"]):
-        assert call("job", "show", first["id"], key=secret).exit_code == 0
-    last = json.loads(call(*rotate, "0").stdout)
-    with pytest.raises(CommandError, match=r"is replaced: set BUILDARENA_KEY"):
-        call("job", "list", key=done["secret"])
-    with pytest.raises(CommandError, match="unknown API key"):
-        call("job", "list", key=key["secret"])
-    assert call("job", "cancel", first["id"], key=last["secret"]).exit_code == 0
-
-
 def test_a_wrong_scope_or_overlap_is_named(call) -> None:
     with pytest.raises(CommandError, match="'root'; choose from read, submit, admin"):
         call("admin", "key", "create", "x", "--scope", "root")
@@ -101,54 +77,3 @@ def test_a_wrong_scope_or_overlap_is_named(call) -> None:
 
 
 # What a deployment runs before its processes start
-
-
-@pytest.fixture
-def fresh(database_url: str) -> Iterator[str]:
-    """A database without any table."""
-    name = f"{make_url(database_url).database}_fresh"
-    superuser = Database(database_url)
-    with superuser.statement() as connection:
-        connection.execute(text(f"CREATE DATABASE {name}"))
-    yield make_url(database_url).set(database=name).render_as_string(hide_password=False)
-    with superuser.statement() as connection:
-        connection.execute(text(f"DROP DATABASE {name} WITH (FORCE)"))
-        for role in ("owner", "api"):
-            connection.execute(text(f'DROP ROLE IF EXISTS "{name}_{role}"'))
-    superuser.close()
-
-
-def admin(url: str, *words: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "buildarena_cli", "admin", *words]
-    environment = {**os.environ, "BUILDARENA_DATABASE_URL": url}
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-
-
-def login(folder: Path, url: str, role: str, password: str) -> tuple[str, str]:
-    """The argument that names a login's file, and its URL."""
-    own = make_url(url).set(username=f"{make_url(url).database}_{role}", password=password)
-    file = folder / role
-    file.write_text(own.render_as_string(hide_password=False) + "\n")
-    return f"{role}={file}", file.read_text().strip()
-
-
-@pytest.mark.ci
-def test_roles_then_migration_by_an_owner_who_is_no_superuser(fresh, tmp_path) -> None:
-    owner, owner_url = login(tmp_path, fresh, "owner", "first")
-    api, api_url = login(tmp_path, fresh, "api", "first")
-    roles = admin(fresh, "roles", owner, api)
-    assert (roles.returncode, roles.stdout.strip()) == (0, "logins for owner, api"), roles.stderr
-    migrated = admin(owner_url, "migrate")
-    assert migrated.returncode == 0, migrated.stderr
-    assert admin(api_url, "migrate").returncode != 0
-    api, renewed = login(tmp_path, fresh, "api", "second")
-    assert admin(fresh, "roles", api).returncode == 0
-    database = Database(renewed)
-    database.require_schema()
-    database.close()
-    refused = admin(api_url, "migrate")
-    assert refused.returncode != 0
-    assert "second" not in refused.stderr + refused.stdout
-    for word, says in (("api", "'api' is not ROLE=FILE"), (f"chief={tmp_path}/api", "no role 'ch")):
-        done = admin(fresh, "roles", word)
-        assert (done.returncode, says in done.stderr) == (1, True), done.stderr

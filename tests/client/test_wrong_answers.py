@@ -21,7 +21,6 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 from support.servers.wrong_server import answer, wrong_server
 
-from buildarena_backend.secret_files import MAX_BYTES, SecretFileError, read_secret
 from buildarena_client import (
     BadArgumentError,
     Client,
@@ -36,7 +35,6 @@ from buildarena_client import (
     UnavailableError,
     UnreachableError,
 )
-from buildarena_client.config import stored_key
 from buildarena_client.event_streams import MAX_EVENT_BYTES
 from buildarena_client.transport import BREAK_PAUSE_S, LONGEST_PAUSE_S
 
@@ -372,39 +370,6 @@ def test_what_is_no_key_or_url_is_refused_unseen(make) -> None:
         with pytest.raises(BadArgumentError, match="no user or password") as refused:
             make(f"http://me:hush@{rest}")
         assert "hush" not in str(refused.value)
-
-
-def read_key(environment: dict[str, str]) -> str | None:
-    """As the client reads it, and the service in the same way."""
-    found: list[str | None] = []
-    for read in (stored_key, lambda given: read_secret("BUILDARENA_KEY", given)):
-        try:
-            found.append(read(environment))
-        except (BadArgumentError, SecretFileError) as error:
-            found.append(f"refused: {error}")
-    assert found[0] == found[1] or all("refused: " in str(one) for one in found)
-    return found[0]
-
-
-def test_keys_stand_in_variables_or_files(tmp_path) -> None:
-    file = tmp_path / "key"
-    of_file = {"BUILDARENA_KEY_FILE": str(file)}
-    assert "No such file" in read_key(of_file)
-    for data, key in {b"k\n": "k", b"k\r\n": "k", b"k\n\n": "k\n", b" k ": " k "}.items():
-        file.write_bytes(data)
-        assert read_key(of_file) == key, "one line end is cut"
-    for data, says in (
-        *((b"", "is empty"), (b" \r\n", "is empty"), (b"\xff", "not UTF-8")),
-        (b"secret" * MAX_BYTES, "more than"),
-    ):
-        file.write_bytes(data)
-        told = read_key(of_file)
-        assert "BUILDARENA_KEY_FILE" in told
-        assert says in told
-        assert "secret" not in told
-    assert read_key({}) is read_key({"BUILDARENA_KEY": "", "BUILDARENA_KEY_FILE": ""}) is None
-    assert read_key({"BUILDARENA_KEY": " k \n", "BUILDARENA_KEY_FILE": ""}) == " k \n"
-    assert "are both set" in read_key({"BUILDARENA_KEY": "secret", **of_file})
 
 
 @pytest.mark.parametrize("scheme", ["https", "HTTPS"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import httpx
 import pytest
 from opentelemetry.sdk.trace import ReadableSpan
 from opentelemetry.semconv._incubating.attributes import gen_ai_attributes as gen_ai
@@ -10,11 +9,9 @@ from opentelemetry.semconv.attributes import error_attributes, http_attributes
 from opentelemetry.trace import SpanKind, StatusCode
 from support.jobs import claim, expire_leases
 from support.providers.stand_in import ProviderStandIn
-from support.servers.collector import collector
 from support.servers.construct_threads import crew
 from support.servers.live_api import api_client, live_api
 from support.servers.runner_rig import slot
-from support.servers.stacks import finished, running_stack
 from support.spans import Spans, recorded
 from support.stages import work
 
@@ -114,36 +111,6 @@ def test_a_caller_that_is_not_sampled_is_followed(context) -> None:
     assert kept.endswith("-00")
 
 
-def test_a_retried_job_stays_in_its_trace(context, monkeypatch) -> None:
-    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
-    with recorded() as spans:
-        job = submitted(context, model="openai/gpt-4o")
-        work(context)
-        with api_client(context) as api:
-            assert api.post(f"/v1/jobs/{job['id']}/retry").status_code == 202
-        work(context)
-    stages = spans.named("construct")
-    assert len(stages) == 2
-    assert_children(request_of(spans, "/v1/jobs"), stages)
-    for one in stages:
-        assert one.status.status_code == StatusCode.ERROR
-        assert one.attributes[error_attributes.ERROR_TYPE] == "missing_key"
-    assert trace_of(request_of(spans, "/v1/jobs/{job_id}/retry")) != trace_of(stages[0])
-
-
-def test_a_job_that_is_wanted_again_moves_to_the_trace_of_who_wants_it(context) -> None:
-    with recorded() as spans:
-        job = submitted(context)
-        with api_client(context) as api:
-            assert api.post(f"/v1/jobs/{job['id']}/cancel").is_success
-        submitted(context)
-        submitted(context)  # was there before, and changes nothing
-        work(context)
-    asked = spans.named("POST /v1/jobs")
-    assert len(asked) == 3
-    assert_children(asked[1], spans.named(*STAGES))
-
-
 def test_a_request_that_fails_says_how(context, tmp_path) -> None:
     faults = {0: "429", 1: None, 2: "garbage", 3: "401"}
     with (
@@ -185,30 +152,3 @@ def test_a_runner_s_trial_is_scored_in_its_job_s_trace(context) -> None:
             assert runner.do_next(10.0)
     (one,) = spans.named("score")
     assert_children(request_of(spans, "/v1/jobs"), [one])
-
-
-@pytest.mark.nightly
-def test_all_processes_send_one_trace(tmp_path, monkeypatch) -> None:
-    sweep = {"tasks": ["support-1"], "models": ["builtin/expert"], "seeds": [0, 1]}
-    with collector() as kept:
-        monkeypatch.setenv("BUILDARENA_OTLP_ENDPOINT", kept.url)
-        with (
-            running_stack(tmp_path, otlp_endpoint=kept.url) as stack,
-            httpx.Client(base_url=stack.url) as client,
-        ):
-            answer = client.post(
-                "/v1/sweeps", json={**sweep, "simulator": "mujoco"}, headers=sampled()
-            )
-            finished(client, answer.json()["id"])
-    ours = [(service, one) for service, one in kept.spans() if one.trace_id.hex() == TRACE]
-    services = {service for service, _ in ours}
-    assert services == {
-        "buildarena-api",
-        "buildarena-construct-worker",
-        "buildarena-simulate-worker",
-    }
-    (root,) = [one for _, one in ours if one.parent_span_id.hex() == CALLER]
-    stages = [one for _, one in ours if one.name in STAGES]
-    assert len(stages) == 4
-    assert {one.parent_span_id for one in stages} == {root.span_id}
-    assert not [one for _, one in kept.spans() if "health" in one.name]
