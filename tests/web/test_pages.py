@@ -14,10 +14,12 @@ import psutil
 import pytest
 from pydantic import SecretStr
 from support.documents.pages import BUILDARENA, LOOKS, in_browser, needs_pages
+from support.machines.random_machines import random_machine
 from support.providers.stand_in import ProviderStandIn
 from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from support.servers.stacks import finished, running_stack
-from tests.web.random_machines import built_session
+
+from buildarena_geometry import Block, Machine, Refused
 
 SWEEP = {
     "name": "pages",
@@ -73,14 +75,40 @@ def test_pages_work_below_a_path(tmp_path) -> None:
         in_browser(outer, ["e2e/below"], BUILDARENA_WEB_ROOT_URL=stack.url)
 
 
+def built_session(client: httpx.Client, seed: int) -> dict[str, object]:
+    """A session's job, and after each call where the geometry library says that every part is."""
+    body = {"task": "support-1", "agent": "random", "seed": seed, "simulator": "mujoco"}
+    job = client.post("/v1/sessions", json=body).raise_for_status().json()["id"]
+    machine, steps = Machine(), []
+    calls = [(done.name, done.arguments) for done in random_machine("support-1", seed).log[:60]]
+    for tool, arguments in (*calls, calls[1]):
+        outcome = machine.act(tool, arguments)
+        call = {"tool": tool, "arguments": arguments}
+        told = client.post(f"/v1/sessions/{job}/calls", json=call)
+        assert told.raise_for_status().json()["ok"] == outcome.ok
+        tried = outcome.attempted if isinstance(outcome, Refused) else ()
+        rods = {rod.id: [*rod.start_xyz, *rod.end_xyz] for rod in machine.connectors.values()}
+        steps.append(
+            {
+                "blocks": {block.id: pose(block) for block in machine.blocks.values()},
+                "rods": rods,
+                "ghosts": [[*block.position, *block.quaternion] for block in tried],
+            }
+        )
+    return {"job": job, "steps": steps}
+
+
+def pose(block: Block) -> list[float]:
+    return [*block.world_from_block.xyz, *block.world_from_block.wxyz]
+
+
 @pytest.mark.nightly
 def test_the_room_of_a_job_shows_what_is(tmp_path) -> None:
-    """Of machines built by random calls."""
+    """Of machines that nobody chose, and of a call that is refused."""
     with running_stack(tmp_path) as stack:
         with httpx.Client(base_url=stack.url, timeout=30) as client:
             sweep = submit(client, models=["builtin/expert"], seeds=[0, 1])
-            groups = [range(first, first + 10) for first in range(0, 50, 10)]
-            sessions = [built_session(client, f"random-{g[0]}", g) for g in groups]
+            sessions = [built_session(client, seed) for seed in range(4)]
             finished(client, sweep)
         assert any(step["ghosts"] for session in sessions for step in session["steps"])
         file = tmp_path / "machines.json"
