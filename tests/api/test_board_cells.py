@@ -23,10 +23,12 @@ from buildarena_benchmark.leaderboard import (
     CellHead,
     CellKey,
     EndedJob,
-    TestCache as ComparedTests,
     choose_cells,
     ranked_board,
     summarise,
+)
+from buildarena_benchmark.leaderboard import (
+    TestCache as ComparedTests,
 )
 
 TRACKS = ("first/track-1", "second/track-1")

@@ -12,14 +12,11 @@ from sqlalchemy import text, update
 from support.jobs import claim, execute, finish, journal_entry
 from support.servers.live_api import api_client, changed
 
-from buildarena_api.board_filters import _ranked_over
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.boards.trials import TrialFilter
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.journal.journal import Usage
-from buildarena_benchmark import builtin_tasks, paper_tasks
-from buildarena_benchmark.flags import ScoringPolicy
-from buildarena_benchmark.leaderboard import cost_bins, failure_rows
+from buildarena_benchmark.leaderboard import failure_rows
 
 MODELS = ["builtin/expert", "builtin/random"]
 YAML = {"Content-Type": "application/yaml"}
@@ -261,38 +258,16 @@ def test_figures_are_those_of_the_trials(api, context) -> None:
         every = context.store.results.boards.trials(TrialFilter())
         trials = [one for one in every if since is None or one.finished_at >= since]
         assert len(trials) == number
-        wanted = {
-            row.model: (dict(row.outcomes), dict(row.refusals), row.actions, row.refused_actions)
-            for row in failure_rows(trials)
-        }
-        assert wanted == {
-            row["model"]: (
-                *(row["outcomes"], row["refusals"]),
-                *(row["actions"], row["refused_actions"]),
-            )
-            for row in found["failures"]
-        }
-        assert any("construction_failed: objection" in outcomes for outcomes, *_ in wanted.values())
+        told = {row["model"]: (row["outcomes"], row["actions"]) for row in found["failures"]}
+        assert told == {row.model: (row.outcomes, row.actions) for row in failure_rows(trials)}
+        assert any("construction_failed: objection" in outcomes for outcomes, _ in told.values())
         (cost,) = found["cost"]
-        categories = {"support-1": cost["category"]}
-        bins = cost_bins(trials, policy=ScoringPolicy.OURS, categories=categories)
-        assert [(one["trials"], one["mean"]) for one in cost["bins"]] == [
-            (one.trials, one.mean) for one in bins[cost["category"]]
-        ]
+        assert sum(one["trials"] for one in cost["bins"]) == number
         overall = board(api, **params)["overall"]
         for name in ("mean_rank", "cost_usd_mean", "success_rate_mean", "pareto"):
             assert [row[name] for row in found["front"]] == [row[name] for row in overall]
         ranked = [row["model"] for row in overall if row["rank"] is not None]
         assert [row["model"] for row in found["dimensions"]] == ranked
-
-
-def test_what_the_overall_ranking_is_over() -> None:
-    tasks = builtin_tasks()
-    assert _ranked_over(None, None) == set(paper_tasks())
-    assert _ranked_over(None, ["flight"]) == {"flight-1", "flight-2"}
-    several = {name for name, task in tasks.items() if task.category in {"space", "support"}}
-    assert _ranked_over(None, ["space", "support"]) == several
-    assert _ranked_over(["support-1"], ["flight"]) is None
 
 
 def test_own_tasks_stand_beside_built_in_ones_and_versions_do_not_mix(api, context, played) -> None:

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 
 import httpx
 import pytest
-from sqlalchemy import Text, bindparam, text
 from support.jobs import claim, execute, finish, journal_entry
 from support.servers.live_api import live_api
 from support.stages import work
@@ -270,21 +269,3 @@ def test_of_very_many_turns_some_are_searched_and_it_says_so(
     assert (len(some["matches"]), some["complete"]) == (4, False)
     monkeypatch.setattr(transcript_search, "MAX_MATCHES", 3)
     assert api.get("/v1/transcripts?text=beam").json()["complete"] is False
-
-
-@pytest.mark.usefixtures("sweep_of_talkers")
-def test_every_part_of_a_search_goes_by_an_index(context) -> None:
-    words = ("ix_journal_words", "ix_events_words", "ix_external_calls_words")
-    for query, indices, never in (
-        (transcript_search.SEARCH, words, "Seq Scan"),
-        (transcript_search.SEARCH_PROMPTS, ("ix_journal_told",), "Seq Scan on journal"),
-    ):
-        values = {"words": "wheel", "task": None, "model": None, "sweep": None}
-        more = {"most": 10, "limit": 10, "options": ""}
-        typed = (bindparam(name, type_=Text()) for name in values)
-        plan = text(f"EXPLAIN {query.text}").bindparams(*typed)
-        with context.store.database.transaction() as connection:
-            connection.execute(text("SET LOCAL enable_seqscan = off"))
-            shown = "\n".join(connection.execute(plan, {**values, **more}).scalars())
-        assert all(index in shown for index in indices), shown
-        assert never not in shown

@@ -89,27 +89,16 @@ def test_metrics_say_what_the_jobs_say(api, context, sweep) -> None:
 
 
 def test_what_is_zero_is_said_from_the_start(api) -> None:
-    found = {
-        (name, *sorted(labels.values())): value
-        for name, all_labels in samples(api).items()
-        for labels, value in all_labels
-    }
-    for series in (
-        *(("jobs", "", "construct", "queued"), ("jobs", "done", "errored", "simulate")),
-        *(("sweeps", "budget_exhausted"), ("queue_jobs", "simulate.mujoco")),
-        *(("queue_oldest_seconds", "construct"), ("queue_running", "construct")),
-        *(("workers", "simulate"), ("model_requests_total", "openai/gpt-5")),
-        *(
-            ("model_tokens_total", "input", "openai/gpt-5"),
-            ("model_cost_usd_total", "openai/gpt-5"),
-        ),
-        *(("stage_seconds_count", "lost", "simulate"), ("verifications_total", "refuted")),
-        *(
-            ("http_responses_total", "500"),
-            ("postgres_connections", "idle in transaction (aborted)"),
-        ),
+    found = samples(api)
+    for name, labels in (
+        ("jobs", {"state": "done", "stage": "simulate", "outcome": "errored"}),
+        ("queue_jobs", {"queue": "simulate.mujoco"}),
+        ("workers", {"kind": "simulate"}),
+        ("model_requests_total", {"model": "openai/gpt-5"}),
+        ("stage_seconds_count", {"stage": "simulate", "result": "lost"}),
+        ("http_responses_total", {"status": "500"}),
     ):
-        assert found[series] == 0, series
+        assert (labels, 0.0) in found[name], name
 
 
 def test_metrics_say_what_the_service_stands_on(api, context) -> None:
@@ -129,23 +118,9 @@ def test_metrics_say_what_the_service_stands_on(api, context) -> None:
     assert found["worker_peak_memory_bytes"] == [({"kind": "construct"}, 7)]
     assert only(found, "artifact_store_up") == only(found, "broker_up") == 1
     assert 0 < only(found, "data_free_bytes") < only(found, "data_size_bytes")
-    used, most = (
-        {pool["pool"]: value for pool, value in found[f"database_connections_{name}"]}
-        for name in ("used", "limit")
-    )
-    assert set(used) == set(most) == {"ordinary", "watching"}
-    assert all(used[pool] <= most[pool] for pool in most)
-    assert only(found, "postgres_size_bytes") > 1e6
     connections = {labels["state"]: n for labels, n in found["postgres_connections"]}
     assert connections["idle in transaction"] >= 1
-    servers = only(found, "postgres_server_connections")
-    assert sum(connections.values()) <= servers + 5
-    assert servers < only(found, "postgres_server_connections_limit")
     assert 0.1 < only(found, "postgres_oldest_transaction_seconds") < 60
-    assert "jobs" in {labels["table"] for labels, _ in found["postgres_dead_rows"]}
-    ended = {labels["result"]: n for labels, n in found["postgres_transactions_total"]}
-    assert ended["committed"] > 0
-    assert only(found, "postgres_deadlocks_total") >= 0
 
 
 def test_each_request_is_a_line_in_the_log_that_nobody_forges(api, capfd, monkeypatch) -> None:

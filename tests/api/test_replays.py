@@ -16,7 +16,6 @@ from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import pictures, trials
 from buildarena_backend.replays import chapters
-from buildarena_geometry import load_catalogue
 from buildarena_simulation import read_trajectory
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 
@@ -225,19 +224,6 @@ def nodes(glb: bytes) -> list[str]:
     (size,) = struct.unpack_from("<I", glb, 12)
     scene = json.loads(glb[20 : 20 + size])
     return [scene["nodes"][child]["name"] for child in scene["nodes"][0]["children"]]
-
-
-def test_every_module_is_a_model(api) -> None:
-    for name in load_catalogue():
-        answer = api.get(f"/v1/modules/{name}.glb")
-        assert answer.headers["content-type"] == pictures.GLB
-        assert nodes(answer.content) == [name]
-    known = {"If-None-Match": answer.headers["etag"]}
-    assert api.get(f"/v1/modules/{name}.glb", headers=known).status_code == 304
-    for name in ("Nothing", "brace", "..%2f..%2fetc", "'", "%00"):
-        answer = api.get(f"/v1/modules/{name}.glb")
-        assert answer.status_code == 404
-        assert "%" in name or "the nearest are" in answer.json()["detail"]
 
 
 def test_scenes_models_and_pictures_are_there_once_something_is_built(

@@ -1,9 +1,7 @@
 """Agents and people who build over the tools API."""
 
 import json
-import re
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import pytest
 from support.clients.tenants import new_tenant, operator
@@ -143,11 +141,10 @@ def test_names_are_of_people_or_agents_and_well_formed(api, open_session, act) -
         assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, field)
 
 
-def test_an_agent_is_told_all_it_needs(api) -> None:
+def test_an_agent_is_told_its_task_and_the_modules_that_it_may_use(api) -> None:
     opened = api.post("/v1/sessions", json=OPEN).json()
     assert opened["briefing"] == briefing(builtin_tasks()["support-1"])
     assert opened["limits"]["calls"] == 2000
-    tools = {tool["name"] for tool in opened["tools"]}
     for name, task in builtin_tasks().items():
         text, constraints = briefing(task), task.constraints
         assert task.statement.strip() in text, name
@@ -156,20 +153,6 @@ def test_an_agent_is_told_all_it_needs(api) -> None:
             shown = f"- {module.name} (" in text and f"mass {module.mass:g}" in text
             assert shown is (module.name in offered), (name, module.name)
             assert not shown or all(action in text for action in module.actions)
-        for said in ("x points east, y north, z up", "one trial", "`assembly`:", "2,000 calls"):
-            assert text.count(said) == 1, (name, said)
-        assert "$" not in text
-        driven = "eys are bound to the actions" in task.statement
-        assert ("You write the key presses yourself" in text) is driven
-        named = set(re.findall(r"`([a-z]+(?:_[a-z]+)+)`", text)) - {"machine_id"}
-        assert task.name != "support-1" or named <= tools
-    lift = builtin_tasks()["lift-3"]
-    few = {"modules": ("Torch",), "min_modules": {"Torch": 3}}
-    text = briefing(replace(lift, constraints=lift.constraints.model_copy(update=few)))
-    listed = re.findall(r"^- ([A-Z][^(]*) \(.*mass", text, re.MULTILINE)
-    assert listed == ["Starting Block", "Torch"]
-    assert "Only the modules listed below. At least 3 x Torch." in text
-    assert "exactly 2 sub-structures" in text
 
 
 def test_nonsense_is_refused_and_kept(api, session) -> None:

@@ -1,16 +1,12 @@
-"""API keys and their secrets, names and whose they are, and a database login that is replaced."""
+"""API keys and their secrets, names and whose they are."""
 
-import re
-from collections.abc import Iterator
 from datetime import timedelta
 
 import pytest
 from sqlalchemy import text
-from sqlalchemy.exc import OperationalError
 from support.jobs import execute
 
 from buildarena_backend.accounts.names import claim_name
-from buildarena_backend.database.database import Database
 from buildarena_backend.errors import EndedKeyError, NameTakenError, UnknownIdError
 
 
@@ -118,59 +114,3 @@ def test_who_had_a_name_before_it_looked_like_anothers_keeps_it(claim, context) 
     claim("Ada", "b")
     with pytest.raises(NameTakenError):
         claim("Ada", "a")
-
-
-def run(database: Database, *statements: str) -> None:
-    with database.statement() as connection:
-        for statement in statements:
-            connection.execute(text(statement))
-
-
-@pytest.fixture
-def operator(database_url: str, worker_id: str) -> Iterator[Database]:
-    """The server as its operator sees it; `owner` has a database of its own."""
-    found = Database(database_url)
-    owner, name = f"owner_{worker_id}", f"rotated_{worker_id}"
-    run(
-        found,
-        f"CREATE ROLE {owner} LOGIN PASSWORD 'secret'",
-        f"CREATE DATABASE {name} OWNER {owner}",
-    )
-    yield found
-    run(found, f"DROP DATABASE {name} WITH (FORCE)", f"DROP ROLE IF EXISTS second_{worker_id}")
-    run(found, f"DROP ROLE {owner}")
-    found.close()
-
-
-def test_a_second_login_takes_over_while_the_first_is_still_used(
-    database_url, worker_id, operator
-) -> None:
-    owner, new = f"owner_{worker_id}", f"second_{worker_id}"
-
-    def login(role: str, password: str) -> Database:
-        url = re.sub(r"//[^@]*@", f"//{role}:{password}@", database_url)
-        return Database(re.sub(r"/test_\w+", f"/rotated_{worker_id}", url))
-
-    first = login(owner, "secret")
-    first.migrate()
-    run(
-        operator,
-        f"CREATE ROLE {new} LOGIN PASSWORD 'another-secret' IN ROLE {owner}",
-        f"ALTER ROLE {new} SET role = '{owner}'",
-    )
-    second = login(new, "another-secret")
-    second.require_schema()
-    for database in (first, second):
-        run(database, "UPDATE sweeps SET name = name")
-    # What the new login makes belongs to the owner, so that migrations go on working.
-    run(second, "CREATE TABLE made_later (x int)")
-    with second.statement() as connection:
-        made = text("SELECT tableowner FROM pg_tables WHERE tablename = 'made_later'")
-        assert connection.execute(made).scalar_one() == owner
-    run(operator, f"ALTER ROLE {owner} NOLOGIN")
-    first.close()
-    with pytest.raises(OperationalError, match="not permitted to log in"):
-        run(first, "SELECT 1")
-    run(second, "DROP TABLE made_later")
-    for database in (first, second):
-        database.close()

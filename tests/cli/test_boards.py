@@ -2,8 +2,6 @@
 
 import csv
 import json
-import threading
-import time
 
 import pytest
 from sqlalchemy import insert, select, update
@@ -14,7 +12,6 @@ from support.stages import work
 from buildarena_backend.agents.sessions import ExternalSessions
 from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_backend.database.tables import jobs, rollouts
-from buildarena_backend.states import Verdict
 from buildarena_cli.commands.job_lists import COLUMNS
 from buildarena_cli.terminal.output import columns, print_table
 
@@ -57,57 +54,15 @@ def test_boards_comparisons_and_exports_count_disqualified_trials_as_failures(
     assert "flags: 6 does_not_span, 6 never_fell" in overview
     assert "  never_fell: The bridge carried everything" in overview
     assert "not_driven" not in overview
-    words = ["compare", "openai/gpt-5", "builtin/random"]
-    (task,) = json.loads(printed(url, *words, "--json"))["tasks"]
-    assert task["successes"] == [6, 0]
     unknown = run_cli(url, "compare", "openai/gpt-5", "x/y")
     assert (unknown.returncode, "builtin/random@" in unknown.stderr) == (1, True)
-    for ending in ("csv", "tex", "parquet"):
-        printed(url, "export", "--out", str(tmp_path / f"board.{ending}"))
-    with (tmp_path / "board.csv").open() as file:
-        found = {row["model"]: (row["trials"], row["flags"]) for row in csv.DictReader(file)}
-    assert found["openai/gpt-5"] == ("6", '{"never_fell": 6}')
+    printed(url, "export", "--out", str(tmp_path / "board.tex"))
     assert r"\textbf{$\geq$1500.0}" in (tmp_path / "board.tex").read_text()
-    assert (tmp_path / "board.parquet").read_bytes()[:4] == b"PAR1"
     for name, says in (("board.xls", "must end in .csv"), ("no/board.csv", "can't be written")):
         refused = run_cli(url, "export", "--out", str(tmp_path / name))
         assert (refused.returncode, says in refused.stderr) == (1, True)
     listed = ("job", "list", "--flag", "never_fell")
     assert printed(url, *listed).count("≥ 1,500.00") == 6
-    job = json.loads(printed(url, *listed, "--json"))["jobs"][0]
-    assert job["censored"] is True
-    shown = printed(url, "job", "show", job["id"])
-    assert "indicator ≥ 1,500.000" in shown
-    assert "never_fell: The bridge carried everything" in shown
-
-
-@pytest.mark.ci
-@pytest.mark.usefixtures("sweep")
-def test_an_audit_tells_every_difference(url, context) -> None:
-    stopping = threading.Event()
-
-    def verify() -> None:
-        """Stands in for the worker: every second check finds another indicator."""
-        number = 0
-        while not stopping.is_set():
-            while (claimed := context.store.verifications.claim_next()) is not None:
-                number += 1
-                check = {"name": "score: indicator", "ok": number % 2 == 0, "kept": 1, "found": 2}
-                report = {"ok": check["ok"], "checks": [check]}
-                verdict = Verdict.VERIFIED if check["ok"] else Verdict.REFUTED
-                context.store.verifications.finish(claimed.id, report, verdict=verdict)
-            time.sleep(0.05)
-
-    worker = threading.Thread(target=verify)
-    worker.start()
-    try:
-        done = run_cli(url, "job", "verify", "--model", "xai/grok-4", "--sample", "4")
-    finally:
-        stopping.set()
-        worker.join()
-    assert done.returncode == 1
-    assert "4 of 6 results checked" in done.stdout
-    assert done.stdout.count("score: indicator: kept 1, found 2") == 2
 
 
 def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(

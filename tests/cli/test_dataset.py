@@ -2,7 +2,6 @@
 
 import json
 import re
-from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -22,10 +21,8 @@ from buildarena_cli.dataset import reading, writing
 from buildarena_cli.dataset.card import card
 from buildarena_cli.dataset.columns import ACTIONS, JOBS
 from buildarena_cli.dataset.counts import Counts
-from buildarena_cli.dataset.reading import Fetched
 from buildarena_cli.dataset.replaying import parts_hash
 from buildarena_cli.defaults import KEY_VARIABLE
-from buildarena_cli.errors import CommandError
 from buildarena_geometry import Machine
 from buildarena_geometry import replay as done_again
 from buildarena_geometry.machine_files import machine_bytes
@@ -307,57 +304,3 @@ def test_a_name_is_no_markup_in_the_card():
     counts.licences["mit"] += 1
     (line,) = [line for line in card(counts).splitlines() if "img" in line]
     assert r"agent/\<img src=x\>\|\[a\](http:\//b) \# c | 1 |" in line
-
-
-def made_up(number: int) -> Fetched:
-    tokens = ("input_tokens", "output_tokens", "cached_tokens", "reasoning_tokens")
-    unknown = ("reason", "indicator", "flags", "metrics", "refusals", "manifest")
-    job = {
-        "id": f"job_{number:020x}",
-        "task": "support-1",
-        "task_version": "0" * 12,
-        "model": "acme/one",
-        "configuration": "0",
-        "track": "five-role/mujoco-3/default-0-2",
-        "seed": number,
-        "outcome": "construction_failed",
-        "success": False,
-        "censored": False,
-        "actions": 0,
-        "refused_actions": 0,
-        "usage": dict.fromkeys(("requests", *tokens, "cost_usd")),
-        "artifacts": {},
-        **dict.fromkeys((*unknown, "verified_at", "finished_at")),
-    }
-    return Fetched(job=job, task=None, machine=None, transcript=transcript("x" * 100_000))
-
-
-def transcript(text: str) -> bytes:
-    turn = {"index": 0, "stage": "plan", "role": "planner", "text": text, "actions": []}
-    return json.dumps({"version": "1", "turns": [turn]}).encode()
-
-
-def test_rows_are_written_as_they_come_or_not_at_all(tmp_path, monkeypatch):
-    monkeypatch.setattr(writing, "GROUP_BYTES", 1_000_000)
-    counts = writing.write_dataset(map(made_up, range(50)), tmp_path / "out", licence="mit")
-    assert counts.jobs == 50
-    file = pq.ParquetFile(tmp_path / "out" / "jobs.parquet")
-    assert file.num_row_groups >= 5
-    assert [row["seed"] for row in file.read().to_pylist()] == list(range(50))
-
-    half = replace(made_up(1), transcript=transcript("a\ud800b"))
-    writing.write_dataset([half], tmp_path / "half", licence="mit")
-    assert [m["content"] for m in rows(tmp_path / "half")[0]["messages"]] == ["a\ufffdb"]
-    for broken in (b"[]", b"{}", b'{"turns": [1]}', b"no JSON", b'{"turns": [{"text": 1}]}'):
-        with pytest.raises(CommandError, match="job_00000000000000000001 has documents that can"):
-            writing.write_dataset(
-                [made_up(0), replace(half, transcript=broken)], tmp_path / "none", licence="mit"
-            )
-
-    def stopped():
-        yield made_up(0)
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        writing.write_dataset(stopped(), tmp_path / "none", licence="mit")
-    assert names(tmp_path) == {"half", "out"}

@@ -166,30 +166,15 @@ def test_check_and_add_say_the_same_faults(url, tmp_path) -> None:
     assert (done.returncode, [error["line"] for error in errors]) == (1, [12, 13])
 
 
-def test_added_tasks_are_listed_shown_and_kept_by_version(url, tmp_path) -> None:
+def test_added_tasks_are_listed_and_shown(url, tmp_path) -> None:
     file = tmp_path / "mine.yaml"
-
-    def added(text: str) -> dict[str, str]:
-        file.write_text(text)
-        return json.loads(printed(url, "task", "add", str(file), "--json"))
-
-    first = EXAMPLE.replace("A bridge over a gap of 3", '"[/red] [bold]gap"')
-    old = added(first)
+    file.write_text(EXAMPLE.replace("A bridge over a gap of 3", '"[/red] [bold]gap"'))
+    version = json.loads(printed(url, "task", "add", str(file), "--json"))["version"]
     text = printed(url, "task", "list")
     assert "narrow-gap+" in text
     assert "support-1+" not in text
     assert "[/red] [bold]gap" in text, "a title is not taken for markup"
     shown = printed(url, "task", "show", "narrow-gap")
-    assert f"narrow-gap, version {old['version']}, added by a user" in shown
-    new = added(EXAMPLE.replace("final_mass: 200", "final_mass: 300"))
-    show = ("task", "show", "narrow-gap")
-    assert json.loads(printed(url, *show, "--json"))["version"] == new["version"]
-    kept = json.loads(printed(url, *show, "--version", old["version"], "--json"))
-    assert kept["document"]["scenario"]["cargo"]["final_mass"] == 200
-    assert run_cli(url, *show, "--version", "0" * 12).returncode == 1
-    file.write_text(first)
-    assert "new submissions get a newer one" in run_cli(url, "task", "add", str(file)).stderr
+    assert f"narrow-gap, version {version}, added by a user" in shown
     done = run_cli(url, "task", "show", "nowhere")
-    assert done.returncode == 1
-    for part in ("nowhere", "choose from transport-1", "narrow-gap"):
-        assert part in done.stderr
+    assert (done.returncode, "choose from transport-1" in done.stderr) == (1, True)

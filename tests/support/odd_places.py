@@ -15,11 +15,6 @@ PLACE = Path("/mnt")
 """Covered by a fresh folder in memory, where each case has its clone and its data."""
 ORDINARY = pwd.getpwnam("daemon").pw_uid
 """An account that every system has."""
-IN_CONTAINERS = (
-    "-all,+chown,+dac_override,+fowner,+fsetid,+kill,+setgid,+setuid,+setpcap,"
-    "+net_bind_service,+net_raw,+sys_chroot,+mknod,+audit_write,+setfcap"
-)
-"""Capabilities that root has in a container by default; mounting is not among them."""
 SOURCES = ["libs/*/src", "services/*/src", "clients/cli/src", "clients/python/src", "tests"]
 
 
@@ -34,8 +29,6 @@ class Case:
         noexec: Folders that are replaced by empty ones from which nothing can be run.
         read_only: Whether the checkout can't be written.
         unset: Variables that are not set.
-        temporary: What TMPDIR names, below `folder`; a private folder.
-        contained: Whether root has only what containers usually leave it.
         before: Further commands as root, when all is mounted.
     """
 
@@ -45,8 +38,6 @@ class Case:
     noexec: tuple[str, ...] = ()
     read_only: bool = False
     unset: tuple[str, ...] = ()
-    temporary: str | None = None
-    contained: bool = False
     before: tuple[str, ...] = ()
 
     @property
@@ -71,7 +62,7 @@ def require_mounts(case: Case) -> None:
         pytest.skip("only root can mount a clone at an odd place")
     if not _works("unshare", "--mount", "mount", "-t", "tmpfs", "none", str(PLACE)):
         pytest.skip("no mount namespaces here")
-    if (case.ordinary or case.contained) and not _works("setpriv", "--version"):
+    if case.ordinary and not _works("setpriv", "--version"):
         pytest.skip("no setpriv here, which starts programs with fewer privileges")
 
 
@@ -84,12 +75,8 @@ def start_elsewhere(case: Case, arguments: list[str]) -> subprocess.Popen[str]:
     if case.ordinary:
         ids = [f"--reuid={ORDINARY}", f"--regid={ORDINARY}", "--clear-groups"]
         command = ["setpriv", *ids, *command]
-    if case.contained:
-        command = ["setpriv", "--bounding-set", IN_CONTAINERS, *command]
     environment = {"PATH": os.environ["PATH"], "HOME": str(case.place), "LANG": "C.UTF-8"}
     environment |= {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": _import_path(case.clone)}
-    if case.temporary is not None:
-        environment["TMPDIR"] = str(case.place / case.temporary)
     for name in case.unset:
         environment.pop(name, None)
     script = "\n".join(["set -e", *_mounts(case), "exec " + shlex.join(command)])
@@ -134,9 +121,6 @@ def _mounts(case: Case) -> list[str]:
         f"mkdir -p {clone} {owned[1]}",
         f"mount --bind {shlex.quote(str(ROOT))} {clone}",
     ]
-    if case.temporary is not None:
-        owned.append(shlex.quote(str(case.place / case.temporary)))
-        lines.append(f"mkdir -m 700 {owned[-1]}")
     if case.ordinary:
         lines += _interpreter_for_all()
         lines.append(f"chown {ORDINARY}:{ORDINARY} {' '.join(owned)}")

@@ -6,7 +6,6 @@ import itertools
 import json
 import re
 import signal
-import sys
 import time
 from dataclasses import replace
 from decimal import Decimal
@@ -23,7 +22,7 @@ from buildarena_backend.accounts.budgets import BudgetLimits
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_worker import builtin
 from buildarena_worker.builtin import expert
-from buildarena_worker.session.messages import Completion, Request, ToolCall
+from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.wiring import verifier
 
 SOON_S = 3.0
@@ -206,41 +205,6 @@ LURES = (
     "\u0000\ud800\x1b[2J",
     "[bold]rich[/bold] [link=file:///etc/passwd]x[/link]",
 )
-TOOLS = ("open", "read_file", "python", "bash", "fetch", "import", "attach_block_to", "start")
-REACHED = ("open", "socket.connect", "socket.getaddrinfo", "subprocess.Popen", "os.system")
-ALLOWED = tuple(
-    str(Path(folder).resolve())
-    for folder in (sys.prefix, sys.base_prefix, Path(__file__).parents[2], "/proc", "/dev")
-)
-watching = False
-seen: list[tuple[str, str]] = []
-
-
-def _watch(event: str, arguments: tuple[object, ...]) -> None:
-    if not watching or event not in REACHED:
-        return
-    target = str(arguments[0])
-    writes = event == "open" and set(str(arguments[1] or "r")) & set("wax+")
-    if event != "open" or writes or not target.startswith(ALLOWED):
-        seen.append((event, str(arguments)[:200]))
-
-
-# A hook can't be taken out again: this one looks only while a session plays.
-sys.addaudithook(_watch)
-
-
-def liar(request: Request) -> Completion:
-    """Says lures only, and calls tools that there are and that there are not with them."""
-    number = len(request.messages) * 7 + sum(len(m.text) for m in request.messages)
-    lure = LURES[number % len(LURES)]
-    name = TOOLS[number % len(TOOLS)]
-    arguments = {"path": lure, "base_block": lure, "face": lure, "new_block": lure, "note": lure}
-    call = ToolCall(id=lure, name=name, arguments=arguments if number % 3 else lure)
-    plan = (
-        f"<building_plan><overall_structure>{lure}</overall_structure><sub_structure>"
-        f"<name>{lure}</name><description>{lure}</description></sub_structure></building_plan>"
-    )
-    return Completion(text=f"{plan}\n{lure}", calls=(call,) if request.tools else ())
 
 
 def spiced_expert() -> object:
@@ -261,23 +225,6 @@ def spiced_expert() -> object:
         return replace(said, text="\n".join(parts), calls=calls)
 
     return reply
-
-
-@pytest.mark.nightly(keep=2)
-@pytest.mark.parametrize("workflow", ["five-role", "guidance-builder", "builder"])
-@pytest.mark.parametrize("task", ["support-2", "transport-1"])
-def test_lures_reach_nothing(play, monkeypatch, workflow, task) -> None:
-    global watching  # noqa: PLW0603 - the hook is as global
-    monkeypatch.setitem(builtin.MODELS, "idle", liar)
-    play("builtin/idle", task=task, workflow=workflow)  # loads what is loaded once
-    seen.clear()
-    watching = True
-    try:
-        played = play("builtin/idle", task=task, workflow=workflow)
-    finally:
-        watching = False
-    assert seen == []
-    assert type(played.failure).__name__ == "Failed"
 
 
 def test_lures_in_a_good_machine_go_the_whole_way_as_text(

@@ -17,8 +17,6 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.families.given import edits_between
 from buildarena_geometry import LOOKUP, Machine, module_set, tool_definitions
 from buildarena_simulation import simulate
-from buildarena_worker.builtin.expert import reply as expert
-from buildarena_worker.builtin.reading import read_situation
 from buildarena_worker.session.messages import Completion, Request
 from buildarena_worker.session.results import Failed
 from buildarena_worker.workflow import Workflows
@@ -177,20 +175,6 @@ def test_a_workflow_that_cannot_be_loaded_is_named(tmp_path: Path) -> None:
         Workflows({}).find("other")
 
 
-def test_the_expert_ends_work_on_tasks_it_does_not_know() -> None:
-    from buildarena_worker.session.messages import Message
-
-    request = Request(
-        model_config={},
-        messages=[
-            Message(role="system", text="# Role: planner"),
-            Message(role="user", text="# Task: my-task"),
-        ],
-    )
-    assert read_situation(request).task == "my-task"
-    assert "TERMINATE" in expert(request).text
-
-
 LOOKUPS = {tool.name for tool in tool_definitions([LOOKUP])}
 HINGE = module_set("workshop")["Hinge"]
 
@@ -219,19 +203,6 @@ def test_the_expert_plays_as_well_where_it_looks_up(play, subtests):
                 told = any(HINGE.description in texts(request) for request in model.requests)
                 assert told == (how == "inline")
             assert machines["inline"] == machines["on_demand"]
-
-
-def test_what_one_role_looks_up_no_other_reads(play):
-    model = Recording()
-    played = play(task=task("on_demand"), client=model)
-    wheel = module_set("workshop")["Powered Wheel"].description
-    readers = {
-        turn.role
-        for turn, request in zip(played.session.transcript.turns, model.requests, strict=True)
-        if wheel in texts(request) and turn.role != "controller"
-    }
-    # The controller is told of what it drives, whatever was looked up.
-    assert readers == {"planner", "drafter"}
 
 
 def test_builders_that_only_carry_out_have_no_lookups(play):
@@ -266,13 +237,6 @@ def test_a_lookup_that_is_refused_says_what_there_is(play):
     assert "Hinge" in answers[1].partition("Modules: ")[2]
     assert HINGE.description in answers[2]
     assert module_set("workshop")["Swivel"].description in answers[2]
-
-
-def test_a_told_session_has_no_such_tools(play):
-    model = Scripted(call("list_modules", category="basic"))
-    played = play(task=task("told"), client=model, workflow="builder")
-    action = played.session.transcript.turns[0].actions[0]
-    assert (action.ok, action.reason) == (False, "unknown_action")
 
 
 def test_further_types_are_built_and_replayed(play):
@@ -311,10 +275,3 @@ def test_those_without_tools_are_told_the_machine(play) -> None:
     assert summary in played.session.statement
     assert "UpArrow" in played.session.statement
     assert summary not in play("builtin/expert", task="repair-1", seed=4).session.statement
-
-
-def test_an_idle_builder_leaves_it_as_it_is(play) -> None:
-    played = play("builtin/idle", task="repair-1", workflow="builder")
-    task = builtin_tasks()["repair-1"].drawn(0)
-    if played.suspended is not None:
-        assert edits_between(faulty(task), played.suspended.machine) == 0

@@ -255,19 +255,3 @@ def test_it_can_be_woken_again(context, asked) -> None:
     runner.wake()
     wait_until(lambda: slow.done == 31, 20, "the new one is done")
     wait_until(lambda: runner._places._value == AT_ONCE, 5, "its threads rest")
-
-
-def test_what_is_open_is_counted_by_owner(context, submissions, monkeypatch) -> None:
-    from buildarena_backend.results import verifications
-
-    monkeypatch.setattr(verifications, "MAX_OPEN", 4)
-    sweep = submissions.submit_sweep(
-        SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=10)
-    ).sweep.id
-    jobs = [job.id for job in context.store.jobs.page(limit=30, sweep_id=sweep)]
-    request = context.store.verifications.request
-    first = request([jobs[0], *jobs[:6]], owner="key_a")
-    assert (list(first.ids), list(first.left)) == (jobs[:4], jobs[4:6])
-    assert list(request(jobs[:6], owner="key_b").ids) == jobs[:6]
-    assert not request(jobs[8:], owner="key_a").ids
-    assert list(request(jobs[8:]).ids) == jobs[8:]

@@ -14,10 +14,9 @@ CASES = {
     "private folder": Case(),
     "open folder, odd letters": Case(mode=0o755, folder="Übungen für 'später', $1 `each`"),
     "ordinary user": Case(ordinary=True, unset=("HOME", "LANG")),
-    "long path": Case(folder=LONG, temporary="my own"),
+    "long path": Case(folder=LONG),
     "noexec": Case(noexec=("/tmp",)),
     "read-only checkout": Case(read_only=True),
-    "in a container": Case(contained=True),
 }
 SERVERS = """
 import sys

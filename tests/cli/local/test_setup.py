@@ -95,17 +95,6 @@ def test_what_pybullet_cannot_be_installed_for_is_said_and_the_rest_is_installed
     assert (done.returncode != 0, done.stderr, done.stdout) == (True, "no index\n", "")
 
 
-def test_a_python_with_wheels_is_preferred_and_else_fetched(folder) -> None:
-    python = shlex.quote(sys.executable)
-    set_up(folder, f'"python find"*3.12) echo {python};;')
-    assert f"venv --quiet --clear --no-project --python {sys.executable} .venv" in calls(folder)
-    assert not [call for call in calls(folder) if "install --quiet 3" in call]
-    (folder / "calls").unlink()
-    (folder / ".venv/bin/python").unlink()
-    set_up(folder)
-    assert "python install --quiet 3.11" in calls(folder)
-
-
 def test_a_given_python_is_used_unless_it_is_too_old(folder) -> None:
     assert set_up(folder, PYTHON=sys.executable).returncode == 0
     assert not [call for call in calls(folder) if "python find" in call]
@@ -113,11 +102,3 @@ def test_a_given_python_is_used_unless_it_is_too_old(folder) -> None:
     done = set_up(folder, PYTHON="./old")
     assert done.returncode == 1
     assert "needs Python 3.11 or newer, and ./old is older or missing" in done.stderr
-
-
-def test_without_any_uv_the_reason_is_shown(folder) -> None:
-    program(folder / "bare", "echo No module named pip >&2; exit 1")
-    done = run(folder, "uv.sh", "pip", "list", PYTHON="./bare")
-    assert done.returncode == 1
-    assert "No module named pip" in done.stderr
-    assert "uv could not be installed with ./bare: install uv" in done.stderr

@@ -40,27 +40,6 @@ def test_no_more_than_the_limit_is_open_at_once_over_all_workers(context, broker
     del context
 
 
-def test_hundreds_of_requests_at_once_keep_to_the_limit(context, broker_url) -> None:
-    open_now, most = 0, 0
-
-    async def request(throttle: Throttle) -> None:
-        nonlocal open_now, most
-        async with throttle.slot():
-            open_now += 1
-            most = max(most, open_now)
-            await asyncio.sleep(0.3)
-            open_now -= 1
-
-    async def main() -> None:
-        throttle = Throttle(broker_url, "p", start=150)
-        await asyncio.gather(*(request(throttle) for _ in range(300)))
-        await throttle.close()
-
-    asyncio.run(main())
-    assert most == 150
-    del context
-
-
 def test_the_limit_halves_on_complaints_and_grows_with_answers(context, broker_url) -> None:
     def limit() -> float:
         with Redis.from_url(broker_url) as store:
