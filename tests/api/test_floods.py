@@ -1,6 +1,5 @@
 """One caller cannot take the API down: bounds per key, through real HTTP with two keys."""
 
-import json
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -196,13 +195,8 @@ def test_a_session_and_its_calls_have_a_size(as_key, context, monkeypatch) -> No
     id_ = client.post("/v1/sessions", json={"task": "support-1", "agent": "me"}).json()["id"]
     calls = f"/v1/sessions/{id_}/calls"
     assert client.post(calls, json=START).status_code == 200
-    for arguments, bound in (
-        ({"note": "x" * 65_536}, "65,536"),
-        (json.loads('{"a":' * 25 + "1" + "}" * 25), "more than 20"),
-    ):
-        answer = client.post(calls, json={"tool": "start", "arguments": arguments})
-        assert (answer.status_code, answer.json()["errors"][0]["field"]) == (422, "arguments")
-        assert bound in answer.json()["detail"]
+    large = client.post(calls, json={"tool": "start", "arguments": {"note": "x" * 65_536}})
+    assert (large.status_code, large.json()["errors"][0]["field"]) == (422, "arguments")
     assert context.store.jobs.get(id_).actions == 1
     monkeypatch.setattr(agent_sessions, "MAX_SESSION_BYTES", 150_000)
     call = {"tool": "get_machine_summary", "arguments": {"note": "x" * 60_000}}

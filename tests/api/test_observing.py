@@ -17,7 +17,7 @@ from pydantic import SecretStr
 from sqlalchemy import text
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.jobs import claim, execute, journal_entry, report_worker
-from support.servers.hushed_proxy import HushedProxy, hushed_proxy
+from support.servers.flaky_proxy import FlakyProxy, flaky_proxy
 from support.servers.live_api import api_client, changed, live_api
 from support.servers.stacks import wait_until
 
@@ -182,20 +182,11 @@ def test_health_names_workers_that_are_missing_wrong_or_silent(api, context, swe
 
 
 @contextmanager
-def service_behind(context, part: str, monkeypatch) -> Iterator[tuple[httpx.Client, HushedProxy]]:
+def service_behind(context, part: str) -> Iterator[tuple[httpx.Client, FlakyProxy]]:
     """The API, with a proxy that can fall silent before one of its stores."""
-    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_REGION"):
-        monkeypatch.setenv(name, "test")
-    monkeypatch.setenv("AWS_ALLOW_HTTP", "true")
-    place = {
-        "database": context.settings.required_database_url(),
-        "broker": context.settings.required_broker_url(),
-        "artifacts": "http://127.0.0.1:9",
-    }[part]
-    with hushed_proxy(place) as proxy:
-        monkeypatch.setenv("AWS_ENDPOINT", proxy.url)
-        url = "s3://bucket" if part == "artifacts" else proxy.url
-        own = {**WITH_KEYS, "metrics_key": SecretStr(METRICS), f"{part}_url": url}
+    place = getattr(context.settings, f"required_{part}_url")()
+    with flaky_proxy(place) as proxy:
+        own = {**WITH_KEYS, "metrics_key": SecretStr(METRICS), f"{part}_url": proxy.url}
         with (
             changed(context, **own) as behind,
             live_api(behind) as served,
@@ -213,16 +204,16 @@ def down(client: httpx.Client) -> list[str]:
 @pytest.mark.ci
 @pytest.mark.nightly(keep=1)
 @pytest.mark.parametrize("part", ["database", "broker"])
-def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part, monkeypatch) -> None:
+def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part) -> None:
     def ask_for_jobs(url: httpx.URL) -> None:
         httpx.get(url.join("/v1/jobs"), headers={"Authorization": f"Bearer {ADMIN}"}, timeout=40)
 
-    with service_behind(context, part, monkeypatch) as (client, proxy):
+    with service_behind(context, part) as (client, proxy):
         wait_until(
             lambda: all(each["ok"] for each in [*checks(client).values()][:3]), 20, "all work"
         )
         assert down(client) == []
-        proxy.hush()
+        proxy.hushed = True
         # Requests that need the store, and hang as long as it is silent.
         hanging = [
             threading.Thread(target=ask_for_jobs, args=(client.base_url,), daemon=True)
@@ -237,7 +228,7 @@ def test_a_store_that_falls_silent_is_named_and_holds_nobody_up(context, part, m
             assert down(client) == [PARTS[part]]
         # Forty answers: none waited for a store.
         assert time.monotonic() - begun < 2 * PATIENCE_S
-        proxy.speak()
+        proxy.hushed = False
         wait_until(lambda: checks(client)[part]["ok"], 20, f"{part} is known to work again")
         for thread in hanging:
             thread.join(40)

@@ -244,9 +244,8 @@ def test_scenes_models_and_pictures_are_there_once_something_is_built(
     assert nodes(api.get(f"{path}/machine.glb").content) == parts
     drawn = api.get(f"{path}/thumbnail.png")
     assert drawn.headers["content-type"] == "image/png"
-    image = Image.open(io.BytesIO(drawn.content))
-    assert image.size == (480, 320)
-    assert len(image.convert("RGB").getcolors(100_000)) > 8, "there is a machine on it"
+    colours = Image.open(io.BytesIO(drawn.content)).convert("RGB").getcolors(100_000)
+    assert len(colours) > 8, "there is a machine on it"
     # What may still change is no artifact.
     assert "thumbnail" not in context.store.jobs.artifacts(job)
     work(context)

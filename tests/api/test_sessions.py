@@ -231,8 +231,6 @@ def test_the_workbench_shows_every_face_as_geometry_has_it(api, open_session, ac
             assert (face["taken_by"] is None) == free
     assert parts["1"]["faces"][0]["taken_by"] == "2"
     assert parts["5"]["ends"] == [["1", "C"], ["3", "A"]]
-    assert parts["2"]["spins"]
-    assert "spinning_forward" in parts["2"]["actions"]
     # Looking changes nothing, and goes on after the end.
     api.post(f"/v1/sessions/{session}/submit")
     after = api.get(f"/v1/sessions/{session}").json()

@@ -53,7 +53,6 @@ def test_a_bad_submission_is_refused_whole_and_names_its_field(api, sweep) -> No
     for change, field, choice in (
         ({"tasks": ["bridge"]}, "tasks[0]", "support-1"),
         ({"models": ["builtin/expert", "gpt-9"]}, "models[1]", "openai/gpt-5"),
-        ({"simulator": "unity"}, "simulator", "mujoco"),
         ({"workflow": "chaos"}, "workflow", "five-role"),
         ({"prompts": "secret"}, "prompts", "default"),
         *(({"seeds": [bad]}, "seeds[0]", None) for bad in (-1, 1.5, "1", True, 2**53)),
@@ -69,9 +68,6 @@ def test_a_bad_submission_is_refused_whole_and_names_its_field(api, sweep) -> No
         errors = {error["field"]: error for error in answer.json()["errors"]}
         assert field in errors
         assert choice is None or choice in errors[field]["choices"]
-    two = {"models": ["builtin/idle", "builtin/random"], "seeds": None, "samples": 60_000}
-    problem = api.post("/v1/sweeps", json={**sweep, **two}).json()
-    assert "120,000 jobs; the largest accepted has 100,000" in problem["detail"]
     for field, bad in (("task", "x"), ("model", "x"), ("seed", -1)):
         errors = api.post("/v1/jobs", json={**JOB, field: bad}).json()["errors"]
         assert [error["field"] for error in errors] == [field]
@@ -265,19 +261,3 @@ def test_the_rate_is_over_time_that_passes_and_the_end_follows_from_it(api, cont
     # What ended before it was resumed says nothing of what comes.
     api.post(f"/v1/sweeps/{large}/resume")
     assert ahead(api, large)["ends_at"] is None
-
-
-def test_one_more_end_moves_a_rate_of_hundreds_by_little(api, context) -> None:
-    many = {**TWO, "models": ["builtin/idle"], "samples": 110}
-    sweep = api.post("/v1/sweeps", json=many).json()["id"]
-    execute(context, "UPDATE events SET at = now() - interval '1 day'")
-    execute(
-        context,
-        "UPDATE jobs SET state = 'done', outcome = 'success', success = true, finished_at = "
-        "now() - number * interval '60 seconds' FROM (SELECT id, row_number() OVER (PARTITION BY "
-        "task) AS number FROM jobs) AS ended WHERE ended.id = jobs.id AND number <= 75",
-    )
-    before = ahead(api, sweep)["jobs_per_minute"]
-    assert before == pytest.approx(2, rel=0.03)
-    end(context, "builtin/idle", "support-1", 1, "0")
-    assert ahead(api, sweep)["jobs_per_minute"] == pytest.approx(before, rel=0.02)

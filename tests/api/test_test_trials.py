@@ -10,9 +10,7 @@ from support.stages import work
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.families.unknowns import drawn_numbers
-from buildarena_worker.builtin.designs.design import Seen
 from buildarena_worker.builtin.designs.risers import riser
-from buildarena_worker.builtin.reading import figures_of
 from buildarena_worker.wiring import verification_runner
 
 TASK = builtin_tasks()["identify-1"]
@@ -37,45 +35,23 @@ def programmed(act, session: str, program) -> None:
         act(session, "add_control_sequence", press)
 
 
-@pytest.mark.nightly
-def test_an_agent_that_measures_succeeds_and_its_job_is_verified(
+@pytest.mark.ci
+def test_a_session_has_as_many_test_trials_as_its_task_says(
     api, open_session, act, context
 ) -> None:
     session = open_session(**OPEN)
-    design, seen = build(act, session), []
+    programmed(act, session, build(act, session).steer([]))
     for number in range(1, TASK.tests + 1):
-        program = design.steer(seen)
-        programmed(act, session, program)
-        asked = api.post(f"/v1/sessions/{session}/tests")
-        assert asked.status_code == 202, asked.text
+        assert api.post(f"/v1/sessions/{session}/tests").status_code == 202
         early = api.post(f"/v1/sessions/{session}/submit")
-        assert early.status_code == 409
-        assert "its machine is being tried" in early.json()["detail"]
+        assert (early.status_code, "is being tried" in early.json()["detail"]) == (409, True)
         work(context)
         view = api.get(f"/v1/sessions/{session}").json()
-        assert view["open"]
         assert (len(view["tests"]), view["most_tests"]) == (number, TASK.tests)
-        told = view["tests"][-1]
-        assert told["trace"]
-        seen.append(Seen(program=program, measured=figures_of(told["result"])))
+        assert view["tests"][-1]["trace"]
     more = api.post(f"/v1/sessions/{session}/tests")
-    assert (more.status_code, more.json()["detail"]) == (
-        409,
-        "all 5 test trials are used up: submit",
-    )
-    programmed(act, session, design.steer(seen))
-    assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
-    work(context)
-    job = api.get(f"/v1/jobs/{session}").json()
-    assert (job["outcome"], job["manifest"]["rollout"]) == ("success", 5)
-    assert job["manifest"]["drawn"] == drawn_numbers(
-        TASK.unknowns, context.store.jobs.get(session).draw
-    )
-    assert api.get(f"/v1/jobs/{session}/replay").json()["exact"]
-    (check,) = context.store.verifications.request([session]).ids.values()
-    while verification_runner(context).process_one():
-        pass
-    assert context.store.verifications.get(check).verdict == "verified"
+    told = "all 5 test trials are used up: submit"
+    assert (more.status_code, more.json()["detail"]) == (409, told)
 
 
 @pytest.mark.ci

@@ -6,13 +6,11 @@ from collections import Counter
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from benchmarks.filling import TRACKS, Amount, fill
+from benchmarks.filling import Amount, fill
 from sqlalchemy import select, text, update
 from support.jobs import execute
 
 from buildarena_backend.database.tables import jobs, sweep_jobs
-from buildarena_backend.jobs.filters import JobFilter
-from buildarena_backend.jobs.pages import Order
 from buildarena_backend.process.worker_process import worker_id
 from buildarena_backend.sweeps.sweeps import COUNTED_EVERY_S
 from buildarena_backend.telemetry.metrics import STAGE_SECONDS
@@ -107,51 +105,6 @@ def test_attempts_are_counted_by_how_long_they_took(filled) -> None:
     # Each class has its lower bound in it.
     assert times.counts == [1] + [2] * (len(STAGE_SECONDS) - 1) + [1]
     assert times.total_s == pytest.approx(sum(near))
-
-
-FILTERS = {
-    "all": (JobFilter(), lambda _: True),
-    "queued": (JobFilter(equals={"state": "queued"}), lambda row: row.state == "queued"),
-    "errored": (JobFilter(equals={"outcome": "errored"}), lambda row: row.outcome == "errored"),
-    "flagged": (JobFilter(flag="unstable"), lambda row: "unstable" in (row.flags or ())),
-    "track": (JobFilter(equals={"track": TRACKS[1]}), lambda row: row.track == TRACKS[1]),
-    "text": (JobFilter(text="LIFT"), lambda row: "lift" in row.task),
-    "id": (JobFilter(text="b_a"), lambda row: "b_a" in row.id),
-    "sweep": (JobFilter(sweep_id="sweep_ended0"), lambda row: row.state == "done"),
-}
-
-
-@pytest.mark.ci
-@pytest.mark.nightly(keep=2)
-@pytest.mark.parametrize("few", [0, 40_000])
-@pytest.mark.parametrize("by", ["created", "finished", "indicator", "cost"])
-def test_pages_in_every_order_hold_each_job_once(filled, monkeypatch, few, by) -> None:
-    """Whether all that a filter finds are sorted, or the order's index is gone along."""
-    monkeypatch.setattr("buildarena_backend.jobs.pages.MAX_SORTED", few)
-    monkeypatch.setattr("buildarena_backend.jobs.filters.MAX_SORTED", few)
-    with filled.database.transaction() as connection:
-        unpriced = {"model_config": {"name": "x", "provider": "external"}}
-        ours = jobs.c.model == "made-up/model-1"
-        connection.execute(update(jobs).where(ours).values(**unpriced))
-        every = connection.execute(select(jobs)).all()
-
-    def value(row) -> object:
-        if by == "cost":
-            is_known = row.state == "done" and row.model != "made-up/model-1"
-            return row.cost_usd if is_known else None
-        return getattr(row, {"created": "created_at", "finished": "finished_at"}.get(by, by))
-
-    for descending in (False, True):
-        for name, (chosen, holds) in FILTERS.items():
-            rows = {row.id: row for row in every if holds(row)}
-            known = [row for row in rows.values() if value(row) is not None]
-            known.sort(key=lambda row: (value(row), row.id), reverse=descending)
-            unknown = sorted((i for i, r in rows.items() if value(r) is None), reverse=descending)
-            order, found, after = Order(by=by, descending=descending), [], None
-            while page := filled.jobs.page(limit=170, after=after, wanted=chosen, order=order):
-                found += [job.id for job in page]
-                after = value(rows[found[-1]]), found[-1]
-            assert found == [*(row.id for row in known), *unknown], name
 
 
 @pytest.fixture

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from sqlalchemy import make_url, text
 from sqlalchemy.exc import IntegrityError, ProgrammingError
 from starlette.testclient import TestClient
 from support.servers.run_servers import execute
-from support.servers.stacks import wait_until
 from support.stages import work
 
 from buildarena_api.app import create_app
@@ -230,25 +228,6 @@ def test_roles_are_made_again_while_others_work(context, owned, database_url) ->
         works.execute(text(f"LOCK TABLE {', '.join(tables.metadata.tables)} IN ROW SHARE MODE"))
         make_roles(impatient, owned)
     impatient.close()
-
-
-def test_an_older_installation_is_taken_over_table_by_table(context, owned) -> None:
-    """Who waits for one table has no other, so that nobody who works with both stops it."""
-    superuser = context.store.database
-    held = text(
-        "SELECT array_agg(held.relation::regclass::text) FILTER (WHERE held.granted) "
-        "FROM pg_locks AS waits JOIN pg_locks AS held USING (pid) "
-        "WHERE waits.relation = 'verifications'::regclass AND NOT waits.granted "
-        "AND held.locktype = 'relation' AND held.mode IN ('AccessExclusiveLock', "
-        "'ShareRowExclusiveLock') HAVING count(*) > 0"
-    )
-    with ThreadPoolExecutor(1) as pool:
-        with superuser.transaction() as works:
-            works.execute(text("LOCK TABLE verifications IN ROW EXCLUSIVE MODE"))
-            made = pool.submit(make_roles, superuser, owned)
-            (others,) = wait_until(lambda: works.execute(held).first(), 30, "it waits")
-        made.result()
-    assert others is None
 
 
 def test_logins_that_are_none_or_may_too_much_are_refused(context, logins, postgres_url) -> None:

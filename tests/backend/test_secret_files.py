@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 
 import pytest
 
@@ -99,24 +97,6 @@ def test_a_wrong_setting_is_named_a_secret_never_shown_and_an_empty_one_none(
         monkeypatch.setenv(f"BUILDARENA_{name}", "")
     found = load_settings()
     assert (found.admin_keys, found.otlp_endpoint) == ((SECRET,), None)
-
-
-@pytest.mark.ci
-def test_a_process_says_in_one_line_which_file_it_misses(tmp_path) -> None:
-    programs = ("buildarena_api", "buildarena_worker", "buildarena_simworker --simulator mujoco")
-    missing = {**os.environ, "BUILDARENA_DATABASE_URL_FILE": str(tmp_path / "gone")}
-    for words in programs:
-        done = subprocess.run(
-            [sys.executable, "-m", *words.split()],
-            env=missing,
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
-        (line,) = done.stderr.splitlines()
-        assert done.returncode == 1, words
-        assert f"BUILDARENA_DATABASE_URL_FILE names {tmp_path / 'gone'}: No such file" in line
 
 
 def test_keys_of_a_stack_pass_to_its_processes_once(kept, tmp_path, monkeypatch) -> None:

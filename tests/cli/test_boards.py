@@ -1,6 +1,5 @@
 """Boards, comparisons, exports and lists: figures, flags, dashes, and tables that fit."""
 
-import csv
 import json
 
 import pytest
@@ -65,15 +64,11 @@ def test_boards_comparisons_and_exports_count_disqualified_trials_as_failures(
     assert printed(url, *listed).count("≥ 1,500.00") == 6
 
 
-def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(
-    url, context, submissions, tmp_path
-) -> None:
+def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(url, context) -> None:
     sessions = ExternalSessions(context)
     job = sessions.open(task="support-1", agent="me", seed=0, simulator="mujoco").job
     sessions.call(job.id, machine="main", tool="start", arguments={})
     sessions.submit(job.id)
-    spec = SweepSpec(tasks=["support-1"], models=["builtin/idle"], seeds=[0], simulator="mujoco")
-    submissions.submit_sweep(spec)
     work(context)
     usage = json.loads(printed(url, "job", "show", job.id, "--json"))["usage"]
     assert set(usage.values()) == {None}
@@ -84,15 +79,9 @@ def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(
     rows = {row["model"]: row for task in board["tasks"] for row in task["rows"]}
     means = [f"{name}_mean" for name in ("requests", "input_tokens", "output_tokens", "cost_usd")]
     assert [rows["agent/me"][name] for name in means] == [None] * 4
-    (idle,) = json.loads(printed(url, "job", "list", "--model", "builtin/idle", "--json"))["jobs"]
-    assert idle["usage"]["requests"] > 0 == idle["usage"]["cost_usd"], "it says that it paid none"
     table = printed(url, "leaderboard", "--task", "support-1")
     (line,) = [line for line in table.splitlines() if "agent/me" in line and "/1" in line]
     assert line.split()[-3:] == ["-", "-", "-"]  # requests, tokens and dollars
-    printed(url, "export", "--out", str(tmp_path / "board.csv"))
-    with (tmp_path / "board.csv").open() as file:
-        (row,) = [row for row in csv.DictReader(file) if row["model"] == "agent/me"]
-    assert [row[name] for name in means] == [""] * 4
 
 
 # Tables: whole through a pipe; on a terminal columns give way, and ids and figures never do

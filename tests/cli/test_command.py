@@ -16,7 +16,6 @@ from support.machines.experts import experts_machine
 from typer.core import TyperArgument
 from typer.main import get_command
 
-from buildarena_backend.database.database import SCHEMA, Database
 from buildarena_cli import main
 from buildarena_cli.command_table import COMMANDS
 
@@ -141,31 +140,6 @@ def test_no_service_and_a_port_that_is_no_port() -> None:
     done = piped("leaderboard", "--url", NOWHERE)
     assert_refused(done, f"no BuildArena answers at {NOWHERE}", "buildarena up")
     assert_refused(piped("up", BUILDARENA_PORT="99999"), "BUILDARENA_PORT", "99999")
-
-
-@pytest.mark.ci
-def test_a_process_refuses_a_foreign_schema(database_url, broker_url) -> None:
-    database = Database(database_url)
-    urls = {"BUILDARENA_DATABASE_URL": database_url, "BUILDARENA_BROKER_URL": broker_url}
-
-    def stamp(revision: str) -> None:
-        with database.transaction() as connection:
-            connection.exec_driver_sql(f"UPDATE alembic_version SET version_num = '{revision}'")
-            connection.exec_driver_sql(f"UPDATE schema_compatibility SET since = '{revision}'")
-
-    stamp("2026_11_27_what_goes")
-    try:
-        for words in ("buildarena_worker", "buildarena_api", "buildarena_cli admin migrate"):
-            command, given = [sys.executable, "-m", *words.split()], {**os.environ, **urls}
-            done = subprocess.run(
-                command, capture_output=True, text=True, check=False, timeout=60, env=given
-            )
-            assert done.returncode == 1
-            assert "schema 2026_11_27_what_goes" in done.stderr
-            assert "Traceback" not in done.stderr
-    finally:
-        stamp(SCHEMA)
-        database.close()
 
 
 # A file that is not there is one sentence and a usage error, whichever command it is given to

@@ -95,10 +95,6 @@ def test_a_sweep_loads_and_every_machine_is_found_again(url, context, tmp_path):
     assert of_file.column_names == [column.name for column in JOBS]
     actions = loaded(str(out), "actions")
     assert actions.column_names == [column.name for column in ACTIONS]
-    file = tmp_path / "chats.jsonl"
-    of_folder.select_columns(["messages", "tools"]).to_json(file)
-    chats = loaded("json", data_files=str(file))
-    assert [row["messages"] for row in chats] == [row["messages"] for row in rows(out)]
 
     by_model = {row["model"]: row for row in of_file}
     assert set(by_model) == {*MODELS, "agent/carpenter"}

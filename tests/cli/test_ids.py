@@ -88,16 +88,10 @@ def test_shells_are_offered_ids_tasks_and_models_and_nothing_where_no_api_answer
 
 
 def test_jobs_are_filtered_and_pages_follow_each_other(url, ids, context, subtests) -> None:
-    lease = claim(context)
-    found = finish(context, lease, "unsuccessful", reason="too_weak", flags=("unstable", "odd"))
-    for words in (
-        ["--reason", "too_weak"],
-        ["--flag", "unstable", "--outcome", "unsuccessful"],
-        ["--state", "done", "--task", lease.job.task, "--model", lease.job.model],
-    ):
-        _, row = printed(url, "job", "list", *words).splitlines()
-        assert row.split()[0] == found
-    assert printed(url, "job", "list", "--outcome", "success").count("\n") == 1
+    found = finish(context, claim(context), "unsuccessful", reason="too_weak", flags=("odd",))
+    words = ["--reason", "too_weak", "--flag", "odd", "--outcome", "unsuccessful"]
+    _, row = printed(url, "job", "list", *words).splitlines()
+    assert row.split()[0] == found
     for words, says in (
         (["--task", "lift-9"], "did you mean lift-1 or"),
         (["--model", "builtin/idel"], "did you mean builtin/idle?"),

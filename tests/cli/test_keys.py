@@ -4,7 +4,6 @@ import json
 from collections.abc import Callable, Iterator
 
 import pytest
-import yaml
 from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import changed, live_api
 from typer.testing import CliRunner, Result
@@ -48,22 +47,6 @@ def test_a_key_is_made_used_listed_and_revoked(call) -> None:
     assert "revoked" in call("admin", "key", "revoke", key["id"]).stdout
     with pytest.raises(CommandError, match=r"is revoked: set BUILDARENA_KEY"):
         call("task", "list", key=key["secret"])
-
-
-def test_running_a_file_again_takes_the_sweep_up_with_another_budget(call, tmp_path) -> None:
-    key = made(call)["secret"]
-    file = tmp_path / "sweep.yaml"
-    payload = {"tasks": ["lift-1"], "models": ["builtin/idle"], "seeds": [0]}
-    file.write_text(yaml.safe_dump({**payload, "budget": {"max_requests": 5}}))
-    words = ("sweep", "run", str(file), "--detach", "--json")
-    first = json.loads(call(*words, key=key).stdout)
-    again = json.loads(call(*words, "--max-requests", "9", key=key).stdout)
-    assert (again["id"], again["resumed"], again["added"]) == (first["id"], True, 0)
-    shown = call("sweep", "status", first["id"], key=key).stdout
-    assert "budget: 0 of 9 requests" in shown
-    call("sweep", "pause", first["id"], key=key)
-    assert "active" in call("sweep", "resume", first["id"], "--max-cost-usd", "3", key=key).stdout
-    assert "$0.00 of $3.00" in call("sweep", "status", first["id"], key=key).stdout
 
 
 def test_a_wrong_scope_or_overlap_is_named(call) -> None:

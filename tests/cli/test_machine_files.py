@@ -61,33 +61,23 @@ def test_a_worker_takes_the_commands_place(monkeypatch) -> None:
     assert (refused.returncode, f"choose from {queues}" in refused.stderr) == (1, True)
 
 
-def test_a_log_of_another_dialect_is_read_as_what_it_is(tmp_path, monkeypatch, subtests) -> None:
+def test_a_log_of_another_dialect_is_read_as_what_it_is(tmp_path) -> None:
     attach = {"base_block": "1", "face": "f1", "new_block": "Single Wooden Block"}
     theirs = [
         {"op": "start", "params": {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}},
-        {"op": "attach_block_to", "params": {**attach, "face": "f0", "new_block": "Wheel"}},
         {"op": "attach_block_to", "params": attach},
     ]
-    monkeypatch.chdir(tmp_path)
     log, out = tmp_path / "history.json", tmp_path / "machine.json"
     log.write_text(json.dumps(theirs))
-    for chosen in ((), ("--dialect", "2.0")):
-        assert run("machine", "export", str(log), "--out", str(out), *chosen).returncode == 0
-        modules = [block["module"] for block in json.loads(out.read_text())["blocks"]]
-        assert modules == ["Starting Block", "Powered Wheel", "Small Wooden Block"]
-    for change, chosen, says in (
-        ({"face": "f9"}, (), "action 3, attach_block_to, is refused"),
-        ({"new_block": "Nonsense"}, (), "Nonsense"),
-        ({}, ("--dialect", "1.0"), "action 2, attach_block_to, is refused"),
-        ({}, ("--dialect", "3.0"), "there is no dialect '3.0'; they are 1.0, 2.0"),
+    assert run("machine", "export", str(log), "--out", str(out)).returncode == 0
+    modules = [block["module"] for block in json.loads(out.read_text())["blocks"]]
+    assert modules == ["Starting Block", "Small Wooden Block"]
+    for dialect, says in (
+        ("1.0", "action 2, attach_block_to, is refused"),
+        ("3.0", "there is no dialect '3.0'; they are 1.0, 2.0"),
     ):
-        with subtests.test(says=says):
-            changed = {**theirs[2], "params": {**attach, **change}}
-            log.write_text(json.dumps({"actions": [*theirs[:2], changed]}))
-            for words in (["check"], ["export", "--out", "out.glb"]):
-                done = run("machine", words[0], "history.json", *words[1:], *chosen)
-                assert (done.returncode, says in done.stderr) == (1, True), done.stderr
-            assert not (tmp_path / "out.glb").exists()
+        done = run("machine", "check", str(log), "--dialect", dialect)
+        assert (done.returncode, says in done.stderr) == (1, True), done.stderr
 
 
 # Machines of the game's files are tried with their own keys, whichever the game has

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 from support.clients.tenants import ADMIN
 
-import buildarena_client
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_benchmark import builtin_tasks
 from buildarena_client import (
@@ -267,11 +266,3 @@ def test_a_program_of_the_readme_does_what_it_says(service, program, says) -> No
         done = ran(program, service.url)
     assert (done.returncode, done.stderr) == (0, "")
     assert says in done.stdout
-
-
-def test_names_in_the_readme_exist() -> None:
-    known = {*dir(buildarena_client), *dir(buildarena_client.Client), "at_once", "Path"}
-    pattern = r"`([a-z]+_[a-z_]+|[A-Z][A-Za-z]+(?:Error|Client)?)(?:\(.*\))?`"
-    named = re.findall(pattern, README.read_text())
-    assert {name for name in named if not name.isupper()} - known == set()
-    assert "not to be had now" in ran(PROGRAMS[-1], "http://127.0.0.1:1").stdout

@@ -5,7 +5,6 @@ import os
 import re
 from ipaddress import ip_network
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import jsonschema
 import kubernetes_validate
@@ -253,27 +252,3 @@ def test_overlays_with_all_components_are_valid_and_lead_to_what_is_there(
     spaces = [each["namespaceSelector"]["matchLabels"] for each in callers]
     parent = route["spec"]["parentRefs"][0]["namespace"]
     assert {"kubernetes.io/metadata.name": parent} in spaces
-    # Prometheus' operator finds each pod of the API, and its key.
-    (monitor,) = of_kind(documents, "PodMonitor").values()
-    pod = pods(documents)["api"]
-    selector = monitor["spec"]["selector"]["matchLabels"]
-    assert selector.items() <= pod["metadata"]["labels"].items()
-    (endpoint,) = monitor["spec"]["podMetricsEndpoints"]
-    assert endpoint["port"] in {port["name"] for port in pod["spec"]["containers"][0]["ports"]}
-    assert endpoint["path"] == "/v1/metrics"
-    secret = next(v["secret"] for v in pod["spec"]["volumes"] if v["name"] == "secrets")
-    credentials = endpoint["authorization"]["credentials"]
-    assert credentials["name"] == secret["secretName"]
-    assert credentials["key"] in {item["key"] for item in secret["items"]}
-    # Models in the cluster can be named and reached.
-    file = tmp_path / "models.yaml"
-    file.write_text(config_of(documents, "models")["data"]["models.yaml"])
-    registry = load_registry(file)
-    (model,) = registry.models.keys() - load_registry().models.keys()
-    url = urlsplit(registry.provider_of(registry.models[model]).base_url)
-    policy = policies["models-in-cluster"]["spec"]
-    assert policy["podSelector"]["matchLabels"] == {"app.kubernetes.io/name": "construct"}
-    (rule,) = policy["egress"]
-    assert rule["ports"] == [{"protocol": "TCP", "port": url.port}]
-    space = rule["to"][0]["namespaceSelector"]["matchLabels"]["kubernetes.io/metadata.name"]
-    assert url.hostname.split(".")[1:] == [space, "svc"]

@@ -8,31 +8,23 @@ import httpx
 import pytest
 import yaml
 from pydantic import SecretStr
-from support.clients.commands import run_cli
 from support.clients.tenants import WITH_KEYS
 from support.documents.promtool import needs_promtool, promtool
 from support.documents.runbook import entries, entry
 from support.servers.live_api import changed, live_api
 from support.servers.prometheus import (
     MONITORING,
-    Receiver,
-    alertmanager,
-    needs_alertmanager,
     needs_prometheus,
     prometheus,
     target_says,
 )
-from support.servers.prometheus import RUNBOOK as RUNBOOK_URL
-from support.servers.stacks import hung, kill, running_stack, wait_until, without_store
 
 from buildarena_api.routes import health
-from buildarena_cli.local.stack import Stack
 
 BOARDS = sorted((MONITORING / "grafana" / "dashboards").glob("*.json"))
 RULES = yaml.safe_load((MONITORING / "prometheus/alerts.yml").read_text())["groups"][0]["rules"]
 SUFFIXES = {"histogram": ("_bucket", "_count", "_sum"), "counter": ("",), "gauge": ("",)}
 KEY = "a-key-for-prometheus-alone"
-WITHIN_S = 60.0
 
 
 def panels() -> Iterator[tuple[str, dict]]:
@@ -116,44 +108,3 @@ def test_prometheus_reads_the_service_with_its_key_and_without_it_nothing(
             assert [each["value"][1] for each in up.json()["data"]["result"]] == ["1"]
         with prometheus(tmp_path, url, "no-such-key-anywhere", every_s=1) as client:
             target_says(client, "401")
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory) -> Iterator[tuple[Stack, Receiver]]:
-    """A service, and whoever is told its alerts."""
-    folder = tmp_path_factory.mktemp("alerts")
-    with (
-        running_stack(folder, simulators=()) as stack,
-        alertmanager(folder) as receiver,
-        prometheus(
-            folder, stack.url, None, every_s=1, alertmanager=receiver.address, waits=False
-        ) as client,
-    ):
-        target_says(client, "up")
-        wait_until(lambda: receiver.watchdog, WITHIN_S, "the watchdog is heard")
-        yield stack, receiver
-
-
-@pytest.mark.nightly
-@needs_alertmanager
-@pytest.mark.timeout(600)
-@pytest.mark.parametrize(
-    ("alert", "part", "doctor"),
-    [
-        ("BuildArenaDatabaseDown", "postgres", "!! +database +has not answered for"),
-        ("BuildArenaBrokerDown", "valkey", "!! +broker "),
-        ("BuildArenaApiDown", "api", None),
-        ("BuildArenaArtifactStoreDown", None, "!! +artifacts "),
-    ],
-)
-def test_a_fault_is_heard_of_seen_by_the_doctor_and_over(served, alert, part, doctor) -> None:
-    stack, receiver = served
-    with without_store(stack) if part is None else hung(stack, part):
-        told = wait_until(lambda: receiver.heard(alert, "firing"), WITHIN_S, f"{alert} is heard")
-        assert told["annotations"]["runbook_url"] == f"{RUNBOOK_URL}#{alert.lower()}"
-        assert told["annotations"]["summary"]
-        if doctor is not None:
-            assert re.search(doctor, run_cli(stack.url, "doctor").stdout)
-        if part is not None:
-            kill(stack, part)
-    wait_until(lambda: receiver.heard(alert, "resolved"), WITHIN_S, f"{alert} is over")

@@ -110,26 +110,9 @@ def test_the_wheels_install_all_but_adapters_and_a_demo_runs_from_them_alone(
 
 
 @pytest.mark.ci
-def test_the_client_alone_brings_nothing_else_of_ours_and_has_its_types(dist, tmp_path) -> None:
-    venv = tmp_path / "venv"
-    uv("venv", "--quiet", "--no-project", "--python", sys.executable, str(venv))
-    words = ["--find-links", str(dist), "--constraint", str(dist / "constraints.txt")]
-    python = ["--python", str(venv / "bin/python")]
-    uv("pip", "install", "--quiet", *python, *words, "buildarena-client", offline=False)
-    listed = json.loads(uv("pip", "list", "--format", "json", *python).stdout)
-    ours = [each["name"] for each in listed if each["name"].startswith("buildarena")]
-    assert ours == ["buildarena-client"]
-    assert len(listed) < 12, listed
-    code = "from buildarena_client import Client, schemas; Client('http://127.0.0.1:1')"
-    code += "; schemas.JobDetail"
-    run(tmp_path, str(venv / "bin/python"), "-c", code, env=alone())
-
-
-@pytest.mark.ci
 def test_wheels_and_sdists_say_what_they_are(dist) -> None:
     wheels, sdists = sorted(dist.glob("*.whl")), sorted(dist.glob("*.tar.gz"))
     assert len(wheels) == len(sdists) == len(PROJECTS)
-    pythons = {f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)}
     for wheel in wheels:
         with zipfile.ZipFile(wheel) as archive:
             names = archive.namelist()
@@ -138,8 +121,6 @@ def test_wheels_and_sdists_say_what_they_are(dist) -> None:
         said = {name: metadata[name] for name in ("License-Expression", "Requires-Python")}
         assert said == {"License-Expression": "Apache-2.0", "Requires-Python": ">=3.11"}
         assert all(metadata[name] for name in ("License-File", "Summary", "Keywords")), wheel
-        assert pythons <= set(metadata.get_all("Classifier", ()))
-        assert str(metadata.get_payload()).startswith("# ")
         assert any(name.endswith("/py.typed") for name in names), wheel
     for sdist in sdists:
         with tarfile.open(sdist) as archive:

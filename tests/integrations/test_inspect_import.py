@@ -4,16 +4,13 @@ import os
 import re
 import subprocess
 import time
-from contextlib import closing
 from pathlib import Path
 
 import httpx
 import pytest
-from support.clients.tenants import WITH_KEYS, new_tenant
 from support.servers.live_api import live_api
 from support.stages import work
 
-from buildarena_backend.process.context import open_context
 from buildarena_simulation import DEFAULT_ENGINE
 
 ROOT = Path(__file__).parents[2]
@@ -100,17 +97,3 @@ def test_an_import_that_was_broken_off_goes_on_where_it_stopped(logs, context) -
         assert whole["id"] == half["id"]
         turns = client.get(f"/v1/jobs/{whole['id']}/transcript").json()["turns"]
         assert len(turns) == whole["actions"] == 61
-
-
-def test_jobs_belong_to_the_key_and_its_name_is_nobody_elses(logs, context) -> None:
-    own = open_context(context.settings.model_copy(update=WITH_KEYS))
-    with closing(own), live_api(own) as url, httpx.Client(base_url=url) as client:
-        mine, theirs = (new_tenant(client, name) for name in ("mine", "theirs"))
-        code, told = bring(url, logs / "honest.eval", "--limit", 1)
-        assert code == 2, told
-        code, told = bring(url, logs / "honest.eval", "--limit", 1, "--wait", 0, key=mine.secret)
-        (job,) = mine.get("/v1/jobs")["jobs"]
-        assert (job["owner"], job["id"] in told[1]) == (mine.id, True)
-        code, told = bring(url, logs / "honest.eval", "--limit", 1, key=theirs.secret)
-        assert code == 2
-        assert "inspect-mockllm-model" in told[-1]

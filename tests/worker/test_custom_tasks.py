@@ -177,12 +177,6 @@ def test_the_simulator_of_the_guide_is_found_run_and_scored(
     assert done.outcome == "success"
 
 
-def test_the_guides_task_is_a_task() -> None:
-    (text,) = re.findall(r"```yaml\n(name: narrow-gap.*?)```", GUIDE, re.DOTALL)
-    task = parse_custom_task(text, origin="extending.md")
-    assert (task.constraints.max_blocks, task.scorer) == (30, "support")
-
-
 def python_of_guide(says: str) -> str:
     """The guide's program whose first line says this."""
     (source,) = re.findall(rf'```python\n("""[^\n]*{says}.*?)```', GUIDE, re.DOTALL)

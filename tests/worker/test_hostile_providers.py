@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import re
-import signal
 import time
 from dataclasses import replace
 from decimal import Decimal
@@ -14,7 +13,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import text
 from support.providers.stand_in import ProviderStandIn
-from support.servers.construct_threads import crew, worker_process
+from support.servers.construct_threads import crew
 from support.servers.stacks import wait_until
 from support.stages import work
 
@@ -117,19 +116,6 @@ def test_nobody_has_free_requests_by_cancelling(context, tmp_path) -> None:
         cancel(context, job_id)
         wait_until(lambda: workers.slots.free == workers.slots.total, SOON_S, "the slot is free")
     assert context.store.budgets.get("key_a") == spent
-
-
-@pytest.mark.ci
-def test_shutdown_ends_open_requests(context, tmp_path) -> None:
-    with stuck("hang") as bad:
-        grace = {"BUILDARENA_STOP_GRACE_S": "3"}
-        with worker_process(context, tmp_path, bad, **grace) as (job_id, process):
-            process.send_signal(signal.SIGTERM)
-            process.wait(timeout=8)
-        wait_until(lambda: bad.left, 1, "the connection is closed")
-    job = context.store.jobs.get(job_id)
-    assert (job.state, job.faults) == ("queued", 0)
-    assert [a.result for a in context.store.jobs.attempts(job.id)] == ["handed_back"]
 
 
 @pytest.mark.ci

@@ -205,16 +205,6 @@ def test_the_expert_plays_as_well_where_it_looks_up(play, subtests):
             assert machines["inline"] == machines["on_demand"]
 
 
-def test_builders_that_only_carry_out_have_no_lookups(play):
-    model = Recording()
-    played = play(task=task("on_demand"), client=model)
-    for turn, request in zip(played.session.transcript.turns, model.requests, strict=True):
-        held = {tool.name for tool in request.tools} & LOOKUPS
-        assert held == (
-            LOOKUPS if turn.role in ("planner", "drafter", "reviewer", "guidance") else set()
-        )
-
-
 def test_a_role_that_only_looks_up_comes_to_its_end(play):
     model = Scripted(last=call("list_modules", category="basic"))
     played = play(task=task("on_demand"), client=model)

@@ -287,3 +287,10 @@ def test_plans_are_read_in_the_published_form() -> None:
     assert "in a row" in plan.sub_structures[0].text
     assert (plan.assembly, plan.motion_control) == ("none", "two wheels")
     assert plan.text == "A cart\nIt rolls\nAssembly: none\nMotion control: two wheels"
+
+
+def test_data_sheets_are_told_to_builders_unless_they_are_withheld(play) -> None:
+    for told in (True, False):
+        model = Recording()
+        play(task="lift-1", client=model, data_sheets=told)
+        assert any("  Data: " in str(request) for request in model.requests) is told

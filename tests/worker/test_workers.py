@@ -241,17 +241,3 @@ def test_one_message_has_all_done_and_few_at_once(context, asked, fails) -> None
     states = {context.store.verifications.get(id_).state for id_ in asked[:-AT_ONCE]}
     assert states == {"done"}
     wait_until(lambda: runner._places._value == AT_ONCE, 5, "its threads rest")
-
-
-def test_it_can_be_woken_again(context, asked) -> None:
-    slow = Slow()
-    runner = VerificationRunner(context.store.verifications, slow)
-    runner.wake()
-    wait_until(lambda: slow.done == 30 and runner._places._value == AT_ONCE, 20, "all are done")
-    job = context.store.verifications.get(asked[0]).job_id
-    again = context.store.verifications.request([job])
-    assert set(again.ids) == {job}
-    assert again.ids[job] not in asked
-    runner.wake()
-    wait_until(lambda: slow.done == 31, 20, "the new one is done")
-    wait_until(lambda: runner._places._value == AT_ONCE, 5, "its threads rest")

@@ -21,7 +21,6 @@ from buildarena_backend.errors import StartupError
 from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, ManagedProcess, Supervisor
 from buildarena_cli.local.postgres import installed_postgres
 from buildarena_cli.local.program_copy import PREFIX, ProgramCopy
-from buildarena_cli.local.supervisor import LOOK_EVERY_S
 
 
 def python(*words: str, **more: object) -> subprocess.Popen[bytes]:
@@ -88,24 +87,6 @@ def test_what_is_started_again_while_all_is_stopped_is_stopped_too(started) -> N
         assert restarting.wait(timeout=10)
         stopping.set()
     assert [process.returncode for process in started] == [-signal.SIGKILL, -signal.SIGTERM]
-
-
-@pytest.mark.ci
-def test_what_dies_while_all_is_stopped_is_not_started_again(started) -> None:
-    def start() -> subprocess.Popen[bytes]:
-        started.append(sleeper())
-        return started[-1]
-
-    def stop(process: subprocess.Popen[bytes]) -> None:
-        process.kill()
-        process.wait()
-        time.sleep(3 * LOOK_EVERY_S)
-
-    with Supervisor() as supervisor:
-        for name in ("one", "two"):
-            supervisor.launch(ManagedProcess(name=name, start=start, stop=stop))
-        supervisor.watch()
-    assert [process.returncode for process in started] == [-signal.SIGKILL] * 2
 
 
 @pytest.mark.ci

@@ -47,7 +47,6 @@ class ProviderStandIn:
         latency_s: Time each answer takes.
         elsewhere: Where redirects lead.
         respond: Answers in the built-in model's place.
-        raw: The body of every answer, in the place of one that is made.
     """
 
     def __init__(
@@ -58,9 +57,7 @@ class ProviderStandIn:
         latency_s: float = 0.0,
         elsewhere: str = "http://127.0.0.1:9/",
         respond: Callable[[Request], Completion] | None = None,
-        raw: Any = None,
     ) -> None:
-        self.raw = raw
         self.elsewhere = elsewhere
         self.counts = Counts()
         self.lock = threading.Lock()
@@ -73,7 +70,6 @@ class ProviderStandIn:
         self.url = f"http://127.0.0.1:{self._server.server_port}"
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
         self.closing = threading.Event()
-        self.held = 0
         self.left = 0
 
     def __enter__(self) -> Self:
@@ -137,9 +133,6 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(200, {"nothing": "here"}, {})
             return
         time.sleep(5.0 if fault == "slow" else self.standin.latency_s)
-        if self.standin.raw is not None:
-            self._send(200, self.standin.raw, {})
-            return
         wire = _WIRES[_wire_of(self.path)]
         reply = self.standin.respond(wire.read(body))
         used = _used(body, reply)
@@ -164,8 +157,6 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _keep_waiting(self, *, drips: bool) -> None:
         """Never answers, or a byte at a time; notes when the client has gone."""
-        with self.standin.lock:
-            self.standin.held += 1
         with contextlib.suppress(ConnectionError):
             if drips:
                 self.send_response(200)

@@ -1,10 +1,11 @@
-"""A proxy between a runner and the API that breaks connections off in the middle."""
+"""A proxy to any TCP server that breaks connections off in the middle, or falls silent."""
 
 import socket
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from urllib.parse import urlsplit
 
 
 @dataclass
@@ -12,7 +13,7 @@ class FlakyProxy:
     """Passes bytes on, and cuts connections.
 
     Attributes:
-        target: Port of the server.
+        target: Host and port of the server.
         cut_after: Bytes from the client after which each of the next connections is cut; each
             number is used once.
         swallow_answers: How many answers are lost, although their requests arrived.
@@ -20,16 +21,18 @@ class FlakyProxy:
             as over a link that died, and hear nothing more.
         delay_s: How late each part of an answer comes.
         away: Whether every connection is refused.
+        hushed: Whether nothing passes for now; connections stay open, and it passes later.
         cuts: Connections that were cut.
         over: Set when the proxy ends.
     """
 
-    target: int
+    target: tuple[str, int]
     cut_after: list[int] = field(default_factory=list)
     swallow_answers: int = 0
     silent: int = 0
     delay_s: float = 0.0
     away: bool = False
+    hushed: bool = False
     cuts: int = 0
     url: str = ""
     over: threading.Event = field(default_factory=threading.Event)
@@ -39,7 +42,7 @@ class FlakyProxy:
         if self.away:
             client.close()
             return
-        with client, socket.create_connection(("127.0.0.1", self.target)) as server:
+        with client, socket.create_connection(self.target) as server:
             back = threading.Thread(target=self._answers, args=(server, client), daemon=True)
             back.start()
             with suppress(OSError):
@@ -48,6 +51,10 @@ class FlakyProxy:
                 with suppress(OSError):
                     end.shutdown(socket.SHUT_RDWR)
             back.join(5)
+
+    def _hold(self) -> None:
+        while self.hushed and not self.over.wait(0.02):
+            pass
 
     def _requests(self, client: socket.socket, server: socket.socket) -> None:
         passed = 0
@@ -61,6 +68,7 @@ class FlakyProxy:
                     self.cut_after.pop(0)
                     self.cuts += 1
                     return
+            self._hold()
             server.sendall(data)
 
     def _answers(self, server: socket.socket, client: socket.socket) -> None:
@@ -79,6 +87,7 @@ class FlakyProxy:
                         self.cuts += 1
                         client.shutdown(socket.SHUT_RDWR)
                         return
+                self._hold()
                 client.sendall(data)
 
 
@@ -86,8 +95,10 @@ class FlakyProxy:
 def flaky_proxy(url: str) -> Iterator[FlakyProxy]:
     """A proxy in front of a server."""
     listener = socket.create_server(("127.0.0.1", 0))
-    proxy = FlakyProxy(int(url.rpartition(":")[2]))
-    proxy.url = f"http://127.0.0.1:{listener.getsockname()[1]}"
+    at = urlsplit(url)
+    assert at.port is not None
+    proxy = FlakyProxy((at.hostname or "127.0.0.1", at.port))
+    proxy.url = url.replace(f":{at.port}", f":{listener.getsockname()[1]}", 1)
     threads: list[threading.Thread] = []
 
     def accept() -> None:

@@ -100,33 +100,22 @@ def test_lies_about_usage_are_nothing_or_bounded(subtests) -> None:
                 assert used["cached_tokens"] <= used["input_tokens"]
 
 
-def test_lies_over_other_protocol_end_as_answers(client, subtests) -> None:
+def test_lies_over_other_protocols_end_as_answers(client, subtests) -> None:
+    said = {"id": "r", "type": "message", "role": "assistant", "model": "m"}
+    said |= {"stop_reason": "end_turn", "content": [{"type": "text", "text": "x"}]}
+    candidates = [{"content": {"role": "model", "parts": [{"text": "x"}]}}]
+    anthropic = ("input_tokens", "output_tokens", "cache_read_input_tokens")
+    google = ("promptTokenCount", "candidatesTokenCount")
     for lie in LIES:
-        for protocol in ["anthropic", "google"]:
+        for protocol, body in (
+            ("anthropic", {**said, "usage": dict.fromkeys(anthropic, lie)}),
+            ("google", {"candidates": candidates, "usageMetadata": dict.fromkeys(google, lie)}),
+        ):
             with subtests.test(lie=lie, protocol=protocol):
-                bodies = {
-                    "anthropic": {
-                        "id": "r",
-                        "type": "message",
-                        "role": "assistant",
-                        "model": "m",
-                        "stop_reason": "end_turn",
-                        "content": [{"type": "text", "text": "x"}],
-                        "usage": {
-                            "input_tokens": lie,
-                            "output_tokens": lie,
-                            "cache_read_input_tokens": lie,
-                        },
-                    },
-                    "google": {
-                        "candidates": [{"content": {"role": "model", "parts": [{"text": "x"}]}}],
-                        "usageMetadata": {"promptTokenCount": lie, "candidatesTokenCount": lie},
-                    },
-                }
-                with ProviderStandIn(fault=lambda _: json.dumps(bodies[protocol]).encode()) as bad:
+                data = json.dumps(body).encode()
+                with ProviderStandIn(fault=lambda _, data=data: data) as bad:
                     usage = client(bad, protocol).complete(ASK).usage
-                    assert bad.counts.requests == 1
-                assert usage.requests == 1
+                assert bad.counts.requests == usage.requests == 1
                 assert 0 <= usage.input_tokens <= bounds.MAX_TOKENS
                 assert 0 <= usage.output_tokens <= bounds.MAX_TOKENS
                 assert 0 <= usage.cost_usd <= 100

@@ -18,10 +18,9 @@ from buildarena_backend.catalog.models import ModelEntry, ProviderEntry, load_re
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import Usage
 from buildarena_geometry import ToolDefinition
-from buildarena_worker.builtin.expert import reply as expert
 from buildarena_worker.providers.keys import key_report
 from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
-from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
+from buildarena_worker.session.messages import Completion, Message, Request
 from buildarena_worker.session.results import Failed
 
 PROTOCOLS = ["openai", "anthropic", "google"]
@@ -46,6 +45,8 @@ def test_a_whole_session_over_http_equals_the_one_played_inside(play, client, su
             assert (
                 over_http.suspended.machine.to_document() == inside.suspended.machine.to_document()
             )
+            for body in standin.counts.bodies:
+                assert is_strict(speakers(protocol, body)), speakers(protocol, body)
             used = sum((entry.usage for entry in over_http.entries), Usage())
             counts = standin.counts
             assert used.requests == counts.requests == counts.answered
@@ -114,13 +115,6 @@ def test_a_missing_key_is_named() -> None:
         ProviderClient(entry, provider)
 
 
-def test_decoding_and_seed_go_over_the_wire(client) -> None:
-    with ProviderStandIn("idle") as standin:
-        client(standin).complete(ask())
-    (body,) = standin.counts.bodies
-    assert (body["temperature"], body["top_p"], body["seed"]) == (0.5, 0.7, 3)
-
-
 def test_every_request_carries_its_own_tools(client) -> None:
     def tool(name: str, unit: str) -> ToolDefinition:
         parameters = {"type": "object", "properties": {unit: {"type": "number"}}}
@@ -137,16 +131,6 @@ def test_every_request_carries_its_own_tools(client) -> None:
     assert "feet" in second["tools"][0]["function"]["parameters"]["properties"]
     assert first["parallel_tool_calls"] is False
     assert "tools" not in bare
-
-
-def test_arguments_that_are_no_json_reach_the_session_as_text(client) -> None:
-    def respond(_: Request) -> Completion:
-        return Completion(text="", calls=(ToolCall(id="c", name="start", arguments=[1, "x"]),))
-
-    with ProviderStandIn(respond=respond) as standin:
-        answer = client(standin).complete(ask())
-    (call,) = answer.calls
-    assert call.arguments == [1, "x"]
 
 
 def test_retry_after_is_honoured_within_bounds() -> None:
@@ -203,49 +187,10 @@ def is_strict(roles: list[str]) -> bool:
     )
 
 
-def awkward(request: Request) -> Completion:
-    """The expert, but its first plan and its first program can't be read."""
-    own = [m for m in request.messages if m.role == "assistant"]
-    role = request.messages[0].text.splitlines()[0]
-    if role in {"# Role: planner", "# Role: controller"} and not own:
-        return Completion(text="Let me think aloud first.")
-    return expert(request)
-
-
-@pytest.mark.ci
-def test_a_driven_session_alternates_through_three_attempts(
-    play, rollout, client, subtests
-) -> None:
-    for protocol in PROTOCOLS:
-        with subtests.test(protocol=protocol):
-            records = [rollout(n, success=False, indicator=float(n)) for n in range(2)]
-            with ProviderStandIn(respond=awkward) as standin:
-                played = play(
-                    task="transport-1", client=client(standin, protocol), rollouts=records
-                )
-            assert played.suspended is not None, played.failure
-            assert played.suspended.number == 2
-            controls = [turn for turn in played.session.transcript.turns if turn.stage == "control"]
-            assert len(controls) == 4
-            for body in standin.counts.bodies:
-                assert is_strict(speakers(protocol, body)), speakers(protocol, body)
-
-
-BARE = {"PATH": os.environ["PATH"]}
 OWN = """
 models: [{name: own/big, provider: own, model: big}]
 providers: {own: {protocol: openai, base_url: "http://vllm:8000/v1", key: OWN_API_KEY}}
 """
-
-
-def check(*models: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "buildarena_worker", "--check", *models],
-        env={**BARE, **variables},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def test_a_key_that_no_provider_names_is_told() -> None:
@@ -266,19 +211,13 @@ def test_an_operators_models_have_keys_too(tmp_path) -> None:
 
 
 @pytest.mark.ci
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize(
-    ("models", "variables", "says"),
-    [
-        ((), {"GEMINI_API_KEY": "x"}, "GEMINI_API_KEY: no provider's key"),
-        (("openai/gpt-5",), {}, "openai/gpt-5: neither OPENAI_API_KEY nor"),
-        (("openai/gpt-6",), {}, "openai/gpt-6: no such model"),
-    ],
-)
-def test_the_worker_says_what_is_wrong_without_starting(models, variables, says) -> None:
-    done = check(*models, **variables)
+def test_the_worker_says_what_is_wrong_without_starting() -> None:
+    words = [sys.executable, "-m", "buildarena_worker", "--check", "openai/gpt-5"]
+    environment = {"PATH": os.environ["PATH"], "GEMINI_API_KEY": "x"}
+    done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 1, done.stderr
-    assert says in done.stdout
+    assert "GEMINI_API_KEY: no provider's key" in done.stdout
+    assert "openai/gpt-5: neither OPENAI_API_KEY nor" in done.stdout
 
 
 def test_what_the_compose_file_offers_are_keys_of_providers() -> None:
