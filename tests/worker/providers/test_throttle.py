@@ -17,8 +17,10 @@ from buildarena_worker.providers import throttle as throttle_module
 from buildarena_worker.providers.provider import RequestLoop
 from buildarena_worker.providers.throttle import Throttle
 
+pytestmark = pytest.mark.usefixtures("context")
 
-def test_no_more_than_the_limit_is_open_at_once_over_all_workers(context, broker_url) -> None:
+
+def test_no_more_than_the_limit_is_open_at_once_over_all_workers(broker_url) -> None:
     open_now, most = 0, 0
 
     async def request(throttle: Throttle) -> None:
@@ -37,10 +39,9 @@ def test_no_more_than_the_limit_is_open_at_once_over_all_workers(context, broker
 
     asyncio.run(main())
     assert most == 3
-    del context
 
 
-def test_the_limit_halves_on_complaints_and_grows_with_answers(context, broker_url) -> None:
+def test_the_limit_halves_on_complaints_and_grows_with_answers(broker_url) -> None:
     def limit() -> float:
         with Redis.from_url(broker_url) as store:
             return float(store.get("buildarena:throttle:p:limit"))
@@ -62,7 +63,6 @@ def test_the_limit_halves_on_complaints_and_grows_with_answers(context, broker_u
     halved, grown = asyncio.run(main())
     assert halved == 4
     assert 4.9 < grown < 5
-    del context
 
 
 HOLDER = """
@@ -84,7 +84,7 @@ def open_slots(broker_url: str) -> int:
         return store.zcard("buildarena:throttle:p:open")
 
 
-def test_a_busy_worker_leaves_slots_to_others(context, broker_url) -> None:
+def test_a_busy_worker_leaves_slots_to_others(broker_url) -> None:
     async def main() -> bool:
         busy, other = (Throttle(broker_url, "p", start=1) for _ in range(2))
         served = asyncio.Event()
@@ -105,10 +105,9 @@ def test_a_busy_worker_leaves_slots_to_others(context, broker_url) -> None:
         return served.is_set()
 
     assert asyncio.run(main())
-    del context
 
 
-def test_an_owner_without_an_open_request_may_send_one_whoever_hangs(context, broker_url) -> None:
+def test_an_owner_without_an_open_request_may_send_one_whoever_hangs(broker_url) -> None:
     """Forty and more requests of one key hang; each other key may send one, over all workers."""
 
     async def main() -> tuple[list[float], int, int]:
@@ -148,11 +147,10 @@ def test_an_owner_without_an_open_request_may_send_one_whoever_hangs(context, br
     assert max(waits) < 2
     assert (most, refused) == (6, 1)
     assert open_slots(broker_url) == 0
-    del context
 
 
 @pytest.mark.ci
-def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeypatch) -> None:
+def test_slots_of_a_dead_worker_are_free_again_soon(broker_url, monkeypatch) -> None:
     monkeypatch.setattr(throttle_module, "SLOT_TTL_S", 1)
 
     async def come_after() -> int:
@@ -172,10 +170,9 @@ def test_slots_of_a_dead_worker_are_free_again_soon(context, broker_url, monkeyp
     assert open_slots(broker_url) == 1
     assert asyncio.run(come_after()) == 1
     assert open_slots(broker_url) == 0
-    del context
 
 
-def test_a_request_that_is_given_up_gives_its_slot_back(context, broker_url) -> None:
+def test_a_request_that_is_given_up_gives_its_slot_back(broker_url) -> None:
     async def main() -> None:
         throttle = Throttle(broker_url, "p", start=1)
 
@@ -195,7 +192,6 @@ def test_a_request_that_is_given_up_gives_its_slot_back(context, broker_url) -> 
 
     asyncio.run(main())
     assert open_slots(broker_url) == 0
-    del context
 
 
 def test_requests_go_on_when_the_store_is_gone() -> None:
