@@ -5,6 +5,7 @@ import io
 import os
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from datetime import timedelta
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from buildarena_backend.artifacts.collecting import LOCK, GarbageCollector
 from buildarena_backend.artifacts.storing import ArtifactStore
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
+from buildarena_backend.process.context import open_context
+from buildarena_backend.settings import load_settings
 
 DAY_S = 86_400
 KEEP = timedelta(days=7)
@@ -57,7 +60,7 @@ def bucket(monkeypatch) -> Iterator[object]:
 
 @pytest.mark.ci
 def test_bytes_come_back_from_a_bucket_and_lost_and_damaged_ones_are_noticed(
-    bucket, monkeypatch
+    context, bucket, monkeypatch, tmp_path
 ) -> None:
     store = ArtifactStore("s3://arena/artifacts")
     kept = store.put(b"a bridge", "application/json")
@@ -71,13 +74,17 @@ def test_bytes_come_back_from_a_bucket_and_lost_and_damaged_ones_are_noticed(
     bucket.delete_object(Bucket="arena", Key=key)
     with pytest.raises(ArtifactMissingError, match="is not in the store"):
         store.get(kept.hash)
-    # Uploads take credentials that stand in no variable.
-    options = dict.fromkeys(("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"), "test")
-    for name in options:
+    # Credentials may stand in files.
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        (tmp_path / name).write_text("test\n")
+        monkeypatch.setenv(f"{name}_FILE", str(tmp_path / name))
         monkeypatch.delenv(name)
     # Without credentials the store is asked for some at an address of the cloud, which takes long.
     monkeypatch.setenv("AWS_METADATA_ENDPOINT", "http://127.0.0.1:9")
-    uploads = Uploads("s3://arena/artifacts", options)
+    given = context.settings.model_dump() | {"artifacts_url": "s3://arena/artifacts"}
+    with closing(open_context(load_settings(**given))) as own:
+        assert own.artifacts.put(b"a bridge", "application/json") == kept
+        uploads = Uploads("s3://arena/artifacts", own.settings.artifact_options)
     uploads.keep(("job_0a", 1), "a" * 64, io.BytesIO(b"a file"))
     assert uploads.leases() == {("job_0a", 1)}
 
