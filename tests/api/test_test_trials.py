@@ -6,12 +6,11 @@ import json
 
 import pytest
 from sqlalchemy import text
-from support.stages import work
+from support.stages import verdict, work
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.families.unknowns import drawn_numbers
 from buildarena_worker.builtin.designs.risers import riser
-from buildarena_worker.wiring import verification_runner
 
 TASK = builtin_tasks()["identify-1"]
 DRAW = 7_654_321_987_654
@@ -111,10 +110,7 @@ def test_who_breaks_a_rule_after_a_test_trial_has_failed_and_that_is_verified(
         act(session, "add_machine", copied, machine="assembly")
     job = api.post(f"/v1/sessions/{session}/submit").json()
     assert (job["outcome"], job["indicator"]) == ("construction_failed", 0.0), job
-    (check,) = context.store.verifications.request([session]).ids.values()
-    while verification_runner(context).process_one():
-        pass
-    assert context.store.verifications.get(check).verdict == "verified"
+    assert verdict(context, session) == "verified"
 
 
 def test_what_is_no_trial_uses_up_no_test_trial(api, open_session, act) -> None:

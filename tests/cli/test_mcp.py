@@ -13,11 +13,10 @@ from mcp import ClientSession, StdioServerParameters, stdio_client
 from mcp.client.streamable_http import streamable_http_client
 from support.clients.terminals import BUILDARENA
 from support.servers.stacks import wait_until
-from support.stages import work
+from support.stages import assert_verified, work
 
 from buildarena_cli.local import free_port
 from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.wiring import verifier
 
 WANTED = {"task": "support-1", "agent": "mcp", "simulator": "mujoco"}
 BLOCK = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
@@ -71,8 +70,7 @@ def test_an_agent_builds_a_bridge_and_gets_its_score(context, stdio) -> None:
     assert result["outcome"] == "success"
     assert result["indicator"] > 100
     (job,) = context.store.jobs.page(limit=2)
-    report = verifier(context).verify(job.id).as_document()
-    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    assert_verified(context, job.id)
 
 
 @pytest.mark.ci

@@ -87,15 +87,8 @@ def test_the_wheels_install_all_but_adapters_and_a_demo_runs_from_them_alone(
     listed = json.loads(uv("pip", "list", "--format", "json", *python).stdout)
     ours = {each["name"] for each in listed if each["name"].startswith("buildarena")}
     assert ours == {project(path)["name"] for path in PROJECTS if path not in ADAPTERS}
-    demo = [
-        "demo",
-        "--task",
-        "support-1",
-        "--data",
-        str(tmp_path / "d"),
-        "--port",
-        str(free_port()),
-    ]
+    demo = ["demo", "--task", "support-1", "--data", str(tmp_path / "d")]
+    demo += ["--port", str(free_port())]
     done = run(tmp_path, str(venv / "bin/buildarena"), *demo, check=False, env=alone())
     assert done.returncode == 0, done.stdout + done.stderr
     assert re.search(r"builtin/expert\*\s+4/4", done.stdout), done.stdout

@@ -16,7 +16,7 @@ from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.installed_simulators import installed_simulators
 from buildarena_backend.trials.simulator import Simulator, TrialRequest, TrialResult
 from buildarena_simworker.simulate import simulate_handler
-from buildarena_worker.wiring import construct_handler
+from buildarena_worker.wiring import construct_handler, verification_runner, verifier
 
 _TRIALS: dict[str, TrialResult] = {}
 
@@ -99,6 +99,21 @@ def work(
             steps -= len(waiting)
             list(pool.map(lambda job: runners[job.queue].process_next(job.queue), waiting))
     keeper.stop()
+
+
+def assert_verified(context: Context, job_id: str) -> None:
+    """Every figure of the job is the same when its session is played and scored again."""
+    report = verifier(context).verify(job_id).as_document()
+    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+
+
+def verdict(context: Context, job_id: str) -> str | None:
+    """What a worker's verification of the job comes to."""
+    (check,) = context.store.verifications.request([job_id]).ids.values()
+    runner = verification_runner(context)
+    while runner.process_one():
+        pass
+    return context.store.verifications.get(check).verdict
 
 
 _RESTORED = """

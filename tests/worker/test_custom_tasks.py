@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from support.providers.scripted import Scripted, call
-from support.stages import work
+from support.stages import assert_verified, work
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.agents.sessions import ExternalSessions
@@ -24,7 +24,6 @@ from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.session.host import JournalHost
 from buildarena_worker.session.messages import Completion
 from buildarena_worker.session.session import Session
-from buildarena_worker.wiring import verifier
 
 BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 SUSPENSION = json.loads((Path(__file__).parents[1] / "data/suspension-bridge.json").read_text())
@@ -63,18 +62,13 @@ def add(context, text: str) -> str:
     return task.version
 
 
-def assert_verified(context, job: Job) -> None:
-    report = verifier(context).verify(job.id).as_document()
-    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
-
-
 @pytest.mark.ci
 def test_an_agents_bridge_is_simulated_scored_and_verified(context, agent_plays, finish) -> None:
     version = add(context, EXAMPLE)
     job = finish(agent_plays("narrow-gap").id)
     assert (job.outcome, job.success, job.indicator) == ("success", True, 200.0)
     assert job.manifest["task"] == {"name": "narrow-gap", "version": version}
-    assert_verified(context, job)
+    assert_verified(context, job.id)
 
 
 @pytest.mark.ci
@@ -87,7 +81,7 @@ def test_a_job_in_work_is_tried_and_verified_with_its_own_version(
     new = agent_plays("narrow-gap", seed=1)
     assert (finish(old.id).indicator, finish(new.id).indicator) == (200.0, 300.0)
     for job in (old, new):
-        assert_verified(context, context.store.jobs.get(job.id))
+        assert_verified(context, job.id)
 
 
 def test_what_a_task_asks_of_modules_is_checked(context, agent_plays) -> None:
@@ -107,7 +101,7 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(context, fi
             done = sessions.call(job.id, machine=machine, tool=tool, arguments=arguments)
             assert done.ok, done.feedback
     job = finish(sessions.submit(job.id).id)
-    assert_verified(context, job)
+    assert_verified(context, job.id)
     assert (job.outcome, job.flags) == ("success", [])
     assert 900 < job.indicator < 1500
 

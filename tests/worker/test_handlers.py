@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from support.jobs import execute
-from support.stages import tampered, work
+from support.stages import assert_verified, tampered, work
 
 from buildarena_backend.agents import submission
 from buildarena_backend.agents.sessions import ExternalSessions
@@ -39,7 +39,7 @@ def test_a_bridge_is_built_simulated_scored_and_verified(context, run) -> None:
     assert job.manifest["machine"] == context.store.jobs.artifacts(job.id)["machine"]
     assert job.requests == len(context.store.journal.read(job.id))
     report = verifier(context).verify(job.id).as_document()
-    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    assert report["ok"], report
     names = {check["name"] for check in report["checks"]}
     assert {"transcript", "rollout 0: trajectory", "score: indicator", "usage: cost_usd"} <= names
 
@@ -60,7 +60,7 @@ def test_any_changed_figure_is_found(context, run, subtests) -> None:
             report = verifier(context).verify(job.id).as_document()
             assert not report["ok"]
             assert check in {entry["name"] for entry in report["checks"] if not entry["ok"]}
-    assert verifier(context).verify(job.id).as_document()["ok"]
+    assert_verified(context, job.id)
 
 
 @pytest.mark.parametrize("model", ["builtin/idle", "builtin/random"])
@@ -68,8 +68,7 @@ def test_failures_are_scored_and_verified_too(context, run, model) -> None:
     job = run(model=model)
     assert job.success is False
     assert job.indicator == 0.0 or job.outcome == "unsuccessful"
-    report = verifier(context).verify(job.id).as_document()
-    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    assert_verified(context, job.id)
 
 
 def test_a_limit_keeps_what_was_built(context, run) -> None:
@@ -77,7 +76,7 @@ def test_a_limit_keeps_what_was_built(context, run) -> None:
     assert (job.outcome, job.reason, job.requests) == ("limit", "max_requests", 20)
     assert job.metrics["parts"] > 5
     assert "machine" in context.store.jobs.artifacts(job.id)
-    assert verifier(context).verify(job.id).as_document()["ok"]
+    assert_verified(context, job.id)
 
 
 def test_a_job_that_was_never_scored_is_not_verified(context) -> None:
@@ -109,14 +108,14 @@ def test_a_driven_car_is_tried_three_times_and_the_best_counts(context, run) -> 
     assert records[0].wall_s > 0
     assert [record.wall_s for record in records[1:]] == [0.0, 0.0]
     assert job.indicator == max(record.indicator for record in records)
-    assert verifier(context).verify(job.id).as_document()["ok"]
+    assert_verified(context, job.id)
 
 
 @pytest.mark.ci
 def test_an_assembled_rocket_flies(context, run) -> None:
     job = run(task="lift-3")
     assert job.outcome == "success"
-    assert verifier(context).verify(job.id).as_document()["ok"]
+    assert_verified(context, job.id)
 
 
 ROCKET = (
@@ -151,8 +150,7 @@ def test_a_machine_that_was_let_through_fails_verification(context, monkeypatch)
 def test_a_machine_that_was_refused_is_verified_as_refused(context) -> None:
     job = _submitted(context)
     assert context.store.jobs.get(job).reason == "unjoined_parts"
-    report = verifier(context).verify(job).as_document()
-    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    assert_verified(context, job)
 
 
 PAYLOAD = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}

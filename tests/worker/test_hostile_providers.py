@@ -15,14 +15,13 @@ from sqlalchemy import text
 from support.providers.stand_in import ProviderStandIn
 from support.servers.construct_threads import crew
 from support.servers.stacks import wait_until
-from support.stages import work
+from support.stages import assert_verified, work
 
 from buildarena_backend.accounts.budgets import BudgetLimits
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_worker import builtin
 from buildarena_worker.builtin import expert
 from buildarena_worker.session.messages import Completion, Request
-from buildarena_worker.wiring import verifier
 
 SOON_S = 3.0
 """A cancelled job is noticed within a second; the rest is for a busy machine."""
@@ -87,8 +86,7 @@ def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how
     # What was sent and broken off costs what was sent.
     assert (job.input_tokens > 100) == (how in {"hang", "drip"})
     assert (job.cost_usd > 0) == (how in {"hang", "drip"})
-    report = verifier(context).verify(job.id).as_document()
-    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    assert_verified(context, job.id)
 
 
 @pytest.mark.ci
@@ -172,8 +170,7 @@ def test_after_garbage_the_session_goes_on_and_is_verified(context, tmp_path) ->
     assert job.requests == bad.counts.requests
     finishes = [entry["finish"] for entry in workers.requests(job_id)]
     assert [n for n, finish in enumerate(finishes) if finish == "garbage"] == sorted(bad_ones)
-    report = verifier(context).verify(job_id).as_document()
-    assert report["ok"], [check for check in report["checks"] if not check["ok"]]
+    assert_verified(context, job_id)
 
 
 LURES = (

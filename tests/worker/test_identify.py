@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 from support.machines.expert_calls import measured_for, played
-from support.stages import work
+from support.stages import verdict, work
 
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.job import Job
@@ -24,7 +24,6 @@ from buildarena_worker.builtin import expert
 from buildarena_worker.builtin.designs import risers
 from buildarena_worker.builtin.designs.calls import calls_with
 from buildarena_worker.builtin.designs.risers import riser
-from buildarena_worker.wiring import verification_runner
 
 pytestmark = pytest.mark.nightly
 
@@ -37,14 +36,6 @@ def ended(context: Context, submissions: Submissions, **spec: object) -> Job:
     job, _ = submissions.submit_job(JobSpec(**{**asked, **spec}))
     work(context)
     return context.store.jobs.get(job.id)
-
-
-def verdict(context: Context, job: Job) -> str | None:
-    (check,) = context.store.verifications.request([job.id]).ids.values()
-    runner = verification_runner(context)
-    while runner.process_one():
-        pass
-    return context.store.verifications.get(check).verdict
 
 
 @pytest.mark.nightly(keep=1)
@@ -64,7 +55,7 @@ def test_the_expert_measures_five_times_and_its_sixth_trial_counts(
     assert job.manifest["drawn"]["gravity"] == task.scenario.gravity
     trajectory = read_trajectory(context.artifacts.get(records[5].trajectory_hash))
     assert trajectory.settings["gravity"] == task.scenario.gravity
-    assert verdict(context, job) == "verified"
+    assert verdict(context, job.id) == "verified"
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -121,7 +112,7 @@ def test_a_controller_that_gives_up_after_a_test_trial_has_failed(
         0.0,
     )
     assert len(context.store.rollouts.read(job.id)) == 2
-    assert verdict(context, job) == "verified"
+    assert verdict(context, job.id) == "verified"
     expert._design.cache_clear()
 
 
@@ -143,7 +134,7 @@ def test_varied_worlds_keep_what_was_drawn(context, submissions) -> None:
         assert trajectory.settings["gravity"] == drawn["gravity"]
         assert trajectory.settings.get("drive_strength", 1.0) == drawn["drive_strength"]
         assert trajectory.cargo_mass[-1] == pytest.approx(drawn["cargo_mass"])
-    assert verdict(context, job) == "verified"
+    assert verdict(context, job.id) == "verified"
 
 
 def test_each_job_has_a_draw_of_its_own_that_its_seed_does_not_tell(context, submissions) -> None:

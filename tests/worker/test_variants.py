@@ -185,10 +185,6 @@ def task(how, modules="workshop"):
     return replace(given, constraints=given.constraints.model_copy(update=update))
 
 
-def texts(request):
-    return "\n".join(message.text for message in request.messages)
-
-
 def test_the_expert_plays_as_well_where_it_looks_up(play, subtests):
     for workflow in ["five-role", "guidance-builder", "builder"]:
         with subtests.test(workflow=workflow):
@@ -200,7 +196,7 @@ def test_the_expert_plays_as_well_where_it_looks_up(play, subtests):
                 machines[how] = played.session.machine
                 held = {tool.name for request in model.requests for tool in request.tools}
                 assert held >= LOOKUPS if how == "on_demand" else not held & LOOKUPS
-                told = any(HINGE.description in texts(request) for request in model.requests)
+                told = any(HINGE.description in text_of(request) for request in model.requests)
                 assert told == (how == "inline")
             assert machines["inline"] == machines["on_demand"]
 
