@@ -25,8 +25,8 @@ chaos)
         .venv/bin/pytest scenarios/chaos -s --timeout 3600 "$@"
     ;;
 besiege)
-    BESIEGE_TASKS=all BESIEGE_KILLS=20 BESIEGE_FAULTY_RUNS=200 .venv/bin/pytest -n 2 --timeout=900 \
-        "$game/test_end_to_end.py" "$game/test_killed_runner.py" "$game/test_faulty_runs.py" "$@"
+    BESIEGE_TASKS=all BESIEGE_KILLS=20 .venv/bin/pytest -n 2 --timeout=900 \
+        "$game/test_end_to_end.py" "$game/test_killed_runner.py" "$game/test_real_game.py" "$@"
     "$python" tests/besiege/fuzz_files.py --files 10000
     ;;
 *)

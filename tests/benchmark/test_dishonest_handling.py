@@ -6,17 +6,13 @@ from dataclasses import replace
 from typing import Any, Final
 
 import pytest
-from support.machines.boulders import car_with_boulder
 from support.machines.drafts import KeyedDraft
-from support.machines.headroom import drafted
 from support.machines.piloted import FASTER_FIRST, scored
 from tests.benchmark.conftest import expert, honest, strict
 
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, simulate
-from buildarena_worker.builtin.designs import throwers, vehicles
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST
 
 TASKS: Final = builtin_tasks()
 THROW: Final = TASKS["throw-1"]
@@ -30,28 +26,6 @@ def fails(result: Any, *flags: str) -> None:
 # Throwing
 
 
-def too_few_stays(draft: Draft, beam: list[str], post: list[str], west: str) -> None:
-    """The post is held along the foot and not across: it breaks when the arm is half way up."""
-    del west
-    for base, way in ((beam[2], NORTH), (beam[1], NORTH), (beam[10], SOUTH)):
-        draft.connect(post[-1], base, way, UP)
-    for side in (EAST, WEST):
-        draft.connect(beam[5], beam[9], side)
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_throwing_by_collapse(engine, monkeypatch) -> None:
-    """The same catapult on a post that breaks while it throws, and a mast that topples over."""
-    monkeypatch.setattr(throwers, "_stays", too_few_stays)
-    fails(scored(THROW, expert("throw-1"), engine, None), "came_apart")
-    draft = KeyedDraft(modules="all")
-    top = draft.row(draft.row(draft.start(), UP, 3)[-1], NORTH, 1)[-1]
-    draft.attach(draft.attach(top, UP, "Bomb Holder"), UP, "Boulder")
-    topples = strict(THROW, min_distance=0.0, max_start_height=50.0)
-    fails(scored(topples, draft.machine, engine, None))
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
@@ -60,13 +34,6 @@ def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
     boulder = next(b.id for b in thrown.blocks.values() if b.module.name == "Boulder")
     assert thrown.act("shift_block", {"block_id": boulder, "shift_real": [0, 0, -0.45]}).ok
     fails(scored(THROW, thrown, engine, None), "unexplained")
-
-
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_throwing_by_driving(engine) -> None:
-    """A car that carries the boulder north and brakes at the line."""
-    fails(scored(strict(THROW, min_distance=0.0), car_with_boulder(), engine, None))
 
 
 @pytest.mark.nightly(keep=1)
@@ -132,38 +99,7 @@ def test_a_ball_that_is_kicked(engine) -> None:
     assert 0.2 < result.indicator < 0.9
 
 
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("engine", FASTER_FIRST)
-def test_a_tower_that_topples_onto_the_ball(engine) -> None:
-    """What lies at the ball after it was knocked away brings it no farther; nor does idling."""
-    draft = KeyedDraft(modules="workshop")
-    top = draft.row(draft.start(), UP, 30)[-1]
-    draft.attach(draft.row(top, NORTH, 2)[-1], DOWN, "Log")
-    result = scored(TASKS["deliver-1"], draft.machine, engine, None)
-    assert (result.success, result.indicator < 0.2) == (False, True)
-    fails(scored(TASKS["deliver-1"], expert("deliver-1", []), engine, None))
-
-
 # Courses
-
-
-def straight() -> Machine:
-    """A car that drives north and never steers."""
-    presses = [("UpArrow", 0.4, 19.0)]
-    return drafted(vehicles._vehicle(length=5, track=1, deck=None, presses=presses))
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_car_whose_wheels_bear_in_turns_has_driven(seed) -> None:
-    """Large wheels on its rear ones lift these, so that it rocks on the front ones."""
-    car = straight()
-    wheels = [name for name, block in car.blocks.items() if block.module.motor]
-    for rear in sorted(wheels, key=lambda name: car.blocks[name].center[1])[:2]:
-        hub = {"base_block": rear, "face": "E", "new_block": "Large Wheel"}
-        assert car.act("attach_block_to", hub).ok
-    result = scored(TASKS["drive-2"], car, "mujoco", seed)
-    assert (result.success, result.flags) == (True, ())
 
 
 @pytest.mark.nightly

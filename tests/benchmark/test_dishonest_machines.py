@@ -55,15 +55,6 @@ def third_wheel() -> KeyedDraft:
     return draft
 
 
-def tandem() -> KeyedDraft:
-    """One wheel in front of the other: they stand by themselves, as a bicycle does not."""
-    draft, middle = workshop()
-    for way, side in ((NORTH, EAST), (SOUTH, WEST)):
-        draft.wheel(draft.row(middle, way, 2)[-1], side, "Large Wheel")
-    draft.attach(draft.attach(middle, UP, "Log"), UP, "Log")
-    return draft
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize(
@@ -71,7 +62,7 @@ def tandem() -> KeyedDraft:
     [
         (cart, ()),
         (short, ("propped",)),
-        *((build, ("not_on_two_wheels",)) for build in (third_wheel, tandem)),
+        (third_wheel, ("not_on_two_wheels",)),
     ],
 )
 def test_who_does_nothing_does_not_balance(build, flags, engine) -> None:
@@ -143,15 +134,6 @@ def mast() -> Machine:
     return moved_by(draft, "turn_right = 1")
 
 
-def scooter() -> Machine:
-    """Two blocks on a row of pistons, which pull and push each other and never leave the ground."""
-    draft, start = workshop()
-    for way in (EAST, WEST):
-        draft.row(start, way, 2)
-    draft.attach(chain(draft, start, NORTH, 2)[-1], NORTH)
-    return moved_by(draft, "extend = t % 1 < 0.7 and 0.4 or 0")
-
-
 def sled() -> Machine:
     """A flat board with a hinge, so that it has two links."""
     draft, start = workshop()
@@ -171,7 +153,7 @@ def stepper() -> Machine:
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("engine", FASTER_FIRST)
-@pytest.mark.parametrize("build", [telescope, mast, scooter, sled, stepper])
+@pytest.mark.parametrize("build", [telescope, mast, sled, stepper])
 def test_what_does_not_walk_does_not_pass(build, engine) -> None:
     machine = build()
     trial = simulate(machine, LEVEL, engine)
@@ -211,7 +193,6 @@ def cross() -> KeyedDraft:
 
 
 FLIGHTS: Final[Mapping[str, tuple[str, str]]] = {
-    "falls": ("landing-1", "return {}"),
     "touches and flies on": (
         "landing-1",
         """
@@ -229,8 +210,6 @@ FLIGHTS: Final[Mapping[str, tuple[str, str]]] = {
     ),
     # It falls, brakes, and sinks slowly by the clock until the ground comes, wherever that is.
     "slow by the clock": ("landing-1", "return { fly = t < 1.2 and 0 or t < 1.7 and 1 or 0.351 }"),
-    "hovers first": ("landing-2", "return { fly = t < 4 and 1 or 0.36 }"),
-    "flies up and falls": ("landing-2", "return { fly = 1 }"),
     "slows down all the way": ("landing-2", "return { fly = 0.351 }"),
     "held up by just its weight": ("hover-3", "return { fly = t < 1.5 and 0.5 or 4.65 / 13 }"),
 }
@@ -326,12 +305,10 @@ def fan_car() -> Machine:
     [
         (lambda: blind(0.6, 0.6), 3),
         (lambda: blind(-0.6, -0.6), 0),
-        (lambda: blind(0.5, -0.5), 0),
-        (lambda: blind(0.6, 0.45), 3),
         (turning_bar, 0),
         (fan_car, 0),
     ],
-    ids=["straight on", "backwards", "spinning", "right", "turning bar", "fan"],
+    ids=["straight on", "backwards", "turning bar", "fan"],
 )
 def test_what_does_not_look_follows_no_line(build: Callable[[], Machine], most, engine) -> None:
     result = scored(TASKS["line-1"], build(), engine, None)

@@ -7,8 +7,6 @@ import pytest
 from support.lua_game import LuaGame
 from support.machine_files import published_files
 from tests.besiege.playing import vehicle
-from tests.besiege.published_logs import copies
-from tests.besiege.test_published_logs import DRIVE_ROWS
 from tests.besiege.test_reading_files import assert_alike, contents
 from typer.testing import CliRunner
 
@@ -145,13 +143,6 @@ def test_our_logs_are_scored(machine, played) -> None:
         "distance"
         in run("besiege", "score", played, "--machine", machine, "--task", "transport-1").stdout
     )
-
-
-def test_published_logs_are_scored(machine, tmp_path) -> None:
-    log = tmp_path / "simulation_log.csv"
-    log.write_text(copies(DRIVE_ROWS), encoding="utf-8")
-    done = run("besiege", "score", log, "--machine", machine, "--task", "transport-1", "--json")
-    assert json.loads(done.stdout)["indicator"] == pytest.approx(12.0, abs=0.1)
 
 
 def test_logs_that_cannot_be_scored_are_named(machine, played, tmp_path) -> None:

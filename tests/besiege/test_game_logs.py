@@ -52,7 +52,6 @@ VARIANTS = {
     "a byte order mark": f"\ufeff{WHOLE}\n",
     "blanks around": "\n".join(f"  {line}\t\xa0" for line in LINES),
     "glued together": "".join(LINES),
-    "glued with foreign text": "x".join(f"{line}?" for line in LINES).replace("?x", "\n"),
     "zeros between": "\x00\n\x00".join(LINES),
     "empty lines": "\n\n\n".join(LINES),
     "non-ASCII between": "\nÄ 日本 😀\n".join(LINES),
@@ -60,9 +59,9 @@ VARIANTS = {
 
 
 def test_form_does_not_matter(subtests) -> None:
-    for name in [n for n in VARIANTS if n != "glued with foreign text"]:
+    for name, text in VARIANTS.items():
         with subtests.test(name=name):
-            assert log_of(VARIANTS[name]) == REFERENCE
+            assert log_of(text) == REFERENCE
 
 
 def test_order_repeats_and_pieces_do_not_matter() -> None:
@@ -93,13 +92,6 @@ def test_a_stream_may_be_cut_anywhere(sizes, windows) -> None:
     assert log == REFERENCE
 
 
-def test_a_stream_may_come_character_by_character() -> None:
-    log = GameLog(RUN)
-    for character in "\n".join(LINES[:12]):
-        log.read(character)
-    assert log == log_of("\n".join(LINES[:12]))
-
-
 @given(st.data())
 @settings(max_examples=150, deadline=None)
 def test_no_damaged_line_counts(data) -> None:
@@ -113,13 +105,6 @@ def test_no_damaged_line_counts(data) -> None:
     assert found <= {line}
     if line not in damaged:
         assert not found
-
-
-def test_every_half_line_is_refused() -> None:
-    for line in LINES[:3] + LINES[-2:]:
-        for cut in range(1, len(line)):
-            assert not log_of(line[:cut]).lines
-            assert not log_of(line[cut:]).lines
 
 
 def test_other_runs_in_the_window_do_not_matter() -> None:

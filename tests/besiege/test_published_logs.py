@@ -31,35 +31,19 @@ def drive(name: str, n: int) -> tuple[float, float, float]:
 
 SUPPORT_ROWS = printed(fall, names=["Ballast"], last=1700, state=mass)
 DRIVE_ROWS = printed(drive, names=["1", "2", "3"], last=3000)
-FORMS = {
-    "cleaned": cleaned(SUPPORT_ROWS),
-    "raw": copies(SUPPORT_ROWS, window=300, every=50),
-    "windows": copies(SUPPORT_ROWS).replace("\n", "\r\n"),
-    "quoted": "\n".join(",".join(f'"{p.strip()}"' for p in r.split(",")) for r in SUPPORT_ROWS),
-    "byte order mark": "\ufeff" + cleaned(SUPPORT_ROWS),
-    "empty rows": cleaned(SUPPORT_ROWS).replace("\n", "\n\n,,\n"),
-}
 
 
 def read(text, task=SUPPORT):
     return published_trajectory(text, MACHINE, task.scenario)
 
 
-def test_a_bridges_load_is_scored_from_any_form(subtests) -> None:
-    for form in FORMS:
-        with subtests.test(form=form):
-            found = read(FORMS[form])
-            result = score(SUPPORT, MACHINE, found)
-            # The height is below 4 from 14.04 s on; one decimal costs a tenth of a second.
-            wanted = SUPPORT.scenario.cargo.mass_at(14.04)
-            assert result.indicator == pytest.approx(wanted, abs=15.0)
-            assert found.time_s[-1] == 17.0
-            assert np.abs(found.cargo_position[:250, 2] - 8.0).max() < 0.05
-            assert (found.engine, found.engine_version, found.bearing) == (
-                "besiege",
-                "published",
-                None,
-            )
+def test_a_bridges_load_is_scored() -> None:
+    found = read(copies(SUPPORT_ROWS, window=300, every=50))
+    result = score(SUPPORT, MACHINE, found)
+    # The height is below 4 from 14.04 s on; one decimal costs a tenth of a second.
+    assert result.indicator == pytest.approx(SUPPORT.scenario.cargo.mass_at(14.04), abs=15.0)
+    assert np.abs(found.cargo_position[:250, 2] - 8.0).max() < 0.05
+    assert (found.engine, found.engine_version, found.bearing) == ("besiege", "published", None)
 
 
 def test_a_vehicles_path_is_scored() -> None:
@@ -134,13 +118,6 @@ def test_a_log_of_several_runs_is_refused() -> None:
         read("\n".join(row for rows in runs for row in rows), DRIVE)
 
 
-def test_a_log_of_nobody_is_refused() -> None:
-    rows = printed(lambda *_: (0.0, 0.0, 0.0), names=["77"], last=3000)
-    with pytest.raises(LogIncompleteError, match="nothing of any block"):
-        read("\n".join(rows), DRIVE)
-    assert not looks_published("hello, world\n1,2,3,4,5")
-
-
 FOLDER = Path(__file__).parents[1] / "data" / "besiege" / "game_logs"
 ROWS = (FOLDER / "support-1_seven_blocks.csv").read_text(encoding="ascii").splitlines()
 REAL_TASK = builtin_tasks()["support-1"]
@@ -172,9 +149,6 @@ def thinned(rows: list[str]) -> list[str]:
 REAL_FORMS = {
     "as it was written": "\n".join(ROWS),
     "decimal commas": "\n".join(row.translate(LETTERS) for row in ROWS),
-    "decimal commas between semicolons": "\n".join(
-        row.replace(",", ";").translate(LETTERS) for row in ROWS
-    ),
     "between tabs": "\n".join(row.replace(",", "\t") for row in ROWS),
     "blanks after commas": "\r\n".join(row.replace(",", ", ") for row in ROWS),
     "quoted": "\n".join(",".join(f'"{part}"' for part in row.split(",")) for row in ROWS),
@@ -254,12 +228,3 @@ def test_a_beginning_without_a_fall_is_refused() -> None:
     ]
     with pytest.raises(LogIncompleteError, match=r"Between 0.00 s and 0.32 s"):
         read_real("\n".join(standing))
-
-
-SAGGING = np.loadtxt(FOLDER / "support-2_sagging_bridge_y.csv", delimiter=",", skiprows=1)
-
-
-def test_the_excerpts_are_as_the_notes_say() -> None:
-    height = dict(zip(np.round(SAGGING[:, 0], 2), SAGGING[:, 2], strict=True))
-    assert height[0.36] == 10.19
-    assert min(height.values()) < 5.1

@@ -1,7 +1,5 @@
 """Logs become trajectories in our world frame; what is missing is said."""
 
-import math
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -14,7 +12,7 @@ from buildarena_besiege import GameLog, LogIncompleteError, game_start, trajecto
 from buildarena_besiege.logs.trajectories import Samples, made_trajectory
 from buildarena_besiege.run import prepared_machine
 from buildarena_geometry import Machine
-from buildarena_simulation import Scenario, read_trajectory, simulate, write_trajectory
+from buildarena_simulation import Scenario, simulate
 
 TASKS = builtin_tasks()
 MACHINE = vehicle(cannon=True)
@@ -92,11 +90,6 @@ def test_a_block_that_went_away_is_a_piece_of_its_own() -> None:
     assert found.pieces[50].tolist() == [0, 0, 0, 3, 0], "what broke off stays off"
 
 
-def test_pieces_are_unknown_without_a_starting_block() -> None:
-    scenario = SHORT.model_copy(update={"tracked_blocks": ("2", "5")})
-    assert trajectory(played(MACHINE, scenario, path=still), scenario=scenario).pieces is None
-
-
 def test_short_gaps_are_filled_in_a_straight_line(subtests) -> None:
     for gone in [{100}, {100, 104, 108, 112}, {4, 8, 12}, {192, 196, 200}]:
         with subtests.test(gone=gone):
@@ -158,21 +151,6 @@ def test_a_log_of_something_else_is_refused() -> None:
             trajectory_of(log, machine, scenario, game="1", mod="2")
 
 
-def test_a_log_always_makes_the_same_trajectory() -> None:
-    game = played(MACHINE, SHORT, path=still)
-    first, second = trajectory(game), trajectory(game)
-    assert dict(first.settings) == dict(second.settings)
-    assert write_trajectory(first) == write_trajectory(second)
-    again = read_trajectory(write_trajectory(first))
-    assert again.engine == "besiege"
-    assert (again.positions == first.positions).all()
-
-
-def test_positions_that_are_no_numbers_stay_so() -> None:
-    game = played(MACHINE, SHORT, path=lambda i, n: (math.nan, 1.0, 1.0) if n > 50 else still(i, n))
-    assert np.isnan(trajectory(game).positions[20:, 0, 0]).all()
-
-
 def drive(i: int, n: int) -> tuple[float, float, float]:
     return (float(i), 1.0, max(n - 300, 0) * 0.01)
 
@@ -204,14 +182,6 @@ def test_the_load_of_a_bridge_is_the_cargos_mass_when_it_falls() -> None:
     assert result.success
     assert result.indicator == pytest.approx(chosen.scenario.cargo.mass_at(14.76), abs=0.1)
     assert "span_not_measured" in result.flags
-
-
-def test_a_run_that_reports_nothing_still_tells_its_time() -> None:
-    scenario = SHORT.model_copy(update={"placement": TASKS["support-1"].scenario.placement})
-    game = played(MACHINE, scenario)
-    assert log_of(game).time_s == 2.0
-    found = trajectory(game, scenario=scenario)
-    assert (found.positions.shape, found.cargo_position, found.pieces) == ((51, 0, 3), None, None)
 
 
 def test_centres_and_turns_are_told_by_the_roots_of_what_moves_as_one(subtests) -> None:
@@ -286,12 +256,6 @@ def test_a_late_start_counts_where_the_first_sample_is_near_where_the_trial_begi
             log = without(played(MACHINE, SHORT, path=elsewhere), gone)
             with pytest.raises(LogIncompleteError, match=r"Between 0\.00 s"):
                 trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
-
-
-def test_a_start_later_than_that_is_refused() -> None:
-    log = without(played(MACHINE, SHORT, path=begun), set(range(4, 44, 4)))
-    with pytest.raises(LogIncompleteError, match=r"Between 0\.00 s and 0\.44 s"):
-        trajectory_of(log, MACHINE, SHORT, game="1", mod="2")
 
 
 def test_a_cargo_that_the_game_destroyed_is_no_trial() -> None:

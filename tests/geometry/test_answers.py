@@ -10,7 +10,6 @@ from support.machines.random_workshop import TASKS, random_workshop_machine
 from buildarena_geometry import Cause, Machine, load_catalogue, module_set
 from buildarena_geometry.feedback.modules import modules_text
 from buildarena_geometry.mobility import mobility
-from buildarena_geometry.modules.names import CaselessNames
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.clusters import find_clusters
 
@@ -49,21 +48,6 @@ def details(machine: Machine, block: str) -> str:
 # What holds
 
 
-def test_a_parted_block_that_a_connector_holds_is_not_called_loose(build):
-    machine = build(("1", "A", BLOCK))
-    assert connect(machine, "1", "C", "2", "C").ok
-    moved = shift(machine, "2", 0, 0.5, 0.5)
-    assert "no longer joined" in moved
-    assert "Not connected" not in moved
-
-
-def test_what_is_just_too_far_is_not_shown_as_just_near_enough(build):
-    machine = build(("1", "A", BLOCK))
-    shift(machine, "2", 0.4, 0, 0)
-    moved = shift(machine, "2", 0.102, 0, 0)
-    assert "0.502 off 1/A; no longer joined" in moved
-
-
 # What heats what
 
 
@@ -74,14 +58,6 @@ def test_a_shift_ends_it_just_beyond_the_flames_radius(engine, block, apart, rea
     ended = "Block 4 (Water Cannon) is no longer heated by 5." in moved
     assert ended is not reached
     assert ("heated by 5" in details(engine, "4")) is reached
-
-
-def test_a_removed_torch_leaves_its_cannon_cold_and_a_removed_cannon_is_not_mourned(engine):
-    copy = engine.copy()
-    gone = act(engine, "remove_block", block_id="5")
-    assert "Block 4 (Water Cannon) is no longer heated by 5." in gone
-    assert "heat" not in act(copy, "remove_block", block_id="4")
-    assert "heats nothing" in details(copy, "5")
 
 
 def test_a_flame_heats_across_sub_structures_until_one_of_them_leaves(build, engine):
@@ -129,31 +105,7 @@ def test_a_refusal_names_the_free_faces_as_successes_do(build, subtests):
             )
 
 
-def test_a_block_without_free_faces_says_so(build):
-    machine = build(("1", "A", "Powered Wheel"), ("2", "E", "Torch"))
-    refused = attach(machine, "2", "E", BLOCK)
-    assert refused.text.endswith("Its free faces: none.")
-
-
-def test_a_missing_face_of_a_connection_names_all_faces_with_their_sides(build):
-    machine = build(("1", "A", BLOCK))
-    refused = connect(machine, "1", "G", "2", "C")
-    assert "Its faces: A <East>, B <West>, C <Up>, D <Down>, E <North>, F <South>." in refused.text
-
-
 # What an assembly's parts have
-
-
-def test_an_added_machine_shows_its_blocks_faces_and_connectors(build):
-    cart = build(("1", "A", BLOCK), ("2", "E", BLOCK))
-    assert connect(cart, "1", "C", "3", "C", connector="Winch").ok
-    assembly = Machine(available={"cart": cart})
-    first = act(assembly, "add_machine", machine_id="cart")
-    assert first.startswith("Added cart as sub-structure A: 3 blocks A_1 to A_3; connectors: A_4.")
-    assert "A_3 Small Wooden Block, on A_2/E, at [2, 0, 0], free faces A <" in first
-    assert "\nA_4 Winch, A_1/C [0, 0, 0.5] to A_3/C [" in first
-    copy = act(assembly, "add_machine", machine_id="cart", init_shift=[0, 3, 0])
-    assert "sub-structure B: 3 blocks B_1 to B_3; connectors: B_4." in copy
 
 
 # Which name is meant
@@ -166,13 +118,6 @@ def test_a_module_is_found_whatever_its_case(build, subtests):
             text = act(machine, "attach_block_to", base_block="1", face="A", new_block=written)
             assert text.startswith("Attached. 2 Small Wooden Block")
             assert machine.blocks["2"].module.name == BLOCK
-
-
-def test_another_name_is_no_module(build, subtests):
-    for written in ["Small Wooden", "Wooden Block", "smallwoodenblock", "", " "]:
-        with subtests.test(written=written):
-            refused = attach(build(), "1", "A", written)
-            assert refused.cause is Cause.UNKNOWN_MODULE
 
 
 def test_connectors_actions_and_tools_are_found_whatever_their_case(build):
@@ -189,21 +134,7 @@ def test_connectors_actions_and_tools_are_found_whatever_their_case(build):
     assert swapped.cause is Cause.BASIC_AS_CONNECTOR
 
 
-def test_names_that_differ_in_case_alone_are_told_apart():
-    names = CaselessNames(["Beam", "beam", "Rod"])
-    assert (names.find("Beam"), names.find("beam"), names.find("BEAM")) == ("Beam", "beam", None)
-    assert names.find("ROD") == "Rod"
-
-
 # The module list
-
-
-def test_the_module_list_gives_sizes_masses_faces_and_actions():
-    text = modules_text(load_catalogue())
-    for module in load_catalogue().values():
-        assert (f"- {module.name} (" in text) is (module.kind != "cargo")
-    assert "- Starting Block (1 x 1 x 1; mass 0.25; faces A B C D E F)" in text
-    assert "actions spinning_forward, spinning_backward" in text
 
 
 def test_a_tasks_module_list_has_its_modules_and_the_starting_block_alone():
@@ -264,12 +195,6 @@ def test_flipping_turns_them_round(subtests):
     ]:
         with subtests.test(module=module):
             assert line(module, flip=True).endswith(f"{said}.")
-
-
-def test_nothing_is_said_of_what_has_no_direction(subtests):
-    for module in ["Double Wooden Block", "Log", "Grip Pad", "Ballast", "Balloon"]:
-        with subtests.test(module=module):
-            assert line(module).count(",") == 4  # its face, and three coordinates
 
 
 WORKSHOP = module_set("workshop")
@@ -335,15 +260,6 @@ def test_a_brace_across_a_joint_is_told_to_lock_it(subtests):
             removed = machine.act("remove_block", {"block_id": "4"})
             assert removed.text.endswith(f"Block 2 ({joint}) can move again.")
             assert "locked" not in machine.act("get_machine_summary", {}).text
-
-
-def test_a_deck_on_two_suspensions_does_not_move():
-    machine = built(
-        ("1", "A", BLOCK), ("1", "C", "Suspension"), ("2", "C", "Suspension"), catalogue=WORKSHOP
-    )
-    answer = connect(machine, "3", "E", "4", "E")
-    assert "Block 3 (Suspension) is locked by 4." in answer.text
-    assert "Block 4 (Suspension) is locked by 3." in answer.text
 
 
 def test_joints_of_a_loop_move_if_they_turn_about_one_line(subtests):

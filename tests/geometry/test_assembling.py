@@ -1,6 +1,5 @@
 """Whole machines as parts of an assembly, and going back to an earlier value of a machine."""
 
-import json
 import pickle
 from copy import deepcopy
 
@@ -10,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.machines.building import attach, connect
 
-from buildarena_geometry import Machine, RefusalClass, replay
+from buildarena_geometry import Machine, RefusalClass
 
 
 @pytest.fixture
@@ -44,15 +43,6 @@ def test_the_same_machine_can_be_added_twice_and_letters_are_never_used_again(as
     add(assembly, "tower", init_shift=[10, 0, 0])
     add(assembly, "tower", init_shift=[15, 0, 0])
     assert list(assembly.sub_structures) == ["B", "C", "D"]
-
-
-def test_a_refused_machine_uses_no_letter_up(assembly):
-    add(assembly, "tower")
-    outcome = add(assembly, "deck")
-    assert outcome.reason == RefusalClass.OVERLAP
-    assert ("B_1", "A_1") in outcome.overlaps
-    assert add(assembly, "deck", init_shift=[0, 9, 0]).ok
-    assert "B_1" in assembly.blocks
 
 
 @pytest.mark.parametrize(
@@ -108,15 +98,6 @@ def test_what_is_attached_later_moves_along_and_connectors_follow(assembly):
     assert np.allclose(link.world_from_connector.apply(link.span), link.end_point)
 
 
-def test_a_motion_into_another_sub_structure_is_rolled_back_completely(assembly):
-    add(assembly, "tower")
-    add(assembly, "deck", init_shift=[0, 4, 0])
-    before = assembly.copy()
-    outcome = assembly.act("shift_machine", {"machine_index": "B", "position": [0, -4, 0]})
-    assert outcome.reason == RefusalClass.OVERLAP
-    assert assembly == before
-
-
 def test_removing_a_sub_structure_takes_what_was_attached_to_it(assembly):
     add(assembly, "deck")
     add(assembly, "tower", init_shift=[0, 6, 0])
@@ -128,24 +109,6 @@ def test_removing_a_sub_structure_takes_what_was_attached_to_it(assembly):
     assert list(assembly.blocks) == ["B_1", "B_2"]
     assert not assembly.connectors
     assert add(assembly, "deck").ok, "its place is free again"
-
-
-def test_sub_structures_that_nothing_joins_are_reported(assembly):
-    add(assembly, "deck")
-    add(assembly, "tower", init_shift=[0, 6, 0])
-    assert assembly.detached == ("B_1", "B_2")
-    summary = assembly.act("get_machine_summary").text
-    assert "Not connected to block A_1: B_1, B_2." in summary
-
-
-@pytest.mark.parametrize("name", ["shift_machine", "rotate_machine", "remove_machine"])
-def test_an_unknown_letter_is_refused_with_the_known_ones(assembly, name):
-    add(assembly, "tower")
-    argument = {"shift_machine": "position", "rotate_machine": "rotation"}.get(name)
-    arguments = {"machine_index": "Q"} | ({argument: [0, 0, 0]} if argument else {})
-    outcome = assembly.act(name, arguments)
-    assert outcome.reason == RefusalClass.UNKNOWN_SUB_STRUCTURE
-    assert "Sub-structures: A." in outcome.text
 
 
 def test_unknown_and_empty_machines_can_not_be_added():
@@ -169,19 +132,6 @@ def test_later_changes_to_a_source_do_not_reach_the_assembly(build):
     assert list(assembly.blocks) == ["A_1"]
 
 
-def test_an_assembly_survives_its_document_and_its_log(assembly):
-    add(assembly, "deck", init_rotation=[15, 0, 0])
-    add(assembly, "tower", init_shift=[0, 6, 0])
-    attach(assembly, "B_1", "B", "Torch")
-    assembly.act("shift_machine", {"machine_index": "B", "position": [0, 1, 0]})
-    assert replay(assembly.log) == assembly
-    document = json.loads(json.dumps(assembly.to_document()))
-    restored = Machine.from_document(document)
-    assert restored == assembly
-    assert restored.available == assembly.available
-    assert replay(restored.log) == assembly
-
-
 def test_the_twenty_seventh_sub_structure_is_called_aa(build):
     assembly = Machine(available={"cube": build()})
     for index in range(28):
@@ -198,12 +148,6 @@ def test_moved_blocks_collide_where_they_are_and_not_where_they_were(assembly):
     there = add(assembly, "deck", init_shift=[0, 5, 40])
     assert there.reason == RefusalClass.OVERLAP
     assert ("D_1", "B_1") in there.overlaps
-
-
-def test_removed_blocks_leave_their_place_to_others(build):
-    machine = build(("1", "A", "Small Wooden Block"), ("2", "E", "Powered Wheel"))
-    machine.act("remove_block", {"block_id": "3"})
-    assert attach(machine, "2", "E", "Torch").ok
 
 
 MODULES = ("Small Wooden Block", "Powered Wheel", "Torch", "Ballast")

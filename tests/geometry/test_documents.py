@@ -43,10 +43,6 @@ def test_a_document_tells_version_parts_joints_sequence_and_log(machine):
     json.dumps(document, allow_nan=False)
 
 
-def test_an_empty_machine_has_a_document_too():
-    assert Machine.from_document(Machine().to_document()) == Machine()
-
-
 def test_a_machine_and_its_copy_go_their_own_ways(machine):
     twin = machine.copy()
     assert twin == machine
@@ -113,12 +109,6 @@ def test_a_spoilt_document_is_refused_with_the_place_and_what_belongs_there(
     spoil(document)
     with pytest.raises(DocumentError, match=message):
         Machine.from_document(document)
-
-
-def test_what_is_no_document_at_all_is_refused(subtests):
-    for document in [None, [], "machine", 3, {}, {"version": 1}]:
-        with subtests.test(document=document), pytest.raises(DocumentError, match="document"):
-            Machine.from_document(document)
 
 
 @pytest.mark.ci

@@ -57,26 +57,6 @@ def test_a_processor_without_the_usual_ones_has_the_first_that_it_can_run(subtes
             assert environment == {"OPENBLAS_CORETYPE": pinned}
 
 
-def test_the_widest_kernels_can_be_chosen() -> None:
-    environment = {kernels.CHOICE: "SkylakeX", "NPY_DISABLE_CPU_FEATURES": "X86_V4"}
-    assert kernels.pin(environment, tuple(kernels.LADDER)) == "SkylakeX"
-    assert environment == {kernels.CHOICE: "SkylakeX", "OPENBLAS_CORETYPE": "SkylakeX"}
-
-
-def test_chosen_kernels_take_numpys_loops_with_them(subtests) -> None:
-    for name in list(kernels.LADDER)[1:]:
-        with subtests.test(name=name):
-            environment = {kernels.CHOICE: name}
-            assert kernels.pin(environment, tuple(kernels.LADDER)) == name
-            assert environment["OPENBLAS_CORETYPE"] == name
-            disabled = environment["NPY_DISABLE_CPU_FEATURES"].split()
-            assert "X86_V4" in disabled
-            assert ("X86_V3" in disabled) == (name != "Haswell")
-            inherited = dict(environment)
-            assert kernels.pin(inherited, tuple(kernels.LADDER)) == name
-            assert inherited == environment, "child processes have the same"
-
-
 def test_kernels_that_the_processor_lacks_are_refused_with_those_it_has() -> None:
     environment = {kernels.CHOICE: "SkylakeX"}
     with pytest.warns(UserWarning, match="'SkylakeX'; this machine runs Haswell, Sandybridge"):

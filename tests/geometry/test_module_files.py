@@ -53,27 +53,6 @@ def test_the_file_is_yaml_and_json_alike_and_fits_its_schema():
     jsonschema.validate(BASIC, SCHEMA)
 
 
-def test_what_a_module_does_stands_in_its_entry():
-    basic = load_catalogue()
-    wheel, cannon, torch = (basic[name] for name in ("Powered Wheel", "Water Cannon", "Torch"))
-    assert (wheel.motor.speed_rpm, wheel.motor.lag_per_s, wheel.motor.torque) == (100, 16, 20)
-    assert wheel.motor.speed == pytest.approx(10.471975512)
-    assert (cannon.thrust.cold, cannon.thrust.heated, cannon.thrust.along) == (1.6, 13.76, 0)
-    spheres = [(ball.along, ball.radius) for ball in cannon.thrust.spheres]
-    assert spheres == [(-0.25, 0.5), (0.5, 0.5)]
-    assert [(flame.along, flame.radius) for flame in torch.flames] == [(1, 0.3)]
-    seats = {name: module.physics.joint_type for name, module in basic.items() if module.physics}
-    assert seats == {
-        "Starting Block": "attachment",
-        "Small Wooden Block": "attachment",
-        "Powered Wheel": "axle",
-        "Water Cannon": "mount",
-        "Torch": "mount",
-    }
-    assert [name for name, module in basic.items() if module.grabs] == ["Small Wooden Block"]
-    assert [name for name, module in basic.items() if module.link == "rope"] == ["Winch"]
-
-
 def test_a_file_without_them_gives_a_module_what_its_kind_does(tmp_path, subtests):
     for name in ["Small Wooden Block", "Powered Wheel", "Water Cannon", "Torch"]:
         with subtests.test(name=name):
@@ -88,14 +67,6 @@ def test_a_file_without_them_gives_a_module_what_its_kind_does(tmp_path, subtest
             assert (spare.motor, spare.thrust) == (basic.motor, basic.thrust)
             assert (spare.physics, spare.flames) == (basic.physics, basic.flames)
             assert not spare.grabs
-
-
-def test_a_connector_that_does_not_say_so_is_rigid(tmp_path):
-    strut = {**BASIC["modules"][5], "name": "Strut"}
-    del strut["link"]
-    rope = {**strut, "name": "Rope", "link": "rope"}
-    catalogue = load_catalogue(module_file(tmp_path, strut, rope))
-    assert [catalogue[name].link for name in ("Strut", "Rope")] == ["rigid", "rope"]
 
 
 def test_a_users_module_says_what_it_does_itself(tmp_path):
@@ -126,12 +97,6 @@ def test_a_block_inside_another_overlaps_it(tmp_path):
     assert assembly.act("add_machine", inside).reason == RefusalClass.OVERLAP
 
 
-def test_a_users_file_may_be_yaml(tmp_path):
-    file = tmp_path / "more.yaml"
-    file.write_text(yaml.safe_dump({"version": 1, "modules": [CRATE]}))
-    assert load_catalogue(file)["Crate"].mass == 4
-
-
 def test_a_users_file_may_use_the_old_names_of_fields(tmp_path):
     physics = {**WOOD["physics"], "seat": "hinge"}
     del physics["joint_type"]
@@ -141,10 +106,6 @@ def test_a_users_file_may_use_the_old_names_of_fields(tmp_path):
     assert module.physics.joint_type == "hinge"
     assert module.joint.drive.default_mode == "free"
     assert module.rope_mount.length == 2
-
-
-def test_a_whole_number_may_be_written_with_a_point(tmp_path):
-    assert load_catalogue(module_file(tmp_path, edit(cost=3.0)))["Crate"].cost == 3
 
 
 def edit(**fields):
@@ -244,13 +205,6 @@ def test_angles_are_degrees_in_files_and_radians_inside(tmp_path):
     assert found.point is None
 
 
-def test_a_slider_counts_in_units(tmp_path):
-    drive = {"kind": "position", "rate": 2, "force": 40, "forward": "left"}
-    found = _loaded(tmp_path, "slider", joint={"limits": [0, 1.5], "drive": drive}).joint
-    assert found.limits == (0.0, 1.5)
-    assert found.drive.rate == 2.0
-
-
 SPEED = {"kind": "speed", "rate": 600, "force": 20}
 SENSELESS_JOINTS = [
     ("attachment", {"joint": {}}, "joint: expected no joint: only one of the joint types axle"),
@@ -295,16 +249,6 @@ def test_senseless_joints_are_refused_with_what_belongs_there(tmp_path, subtests
     for seat, fields, message in SENSELESS_JOINTS:
         with subtests.test(seat=seat), pytest.raises(CatalogueError, match=message):
             _loaded(tmp_path, seat, **fields)
-
-
-def test_driven_joints_can_be_flipped_and_passive_ones_cannot(subtests):
-    for name in ["Steering Hinge", "Steering Block", "Spinning Block"]:
-        with subtests.test(name=name):
-            machine = built(("1", "A", name), ("1", "B", "Hinge"), catalogue=module_set("workshop"))
-            before = machine.blocks["2"].forward_is_clockwise
-            assert machine.act("flip_spin", {"block_id": "2"}).ok
-            assert machine.blocks["2"].forward_is_clockwise != before
-            assert not machine.act("flip_spin", {"block_id": "3"}).ok
 
 
 FURTHER = entries("extended.yaml")

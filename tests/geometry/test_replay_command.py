@@ -3,8 +3,6 @@
 import gzip
 import io
 import json
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import pytest
@@ -38,13 +36,6 @@ def test_every_step_tells_verdict_kind_and_state(tmp_path, replay):
     assert [step["kind"] for step in results["steps"]] == ["ok", "ok", "face_occupied"]
     assert [step["ok"] for step in results["steps"]] == [True, True, False]
     assert [step["state"]["n"] for step in results["steps"]] == [1, 2, 2]
-
-
-def test_compressed_files_and_many_sequences_are_read(tmp_path, replay):
-    file = tmp_path / "many.json.gz"
-    sequences = [{"seed": seed, "steps": STEPS} for seed in (1, 2)]
-    file.write_bytes(gzip.compress(json.dumps(sequences).encode()))
-    assert [results["seed"] for results in replay(file).results] == [1, 2]
 
 
 def test_standard_input_is_read_plain_and_compressed(monkeypatch, replay):
@@ -87,11 +78,3 @@ def test_input_that_is_no_sequence_is_refused_with_its_place(tmp_path, replay, c
     result = replay(file)
     assert result.code == 1
     assert message in result.error
-
-
-def test_the_module_runs_as_a_command(tmp_path):
-    file = tmp_path / "bare.json"
-    file.write_text(json.dumps(STEPS))
-    command = [sys.executable, "-m", "buildarena_geometry", "replay", str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert json.loads(done.stdout)["steps"][2]["kind"] == "face_occupied"

@@ -137,7 +137,6 @@ def angle_deg(left, right) -> float:
 
 FILE = Path(__file__).parents[1] / "data" / "geometry" / "extended.json.gz"
 TOLERANCE = 1e-6
-CATALOGUE = dialect("2.0").catalogue
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,6 @@ from support.machines.piloted import FASTER_FIRST
 from buildarena_geometry import module_set
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import GRAVITY
-from buildarena_simulation.parquet import read_trajectory, write_trajectory
 from buildarena_simulation.scenario import SpanPlacement, TerrainBox
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, WEST
 
@@ -47,13 +46,6 @@ def test_a_ball_rolls_down_a_slope(engine) -> None:
     assert gained == pytest.approx(5 / 7 * GRAVITY * math.sin(math.radians(SLOPE_DEG)), rel=0.03)
     turned = 2 * np.arccos(np.clip(np.abs(trial.cargo_quaternion[:, 0].astype(float)), 0, 1))
     assert turned[12] == pytest.approx(way[12] / 1.0, rel=0.05)
-
-
-def test_a_trajectory_knows_that_its_cargo_is_a_ball() -> None:
-    draft = KeyedDraft()
-    draft.start()
-    trial = simulate(draft.machine, on_a_slope(), "mujoco")
-    assert read_trajectory(write_trajectory(trial)).cargo_shape == "ball"
 
 
 def test_a_ball_has_one_diameter() -> None:

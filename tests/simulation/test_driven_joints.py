@@ -161,13 +161,6 @@ def test_a_cog_turns_another_the_other_way_by_the_ratio_of_their_radii(
     assert other_angle == pytest.approx(-ratio * angle, abs=0.05)
 
 
-def test_cogs_that_do_not_touch_leave_each_other_alone(engine) -> None:
-    rig, motor, cog = _pair(MEDIUM, 3)
-    driving, driven = _speeds(rig.tried(engine, 1.2), motor, cog)
-    assert driving[-1] == pytest.approx(-RPM_100, rel=0.03)
-    assert abs(driven).max() < 0.01
-
-
 @pytest.mark.parametrize(("weights", "lifted"), [(1, True), (2, False)])
 def test_a_gear_lifts_by_its_ratio_what_its_motor_alone_could_not(
     engine: str, weights: int, *, lifted: bool

@@ -21,7 +21,6 @@ from buildarena_geometry import Catalogue, Machine, load_catalogue
 from buildarena_simulation import (
     MachineNotSimulable,
     Scenario,
-    UnknownEngineError,
     read_trajectory,
     rollout,
     simulate,
@@ -53,11 +52,6 @@ def test_a_machine_of_ten_thousand_blocks_is_refused_at_once(engine, tasks) -> N
     crowd = SimpleNamespace(blocks=draft.machine.blocks, part_count=10_000)
     with pytest.raises(MachineNotSimulable, match=str(MAX_PARTS)):
         simulate(crowd, tasks["lift-1"].scenario, engine)
-
-
-def test_an_unknown_engine_is_named_with_the_known_ones(tasks) -> None:
-    with pytest.raises(UnknownEngineError, match="pybullet, mujoco"):
-        simulate(beam(3), tasks["lift-1"].scenario, "havok")
 
 
 def test_a_scenario_that_tracks_a_missing_block_says_so(tasks) -> None:
@@ -100,45 +94,6 @@ def _other(name: str, **fields: Any) -> dict[str, Any]:
 
 def _catalogue(folder: Path, module: dict[str, Any]) -> Catalogue:
     return load_catalogue(module_file(folder, module))
-
-
-def _driven_car(catalogue: Catalogue | None, wheel: str) -> Machine:
-    """A car of three blocks and four wheels that drives north from 0.2 s on."""
-    sides = tuple((base, face, wheel) for base in ("2", "3") for face in "AB")
-    machine = built(("1", "E", BLOCK), ("1", "F", BLOCK), *sides, catalogue=catalogue)
-    for block in ("4", "5", "6", "7"):
-        if "<South>" in machine.act("get_block_details", {"block_id": block}).text.split("\n")[0]:
-            assert machine.act("flip_spin", {"block_id": block}).ok
-        binding = {"block_id": block, "action": "spinning_forward", "new_key": "UpArrow"}
-        assert machine.act("change_control_key", binding).ok
-    press = {"time": 0.2, "key": "UpArrow", "hold_for": 3}
-    assert machine.act("add_control_sequence", press).ok
-    return machine
-
-
-def test_a_wheel_turns_at_its_own_speed(tmp_path, engine) -> None:
-    motor = {**BASIC["Powered Wheel"]["motor"], "speed_rpm": 50}
-    slow = _catalogue(tmp_path, _other("Powered Wheel", motor=motor))
-    scenario = Scenario(duration_s=3.0, control=Control(mode="agent"))
-    reached = [
-        np.linalg.norm(np.diff(simulate(machine, scenario, engine).positions[-25:, 0], axis=0))
-        for machine in (_driven_car(None, "Powered Wheel"), _driven_car(slow, "Other"))
-    ]
-    assert reached[1] == pytest.approx(reached[0] / 2, rel=0.05)
-
-
-def test_a_file_that_says_nothing_of_physics_is_simulated_like_its_kind(tmp_path, engine) -> None:
-    for name in ("Powered Wheel", "Water Cannon"):
-        new = ("motor", "thrust", "physics")
-        entry = {key: value for key, value in _other(name).items() if key not in new}
-        catalogue = _catalogue(tmp_path, entry)
-        scenario = Scenario(duration_s=0.4, control=Control(mode="held"))
-        pairs = (((("1", "A", part), ("1", "B", part))) for part in (name, "Other"))
-        first, second = (
-            simulate(built(*pair, catalogue=catalogue), scenario, engine) for pair in pairs
-        )
-        assert (first.positions == second.positions).all()
-        assert (first.quaternions == second.quaternions).all()
 
 
 def test_a_cannon_pushes_and_is_heated_as_its_entry_says(tmp_path) -> None:

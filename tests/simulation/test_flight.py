@@ -15,7 +15,7 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, ReleasedPlacement
 from buildarena_simulation.structure.aerodynamics import wings_of
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, UP, WEST, Direction
 
 WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")
@@ -132,57 +132,6 @@ def test_still_air_gives_what_is_fixed_no_energy() -> None:
         across = free - power[:, None] * velocity / (velocity**2).sum(axis=1)[:, None]
         assert fixed[~unchanged] == pytest.approx(across[~unchanged])
         assert unchanged.all() == (not wing.pitch_deg)
-
-
-@pytest.mark.nightly(keep=2)
-@pytest.mark.parametrize("y_axis", [NORTH, SOUTH, UP, DOWN])
-def test_a_frame_with_blades_gains_no_energy_as_it_flies(engine, y_axis) -> None:
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    spine = [start, *draft.row(start, SOUTH, 2)]
-    for base in spine:
-        for side in (EAST, WEST):
-            draft.placed(base, side, "Propeller", y_axis)
-    speed = (0.0, 15.0, 0.0)
-    trial = _released(draft.machine, engine, seconds=1.2, velocity=speed, height=30.0)
-    path = trial.positions.astype(float).mean(axis=1)
-    rate = np.diff(path, axis=0) * 25.0
-    energy = (rate**2).sum(axis=1) / 2 + GRAVITY * (path[1:, 2] + path[:-1, 2]) / 2
-    assert energy.max() <= energy[0] * 1.01
-
-
-def _lifted(engine: str, module: str, y_axis: Direction, flip: bool) -> float:
-    """By how much two blades that a wheel turns lighten what stands on the ground, mass·g."""
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    for side in (EAST, WEST, NORTH, SOUTH):
-        draft.row(start, side, 4)
-    top = draft.row(start, UP, 2)[-1]
-    wheel = draft.attach(top, UP, "Powered Wheel")
-    if flip:
-        draft.do("flip_spin", block_id=wheel)
-    hub = draft.row(wheel, UP, 1)[-1]
-    for side in (EAST, WEST):
-        draft.placed(hub, side, module, y_axis)
-    draft.bind(wheel, "spinning_forward", "UpArrow")
-    scenario = Scenario(duration_s=3.0, control=DRIVEN)
-    trajectory = simulate(draft.machine, scenario, engine, controls=HELD)
-    assert not trajectory.breaks
-    weight = structure_of(draft.machine).masses.sum()
-    return float(weight - trajectory.bearing.ground[-25:].mean())
-
-
-@pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("name", ["Propeller", "Small Propeller"])
-@pytest.mark.parametrize("y_axis", [UP, DOWN])
-def test_blades_on_a_wheel_pull_as_the_published_law_says(engine, name, y_axis) -> None:
-    module = WORKSHOP[name]
-    radius = 0.5 + structure_of(_pair(name, UP)).positions[1, 0] - 0.5
-    speed = WORKSHOP["Powered Wheel"].motor.speed * radius
-    pitch = math.radians(module.wing.pitch_deg)
-    pull = 2 * 0.015 * speed * math.sin(pitch) * min(speed**2, 900.0) / GRAVITY
-    one, other = (_lifted(engine, name, y_axis, flip) for flip in (False, True))
-    assert sorted((one, other)) == pytest.approx([-pull, pull], rel=0.03)
 
 
 @pytest.mark.parametrize("y_axis", [UP, DOWN])

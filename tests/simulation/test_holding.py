@@ -148,34 +148,6 @@ def test_a_grabber_holds_a_block_of_another_piece(engine) -> None:
     assert height[-1] == pytest.approx(0.5, abs=0.1)
 
 
-def test_an_arm_that_has_turned_takes_hold_of_a_cargo_that_has_sunk(engine) -> None:
-    """Both are held as they are by then, not as they were at the start."""
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    for way in (NORTH, SOUTH):
-        end = draft.row(start, way, 4)[-1]
-        for side in (EAST, WEST):
-            draft.row(end, side, 3)
-    shoulder = draft.attach(draft.row(start, UP, 3)[-1], UP, "Steering Block")
-    draft.bind(shoulder, "turn_left", "LeftArrow")
-    hand = draft.row(shoulder, NORTH, 3)[-1]
-    grabber = draft.attach(draft.row(hand, DOWN, 1)[-1], DOWN, "Grabber")
-    draft.bind(grabber, "release", "DownArrow")
-    draft.bind(grabber, "grab", "UpArrow")
-    # It falls on the ground before the arm is there, and then its top is 0.15 below the gripper.
-    cargo = Cargo(
-        size=(1.2, 1.2, 1.85), initial_mass=4.0, final_mass=4.0, ramp_s=1.0, at=(-3.0, 0.0, 0.1)
-    )
-    keys = [press("LeftArrow", 0.5, 2.0), press("DownArrow", 0.0, 2.9), press("UpArrow", 3.0, 0.2)]
-    trajectory = _tried(draft.machine, engine, cargo, *keys, seconds=5.0)
-    assert _told(trajectory) == [("grabbed", "cargo")]
-    assert trajectory.breaks == ()
-    since = round(trajectory.events[0].time_s * 25)
-    moved = np.linalg.norm(np.diff(trajectory.cargo_position[since:], axis=0), axis=1)
-    assert moved.max() < 0.05
-    assert np.ptp(trajectory.positions[since:, 0], axis=0).max() < 0.1
-
-
 IMPULSE = WORKSHOP["Decoupler"].decouple.impulse
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from support.machines.building import built
 from support.machines.drafts import KeyedDraft
 from support.marks import nightly
 
@@ -11,10 +10,9 @@ from buildarena_geometry import KeyPress
 from buildarena_simulation import MachineNotSimulable, Scenario, simulate
 from buildarena_simulation.control import ended_presses
 from buildarena_simulation.engines.base import CargoBox, rotation_of
-from buildarena_simulation.machine import structure_of
-from buildarena_simulation.placement import Start, start_of
+from buildarena_simulation.placement import Start
 from buildarena_simulation.scenario import Cargo, Control
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, UP
+from buildarena_worker.builtin.designs.drafting import NORTH, UP
 
 BOX = {"size": [1, 1, 1], "initial_mass": 2, "final_mass": 2, "ramp_s": 1}
 
@@ -59,17 +57,6 @@ def test_a_place_that_is_taken_is_refused_and_one_that_is_only_near_is_not(beam)
         simulate(beam, scenario(clear_start=True, **given))
 
 
-def test_a_wheel_is_round_to_a_ridge() -> None:
-    machine = built(("1", "A", "Powered Wheel"))
-    # A ridge half a unit high: its box's corner lies inside the square around the wheel only.
-    ridge = {"size": [9, 0.8, 0.8], "slope_deg": 45}
-    peak = 0.5 - 0.4 * np.sqrt(2)
-    near = scenario(clear_start=True, terrain=[ridge | {"center": [0, 1.1, peak]}])
-    simulate(machine, near)
-    with pytest.raises(MachineNotSimulable, match="Powered Wheel"):
-        simulate(machine, scenario(clear_start=True, terrain=[ridge | {"center": [0, 0.8, peak]}]))
-
-
 def test_keys_end_when_the_control_says_so() -> None:
     times = ((1.0, 2.0), (4.0, 9.0), (5.5, 1.0), (5.0, 0.0))
     presses = [KeyPress(time_s=begin, key="UpArrow", hold_for_s=hold) for begin, hold in times]
@@ -95,17 +82,6 @@ SHORT = Scenario(duration_s=0.4)
 
 
 LOADED = Scenario(duration_s=0.4, cargo=Cargo(size=(1, 1, 1), final_mass=6, ramp_s=1))
-
-
-def test_the_scenarios_own_place_given_as_a_start_changes_nothing(beam, engine) -> None:
-    there = start_of(structure_of(beam), LOADED)
-    given = simulate(beam, LOADED, engine, start=there)
-    usual = simulate(beam, LOADED, engine)
-    assert np.array_equal(given.positions, usual.positions)
-    assert np.array_equal(given.quaternions, usual.quaternions)
-    assert given.cargo_position is not None
-    assert usual.cargo_position is not None
-    assert np.array_equal(given.cargo_position, usual.cargo_position)
 
 
 def test_a_start_that_contradicts_the_rest_is_refused(beam) -> None:
@@ -150,25 +126,6 @@ def test_a_machine_starts_tilted_and_touches_the_ground(engine, tilt_deg) -> Non
     rise = 0.5 * (np.cos(angle) + np.sin(abs(angle)))
     assert first[0, 2] == pytest.approx(rise, abs=0.01)
     assert trial.positions[-1, -1, 2] < 4.6
-
-
-def test_a_cargo_is_above_the_highest_point_of_what_is_tilted() -> None:
-    cargo = {"size": [1, 1, 1], "final_mass": 6, "ramp_s": 1, "drop_height": 2}
-    draft = mast()
-    draft.row("1", NORTH, 6)
-    draft.row("1", EAST, 2)
-    structure = structure_of(draft.machine)
-    start = start_of(
-        structure, scenario(placement={"kind": "ground", "tilt_deg": -60}, cargo=cargo)
-    )
-    assert start.cargo is not None
-    top = max(
-        (start.position + start.rotation @ shape.center)[2]
-        + shape.turned(start.rotation).reach()[2]
-        for part in structure.parts
-        for shape in part.shapes
-    )
-    assert start.cargo.position[2] - 2.5 == pytest.approx(top)
 
 
 def test_a_machine_starts_turned_about_the_vertical(engine) -> None:

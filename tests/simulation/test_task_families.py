@@ -193,11 +193,6 @@ def test_a_lever_that_turns_over_on_the_ground_does_not_count(engine, length) ->
         assert result.metrics["top_s"] > 0.5
 
 
-def test_who_stays_on_the_ground_has_nothing(engine) -> None:
-    result, _ = trial(with_rise(60), flyer(0.3, arms=2), engine)
-    assert (result.success, result.indicator) == (False, 0.0)
-
-
 def test_files_that_nobody_could_play_are_refused() -> None:
     folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
     text = (folder / "identify-1.yaml").read_text()

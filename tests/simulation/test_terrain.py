@@ -196,25 +196,6 @@ def told(line: Line, *, north: float = 0.0, delay_ticks: int = 0) -> dict[str, l
     return {name: piloting.senses[:, k].tolist() for k, name in enumerate(piloting.sense_names)}
 
 
-def test_a_line_begins_at_the_origin_towards_the_north() -> None:
-    points = BENT.points(1000)
-    assert points[0] == pytest.approx([0, 0])
-    assert points[1][1] > 0
-    assert abs(points[1][0]) < 0.01 * points[1][1]
-    assert points[500][0] < -15
-    mirrored = BENT.model_copy(update={"side": -1.0})
-    assert mirrored.points(1000) == pytest.approx(points * [-1, 1])
-
-
-def test_curvature_is_what_three_points_of_it_show() -> None:
-    points = BENT.points(400)
-    before, after = np.roll(points, 1, axis=0) - points, np.roll(points, -1, axis=0) - points
-    lengths = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    shown = 2 * np.abs(cross) / (lengths[0] * lengths[1] * np.linalg.norm(before - after, axis=1))
-    assert shown.max() == pytest.approx(BENT.greatest_curvature, rel=0.02)
-
-
 def test_the_nearest_point_of_a_place_is_found() -> None:
     points = BENT.points(360)
     ahead = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)

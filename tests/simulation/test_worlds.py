@@ -236,13 +236,3 @@ def test_a_scenario_that_uses_none_of_it_reads_and_hashes_as_before() -> None:
     assert Scenario(duration_s=1).model_dump(mode="json") == plain
     usual = Scenario(duration_s=1, gravity=GRAVITY, drive_strength=1, senses=Senses())
     assert usual.model_dump(mode="json").keys() - plain.keys() == {"senses"}
-
-
-def test_pushes_and_wind_add_up(engine) -> None:
-    gusts = {"strength": 4}
-    trials = [
-        simulate(beam_of(3), falling(**fields), engine).positions[-1].astype(float)
-        for fields in ({}, {"gusts": gusts}, {"pushes": PUSHES}, {"gusts": gusts, "pushes": PUSHES})
-    ]
-    calm, blown, pushed, both = trials
-    assert both - calm == pytest.approx((blown - calm) + (pushed - calm), abs=0.05)

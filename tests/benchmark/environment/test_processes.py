@@ -9,7 +9,6 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
-from multiprocessing.context import SpawnProcess
 
 import psutil
 import pytest
@@ -76,36 +75,6 @@ def test_work_that_is_given_up_is_broken_off(process) -> None:
     assert time.monotonic() - started < 5
     assert not psutil.pid_exists(pid)
     assert process.ask(["hello"]) == "hello"
-
-
-def test_one_that_is_just_being_started_is_ended_too(process, monkeypatch) -> None:
-    starts, closes = threading.Event(), threading.Event()
-    start_process = SpawnProcess.start
-
-    def start_slowly(self: SpawnProcess) -> None:
-        starts.set()
-        closes.wait(10)
-        time.sleep(0.2)  # time for the other thread to get as far as it can
-        start_process(self)
-
-    monkeypatch.setattr(SpawnProcess, "start", start_slowly)
-    answers: list[object] = []
-
-    def ask() -> None:
-        try:
-            answers.append(process.ask(["sleep", 60]))
-        except ProcessEndedError as ended:
-            answers.append(ended)
-
-    asker = threading.Thread(target=ask)
-    asker.start()
-    assert starts.wait(10)
-    closes.set()
-    process.close()
-    asker.join(10)
-    assert not asker.is_alive()
-    assert isinstance(answers[0], ProcessEndedError)
-    assert process.pid is None
 
 
 PARENT = """

@@ -70,10 +70,3 @@ def test_a_program_that_failed_in_the_game_is_believed_by_its_log(logs) -> None:
 def test_a_failure_that_the_log_does_not_tell_is_not_believed(logs, text, log, more, words) -> None:
     with pytest.raises(OutcomeRefusedError, match=words):
         refusable(text, logs.get(log), **{"refused": FAILED, **more})
-
-
-@pytest.mark.parametrize("kind", ["p", "f", "e", "b"])
-def test_a_log_that_lacks_what_shows_the_failure_is_not_believed(logs, kind) -> None:
-    lines = [line for line in logs[FAILS].decode().splitlines() if f",{kind}," not in line]
-    with pytest.raises(OutcomeRefusedError):
-        refusable(FAILS, "\n".join(lines).encode(), refused=FAILED)

@@ -6,7 +6,6 @@ from typer.testing import CliRunner
 
 from buildarena_cli.main import app
 
-TRACK = "five-role/besiege-1.75-1.4/default-0-2"
 RUNNER = ["-m", "buildarena_simworker.besiege"]
 
 

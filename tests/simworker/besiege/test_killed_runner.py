@@ -54,16 +54,3 @@ def test_the_next_runner_cleans_up_and_plays_the_run_again(clean, screen) -> Non
     report = clean.report()
     assert (report["phase"], report["machine"]) == ("build", None)
     assert report["modifiers"] == []
-
-
-@pytest.mark.nightly
-def test_a_log_in_a_file_takes_the_place_of_the_log_window(clean, screen) -> None:
-    task, machine = short_trial("transport-1")
-    right = our_score(task, machine)
-    log = clean.folder / "mod.log"
-    command = clean.environment()["BUILDARENA_BESIEGE_COMMAND"] + f" --log-file {log}"
-    given = {"BUILDARENA_BESIEGE_COMMAND": command, "BUILDARENA_BESIEGE_LOG_FILE": str(log)}
-    with runner(clean, {**screen, **given}) as playing:
-        told, _ = playing.communicate(timeout=120)
-    assert json.loads(told)[1] == pytest.approx(right.indicator, rel=0.01)
-    assert clean.report()["counts"]["copies"] == 1, "only the name was copied back"

@@ -15,7 +15,6 @@ from buildarena_backend.trials.simulator import SimulatorFaultError
 from buildarena_simworker.besiege import doctor
 from buildarena_simworker.besiege.commands import command_words
 from buildarena_simworker.besiege.errors import (
-    DesktopError,
     GameChangedError,
     NeedsPersonError,
     NotSetUpError,
@@ -23,10 +22,8 @@ from buildarena_simworker.besiege.errors import (
 )
 from buildarena_simworker.besiege.game_lock import GameLock
 from buildarena_simworker.besiege.installed import installed
-from buildarena_simworker.besiege.process import executable_stem
 from buildarena_simworker.besiege.screen import clipboard
 from buildarena_simworker.besiege.screen.calibration import Calibration, PathClick, load_calibration
-from buildarena_simworker.besiege.screen.input import ScreenInput
 from buildarena_simworker.besiege.screen.machine_list import shown_text
 from buildarena_simworker.besiege.screen.window_types import Area, Wanted
 from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
@@ -45,12 +42,6 @@ def test_a_mod_of_its_own_folder_is_found_one_level_down(tmp_path) -> None:
     mods.mkdir(parents=True)
     (mods / "mod.xml").write_text(MOD_XML.format(name="Lua Scripting Mod", version="1.1.9", id="x"))
     assert installed(tmp_path).mod == "1.1.9"
-
-
-def test_without_files_nothing_is_said(tmp_path) -> None:
-    (tmp_path / "Mods" / "a" / "Mod.xml").mkdir(parents=True)
-    for folder in (None, tmp_path, tmp_path / "missing"):
-        assert installed(folder).as_facts() == {}
 
 
 def test_another_build_or_mod_than_the_calibrated_one_is_not_played(tmp_path, subtests) -> None:
@@ -81,7 +72,6 @@ def test_commands_are_split_as_windows_does(subtests) -> None:
             r'"C:\Program Files (x86)\Steam\steam.exe" -applaunch 346010',
             [r"C:\Program Files (x86)\Steam\steam.exe", "-applaunch", "346010"],
         ),
-        (r"C:\Besiege\Besiege.exe", [r"C:\Besiege\Besiege.exe"]),
         (r'D:\a\b.exe --level="{level}"', [r"D:\a\b.exe", "--level={level}"]),
         (r'"\\server\a b\\" x', ["\\\\server\\a b\\", "x"]),
         (r'a "b\"c" ""', ["a", 'b"c', ""]),
@@ -97,12 +87,6 @@ def test_commands_are_split_as_a_shell_does_elsewhere() -> None:
     for windows in (True, False):
         with pytest.raises(ValueError, match="quotation"):
             command_words('"a b', windows=windows)
-
-
-def test_a_program_is_known_by_its_name_without_the_systems_ending(subtests) -> None:
-    for name in ["Besiege.exe", "besiege", "Besiege.x86_64", " BESIEGE.EXE "]:
-        with subtests.test(name=name):
-            assert executable_stem(name) == "besiege"
 
 
 def test_a_name_is_compared_without_what_nobody_sees(subtests) -> None:
@@ -237,45 +221,6 @@ def test_a_clipboard_that_another_program_keeps_is_waited_for_and_then_a_fault(
             for use in (reached.get, lambda: reached.put("x")):
                 with pytest.raises(ScreenError, match="another program keeps it"):
                     use()
-
-
-class CornerError(Exception):
-    """As PyAutoGUI raises it."""
-
-
-class Gui:
-    """PyAutoGUI on a screen that takes nothing."""
-
-    FailSafeException = CornerError
-
-    def __init__(self, error: Exception) -> None:
-        self.error = error
-
-    def __getattr__(self, _):
-        def refuse(*_words):
-            raise self.error
-
-        return refuse
-
-
-def test_a_screen_that_takes_nothing_is_a_fault(subtests) -> None:
-    for error, says in [
-        (OSError(5, "Access is denied"), "mouse and keyboard cannot be used: .*Access is denied"),
-        (RuntimeError(), "mouse and keyboard cannot be used: RuntimeError|cannot be used"),
-        (CornerError(), "moved the mouse into the screen's corner"),
-    ]:
-        with subtests.test(error=error):
-            screen = ScreenInput.__new__(ScreenInput)
-            screen._gui, screen._pace = Gui(error), 20.0
-            for act in (
-                lambda: screen.click(1, 1),
-                lambda: screen.press("a"),
-                lambda: screen.write("a"),
-            ):
-                with pytest.raises(DesktopError, match=says):
-                    act()
-            with pytest.raises(DesktopError, match=says):
-                screen.hotkey("ctrl", "l")
 
 
 def test_a_lock_is_of_one_game_and_ends() -> None:

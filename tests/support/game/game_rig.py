@@ -112,12 +112,10 @@ class Rig:
         made.save(self.folder / "state" / "calibration.json")
 
 
-def tried_machine(level: str = "") -> tuple[Machine, Scenario]:
-    """What `calibrate` plays to see whether the positions are right, in a task's level."""
-    machine = built(("1", "A", BLOCK))
+def tried_machine() -> tuple[Machine, Scenario]:
+    """What `calibrate` plays to see whether the positions are right."""
     scenario = Scenario.model_validate({"duration_s": TRIAL_S, "control": {"mode": "agent"}})
-    terrain = builtin_tasks()[level].scenario.terrain if level else ()
-    return machine, scenario.model_copy(update={"terrain": terrain})
+    return built(("1", "A", BLOCK)), scenario
 
 
 def short_trial(name: str) -> tuple[Task, Machine]:

@@ -179,8 +179,7 @@ def played_runs() -> dict[str, tuple[Machine, Scenario]]:
     for name in PROGRAMS:
         task, machine = piloted_trial(name)
         runs[f"program-{name}"] = (machine, task.scenario)
-    bridge = tried_machine("support-1")
-    return {**runs, "calibration": tried_machine(), "calibration-support-1": bridge}
+    return {**runs, "calibration": tried_machine()}
 
 
 def main() -> None:

@@ -5,10 +5,9 @@ import ctypes
 import sys
 from pathlib import Path
 
-from support.game.stand_in_game.faults import Faults, read_faults
-from support.game.stand_in_game.game import Game, Settings
-from support.game.stand_in_game.report import Report
-from support.game.stand_in_game.window import Window
+from support.game.stand_in_game.faults import Faults
+from support.game.stand_in_game.game import Game
+from support.game.stand_in_game.window import Report, Window
 
 _PR_SET_NAME = 15
 
@@ -16,25 +15,14 @@ _PR_SET_NAME = 15
 def main() -> int:
     """Starts the game with the options of the command line."""
     options = _parser().parse_args()
-    faults = []
-    if options.faults_once is not None and options.faults_once.exists():
-        faults = read_faults(options.faults_once)
-        options.faults_once.unlink()
-    settings = Settings(
-        games=options.games,
-        speed=options.speed,
-        log_file=options.log_file,
-        level=options.level or None,
-    )
-    game, report = Game(settings, Faults(faults)), Report(options.report)
-    _take_name()
-    Window(game, options.machines, report, title=options.title_screen).run()
-    return 0
-
-
-def _take_name() -> None:
-    """The process is called as the game's, by which the runner knows it."""
+    faults = Faults(options.faults_once)
+    if options.faults_once is not None:
+        options.faults_once.unlink(missing_ok=True)
+    game = Game(options.games, faults, options.speed, options.level)
+    # The process is called as the game's, by which the runner knows it.
     ctypes.CDLL(None).prctl(_PR_SET_NAME, b"Besiege", 0, 0, 0)
+    Window(game, options.machines, Report(options.report), title=options.title_screen).run()
+    return 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -47,7 +35,6 @@ def _parser() -> argparse.ArgumentParser:
     add("--speed", type=float, default=1.0, help="game time over the wall clock")
     add("--faults-once", type=Path, metavar="FILE", help="faults of this start; then deleted")
     add("--report", type=Path, metavar="FILE", help="kept up to date with what the game does")
-    add("--log-file", type=Path, metavar="FILE", help="write the log there as well")
     return parser
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 from support.game.stand_in_game.faults import Fault
-from support.game.stand_in_game.game import Game
+from support.game.stand_in_game.game import LOAD_S, Game
 from support.game.stand_in_game.layout import (
     CONFIRM_ITEMS,
     CONFIRM_PANEL,
@@ -14,12 +14,12 @@ from support.game.stand_in_game.layout import (
     LEVELS_ITEMS,
     LOAD_ITEMS,
     LOAD_PANEL,
+    LOG_PANEL,
+    LUA_PANEL,
     TITLE_ITEMS,
     TOOLBAR,
     Box,
-    log_panel,
     log_text,
-    lua_panel,
 )
 
 Focus = Literal["name", "log"] | None
@@ -79,7 +79,6 @@ class Interface:
     log_selected: int = 0
     """How many characters of the log, from its newest on."""
     scene: Scene = "level"
-    size: tuple[int, int] = (1280, 800)
     name_box: NameBox = field(default_factory=NameBox)
 
     @property
@@ -107,9 +106,9 @@ class Interface:
         if not self.lua_panel:
             return ""
         lines = self.game.log.count
-        if lines and log_panel(self.size).holds(x, y):
-            return "log_window" if log_text(self.size, lines).holds(x, y) else "panel"
-        return "panel" if lua_panel(self.size).holds(x, y) else ""
+        if lines and LOG_PANEL.holds(x, y):
+            return "log_window" if log_text(lines).holds(x, y) else "panel"
+        return "panel" if LUA_PANEL.holds(x, y) else ""
 
     def _games_item(self, x: float, y: float) -> str:
         if self.confirm:
@@ -175,15 +174,12 @@ class Interface:
     def _open_machine(self) -> None:
         if self.loading:
             return
-        seconds = self.game.settings.load_s / self.game.settings.speed
-        for fault in self._strike("open_machine"):
-            if fault.kind == "slow_load":
-                seconds += fault.number("seconds", 5.0)
+        self._strike("open_machine")
         if self.dialog:
             return
         self.loading = True
         name = self.name_box.text
-        self.screen.later(seconds, lambda: self._loaded(name))
+        self.screen.later(LOAD_S / self.game.speed, lambda: self._loaded(name))
 
     def _loaded(self, name: str) -> None:
         self.loading = False
@@ -258,27 +254,24 @@ class Interface:
             self.name_box.type("".join(filter(str.isprintable, self.screen.paste())))
 
     def _copy_log(self) -> None:
-        struck = self._strike("copy")
-        below = sum(int(f.number("lines", 50)) for f in struck if f.kind == "log_scrolled")
+        self._strike("copy")
         if not self.dialog:
             # What was printed since it was selected pushes the oldest lines out of the selection.
-            self._copy(self.game.log.text(below=below)[: self.log_selected])
+            self._copy(self.game.log.text()[: self.log_selected])
 
     def _copy(self, text: str) -> None:
         self.game.counts["copies"] += 1
         self.screen.copy(text)
 
-    def _strike(self, point: str) -> list[Fault]:
-        """The faults at a point; those of the window happen at once."""
-        due = self.game.faults.at(point)
-        for fault in due:
+    def _strike(self, point: str) -> None:
+        """The faults at a point happen at once."""
+        for fault in self.game.faults.at(point):
             self.carry_out(fault)
-        return due
 
     def carry_out(self, fault: Fault) -> None:
         """Does what a fault does to the window."""
         if fault.kind == "dialog":
-            self.dialog = fault.text("A new version of the game is available.")
+            self.dialog = "A new version of the game is available."
         else:
             self.screen.strike(fault)
 

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Final
 
+from support.game.stand_in_game.game import SIZE
+
 
 @dataclass(frozen=True, slots=True)
 class Box:
@@ -50,21 +52,16 @@ LINE_HEIGHT: Final = 18
 """Of a line in the log, pixels."""
 
 
-def lua_panel(size: tuple[int, int]) -> Box:
-    """The mod's panel, which Ctrl+L shows and hides: pixels, whatever the window's size."""
-    return _pixels((6, 70, 206, 324), size)
+def _pixels(left: float, top: float, right: float, bottom: float) -> Box:
+    return Box(left / SIZE[0], top / SIZE[1], right / SIZE[0], bottom / SIZE[1])
 
 
-def log_panel(size: tuple[int, int]) -> Box:
-    """The mod's log, drawn beside the panel once something was printed."""
-    return _pixels((274, 70, 774, 670), size)
+LUA_PANEL: Final = _pixels(6, 70, 206, 324)
+"""The mod's panel, which Ctrl+L shows and hides."""
+LOG_PANEL: Final = _pixels(274, 70, 774, 670)
+"""The mod's log, drawn beside the panel once something was printed."""
 
 
-def log_text(size: tuple[int, int], lines: int) -> Box:
+def log_text(lines: int) -> Box:
     """The text in the log: as high as its lines, as far as they are seen."""
-    return _pixels((284, 124, 764, 124 + min(lines * LINE_HEIGHT, 536)), size)
-
-
-def _pixels(corners: tuple[int, int, int, int], size: tuple[int, int]) -> Box:
-    left, top, right, bottom = corners
-    return Box(left / size[0], top / size[1], right / size[0], bottom / size[1])
+    return _pixels(284, 124, 764, 124 + min(lines * LINE_HEIGHT, 536))

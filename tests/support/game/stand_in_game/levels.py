@@ -39,7 +39,7 @@ class Box:
 class Level:
     """What is open: the flat sandbox, or a level file's boxes on its ground."""
 
-    def __init__(self, file: str | None = None) -> None:
+    def __init__(self, file: str | None) -> None:
         objects = ET.fromstring(Path(file).read_bytes()).iter("Object") if file else ()
         self.boxes = [_box(entry) for entry in objects if entry.get("Prefab") == "7000"]
 

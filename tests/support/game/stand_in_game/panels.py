@@ -5,6 +5,7 @@ from __future__ import annotations
 import tkinter as tk
 from typing import Final
 
+from support.game.stand_in_game.game import SIZE
 from support.game.stand_in_game.interface import Interface
 from support.game.stand_in_game.layout import (
     CONFIRM_ITEMS,
@@ -14,12 +15,12 @@ from support.game.stand_in_game.layout import (
     LEVELS_ITEMS,
     LOAD_ITEMS,
     LOAD_PANEL,
+    LOG_PANEL,
+    LUA_PANEL,
     TITLE_ITEMS,
     TOOLBAR,
     Box,
-    log_panel,
     log_text,
-    lua_panel,
 )
 
 MACHINE: Final = Box(0.400, 0.450, 0.700, 0.700)
@@ -47,11 +48,11 @@ def shapes(shown: Interface) -> list[Shape]:
         seen += [(LOAD_PANEL, "beige", game.message), *_buttons(LOAD_ITEMS)]
         seen.append((LOAD_ITEMS["name_box"], "skyblue" if name.selected else "white", said))
     if shown.lua_panel:
-        seen.append((lua_panel(shown.size), "gray", "Lua Scripting"))
+        seen.append((LUA_PANEL, "gray", "Lua Scripting"))
         if game.log.count:
             marked = shown.log_selected and shown.focus == "log"
-            text = log_text(shown.size, game.log.count)
-            seen.append((log_panel(shown.size), "gray", "Log"))
+            text = log_text(game.log.count)
+            seen.append((LOG_PANEL, "gray", "Log"))
             seen.append((text, "skyblue" if marked else "white", game.log.text()[:2000]))
     if shown.confirm:
         seen += [(CONFIRM_PANEL, "beige", "Remove the machine?"), *_buttons(CONFIRM_ITEMS)]
@@ -64,10 +65,10 @@ def _buttons(items: dict[str, Box]) -> list[Shape]:
     return [(box, "khaki", name) for name, box in items.items()]
 
 
-def draw(canvas: tk.Canvas, size: tuple[int, int], seen: list[Shape]) -> None:
+def draw(canvas: tk.Canvas, seen: list[Shape]) -> None:
     """Draws everything anew."""
     canvas.delete("all")
-    (width, height) = size
+    width, height = SIZE
     for box, fill, words in seen:
         left, top = box.left * width, box.top * height
         canvas.create_rectangle(left, top, box.right * width, box.bottom * height, fill=fill)

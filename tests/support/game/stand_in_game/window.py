@@ -3,34 +3,52 @@
 from __future__ import annotations
 
 import contextlib
+import json
+import os
+import shutil
+import subprocess
 import time
 import tkinter as tk
 from collections.abc import Callable
 from pathlib import Path
 from typing import Final
 
-from support.game.stand_in_game.breakage import Breakage
 from support.game.stand_in_game.faults import Fault
-from support.game.stand_in_game.game import Game
+from support.game.stand_in_game.game import SIZE, Game
 from support.game.stand_in_game.interface import Interface
 from support.game.stand_in_game.ownership import sign
 from support.game.stand_in_game.panels import Shape, draw, shapes
-from support.game.stand_in_game.report import Report
 
 TITLE: Final = "Besiege"
-SIZE: Final = (1280, 800)
-"""Width and height, pixels."""
 FRAMES_PER_S: Final = 30.0
 _CONTROL: Final = 0x4
-_LOCK: Final = 0x2
+_CRASHED: Final = 139
+"""The exit status a shell shows for a segmentation fault."""
 _MODIFIERS: Final = ("Control", "Shift", "Alt", "Super", "Meta")
+
+
+class Report:
+    """Rewritten as a whole whenever it changes, so that a reader never sees half of it."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path, self._written = path, ""
+
+    def write(self, state: dict[str, object]) -> None:
+        """Writes a state, unless it is the one written last."""
+        text = json.dumps({**state, "pid": os.getpid()}, indent=1)
+        if self._path is None or text == self._written:
+            return
+        self._written = text
+        fresh = self._path.with_name(f".{self._path.name}.{os.getpid()}")
+        fresh.write_text(text)
+        fresh.replace(self._path)
 
 
 class Window:
     """The window with everything in it."""
 
     def __init__(self, game: Game, machines: Path, report: Report, *, title: bool = False) -> None:
-        self._game, self._report, self._size = game, report, SIZE
+        self._game, self._report = game, report
         self._root = tk.Tk(className="Besiege")
         self._root.title(TITLE)
         width, height = SIZE
@@ -38,11 +56,10 @@ class Window:
         self._root.resizable(width=False, height=False)
         self._canvas = tk.Canvas(self._root, width=width, height=height, highlightthickness=0)
         self._canvas.pack()
-        self._breakage = Breakage(self._root)
+        self._thieves: list[subprocess.Popen[bytes]] = []
         self._shown = Interface(game, machines, self, scene="title" if title else "level")
         self._drawn: list[Shape] = []
         self._modifiers: set[str] = set()
-        self._caps_lock = False
         self._pressed_on = ""
         self._last_s = time.monotonic()
         self._bind()
@@ -56,7 +73,9 @@ class Window:
         try:
             self._root.mainloop()
         finally:
-            self._breakage.close()
+            for thief in self._thieves:
+                thief.kill()
+                thief.wait()
 
     def later(self, seconds: float, work: Callable[[], None]) -> None:
         """Does something after some time of the wall clock."""
@@ -75,19 +94,24 @@ class Window:
 
     def strike(self, fault: Fault) -> None:
         """Carries out a fault that is the window's business."""
-        if fault.kind in ("freeze", "crash"):
-            # Whoever watches learns of it now or never.
-            self._report.write(self._state())
-        if fault.kind == "resize":
-            self._resize((round(fault.number("width", 1100)), round(fault.number("height", 700))))
-        self._breakage.strike(fault)
+        # Whoever watches learns of it now or never.
+        self._report.write(self._state())
+        if fault.kind == "crash":
+            os._exit(_CRASHED)
+        elif fault.kind == "freeze":
+            time.sleep(10_000 if fault.seconds is None else fault.seconds)
+        elif fault.kind == "clipboard_stolen":
+            # Right after the copy, before anybody reads it.
+            self._root.after(30, self._steal)
 
-    def _resize(self, size: tuple[int, int]) -> None:
-        """The window as somebody dragged it; what lies in it moves along, all but the mod's."""
-        width, height = self._size = self._shown.size = self._game.screen = size
-        self._root.geometry(f"{width}x{height}+0+0")
-        self._canvas.config(width=width, height=height)
-        self._drawn = []
+    def _steal(self) -> None:
+        command = [shutil.which("xclip") or "xclip", "-quiet", "-selection", "clipboard", "-i"]
+        quiet = subprocess.DEVNULL
+        thief = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=quiet, stderr=quiet)
+        assert thief.stdin is not None
+        thief.stdin.write(b"a text that somebody else has copied")
+        thief.stdin.close()
+        self._thieves.append(thief)
 
     def _bind(self) -> None:
         self._canvas.bind("<ButtonPress-1>", self._mouse_down)
@@ -100,7 +124,7 @@ class Window:
         self._root.protocol("WM_DELETE_WINDOW", self._root.destroy)
 
     def _fractions(self, event: tk.Event[tk.Misc]) -> tuple[float, float]:
-        width, height = self._size
+        width, height = SIZE
         return event.x / width, event.y / height
 
     def _mouse_down(self, event: tk.Event[tk.Misc]) -> None:
@@ -115,12 +139,9 @@ class Window:
 
     def _key_down(self, event: tk.Event[tk.Misc]) -> None:
         state = event.state if isinstance(event.state, int) else 0
-        self._caps_lock = bool(state & _LOCK)
         name = event.keysym.removesuffix("_L").removesuffix("_R")
         if name in _MODIFIERS:
             self._modifiers.add(name)
-        elif name == "Caps_Lock":
-            self._caps_lock = not self._caps_lock
         else:
             self._shown.key(event.keysym, event.char, control=bool(state & _CONTROL))
 
@@ -132,11 +153,11 @@ class Window:
         passed, self._last_s = now - self._last_s, now
         self._game.frame(passed)
         if self._game.simulating:
-            for fault in self._game.faults.at("simulating", self._game.time_s):
+            for fault in self._game.faults.at("simulating") if self._game.time_s > 1 else ():
                 self._shown.carry_out(fault)
         seen = shapes(self._shown)
         if seen != self._drawn:
-            draw(self._canvas, self._size, seen)
+            draw(self._canvas, seen)
             self._drawn = seen
         self._report.write(self._state())
         spent = time.monotonic() - now
@@ -149,7 +170,6 @@ class Window:
             "machine": game.machine_name,
             "message": game.message,
             "modifiers": sorted(self._modifiers),
-            "caps_lock": self._caps_lock,
             "counts": dict(game.counts),
             "faults": list(game.faults.struck),
         }
