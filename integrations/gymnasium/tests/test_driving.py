@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AsyncVectorEnv
 
 import buildarena_gymnasium
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_benchmark.environment import UnknownChoiceError
 from buildarena_gymnasium import DriveEnv
 from buildarena_gymnasium.machines import fixed_machine, fixed_machines
-from buildarena_simulation import Drive, SimulationError, simulate, write_trajectory
+from buildarena_simulation import SimulationError, simulate, write_trajectory
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.trial import Trial
 
@@ -152,21 +151,6 @@ def test_worlds_are_the_exact_one_or_of_a_seed_or_drawn() -> None:
     assert [varied.reset(seed=9)[1], varied.reset()[1], varied.reset()[1]] == drawn
 
 
-def test_numbers_of_other_kinds_count_and_what_is_beyond_is_the_bound() -> None:
-    def after(action) -> bytes:
-        environment = short()
-        environment.reset()
-        for _ in range(20):
-            seen, *_ = environment.step(action)
-        return seen.tobytes()
-
-    full = after(np.ones(4))
-    for same in (np.ones(4, np.float32), [1, 1, 1, 1], np.ones(4, bool), np.full(4, np.inf)):
-        assert after(same) == full
-    # A fan has no way back: below 0 is nothing.
-    assert after(np.full(4, -np.inf)) == after(np.zeros(4)) != full
-
-
 def test_a_machine_that_blows_up_truncates_the_episode(monkeypatch) -> None:
     environment = short()
     environment.reset()
@@ -186,32 +170,6 @@ def test_a_machine_that_blows_up_truncates_the_episode(monkeypatch) -> None:
     assert not info["score"]["success"]
 
 
-def test_each_environment_of_a_vector_drives_by_itself() -> None:
-    alone = []
-    for seed in (4, 5):
-        environment = short()
-        environment.reset(seed=seed)
-        alone.append(to_the_end(environment))
-    vector = AsyncVectorEnv([short, short])
-    try:
-        vector.reset(seed=4)
-        for tick in range(TICKS):
-            seen, rewards, terminated, truncated, info = vector.step(np.full((2, 4), 0.37))
-            for index in range(2):
-                assert np.array_equal(seen[index], alone[index][tick][0])
-        assert terminated.all()
-        assert not truncated.any()
-        assert rewards.tolist() == [steps[-1][1] for steps in alone]
-        assert info["score"]["indicator"].tolist() == [
-            steps[-1][4]["score"]["indicator"] for steps in alone
-        ]
-        _, _, terminated, _, info = vector.step(np.full((2, 4), 0.37))  # begins the next ones
-        assert not terminated.any()
-        assert info["time_s"].tolist() == [0.0, 0.0]
-    finally:
-        vector.close()
-
-
 def test_what_cannot_be_driven_is_refused_with_the_choices() -> None:
     with pytest.raises(UnknownChoiceError, match="no task 'hover-9'"):
         gymnasium.make("BuildArena/Drive-v0", task="hover-9")
@@ -228,15 +186,6 @@ def test_what_cannot_be_driven_is_refused_with_the_choices() -> None:
     # Wheels are no modules of this task.
     with pytest.raises(ValueError, match="this is no machine for hover-3: "):
         DriveEnv(machine=fixed_machine("slalom-2"))
-
-
-def test_an_episode_that_is_left_behind_ends_its_world(monkeypatch) -> None:
-    closed, close = [], Drive.close
-    monkeypatch.setattr(Drive, "close", lambda drive: (closed.append(1), close(drive)))
-    environment = short()
-    for _ in range(3):
-        environment.reset()
-    assert len(closed) == 2
 
 
 def test_what_is_no_action_is_refused_and_no_tick_passes() -> None:

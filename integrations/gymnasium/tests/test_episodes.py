@@ -140,8 +140,6 @@ def test_starts_vary_when_asked_for_and_only_then(actions) -> None:
 def test_what_does_not_exist_is_named_with_the_choices() -> None:
     with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
         gymnasium.make(IDS[0], simulator="game")
-    with pytest.raises(UnknownChoiceError, match="no reward 'fun'"):
-        gymnasium.make(IDS[0], rewards={"fun": 1.0})
     with pytest.raises(ValueError, match="no option 'sede': choose from state, start_seed"):
         gymnasium.make(IDS[0]).reset(options={"sede": 1})
     with pytest.raises(ValueError, match="no render mode 'film'"):

@@ -2,15 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
-import socket
-import subprocess
-import sys
-import time
 from pathlib import Path
-from urllib.parse import quote
-from urllib.request import urlopen
 
 import pytest
 from inspect_ai import Task
@@ -23,54 +15,6 @@ from buildarena_inspect.__main__ import main
 from buildarena_inspect.logs import LoggedSample, logged_samples
 
 pytestmark = pytest.mark.nightly
-
-BIN = Path(sys.executable).parent
-OFFLINE = Path(__file__).with_name("offline")
-
-
-def inspect(*words: str) -> subprocess.CompletedProcess[str]:
-    """Inspect's command, without a network."""
-    return subprocess.run(
-        [BIN / "inspect", *words],
-        env={**os.environ, "PYTHONPATH": str(OFFLINE), "TERM": "dumb"},
-        capture_output=True,
-        text=True,
-        timeout=200,
-        check=False,
-    )
-
-
-def test_the_viewer_serves_a_log_with_its_pictures(run, tmp_path) -> None:
-    log = run("buildarena/support_1")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    words = ["view", "--log-dir", str(tmp_path / "logs"), "--host", "127.0.0.1", "--port", port]
-    with subprocess.Popen(
-        [BIN / "inspect", *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as viewer:
-        try:
-            shown = _got(f"http://127.0.0.1:{port}/api/logs/{quote(log.location, safe='')}")
-        finally:
-            viewer.terminate()
-    document = json.loads(shown)
-    (sample,) = document["samples"]
-    assert sample["scores"]["success"]["value"] == "C"
-    assert any(text.startswith("data:image/png") for text in sample["attachments"].values())
-    dumped = inspect("log", "dump", log.location)
-    assert json.loads(dumped.stdout)["eval"]["task"] == "buildarena/support_1"
-
-
-def _got(url: str) -> bytes:
-    until = time.monotonic() + 60
-    while True:
-        try:
-            with urlopen(url) as answer:
-                return answer.read()
-        except OSError:
-            if time.monotonic() > until:
-                raise
-            time.sleep(0.1)
 
 
 def test_models_of_several_logs_are_ranked_over_their_tasks(run, tmp_path, capsys) -> None:

@@ -5,13 +5,10 @@ from __future__ import annotations
 import base64
 import json
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 
 import anyio
-import psutil
 import pytest
-from inspect_ai import eval_retry, score
+from inspect_ai import score
 from inspect_ai.model import ModelOutput, get_model
 from scripted_models import (
     EXPERTS,
@@ -204,65 +201,6 @@ def test_a_trial_does_not_hold_up_another_samples_requests(run, monkeypatch) -> 
     model = get_model("mockllm/model", custom_outputs=answer, memoize=False)
     log = run("buildarena/all", model=model, sample_id=["lift-1", "support-1"], max_samples=2)
     assert [sample.scores["success"].value for sample in log.samples] == ["C", "C"]
-
-
-@pytest.mark.nightly
-def test_a_machine_that_ends_its_process_costs_one_sample_and_only_that_is_run_again(
-    run, monkeypatch
-) -> None:
-    usual = TrialPool.try_machine
-
-    def tries(self, task, *given, **named):
-        if task.name != "support-1":
-            return usual(self, task, *given, **named)
-        with killing_children():
-            return usual(self, task, *given, **named)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(TrialPool, "try_machine", tries)
-        log = run("buildarena/all", sample_id=["lift-1", "support-1"], max_samples=1)
-    before = {sample.id: sample for sample in log.samples}
-    assert log.status == "error"
-    assert before["lift-1"].scores["success"].value == "C"
-    assert "ended with code -9" in before["support-1"].error.message
-    asked = set()
-
-    async def generate(*given, **named):
-        messages = named.get("input") or given[1]
-        asked.add(task_in(messages))
-        output = expert(messages)
-        output.usage = USAGE
-        return output
-
-    # A retry makes the model anew, by its name.
-    monkeypatch.setattr(type(get_model("mockllm/model").api), "generate", generate)
-    (again,) = eval_retry(log, log_dir="logs", display="none")
-    assert again.status == "success"
-    after = {sample.id: sample for sample in again.samples}
-    assert [after[name].scores["success"].value for name in after] == ["C", "C"]
-    assert asked == {"support-1"}
-    assert after["lift-1"].uuid == before["lift-1"].uuid
-
-
-@contextmanager
-def killing_children() -> Iterator[None]:
-    """Kills every process of a trial that there is."""
-    over = threading.Event()
-
-    def kill() -> None:
-        while not over.wait(0.05):
-            for child in psutil.Process().children():
-                with suppress(psutil.NoSuchProcess):
-                    if "spawn_main" in " ".join(child.cmdline()):
-                        child.kill()
-
-    thread = threading.Thread(target=kill)
-    thread.start()
-    try:
-        yield
-    finally:
-        over.set()
-        thread.join()
 
 
 def test_arguments_that_do_not_exist_are_refused_with_the_choices() -> None:

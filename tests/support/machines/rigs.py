@@ -20,9 +20,6 @@ from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.model import Structure
 from buildarena_worker.builtin.designs.drafting import DOWN
 
-SIDES = ("base", "arm")
-"""Which side of a joint is a tree's root, from which the engines see the joint."""
-
 
 @cache
 def catalogue() -> Catalogue:
