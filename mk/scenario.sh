@@ -27,7 +27,7 @@ chaos)
 besiege)
     BESIEGE_TASKS=all BESIEGE_KILLS=20 .venv/bin/pytest -n 2 --timeout=900 \
         "$game/test_end_to_end.py" "$game/test_killed_runner.py" "$game/test_real_game.py" "$@"
-    "$python" tests/besiege/fuzz_files.py --files 10000
+    BESIEGE_FILES=10000 .venv/bin/pytest --timeout=3600 tests/besiege/test_hostile_files.py
     ;;
 *)
     echo "no scenario '$name'; there are: attack besiege chaos containers gameday hunt soak" >&2

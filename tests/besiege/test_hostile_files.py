@@ -1,17 +1,25 @@
 """Machine files that were damaged, or made to do harm, are refused or sound."""
 
+import os
 import re
 import time
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.machine_files import RICH, published_files
 from tests.besiege.foreign_files import FOREIGN, block, foreign
-from tests.besiege.fuzz_files import DAMAGES, SAMPLES
-from tests.besiege.hostile import TRICKS
+from tests.besiege.hostile import TRICKS, mutated, rearranged
+from tests.besiege.playing import press, vehicle
 from tests.besiege.round_trips import round_trip
 
-from buildarena_besiege import MachineFileError, read_machine_file
+from buildarena_benchmark import builtin_tasks
+from buildarena_besiege import (
+    MachineFileError,
+    plain_machine_file,
+    prepare_run,
+    read_machine_file,
+)
 
 pytestmark = pytest.mark.ci
 
@@ -55,7 +63,26 @@ def test_a_thousand_blocks_at_one_place_are_no_hang() -> None:
     assert time.process_time() - started < 20
 
 
-@given(st.integers(0, 2**32), st.sampled_from(SAMPLES), st.sampled_from(DAMAGES))
-@settings(max_examples=150, deadline=None)
+def exported(task: str) -> bytes:
+    scenario, presses = builtin_tasks()[task].scenario, [press(1.0, "UpArrow", 1.0)]
+    machine = vehicle(cannon=True)
+    return prepare_run(machine, scenario, name="m", run_id="r", controls=presses).machine_file
+
+
+SAMPLES = [
+    published_files()["single_5_transport_medium"],
+    plain_machine_file(vehicle(cannon=True), name="m", controls=[press(1.0, "UpArrow", 1.0)]),
+    exported("transport-2"),
+    exported("lift-2"),
+    RICH,
+    RICH,
+]
+
+
+@pytest.mark.timeout(3600)
+@given(st.integers(0, 2**32), st.sampled_from(SAMPLES), st.sampled_from([mutated, rearranged]))
+@settings(max_examples=int(os.environ.get("BESIEGE_FILES", "150")), deadline=None)
 def test_damaged_files_are_refused_or_go_round_without_a_loss(seed, sample, damage) -> None:
+    started = time.process_time()
     round_trip(damage(sample, seed))
+    assert time.process_time() - started < 10

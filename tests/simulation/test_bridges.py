@@ -1,21 +1,18 @@
 """Bridges: which carries more, whichever way they stand, and how a cargo rests on them."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import pytest
 from benchmarks.agreement import compared
 from support.machines.drafts import KeyedDraft
-from support.machines.families import beam, deck
 from support.machines.random_machines import TASKS
 from support.machines.references import load_machine
 from support.machines.trials import trial
 from support.marks import nightly
 
-from buildarena_benchmark import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
-from buildarena_simulation.scenario import SpanPlacement, TerrainBox, gap_terrain
+from buildarena_simulation.scenario import SpanPlacement, gap_terrain
 from buildarena_worker.builtin.designs.drafting import BRACE, NORTH, SOUTH, UP
 
 
@@ -62,43 +59,6 @@ def test_connectors_stacked_on_the_same_faces_are_worth_one(
     if connector == BRACE:
         first = "load_at_first_break"
         assert often.metrics[first] <= 1.02 * once.metrics[first]
-
-
-TOLERANCE = {"mujoco": 0.02, "pybullet": 0.05}
-
-
-def _turned(machine: Machine, yaw_deg: float) -> Machine:
-    whole = Machine(available={"m": machine})
-    assert whole.act("add_machine", {"machine_id": "m", "init_rotation": [yaw_deg, 0, 0]}).ok
-    return whole
-
-
-@pytest.mark.ci
-@pytest.mark.nightly(engine="pybullet")
-@pytest.mark.parametrize("yaw_deg", [90, nightly(180), nightly(270)])
-def test_a_turned_bridge_carries_the_same(engine, tasks, yaw_deg) -> None:
-    task = tasks["support-1"]
-    for machine in (deck(5, 7), beam(9, "t")):
-        # A deck is as long across as along, so the gap turns with it.
-        terrain = task.scenario.terrain
-        if yaw_deg != 180:
-            terrain = tuple(_turned_box(box) for box in terrain)
-        straight = trial(task, machine, engine)[0].metrics["load_at_first_break"]
-        changes = {"terrain": terrain, **_unturned(task)}
-        turned, _ = trial(task, _turned(machine, yaw_deg), engine, **changes)
-        found = turned.metrics["load_at_first_break"]
-        assert found == pytest.approx(straight, rel=TOLERANCE[engine])
-
-
-def _turned_box(box: TerrainBox) -> TerrainBox:
-    x, y, z = box.center
-    width, length, height = box.size
-    return TerrainBox(center=(-y, x, z), size=(length, width, height))
-
-
-def _unturned(task: Task) -> dict[str, Any]:
-    """A placement that never turns a machine: none is longer than this gap."""
-    return {"placement": task.scenario.placement.model_copy(update={"gap": 99.0})}
 
 
 @pytest.mark.nightly(keep=1)

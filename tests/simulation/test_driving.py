@@ -192,19 +192,6 @@ def test_trials_side_by_side_do_not_touch_each_other(engine) -> None:
     assert alone[0] != alone[1]
 
 
-def test_a_trajectory_on_the_way_is_the_beginning_and_changes_nothing() -> None:
-    answers = wheels()
-    whole = to_the_end(Drive(car(drive=()), SHORT, "mujoco"), [answers] * 50)
-    drive = Drive(car(drive=()), SHORT, "mujoco")
-    for tick in range(50):
-        assert drive.time_s == pytest.approx(0.04 * tick)
-        part = drive.trajectory()
-        assert len(part.time_s) == tick + 1
-        assert np.array_equal(part.positions, whole.positions[: tick + 1])
-        drive.step(answers)
-    assert written(drive.trajectory()) == written(whole)
-
-
 WRONG = [
     ({"spinning_forwards": 1.0}, "there is no action 'spinning_forwards'; there is spinning_"),
     ({"99.fly": 1.0}, "there is no action '99.fly'"),

@@ -9,8 +9,7 @@ from support.marks import nightly
 from buildarena_geometry import KeyPress
 from buildarena_simulation import MachineNotSimulable, Scenario, simulate
 from buildarena_simulation.control import ended_presses
-from buildarena_simulation.engines.base import CargoBox, rotation_of
-from buildarena_simulation.placement import Start
+from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.scenario import Cargo, Control
 from buildarena_worker.builtin.designs.drafting import NORTH, UP
 
@@ -78,22 +77,7 @@ def test_what_makes_no_sense_is_refused() -> None:
             scenario(**fields)
 
 
-SHORT = Scenario(duration_s=0.4)
-
-
 LOADED = Scenario(duration_s=0.4, cargo=Cargo(size=(1, 1, 1), final_mass=6, ramp_s=1))
-
-
-def test_a_start_that_contradicts_the_rest_is_refused(beam) -> None:
-    box = CargoBox(size=np.ones(3), position=np.zeros(3), mass=1.0)
-    for given, cargo, seed, message in (
-        (SHORT, None, 3, "a seed varies it"),
-        (LOADED, None, None, "the start has no cargo"),
-        (SHORT, box, None, "the scenario has no cargo"),
-    ):
-        start = Start(position=np.zeros(3), rotation=np.eye(3), cargo=cargo)
-        with pytest.raises(ValueError, match=message):
-            simulate(beam, given, "mujoco", start=start, seed=seed)
 
 
 @pytest.mark.parametrize("heading", [30.0, nightly(-90.0)])

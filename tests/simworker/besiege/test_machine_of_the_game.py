@@ -182,45 +182,25 @@ def test_windows_gives_the_area_that_the_game_draws_to(monkeypatch) -> None:
     assert Win32Windows(GAME_WINDOW, User32()).find() is None
 
 
-class BusyError(RuntimeError):
-    """As pyperclip raises it."""
+def test_a_clipboard_that_another_program_keeps_is_waited_for_and_then_a_fault(monkeypatch) -> None:
+    busy = 3
 
+    def paste() -> str:
+        nonlocal busy
+        busy -= 1
+        if busy >= 0:
+            raise RuntimeError("Error calling OpenClipboard")
+        return "text"
 
-class Clip:
-    """What pyperclip is where another program keeps the clipboard for a while."""
-
-    PyperclipException = BusyError
-
-    def __init__(self, busy: int) -> None:
-        self.busy, self.text = busy, "text"
-
-    def paste(self):
-        self.busy -= 1
-        if self.busy >= 0:
-            raise BusyError("Error calling OpenClipboard")
-        return self.text
-
-    def copy(self, text):
-        self.paste()
-        self.text = text
-
-
-def test_a_clipboard_that_another_program_keeps_is_waited_for_and_then_a_fault(
-    monkeypatch, subtests
-) -> None:
-    for busy in [0, 3, 1000]:
-        with subtests.test(busy=busy):
-            monkeypatch.setitem(sys.modules, "pyperclip", Clip(busy))
-            monkeypatch.setattr(clipboard, "TRY_AGAIN_S", 0.0)
-            reached = clipboard._SystemClipboard()
-            if busy < clipboard.TRIES:
-                assert reached.get() == "text"
-                reached.put("other")
-                assert reached.get() == "other"
-                return
-            for use in (reached.get, lambda: reached.put("x")):
-                with pytest.raises(ScreenError, match="another program keeps it"):
-                    use()
+    system = SimpleNamespace(PyperclipException=RuntimeError, paste=paste, copy=lambda _: paste())
+    monkeypatch.setitem(sys.modules, "pyperclip", system)
+    monkeypatch.setattr(clipboard, "TRY_AGAIN_S", 0.0)
+    reached = clipboard._SystemClipboard()
+    assert reached.get() == "text"
+    for use in (reached.get, lambda: reached.put("x")):
+        busy = 1000
+        with pytest.raises(ScreenError, match="another program keeps it"):
+            use()
 
 
 def test_a_lock_is_of_one_game_and_ends() -> None:
