@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.machines.building import BLOCK, built
 from support.machines.headroom import Presses, drafted
-from support.machines.piloted import experts_machine
+from support.machines.piloted import FASTER_FIRST, experts_machine
 
 from buildarena_benchmark import Task, builtin_tasks, score
 from buildarena_geometry import Machine
@@ -165,6 +165,11 @@ def honest(name: str, engine: str = "mujoco") -> tuple[Task, Machine, Trajectory
     trial = simulate(machine, task.scenario, engine)
     assert score(task, machine, trial).success
     return task, machine, trial
+
+
+@pytest.fixture(params=FASTER_FIRST)
+def engine(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
 
 
 @pytest.fixture(scope="session")

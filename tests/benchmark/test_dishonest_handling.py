@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import pytest
 from support.machines.drafts import KeyedDraft
-from support.machines.piloted import FASTER_FIRST, scored
+from support.machines.piloted import scored
 from tests.benchmark.conftest import expert, honest, strict
 
 from buildarena_benchmark import builtin_tasks, score
@@ -27,7 +27,6 @@ def fails(result: Any, *flags: str) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
     """Engines part what overlaps: whoever throws so is refused."""
     thrown = expert("throw-1")
@@ -37,7 +36,6 @@ def test_a_boulder_that_begins_inside_its_cup(engine) -> None:
 
 
 @pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_throws_at_once_or_lets_it_lie_or_drops_it_throws_nothing(engine) -> None:
     """A boulder is borne for a second first."""
     fails(scored(THROW, expert("throw-1", [(0.2, "Alpha1", 4.0)]), engine, None), "not_borne")
@@ -48,7 +46,6 @@ def test_who_throws_at_once_or_lets_it_lie_or_drops_it_throws_nothing(engine) ->
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_fence_is_cleared_or_not(engine) -> None:
     """The same throw leaves a fence of 3 untouched; one of 40 is what it touches first."""
     _, machine, trial = honest("throw-1", engine)
@@ -91,7 +88,6 @@ def test_a_machine_in_a_things_place_is_refused() -> None:
 
 
 @pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_ball_that_is_kicked(engine) -> None:
     """The same car brakes half way, and the ball rolls on over the line."""
     result = scored(TASKS["deliver-1"], expert("deliver-1", [(0.4, "UpArrow", 2.4)]), engine, None)
@@ -149,7 +145,6 @@ VARIANTS: Final = {
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("how", VARIANTS)
 def test_what_is_not_put_down_from_the_arm(engine, how) -> None:
     machine = expert("place-2")

@@ -7,7 +7,7 @@ from typing import Final
 
 import pytest
 from support.machines.drafts import KeyedDraft
-from support.machines.piloted import FASTER_FIRST, scored
+from support.machines.piloted import scored
 from tests.benchmark.conftest import expert, strict
 
 from buildarena_benchmark import builtin_tasks, score
@@ -56,7 +56,6 @@ def third_wheel() -> KeyedDraft:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize(
     ("build", "flags"),
     [
@@ -74,7 +73,6 @@ def test_who_does_nothing_does_not_balance(build, flags, engine) -> None:
 
 
 @pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("share", ["1", "t % 0.4 < 0.2 and 1 or -1"])
 def test_driving_on_and_shaking_do_not_balance(engine, share) -> None:
     machine = moved_by(cart(), f"spinning_forward = {share}")
@@ -82,7 +80,6 @@ def test_driving_on_and_shaking_do_not_balance(engine, share) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_spinning_in_place_does_not_balance(engine) -> None:
     """A long bar above the wheels, which turns about the vertical: that may keep it level."""
     draft = cart(logs=1, wheel="Large Wheel")
@@ -152,7 +149,6 @@ def stepper() -> Machine:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("build", [telescope, mast, sled, stepper])
 def test_what_does_not_walk_does_not_pass(build, engine) -> None:
     machine = build()
@@ -167,7 +163,6 @@ def test_what_does_not_walk_does_not_pass(build, engine) -> None:
 
 
 @pytest.mark.nightly(keep=1)
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("build", [sled, stepper])
 def test_who_is_pushed_and_slides_does_not_walk(build, engine) -> None:
     """Even where its feet are lifted in turn meanwhile: a link that slides carries nothing."""
@@ -216,7 +211,6 @@ FLIGHTS: Final[Mapping[str, tuple[str, str]]] = {
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize("how", FLIGHTS)
 def test_what_flies_without_a_look_or_lands_in_no_way(engine, how) -> None:
     name, answer = FLIGHTS[how]
@@ -227,7 +221,6 @@ def test_what_flies_without_a_look_or_lands_in_no_way(engine, how) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_a_tower_at_the_place_is_no_flight(engine) -> None:
     """The place is reached from the ground: a mast, and the mass at its top."""
     draft, middle = workshop()
@@ -243,7 +236,6 @@ def test_a_tower_at_the_place_is_no_flight(engine) -> None:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 def test_who_stays_where_the_place_was_does_not_follow_it(engine) -> None:
     """The expert's craft, which keeps to the middle of where the place goes, without a look."""
     craft = expert("hover-4")
@@ -299,7 +291,6 @@ def fan_car() -> Machine:
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("engine", FASTER_FIRST)
 @pytest.mark.parametrize(
     ("build", "most"),
     [

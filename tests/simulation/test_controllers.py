@@ -286,10 +286,5 @@ def test_files_of_piloted_trials_have_it_and_others_are_as_before() -> None:
     by_keys = simulate(car(drive=()), drive(1.0), "mujoco", controls=[press("UpArrow", 0.0, 1.0)])
     assert by_keys.piloting is None
     assert schema_of(write_trajectory(by_keys)) == 3
-    # A program that asks for nothing, where nothing is offered.
-    nothing = drive(1.0).model_copy(update={"senses": Senses(offers=())})
-    silent = driven("function control() end", nothing)
-    assert (silent.piloting.sense_names, silent.piloting.action_names) == ((), ())
-    assert read_trajectory(write_trajectory(silent)).piloting.senses.shape == (26, 0)
     with pytest.raises(ValueError, match="piloting has 26 instants, not 25"):
-        replace(silent, **{name: getattr(silent, name)[:25] for name in SERIES}, bearing=None)
+        replace(piloted, **{name: getattr(piloted, name)[:25] for name in SERIES}, bearing=None)

@@ -32,6 +32,7 @@ from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_point, besiege_turn
 from buildarena_geometry.rotations import multiply
 from buildarena_simulation import Scenario, Trajectory, simulate
+from buildarena_simulation.engines.base import rotation_of
 
 RUN = "golden"
 UPDATES_PER_SAMPLE = 4
@@ -51,11 +52,11 @@ class Recorded:
         """Where the file's block of this number is, Besiege's components."""
         record, told = self.prepared.records[number], self.trajectory
         if record.part == CARGO_ID:
-            lifted = _matrix(told.cargo_quaternion[sample]) @ [0.0, 0.0, self.cargo_height / 2]
+            lifted = rotation_of(told.cargo_quaternion[sample]) @ [0.0, 0.0, self.cargo_height / 2]
             return besiege_point(told.cargo_position[sample] - lifted)
         column = self._column(record.part)
         built = self.rotation @ np.array(besiege_point(record.position)) + self.position
-        turned = _matrix(told.quaternions[sample, column]) @ self._began(column)
+        turned = rotation_of(told.quaternions[sample, column]) @ self._began(column)
         moved = turned @ (built - told.positions[0, column])
         return besiege_point(told.positions[sample, column] + moved)
 
@@ -65,7 +66,7 @@ class Recorded:
             of_cargo = besiege_turn(_plain(self.trajectory.cargo_quaternion[sample]))
             return multiply(of_cargo, self.prepared.records[number].rotation)
         column = self._column(self.prepared.records[number].part)
-        turned = _matrix(self.trajectory.quaternions[sample, column]) @ self._began(column)
+        turned = rotation_of(self.trajectory.quaternions[sample, column]) @ self._began(column)
         return multiply(
             besiege_turn(_quaternion(turned @ self.rotation)),
             self.prepared.records[number].rotation,
@@ -82,7 +83,7 @@ class Recorded:
         return ids.index(part) if part in ids else 0
 
     def _began(self, column: int) -> np.ndarray:
-        return _matrix(self.trajectory.quaternions[0, column]).T
+        return rotation_of(self.trajectory.quaternions[0, column]).T
 
 
 def recorded(machine: Machine, scenario: Scenario, moved_as: Machine | None = None) -> Recorded:
@@ -147,21 +148,10 @@ def log_lines(run: Recorded, scenario: Scenario) -> Iterator[str]:
         yield line.text.removeprefix(f"{marked(RUN)},").rpartition(",")[0]
 
 
-def _matrix(quaternion: Any) -> np.ndarray:
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
 def _quaternion(matrix: np.ndarray) -> tuple[float, float, float, float]:
     from scipy.spatial.transform import Rotation
 
-    x, y, z, w = Rotation.from_matrix(matrix).as_quat()
+    x, y, z, w = Rotation.fromrotation_of(matrix).as_quat()
     return _plain((w, x, y, z))
 
 

@@ -31,11 +31,6 @@ class Reference:
     quality: str
 
 
-def actions_of(name: str) -> list[dict[str, Any]]:
-    """The action log of a machine."""
-    return list(content_of(name)["actions"])
-
-
 def content_of(name: str) -> dict[str, Any]:
     """A stored machine: its task, sub-structures and actions."""
     return dict(_CONTENTS[name])

@@ -12,6 +12,7 @@ from support.machines.module_files import like
 from buildarena_geometry import Catalogue, Machine, module_set
 from buildarena_geometry.modules.catalogue import read_modules
 from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.engines import base
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.placement import start_of
 from buildarena_simulation.rollout import simulate_structure
@@ -23,7 +24,7 @@ from buildarena_worker.builtin.designs.drafting import DOWN
 
 @cache
 def catalogue() -> Catalogue:
-    """The workshop's modules, a mast, a weight of 10, a heavy one of 100, and a wedge of 30°."""
+    """The workshop's modules, a mast, a weight of 10, and a wedge of 30°."""
     slope, up = math.sin(math.radians(30)), math.cos(math.radians(30))
     slanted = {
         "label": "A",
@@ -50,7 +51,6 @@ def catalogue() -> Catalogue:
     entries = [
         like(BLOCK, "Mast", grabs=False, **mast),
         like(BLOCK, "Weight", mass=10, grabs=False),
-        like(BLOCK, "Heavy Weight", mass=100, grabs=False),
         like(BLOCK, "Wedge", faces=[slanted], grabs=False),
     ]
     extra = read_modules({"version": 1, "modules": entries}, where="rigs")
@@ -105,13 +105,8 @@ def place_of(trajectory: Trajectory, block: str) -> np.ndarray:
 
 def rotation_of(trajectory: Trajectory, block: str) -> np.ndarray:
     """(T, 3, 3) world_from_block."""
-    w, x, y, z = trajectory.quaternions[:, trajectory.block_ids.index(block)].astype(float).T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    column = trajectory.block_ids.index(block)
+    return base.rotation_of(trajectory.quaternions[:, column].astype(float))
 
 
 def turned_by(trajectory: Trajectory, block: str, axis: tuple[int, int, int]) -> np.ndarray:
