@@ -76,35 +76,6 @@ def test_a_flame_heats_across_sub_structures_until_one_of_them_leaves(build, eng
     assert "Block B_2 (Water Cannon) is no longer heated by A_5." in gone
 
 
-# Which face looks where
-
-
-def shown_free_faces(text: str) -> dict[str, str]:
-    listed = text.rpartition("free faces: ")[2] or text.rpartition("Free faces: ")[2]
-    return dict(re.findall(r"([A-F]) <([^>]*)>", listed))
-
-
-def test_a_refusal_names_the_free_faces_as_successes_do(build, subtests):
-    for angle in [0, 90, 180, 270]:
-        with subtests.test(angle=angle):
-            machine = build(("1", "A", BLOCK), ("2", "E", "Torch"))
-            twisted = twist(machine, "2", angle)
-            faces = dict(re.findall(r"([A-F]) (<[^>]*>) \[[^]]*\](?=;|\.)", details(machine, "2")))
-            free = {label: side.strip("<>") for label, side in faces.items()}
-            assert set(free) == set("ABCD")
-            torch = {"base_block": "2", "new_block": "Torch"}
-            taken = machine.act("attach_block_to", {**torch, "face": "E"})
-            absent = machine.act("attach_block_to", {**torch, "face": "X"})
-            assert taken.cause is Cause.FACE_OCCUPIED
-            assert absent.cause is Cause.NO_SUCH_FACE
-            assert taken.text.startswith("Face E <East> of block 2")
-            assert shown_free_faces(taken.text) == free
-            assert shown_free_faces(absent.text) == free
-            assert (
-                dict(re.findall(r"([A-F]) <([^>]*)>", twisted.partition("Free faces: ")[2])) == free
-            )
-
-
 # What an assembly's parts have
 
 

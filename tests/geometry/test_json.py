@@ -3,16 +3,18 @@
 import json
 import math
 import re
-import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+import msgspec
 import pytest
 
 from buildarena_geometry.errors import DocumentError
 from buildarena_geometry.json_texts import MAX_DEPTH, TooDeepError, is_too_deep, read_json
 from buildarena_geometry.modules.solids import Ball, Box
-from buildarena_geometry.reading import Amount, Finite, Name, Point, Whole, read
+from buildarena_geometry.reading import Amount, Finite, Form, Name, Point, Whole, read
 from buildarena_geometry.rotations import ORIGIN
 
 
@@ -68,43 +70,25 @@ def test_a_misfit_is_told_by_its_place_and_by_what_may_stand_there(subtests) -> 
             read(value, form, where="it", error=DocumentError)
 
 
-FIRST_READS = """
-import sys
-import threading
-
-import msgspec
-
-from buildarena_geometry.errors import DocumentError
-from buildarena_geometry.reading import Form, read
-
-THREADS, ROUNDS, FIELDS = 8, 50, 30
-sys.setswitchinterval(1e-6)
-
-
-def fresh():
-    kinds = {"bases": (Form,), "frozen": True, "kw_only": True}
-    numbers = [(f"n{i}", dict[str, tuple[float, ...]]) for i in range(FIELDS)]
-    inner = msgspec.defstruct("Inner", numbers, **kinds)
-    return msgspec.defstruct("Outer", [(f"f{i}", list[inner]) for i in range(FIELDS)], **kinds)
-
-
-inner = {f"n{i}": {"a": [1.0]} for i in range(FIELDS)}
-value = {f"f{i}": [inner] for i in range(FIELDS)}
-for _ in range(ROUNDS):
-    kind, together, whole = fresh(), threading.Barrier(THREADS), []
-
-    def go():
-        together.wait()
-        whole.append(read(value, kind, where="value", error=DocumentError))
-
-    threads = [threading.Thread(target=go) for _ in range(THREADS)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(whole) == THREADS and all(one == whole[0] for one in whole)
-"""
-
-
 def test_threads_may_be_the_first_to_read_a_form_together() -> None:
-    subprocess.run([sys.executable, "-c", FIRST_READS], check=True)
+    count, fields, before = 8, 30, sys.getswitchinterval()
+    inner = {f"n{i}": {"a": [1.0]} for i in range(fields)}
+    value = {f"f{i}": [inner] for i in range(fields)}
+    how: dict[str, Any] = {"bases": (Form,), "frozen": True, "kw_only": True}
+    sys.setswitchinterval(1e-6)
+    try:
+        for _ in range(50):
+            numbers = [(name, dict[str, tuple[float, ...]]) for name in inner]
+            parts = msgspec.defstruct("Inner", numbers, **how)
+            kind = msgspec.defstruct("Outer", [(name, list[parts]) for name in value], **how)  # type: ignore[valid-type]
+            together = threading.Barrier(count)
+
+            def first(kind: Any = kind, together: Any = together) -> object:
+                together.wait()
+                return read(value, kind, where="value", error=DocumentError)
+
+            with ThreadPoolExecutor(count) as threads:
+                found = [each.result() for each in [threads.submit(first) for _ in range(count)]]
+            assert all(each == found[0] for each in found)
+    finally:
+        sys.setswitchinterval(before)

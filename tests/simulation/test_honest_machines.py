@@ -42,12 +42,6 @@ def test_a_bridge_that_breaks_off_early_still_spans(engine, tasks) -> None:
     assert result.metrics["least_terrain_share"] == pytest.approx(0.5, abs=0.05)
 
 
-def test_debris_of_a_collapse_is_not_unstable(engine, tasks) -> None:
-    result, _ = trial(tasks["support-2"], beam(19), engine, duration_s=4.0)
-    assert result.metrics["broken_joints"] > 0
-    assert "unstable" not in result.flags
-
-
 def test_a_long_bridge_counts_and_tells_its_load_over_its_mass(engine, tasks) -> None:
     machine = propped_beam(30)
     result, _ = trial(tasks["support-4"], machine, engine, duration_s=6.0)
@@ -239,24 +233,8 @@ def test_a_token_frame_is_refused(tasks) -> None:
 FOLDER = Path(__file__).parents[2] / "examples" / "tasks" / "besiegefield"
 
 
-LEVELS = sorted(path.stem for path in FOLDER.glob("*.yaml"))
-
-
 def level(name: str) -> Task:
     return parse_custom_task((FOLDER / f"{name}.yaml").read_text(), origin=name)
-
-
-@pytest.mark.nightly(keep=2)
-@pytest.mark.parametrize("name", LEVELS)
-def test_each_can_be_read_and_a_machine_of_nothing_fails(name) -> None:
-    task = level(name)
-    assert task.name == name
-    machine = task.new_machine(task.constraints.catalogue)
-    assert machine.act("start", {"init_shift": [0, 0, 0], "init_rotation": [0, 0, 0]}).ok
-    trajectory = simulate(machine, task.scenario, "mujoco")
-    failed = score(task, machine, trajectory)
-    assert not failed.success
-    assert failed.indicator < 0.5
 
 
 @pytest.mark.ci

@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import httpx
-import httpx2
 import pytest
 from support.clients.tenants import WITH_KEYS
 from support.jobs import execute
@@ -22,12 +21,10 @@ from buildarena_api.runners.outcomes import drop_dead_uploads
 from buildarena_backend.artifacts import uploads
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.errors import UploadError
-from buildarena_backend.keepalive import socket_options
 from buildarena_backend.leases.runner_leases import JobToken
 from buildarena_backend.trials.simulator import File, TrialResult
 from buildarena_simworker.engines import EngineSimulator
 from buildarena_simworker.remote import api as remote_api
-from buildarena_simworker.remote.api import RunnerApi, tls_context
 
 LEASE = ("job_0a", 3)
 
@@ -78,19 +75,6 @@ def test_links_that_fall_silent_cost_a_time_out_each(context, url, monkeypatch) 
     assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
 
 
-def test_a_runner_gives_up_dead_links_unless_a_proxy_ends_them(url, monkeypatch) -> None:
-    for name in [name for name in os.environ if name.lower().endswith("_proxy")]:
-        monkeypatch.delenv(name)
-
-    def options() -> object:
-        api = RunnerApi(url, None, tls=tls_context(None), stopping=threading.Event())
-        found = api._http._transport_for_url(httpx2.URL(url))._pool._socket_options
-        api.close()
-        return found
-
-    assert options() == socket_options()
-    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
-    assert options() is None
 
 
 @pytest.mark.ci

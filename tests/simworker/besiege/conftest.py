@@ -29,3 +29,10 @@ def rig(tmp_path: Path) -> Rig:
     rig = Rig(folder=tmp_path / "rig")
     rig.calibrate()
     return rig
+
+
+@pytest.fixture
+def clean(rig: Rig) -> Iterator[Rig]:
+    """Ends the game that runners leave running."""
+    yield rig
+    rig.end_game()

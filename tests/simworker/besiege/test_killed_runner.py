@@ -6,9 +6,7 @@ import random
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 
-import psutil
 import pytest
 from support.game.game_rig import Rig, our_score, short_trial
 
@@ -16,15 +14,6 @@ pytestmark = pytest.mark.timeout(900)
 KILLS = int(os.environ.get("BESIEGE_KILLS", "3"))
 LONGEST_S = 9.0
 """A run from the game's start to its end takes a little less."""
-
-
-@pytest.fixture
-def clean(rig: Rig) -> Iterator[Rig]:
-    """Ends the game that killed runners leave running, as a next runner would."""
-    yield rig
-    known = rig.folder / "state" / "game.json"
-    if known.exists():
-        psutil.Process(json.loads(known.read_text())["pid"]).kill()
 
 
 def runner(rig: Rig, screen: dict[str, str]) -> subprocess.Popen[str]:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.game.game_programs import AGENT, GO, drive, piloted, program
+from support.game.game_programs import AGENT, drive, piloted, program
 from support.game.record_games import RUN, Recorded, game_of, recorded
 from support.lua_game import LuaGame
-from support.machines.families import car, mechanism
+from support.machines.families import mechanism
 
 from buildarena_benchmark import load_task, score
 from buildarena_besiege import (
@@ -17,7 +17,6 @@ from buildarena_besiege import (
     LogIncompleteError,
     MachineNotPlayableError,
     prepare_run,
-    read_machine_file,
     trajectory_of,
 )
 from buildarena_besiege.check_sums import check_sum
@@ -188,19 +187,6 @@ def test_a_program_that_fails_lets_go_of_all_keys_and_its_log_says_why(subtests)
             with pytest.raises(ControllerFailed) as caught:
                 read_back(game, machine, scenario)
             assert words in caught.value.reason
-
-
-def test_a_machine_file_brings_its_program_and_keys_back() -> None:
-    machine = piloted(GO + '\n-- a < b & "c" ]]> é', car())
-    run = prepare_run(machine, drive(), name="m", run_id="r")
-    back = read_machine_file(run.machine_file)
-    assert back.machine.controller == machine.controller
-    assert back.machine.control_sequence == machine.control_sequence
-    assert [b.bindings for b in back.machine.blocks.values()] == [
-        b.bindings for b in machine.blocks.values()
-    ]
-    assert back.not_understood == ()
-    assert back.own_keys == {}
 
 
 BOX = TerrainBox(center=(0, 9, 0.5), size=(4, 4, 1))

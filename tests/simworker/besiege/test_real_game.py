@@ -4,10 +4,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from typing import Any
 
-import psutil
 import pytest
 from support.game.game_rig import SUPPORT, Rig, our_score, short_trial
 
@@ -16,19 +14,6 @@ from buildarena_besiege import level_file
 from buildarena_simworker.besiege.screen.calibration import PathClick
 
 pytestmark = [pytest.mark.nightly, pytest.mark.timeout(600)]
-
-
-@pytest.fixture
-def clean(rig: Rig) -> Iterator[Rig]:
-    """Ends the game that a program leaves running."""
-    yield rig
-    end_game(rig)
-
-
-def end_game(rig: Rig) -> None:
-    known = rig.folder / "state" / "game.json"
-    if known.exists():
-        psutil.Process(json.loads(known.read_text())["pid"]).kill()
 
 
 FAULTS = (
@@ -50,7 +35,7 @@ def test_a_fault_ends_in_a_right_score_or_in_a_sentence_with_a_picture(
             found = told(clean, screen)
             assert not list(clean.machines.iterdir())
             assert is_right(found, "transport-1") or (found["fault"] and found["pictures"])
-            end_game(clean)
+            clean.end_game()
 
 
 def told(rig: Rig, screen: dict[str, str], task: str = "transport-1", **more: str) -> Any:
@@ -115,7 +100,7 @@ def test_a_launcher_that_ends_is_not_started_again_and_a_path_leads_to_the_level
     assert started.read_text() == "started\n"
     # One that is gone is started again, and one that freezes then once more.
     clean.faults.write_text(json.dumps([{"fault": "freeze", "at": "open_folder"}]))
-    end_game(clean)
+    clean.end_game()
     assert is_right(told(clean, screen, COMMAND=game), "transport-1")
     assert started.read_text() == 3 * "started\n"
 

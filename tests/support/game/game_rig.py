@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import psutil
 from support.machines.building import BLOCK, built
 from support.machines.experts import experts_machine
 
@@ -74,6 +75,12 @@ class Rig:
     def report(self) -> dict[str, Any]:
         """What the game says of itself."""
         return json.loads((self.folder / "report.json").read_text())
+
+    def end_game(self) -> None:
+        """Ends the game that a runner left running, as a next runner would."""
+        known = self.folder / "state" / "game.json"
+        if known.exists():
+            psutil.Process(json.loads(known.read_text())["pid"]).kill()
 
     def game(self, *options: str, launcher: Path | None = None) -> str:
         """The command that starts the stand-in.

@@ -54,26 +54,3 @@ def propped_beam(
         for side in (EAST, WEST, NORTH, SOUTH):
             draft.row(low, side, foot)
     return draft.machine
-
-
-def boom_on_a_base(length: int = 20) -> KeyedDraft:
-    """The starting block at the tip of a boom that a steering block swings over a heavy base.
-
-    Four powered wheels on the base turn against each other on the spot.
-    """
-    draft = KeyedDraft(modules="workshop")
-    start = draft.start()
-    root = draft.row(start, SOUTH, length)[-1]
-    joint = draft.attach(draft.attach(root, DOWN), DOWN, "Steering Block")
-    base = draft.attach(joint, DOWN)
-    spine = [base, *draft.row(base, NORTH, 3), *draft.row(base, SOUTH, 3)]
-    for block in spine[1:]:
-        draft.attach(block, DOWN, "Log")
-    for end in (spine[3], spine[6]):
-        for side in (EAST, WEST):
-            wheel = draft.wheel(draft.attach(end, side), side)
-            draft.bind(wheel, "spinning_forward", "UpArrow")
-            draft.bind(wheel, "spinning_backward", "DownArrow")
-    draft.bind(joint, "turn_left", "LeftArrow")
-    draft.bind(joint, "turn_right", "RightArrow")
-    return draft
