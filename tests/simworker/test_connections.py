@@ -75,8 +75,6 @@ def test_links_that_fall_silent_cost_a_time_out_each(context, url, monkeypatch) 
     assert [one.result for one in context.store.jobs.attempts(job.id)] == ["done"]
 
 
-
-
 @pytest.mark.ci
 def test_an_api_that_is_away_is_waited_for(context) -> None:
     job = waiting(context)
