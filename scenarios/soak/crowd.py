@@ -24,7 +24,9 @@ TASK = "lift-1"
 ACT_EVERY_S = 5.0
 STRANGERS = 40
 NOISE_BYTES = 2_000_000
-LIED = tuple(LIES[name] for name in ("time at half its pace", "a late jump", "small peaks"))
+LIED = tuple(
+    LIES[name] for name in ("poses held from instant 5", "blocks +50 along z", "no ground")
+)
 """Lies about any trial of a machine with joints."""
 
 

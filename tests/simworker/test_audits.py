@@ -3,14 +3,13 @@
 import json
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import httpx
-import numpy as np
 import pytest
 from support.clients.tenants import WITH_KEYS
 from support.jobs import execute
+from support.servers.lies import LIES, Lie
 from support.servers.live_api import changed, live_api
 from support.servers.runner_rig import (
     CARRY,
@@ -34,48 +33,9 @@ from buildarena_backend.process.context import Context
 from buildarena_benchmark import parse_custom_task
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import ControllerFailed, Trajectory, simulate, write_trajectory
-from buildarena_simulation.trajectory import Break
 from buildarena_worker.wiring import verification_runner
 
-Lie = Callable[[Trajectory], Trajectory]
-
-
-def moved(by: float) -> Lie:
-    """Blocks elsewhere along x, a little further at each instant."""
-
-    def lie(true: Trajectory) -> Trajectory:
-        positions = true.positions.copy()
-        positions[1:, :, 0] += np.linspace(0, by, len(positions) - 1, dtype=np.float32)[:, None]
-        return replace(true, positions=positions)
-
-    return lie
-
-
-def last_bit(true: Trajectory) -> Trajectory:
-    positions = true.positions.copy()
-    positions[-1, 0, 2] = np.nextafter(positions[-1, 0, 2], np.float32(9))
-    return replace(true, positions=positions)
-
-
-def broken(true: Trajectory) -> Trajectory:
-    peak = true.joint_peaks[0]
-    mass = float(true.cargo_mass[-1])
-    event = Break(time_s=0.3, joint=peak.joint, kind=peak.kind, ratio=1.1, cargo_mass=mass)
-    return replace(true, breaks=(event,))
-
-
 OTHER_ENGINE = "a version of the engine that it has not"
-LIES: dict[str, Lie] = {
-    "blocks +0.01 along x": moved(0.01),
-    "blocks +50 along x": moved(50.0),
-    "a cargo turned": lambda t: replace(t, cargo_quaternion=t.cargo_quaternion[:, [1, 0, 2, 3]]),
-    "a heavier load": lambda t: replace(t, bearing=replace(t.bearing, cargo=t.bearing.cargo * 2)),
-    "joints without loads": lambda t: replace(t, joint_loads=t.joint_loads * np.float32(0)),
-    "a break at 0.3 s": broken,
-    "the last bit of one pose": last_bit,
-    "another step": lambda t: replace(t, settings={**t.settings, "substeps": 1}),
-    OTHER_ENGINE: lambda t: replace(t, engine_version="0.0.1"),
-}
 SHIFTED = LIES["blocks +0.01 along x"]
 CONTROL = Path(__file__).parents[2] / "examples" / "control"
 PILOTED = (CONTROL / "to-the-mark.yaml").read_text().replace("duration_s: 20", "duration_s: 2")

@@ -54,6 +54,7 @@ def deck(
     cross: bool = False,
     along: str = "",
     rails: bool = False,
+    pillars: int = 0,
 ) -> Machine:
     """A deck of rows along north-south that hang on one row along east-west.
 
@@ -63,6 +64,7 @@ def deck(
         cross: Whether every east-west seam is braced on top.
         along: Braces along the rows, as in `beam`.
         rails: Whether three blocks are on top at the middle of each long side.
+        pillars: Height of the two pillars below the deck; 0 for none.
     """
     draft = Draft()
     grid = _deck_grid(draft, width // 2, length // 2)
@@ -70,6 +72,8 @@ def deck(
         for x in (-(width // 2), width // 2):
             for y in (-1, 0, 1):
                 draft.attach(grid[x, y], UP)
+    for place in ((0, 1), (0, -1)) if pillars else ():
+        draft.row(grid[place], DOWN, pillars)
     if cross:
         _brace_grid(draft, grid, (1, 0), UP)
     for kind in along:
