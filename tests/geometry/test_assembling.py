@@ -202,6 +202,15 @@ def test_a_machine_that_went_back_goes_on_like_a_copy(first, astray, then) -> No
     assert machine.to_document() == copy.to_document()
 
 
+def test_what_moved_is_in_nobodys_way_after_a_return(build) -> None:
+    machine = build(("1", "A", "Small Wooden Block"))
+    kept = machine.logged
+    for _ in range(3):
+        assert machine.act("shift_block", {"block_id": "2", "shift_real": [0.5, 0, 0]}).ok
+    machine.return_to(kept)
+    assert attach(machine, "2", "E").ok
+
+
 def test_a_value_of_another_assembly_is_refused() -> None:
     part = Machine()
     part.act("start", {})

@@ -202,6 +202,13 @@ def across(normal):
     return [1, 0, 0] if abs(normal[0]) < 0.5 else [0, 1, 0]
 
 
+def test_what_reaches_into_its_base_may_not_reach_through_it(tmp_path):
+    rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -1.4], "to": [0, 0, 0]}
+    catalogue = own(tmp_path, overlaps_base=True, colliders=[*BASIC[BLOCK]["colliders"], rod])
+    machine = built(("1", "A", BLOCK), catalogue=catalogue)
+    assert attach(machine, "2", "E", "Own").overlaps == (("3", "1"),)
+
+
 def test_what_reaches_into_its_base_still_meets_it_after_that_base_was_exchanged(tmp_path):
     rod = {"shape": "cylinder", "radius": 0.2, "from": [0, 0, -0.4], "to": [0, 0, 0]}
     catalogue = own(tmp_path, overlaps_base=True, colliders=[*BASIC[BLOCK]["colliders"], rod])
