@@ -252,6 +252,13 @@ def test_a_level_with_a_quarter_pipe_is_written_and_one_that_is_turned_is_refuse
             assert run.level.count(b"<Object ID") == 12
 
 
+def test_a_trial_with_a_boulder_is_refused_and_its_plain_file_is_not() -> None:
+    machine, scenario = built_with(ALL["Boulder"]), builtin_tasks()["throw-1"].scenario
+    with pytest.raises(MachineNotPlayableError, match="what a boulder touches: use another"):
+        prepare_run(machine, scenario, name="m", run_id="r")
+    assert b'id="36"' in plain_machine_file(machine, name="m")
+
+
 def read(scenario):
     data = level_file(scenario)
     assert data.startswith(b"\xef\xbb\xbf<?xml")

@@ -1,5 +1,7 @@
 """Machine files come back: ours as they were, others as far as they can be, and nothing else."""
 
+import gzip
+import json
 import re
 
 import numpy as np
@@ -14,10 +16,11 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_besiege import (
     plain_machine_file,
     prepare_run,
+    read_any_machine,
     read_machine_file,
 )
 from buildarena_besiege.normal import normal_form
-from buildarena_geometry import Machine
+from buildarena_geometry import DocumentError, Machine
 
 EXPORTS = [
     (one, export)
@@ -255,6 +258,16 @@ def test_a_description_that_does_not_fit_is_not_believed(subtests) -> None:
             assert any("description is not believed" in one for one in imported.not_understood)
             assert imported.machine.part_count == 4
             assert all(b.mount for b in list(imported.machine.blocks.values())[1:])
+
+
+def test_files_are_told_apart_by_content() -> None:
+    file = plain_machine_file(vehicle(), name="m")
+    utf16 = file.decode().replace('encoding="utf-8"', 'encoding="utf-16"').encode("utf-16")
+    document = json.dumps(vehicle().to_document()).encode()
+    for data in (file, b"\xef\xbb\xbf" + file, utf16, document, b"\xef\xbb\xbf" + document):
+        assert read_any_machine(data, where="f").machine.part_count == 4
+    with pytest.raises(DocumentError, match=r"^f: not valid JSON"):
+        read_any_machine(gzip.compress(file), where="f")
 
 
 def test_an_assembly_comes_back_with_its_sub_structures() -> None:

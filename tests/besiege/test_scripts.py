@@ -16,7 +16,7 @@ from buildarena_besiege import (
     trajectory_of,
 )
 from buildarena_besiege.check_sums import check_sum
-from buildarena_besiege.exporting.probes import height_at
+from buildarena_besiege.exporting.probes import MAX_PROBES, height_at, level_probes
 from buildarena_besiege.exporting.script import lua_text
 from buildarena_besiege.keys import key_edges
 from buildarena_besiege.tracking import tracked_blocks
@@ -331,6 +331,15 @@ def test_a_level_that_was_not_seen_is_not_believed(subtests) -> None:
             judged(short("support-1"), ground=lambda _e, _n: ground)
 
 
+def test_a_log_without_the_line_about_the_level_is_refused() -> None:
+    scenario = short("transport-1")
+    machine = vehicle()
+    game = played(machine, scenario)
+    game.lines = [line for line in game.lines if ",w," not in line]
+    with pytest.raises(LogIncompleteError, match="line about the level is missing"):
+        trajectory_of(log_of(game), machine, scenario, game="1", mod="2")
+
+
 def test_a_tilted_boxs_height_is_that_of_its_upper_side() -> None:
     box = TerrainBox(center=(0.0, 0.0, 1.0), size=(4.0, 10.0, 2.0), slope_deg=30.0)
     # The middle of the upper side is 1 along the box's own vertical: half a unit south, 0.87 up.
@@ -338,3 +347,9 @@ def test_a_tilted_boxs_height_is_that_of_its_upper_side() -> None:
     rise = height_at((box,), 1.0, 2.0) - height_at((box,), 1.0, 1.0)
     assert rise == pytest.approx(3**-0.5)
     assert height_at((box,), 2.1, 0.0) == 0.0
+
+
+def test_many_boxes_have_few_probes() -> None:
+    box = TerrainBox(center=(0.0, 0.0, 0.25), size=(1.0, 1.0, 0.5))
+    terrain = tuple(box.model_copy(update={"center": (3.0 * i, 30.0, 0.25)}) for i in range(64))
+    assert len(level_probes(Scenario(duration_s=1.0, terrain=terrain))) == MAX_PROBES

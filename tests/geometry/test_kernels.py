@@ -57,6 +57,12 @@ def test_a_processor_without_the_usual_ones_has_the_first_that_it_can_run(subtes
             assert environment == {"OPENBLAS_CORETYPE": pinned}
 
 
+def test_the_widest_kernels_can_be_chosen() -> None:
+    environment = {kernels.CHOICE: "SkylakeX", "NPY_DISABLE_CPU_FEATURES": "X86_V4"}
+    assert kernels.pin(environment, tuple(kernels.LADDER)) == "SkylakeX"
+    assert environment == {kernels.CHOICE: "SkylakeX", "OPENBLAS_CORETYPE": "SkylakeX"}
+
+
 def test_kernels_that_the_processor_lacks_are_refused_with_those_it_has() -> None:
     environment = {kernels.CHOICE: "SkylakeX"}
     with pytest.warns(UserWarning, match="'SkylakeX'; this machine runs Haswell, Sandybridge"):

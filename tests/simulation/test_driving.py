@@ -1,5 +1,6 @@
 """Keys, heat, and trials that somebody outside drives: the same bytes, one or many."""
 
+import gc
 import math
 from dataclasses import replace
 
@@ -57,6 +58,11 @@ def test_a_wheel_follows_its_key_with_a_lag() -> None:
     assert speeds[59] == pytest.approx(reached)
     assert speeds[149] == pytest.approx(WHEEL_SPEED, rel=1e-3)
     assert speeds[299] < 0.01
+
+
+def test_keys_for_both_directions_brake() -> None:
+    both = press("UpArrow", 0.0, 3.0), press("DownArrow", 0.0, 3.0)
+    assert (_speeds_of(car(), *both) == 0.0).all()
 
 
 def test_given_controls_replace_the_machines_own(tasks) -> None:
@@ -216,6 +222,20 @@ def test_a_wrong_answer_is_refused_and_nothing_passes() -> None:
     assert {name.partition(".")[2]: low for name, low in pilot.axes.items()} == {
         "spinning_forward": -1.0
     }
+
+
+def test_an_abandoned_trial_ends_its_world(monkeypatch) -> None:
+    ended = []
+    drive = Drive(car(drive=()), SHORT, "mujoco")
+    close = type(drive._rollout._adapter).close
+    monkeypatch.setattr(
+        type(drive._rollout._adapter), "close", lambda engine: (ended.append(1), close(engine))
+    )
+    abandoned = Drive(car(drive=()), SHORT, "mujoco")
+    drive.close()
+    del abandoned
+    gc.collect()
+    assert ended == [1]
 
 
 def test_a_machine_that_blows_up_ends_the_trial_there(engine, monkeypatch) -> None:

@@ -77,6 +77,18 @@ def test_a_film_shows_the_trial(run, stored, tmp_path, kind, count) -> None:
     assert len(frames[0].convert("RGB").getcolors(maxcolors=10**6)) > 8
 
 
+def test_a_seed_varies_the_start(run, stored, tmp_path) -> None:
+    starts = []
+    for more in ([], ["--seed", "1"], ["--seed", "2"]):
+        data = tmp_path / "shifted.parquet"
+        asked = ("--engine", "mujoco", "--trajectory", str(data))
+        assert run("simulate", stored("beam"), *asked, *more).exit_code == 0
+        starts.append(tuple(read_trajectory(data.read_bytes()).positions[0, 0]))
+    assert len(set(starts)) == 3
+    assert starts[0][:2] == (0.0, 0.0)
+    assert all(abs(x) <= 0.1 and abs(y) <= 0.1 for x, y, _ in starts)
+
+
 @pytest.mark.ci
 def test_seeds_tell_how_often_a_machine_succeeds(run, stored) -> None:
     given = ("simulate", stored("beam-braced-on-top"), "--engine", "mujoco")

@@ -49,6 +49,20 @@ rawequal rawget rawlen rawset require setmetatable string utf8 warn xpcall
 """
 
 
+def test_nothing_and_yes_and_no_are_answers() -> None:
+    assert answered(control("")) == [{}]
+    assert answered(control("return { a = true, b = false }")) == [{"a": 1.0, "b": 0.0}]
+
+
+def test_what_was_sensed_before_stays_what_it_was() -> None:
+    program = ready(
+        "local last\n"
+        + control("local was = last last = sense return was and { h = was.height } or {}")
+    )
+    assert program.answer(0, 0.0, [5.0, 0.0, 0.0]) == {}
+    assert program.answer(1, 0.04, [6.0, 0.0, 0.0]) == {"h": 5.0}
+
+
 def test_a_program_has_nothing_of_files_processes_or_other_programs() -> None:
     for there in ("{}", "_G.{}"):
         asked = ", ".join(f"{name} = {there.format(name)} ~= nil" for name in LEFT_OUT.split())

@@ -111,6 +111,15 @@ def test_older_files_are_read_and_can_be_written(tasks) -> None:
         dataclasses.replace(trajectory, joint_loads=np.zeros((3, 2), dtype=np.float32))
 
 
+def test_samples_are_taken_at_25_hz_from_the_start_on(tasks) -> None:
+    scenario = tasks["support-1"].scenario.model_copy(update={"duration_s": 2.0})
+    trajectory = simulate(load_machine("one-shot-bridge"), scenario, "mujoco")
+    assert np.allclose(trajectory.time_s, np.arange(51) / 25)
+    assert trajectory.cargo_mass is not None
+    assert trajectory.cargo_mass[0] == pytest.approx(5 + 1495 * 0.005)
+    assert trajectory.cargo_mass[-1] == pytest.approx(5 + 1495 * 0.1)
+
+
 def test_positions_are_the_points_shown_to_models(engine, tasks) -> None:
     machine = car()
     scenario = tasks["transport-1"].scenario.model_copy(update={"duration_s": 0.04})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from scipy.spatial.transform import Rotation
 from support.machines.references import load_machine
 from support.machines.trials import trial as trial_of
 
@@ -133,6 +134,18 @@ def test_a_success_that_a_flag_disqualifies_is_none():
     text = score_text(builtin_tasks()["lift-2"], flagged)
     assert text.startswith("It did not succeed.")
     assert meaning("start_too_high") in text
+
+
+def test_toppling_is_told_from_the_starting_blocks_lean():
+    given = builtin_tasks()["transport-1"]
+    told, path = trial_of(given, load_machine("car-without-keys"), "mujoco", duration_s=1.0)
+    for degrees, axis, topples in ((59, "y", False), (61, "y", True), (61, "z", False)):
+        lean = Rotation.from_euler(axis, degrees, degrees=True).as_quat()[[3, 0, 1, 2]]
+        turned = path.quaternions.copy()
+        turned[:10, 0], turned[10:, 0] = (1, 0, 0, 0), lean
+        text = score_text(given, told, replace(path, quaternions=turned))
+        assert (f"from {path.time_s[10]:.2f} s on" in text) == topples
+        assert ("It toppled" in text) == (f"by {degrees}°" in text) == topples
 
 
 def test_the_first_break_is_told():
