@@ -25,17 +25,17 @@ PRESSES: tuple[KeyPress, ...] = (press("Alpha1", 0.2, 8.0), press("Alpha2", RELE
 _LEAN_DEG = Shape().lean_deg
 _BACK, _UNDER = leaning(SOUTH, _LEAN_DEG), leaning(DOWN, _LEAN_DEG)
 
-Latch = tuple[str, Direction, str, Direction, Direction]
-"""What a decoupler sits on, the side, and which side of what a brace holds to its own side."""
+Latch = tuple[str, Direction, str, Direction]
+"""What a decoupler sits on, the side, and which side of what a brace holds to its far end."""
 LATCHES: dict[str, tuple[int, tuple[Latch, ...]]] = {
-    "beside the arm": (3, (("10", EAST, "46", WEST, EAST),)),
-    "behind the arm": (2, (("24", UP, "46", _BACK, UP),)),
-    "across the arm": (2, (("11", EAST, "46", _BACK, EAST),)),
-    "on the arm": (3, (("45", WEST, "9", UP, WEST),)),
-    "two at once": (3, (("10", EAST, "46", WEST, EAST), ("24", UP, "46", _BACK, UP))),
-    "under the tail": (4, (("15", UP, "49", _UNDER, UP),)),
-    "at the post": (2, (("20", UP, "43", _UNDER, UP),)),
-    "on the mast": (3, (("55", WEST, "9", UP, WEST),)),
+    "beside the arm": (3, (("10", EAST, "46", WEST),)),
+    "behind the arm": (2, (("24", UP, "46", _BACK),)),
+    "across the arm": (2, (("11", EAST, "46", _BACK),)),
+    "on the arm": (3, (("45", WEST, "9", UP),)),
+    "two at once": (3, (("10", EAST, "46", WEST), ("24", UP, "46", _BACK))),
+    "under the tail": (4, (("15", UP, "49", _UNDER),)),
+    "at the post": (2, (("20", UP, "43", _UNDER),)),
+    "on the mast": (3, (("55", WEST, "9", UP),)),
 }
 """Springs of the catapult, and its latches."""
 
@@ -56,14 +56,15 @@ def sprung_arm(springs: int = 2, weights: int = 0) -> KeyedDraft:
     draft, foot = _on_a_foot()
     north, south = _on_a_swivel(draft, north=3, south=3)
     for end in (north[-1], south[-1]):
+        top = end
         for _ in range(weights):
-            end = draft.attach(end, UP, "Ballast")
+            top = draft.attach(top, UP, "Ballast")
     for end, base, side, other in (
         (north[-1], foot[NORTH][-1], DOWN, UP),
         (north[-1], foot[NORTH][-2], EAST, EAST),
     )[:springs]:
         _spring(draft, end, base, side, other)
-    _latch(draft, foot[SOUTH][-1], UP, south[-1], DOWN, UP)
+    _latch(draft, foot[SOUTH][-1], UP, south[-1], DOWN)
     return draft
 
 
@@ -71,7 +72,7 @@ def _trebuchet() -> KeyedDraft:
     draft, foot = _on_a_foot()
     north, south = _on_a_swivel(draft, north=1, south=4)
     draft.attach(north[-1], DOWN, "Log")
-    _latch(draft, foot[SOUTH][-1], UP, south[-1], DOWN, UP)
+    _latch(draft, foot[SOUTH][-1], UP, south[-1], DOWN)
     return draft
 
 
@@ -82,7 +83,7 @@ def _crossbow() -> KeyedDraft:
     for side, back in ((EAST, WEST), (WEST, EAST)):
         tip, tower = draft.row(bow, side, 2)[-1], draft.row(foot[side][-1], UP, 9)[-1]
         _spring(draft, tip, tower, UP, back)
-    _latch(draft, post[0], SOUTH, bow, SOUTH, SOUTH)
+    _latch(draft, post[0], SOUTH, bow, SOUTH)
     return draft
 
 
@@ -92,7 +93,7 @@ def _gate() -> KeyedDraft:
     leaf = draft.row(hub, NORTH, 4)
     tower = draft.row(foot[EAST][-1], UP, 4)
     _spring(draft, leaf[2], tower[-1], EAST, WEST)
-    _latch(draft, foot[NORTH][-1], UP, leaf[-1], DOWN, UP)
+    _latch(draft, foot[NORTH][-1], UP, leaf[-1], DOWN)
     return draft
 
 
@@ -102,7 +103,7 @@ def _drawbridge() -> KeyedDraft:
     deck = draft.row(hinge, UP, 5)
     _spring(draft, deck[-1], foot[NORTH][-1], NORTH, NORTH)
     _spring(draft, deck[-1], foot[NORTH][-1], EAST, EAST)
-    _latch(draft, draft.row("1", UP, 5)[-1], NORTH, deck[-1], SOUTH, NORTH)
+    _latch(draft, draft.row("1", UP, 5)[-1], NORTH, deck[-1], SOUTH)
     return draft
 
 
@@ -134,12 +135,10 @@ def _spring(draft: Draft, end: str, base: str, side: Direction, other: Direction
     _bind(draft, list(draft.machine.connectors)[-1], "contract", "Alpha1")
 
 
-def _latch(
-    draft: Draft, base: str, way: Direction, held: str, side: Direction, own: Direction
-) -> None:
+def _latch(draft: Draft, base: str, way: Direction, held: str, side: Direction) -> None:
     decoupler = draft.attach(base, way, "Decoupler")
     _bind(draft, decoupler, "decouple", "Alpha2")
-    draft.connect(decoupler, held, own, side)
+    draft.connect(decoupler, held, way, side)
 
 
 def _bind(draft: Draft, block: str, action: str, key: str) -> None:
