@@ -299,7 +299,11 @@ def test_a_line_is_followed_in_its_way_and_once() -> None:
         for way in (first, both)
     )
     assert 2 < ahead.metrics["stretches"] == back.metrics["stretches"]
+    assert score(task, machine, shifted(trial, [1.3, 0, 0])).metrics["stretches"] <= 9, "beside it"
+    wheel = next(k for k, name in enumerate(trial.block_ids) if machine.blocks[name].module.motor)
+    torn = score(task, machine, lost(trial, 101, wheel)).metrics
     stops = score(task, machine, played(trial, np.minimum(samples, 100)))
+    assert (torn["wheels_lost"], torn["stretches"]) == (True, stops.metrics["stretches"])
     assert 0 < stops.metrics["stretches"] < 6
     assert stops.metrics["all_followed_s"] is None
     assert stops.indicator == pytest.approx(stops.metrics["length"] / 30, rel=1e-5)
