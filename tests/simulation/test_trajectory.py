@@ -198,7 +198,7 @@ several = pytest.mark.skipif(not OTHERS, reason="this processor has one kind of 
 TASK = builtin_tasks()["support-1"]
 
 
-SCENARIO = TASK.scenario.model_copy(update={"duration_s": 2.6})
+SHORT = dataclasses.replace(TASK, scenario=TASK.scenario.model_copy(update={"duration_s": 2.6}))
 
 
 @pytest.mark.ci
@@ -208,10 +208,10 @@ def test_a_trial_of_other_kernels_is_repeated_to_the_byte() -> None:
     own, *others = (
         write_trajectory(trajectory)
         for trajectory in (
-            simulate(machine, SCENARIO, "mujoco"),
-            simulate_with(OTHERS[0], machine, SCENARIO, "mujoco"),
-            simulate_with(OTHERS[0], machine, SCENARIO, "mujoco"),
-            simulate_with(kernels.PINNED, machine, SCENARIO, "mujoco"),
+            simulate(machine, SHORT.scenario, "mujoco"),
+            simulate_with(OTHERS[0], SHORT, machine, "mujoco"),
+            simulate_with(OTHERS[0], SHORT, machine, "mujoco"),
+            simulate_with(kernels.PINNED, SHORT, machine, "mujoco"),
         )
     )
     assert others[0] == others[1], "the same kernels, the same bytes"

@@ -3,7 +3,8 @@
 import io
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -72,11 +73,25 @@ def with_column(name: str, values: Callable[[int], list]) -> Callable[[bytes], b
     return lambda data: with_facts(data, change=change)
 
 
+def part_of(whole: Any, count: int) -> Any:
+    """The first samples of a trajectory, or of one of its records."""
+    length = len(whole.time_s) if isinstance(whole, Trajectory) else None
+    parts = {}
+    for field in fields(whole):
+        value = getattr(whole, field.name)
+        if field.name in ("bearing", "piloting") and value is not None:
+            parts[field.name] = part_of(value, count)
+        elif isinstance(value, np.ndarray) and (length is None or len(value) == length):
+            parts[field.name] = value[:count]
+    return replace(whole, **parts)
+
+
 OTHERS: dict[str, Forgery] = {
     "blocks of another machine": lambda t: replace(t, block_ids=("1", "3")),
     "blocks in another order": lambda t: replace(t, block_ids=t.block_ids[::-1]),
     "one block twice": lambda t: replace(t, block_ids=("1", "1")),
     "another time base": lambda t: replace(t, time_s=t.time_s * 2),
+    "cut off": lambda t: part_of(t, len(t.time_s) - 1),
     "a start a little higher": lambda t: replace(t, positions=t.positions + np.float32(0.01)),
     "a hole in the middle": lambda t: replace(t, positions=put(t.positions, 3, np.nan)),
     "infinity between figures": lambda t: replace(t, quaternions=put(t.quaternions, 2, np.inf)),

@@ -54,8 +54,8 @@ def elsewhere(context, job) -> bytes:
     document = context.artifacts.get(record.machine_hash)
     trajectory = simulate_with(
         OTHERS[0],
+        builtin_tasks()[SPEC.task],
         Machine.from_document(json.loads(document)),
-        builtin_tasks()[SPEC.task].scenario,
         "mujoco",
     )
     return write_trajectory(trajectory)

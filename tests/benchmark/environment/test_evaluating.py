@@ -7,7 +7,6 @@ import os
 import signal
 import threading
 import time
-from dataclasses import replace
 
 import psutil
 import pytest
@@ -21,6 +20,7 @@ from buildarena_benchmark.environment import (
     TrialPool,
     try_machine,
 )
+from buildarena_benchmark.scores import decided_length
 from buildarena_geometry import DocumentError, Machine
 from buildarena_simulation import SimulationError
 
@@ -89,11 +89,12 @@ def test_a_trial_that_ends_when_it_is_decided_has_the_same_verdict(bridge) -> No
         weak.act("remove_block", {"block_id": connector})
     for machine in (bridge, weak):
         whole, ended = (try_machine(task, machine, whole=how) for how in (True, False))
-        assert replace(ended.score, metrics={}) == replace(whole.score, metrics={})
+        assert ended.score == whole.score
         falls = whole.score.metrics["fall_time_s"]
-        assert ended.score.metrics["fall_time_s"] == falls
-        lengths = [len(trial.trajectory.time_s) for trial in (ended, whole)]
-        assert (lengths[0] < lengths[1]) is (machine is weak or falls is not None)
+        length = len(ended.trajectory.time_s)
+        assert ended.trajectory.time_s[-1] == pytest.approx(falls + 1.0)
+        for trial in (ended, whole):
+            assert decided_length(task, trial.trajectory) == length < len(whole.trajectory.time_s)
 
 
 def children() -> list[psutil.Process]:

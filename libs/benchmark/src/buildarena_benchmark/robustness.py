@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from buildarena_benchmark.constraints import broken_constraint
-from buildarena_benchmark.scores import Score, failed_score, score
+from buildarena_benchmark.scores import Score, decision, failed_score, score
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Play, simulate_many
@@ -56,7 +56,7 @@ def robustness(
     if broken_constraint(task, machine) is not None:
         scores = [failed_score(task, machine)] * len(seeds)
         return Robustness(seeds=tuple(seeds), scores=tuple(scores))
-    plays = (Play(seed=seed) for seed in seeds)
+    plays = (Play(seed=seed, until=decision(task, seed=seed)) for seed in seeds)
     for k, outcome in enumerate(simulate_many(machine, task.scenario, engine, plays=plays), 1):
         if isinstance(outcome, MachineNotSimulable):
             scores.append(failed_score(task, machine))

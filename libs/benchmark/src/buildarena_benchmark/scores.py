@@ -1,16 +1,25 @@
 """Scores: one trial's verdict, and a trial that never was."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from buildarena_benchmark.scorers.measures.stability import is_unstable
 from buildarena_benchmark.scorers.registry import known_scorers
 from buildarena_benchmark.scorers.scorer import UNSTABLE, Metric
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
-from buildarena_simulation import Trajectory, world_of
+from buildarena_simulation import Trajectory, simulate, world_of
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.control import KeyHold
 from buildarena_simulation.trial import Decision
+
+AFTER_S: Final = 1.0
+"""A trial goes on for this long after it is decided, seconds, so that its picture shows why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,21 +70,84 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
     )
 
 
-def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
-    """Tells when a running trial is decided, for those who try many machines.
-
-    A trial that ends there has the success, indicator and flags of the whole one; metrics that tell
-    of the rest (lowest height, number of broken joints) are of what was seen.
+def simulate_task(
+    task: "Task",
+    machine: "Machine",
+    engine: str,
+    *,
+    controls: Sequence[KeyHold] | None = None,
+    seed: int | None = None,
+    whole: bool = False,
+    on_progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Simulate a task's trial until it is decided, and `AFTER_S` longer.
 
     Args:
         task: The task.
-        seed: Of the trial.
+        machine: The machine.
+        engine: Name of the engine.
+        controls: See `simulate`.
+        seed: See `simulate`.
+        whole: Whether it is simulated to its end instead; its score is the same.
+        on_progress: See `simulate`.
+
+    Raises:
+        BuildarenaSimulationError: As of `simulate`.
+    """
+    return simulate(
+        machine,
+        task.scenario,
+        engine,
+        controls=controls,
+        seed=seed,
+        until=None if whole else decision(task, seed=seed),
+        on_progress=on_progress,
+    )
+
+
+def decision(task: "Task", *, seed: int | None = None) -> "Decision | None":
+    """Return what ends one trial `AFTER_S` after it is decided.
+
+    A trial that ends there has the score of the whole one.
+
+    Args:
+        task: The task.
+        seed: Seed of the trial.
 
     Returns:
-        What `simulate` takes as `until`; None where the whole trial decides.
+        What `simulate` takes as `until`, for one trial; None where the whole trial decides.
     """
     decide = known_scorers()[task.scorer].decision
-    return decide(task.scoring, task.scenario.world(seed)) if decide else None
+    return _Afterwards(decide(task.scoring, task.scenario.world(seed))) if decide else None
+
+
+def decided_length(task: "Task", trajectory: Trajectory, *, seed: int | None = None) -> int:
+    """Return how many samples a trial has that is simulated until it is decided.
+
+    Args:
+        task: The task.
+        trajectory: What was recorded of it.
+        seed: Seed of the trial.
+    """
+    cargo, ends = trajectory.cargo_position, decision(task, seed=seed)
+    if ends is None or cargo is None:
+        return task.scenario.sample_count
+    last = next((k for k in range(1, len(cargo)) if ends(cargo[k])), None)
+    return task.scenario.sample_count if last is None else last + 1
+
+
+class _Afterwards:
+    """Whether a trial was decided a while ago; called once for each sample."""
+
+    def __init__(self, is_decided: Decision) -> None:
+        self._is_decided, self._left = is_decided, -1
+
+    def __call__(self, cargo: NDArray[np.float32] | None) -> bool:
+        if self._left > 0:
+            self._left -= 1
+        elif self._left < 0 and self._is_decided(cargo):
+            self._left = round(AFTER_S * SAMPLE_RATE_HZ)
+        return self._left == 0
 
 
 def failed_score(task: "Task", machine: "Machine | None" = None) -> Score:

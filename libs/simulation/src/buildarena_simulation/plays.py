@@ -59,9 +59,9 @@ def simulate(
         ValueError: A start and a seed are given, or only one of start and scenario has a cargo.
         SimulationError: The simulator failed; never scored.
     """
-    play = Play(controls=controls, start=start, seed=seed)
+    play = Play(controls=controls, start=start, seed=seed, until=until)
     return _Model(machine).played(
-        scenario, engine, play, substeps=substeps, until=until, on_progress=on_progress
+        scenario, engine, play, substeps=substeps, on_progress=on_progress
     )
 
 
@@ -73,11 +73,13 @@ class Play:
         controls: A control sequence to use in place of the machine's own, or of its controller.
         start: Where machine and cargo start, in place of where the scenario puts them.
         seed: Draws what the scenario leaves to it, and varies the start; None for the exact one.
+        until: Ends the trial after the first sample for which it is true.
     """
 
     controls: Sequence[KeyHold] | None = None
     start: Start | None = None
     seed: int | None = None
+    until: Decision | None = None
 
 
 def simulate_many(
@@ -132,7 +134,6 @@ class _Model:
         play: Play,
         *,
         substeps: int = 1,
-        until: Decision | None = None,
         on_progress: Callable[[float], None] | None = None,
     ) -> Trajectory:
         """One trial; see `simulate`."""
@@ -158,6 +159,6 @@ class _Model:
             start=play.start,
             seed=seed,
             substeps=substeps,
-            until=until,
+            until=play.until,
             on_progress=on_progress,
         )

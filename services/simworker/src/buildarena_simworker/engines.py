@@ -13,13 +13,13 @@ from buildarena_backend.trials.simulator import (
 )
 from buildarena_benchmark.environment import TrialPool
 from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError
+from buildarena_benchmark.scores import simulate_task
 from buildarena_simulation import (
     SIMULATION_VERSION,
     MachineNotSimulable,
     SimulationError,
     engine_version,
     processor,
-    simulate,
 )
 
 
@@ -49,10 +49,10 @@ class EngineSimulator:
         machine, task = trial.machine, trial.task
         try:
             if self._pool is None:
-                trajectory = simulate(
+                trajectory = simulate_task(
+                    task,
                     machine,
-                    task.scenario,
-                    engine=self.name,
+                    self.name,
                     controls=trial.controls,
                     seed=trial.seed,
                     on_progress=lambda _: trial.require_held(),

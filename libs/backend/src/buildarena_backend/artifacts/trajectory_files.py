@@ -49,8 +49,17 @@ def require(condition: object, message: str) -> None:
         raise OutcomeRefusedError(message)
 
 
-def require_bounded(data: bytes, scenario: Scenario, blocks: int, *, piloted: bool) -> int:
+def require_bounded(
+    data: bytes, scenario: Scenario, blocks: int, *, piloted: bool, may_end: bool
+) -> int:
     """Looks at a file's own account of itself, before anything is unpacked.
+
+    Args:
+        data: The file.
+        scenario: What the machine was put through.
+        blocks: How many it has.
+        piloted: Whether a program acted.
+        may_end: Whether the trial may be decided, and end, before the scenario does.
 
     Returns:
         The number of instants that it tells of.
@@ -63,7 +72,8 @@ def require_bounded(data: bytes, scenario: Scenario, blocks: int, *, piloted: bo
     except (pa.ArrowException, OSError, ValueError) as error:
         raise OutcomeRefusedError(f"these bytes are not a trajectory: {error}"[:500]) from error
     rows, whole = int(metadata.num_rows), scenario.sample_count
-    require(rows == whole, f"it has {rows:,} instants, not {whole:,}")
+    fits = 0 < rows <= whole if may_end else rows == whole
+    require(fits, f"it has {rows:,} instants, not {whole:,}")
     require(metadata.num_row_groups == 1, "a trajectory has one row group")
     require(metadata.num_columns <= MAX_COLUMNS, "a trajectory has fewer columns")
     facts = sum(len(key) + len(value) for key, value in (metadata.metadata or {}).items())

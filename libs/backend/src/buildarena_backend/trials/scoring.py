@@ -13,10 +13,13 @@ from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.results.results import JobScore
 from buildarena_backend.states import Outcome
+from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Task, failed_score
 from buildarena_benchmark.families.unknowns import drawn_numbers
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS
+from buildarena_benchmark.scorers.registry import known_scorers
+from buildarena_benchmark.scores import AFTER_S
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 
@@ -163,4 +166,6 @@ def job_manifest(job: Job, task: Task, record: RolloutRecord | None) -> Mapping[
         manifest["machine"] = record.machine_hash
         manifest["trajectory"] = record.trajectory_hash
         manifest["rollout"] = record.number
+        ends_early = known_scorers()[task.scorer].decision and record.engine != BESIEGE
+        manifest["trial_ends"] = f"{AFTER_S:g} s after it is decided" if ends_early else "whole"
     return manifest

@@ -25,6 +25,7 @@ from buildarena_backend.artifacts.trajectory_files import (
 )
 from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_backend.trials.trials import MAX_SENTENCE, REFUSED, refused
+from buildarena_benchmark.scores import decided_length
 from buildarena_besiege import MachineNotPlayableError, logged_trajectory, prepare_run
 from buildarena_besiege.keys import cannons
 from buildarena_besiege.tracking import tracked_blocks
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from buildarena_benchmark import Task
     from buildarena_geometry import KeyPress, Machine
     from buildarena_simulation import Scenario
     from buildarena_simulation.structure.model import Structure
@@ -86,7 +88,8 @@ def checked_trajectory(
     """
     world = scenario.world(seed)
     piloted = bool(machine.controller) and controls is None
-    count = require_bounded(data, world, len(machine.blocks), piloted=piloted)
+    may_end = simulator != BESIEGE
+    count = require_bounded(data, world, len(machine.blocks), piloted=piloted, may_end=may_end)
     try:
         same("schema", schema_of(data), PILOTED_SCHEMA if piloted else SCHEMA_VERSION)
         trajectory = read_trajectory(data)
@@ -108,6 +111,17 @@ def checked_trajectory(
         _require_engine(trajectory, machine, world, seed)
         _require_presses(trajectory, machine, world, controls, seed)
     return trajectory
+
+
+def require_decided(trajectory: Trajectory, task: Task, *, seed: int | None) -> None:
+    """Checks that an engine's trial lasts until it is decided, and no longer than it must.
+
+    Raises:
+        OutcomeRefusedError: It is cut off, or goes on.
+    """
+    wanted = decided_length(task, trajectory, seed=seed)
+    count = len(trajectory.time_s)
+    require(count == wanted, f"it has {count:,} instants, not {wanted:,}, when it is decided")
 
 
 def require_refusable(

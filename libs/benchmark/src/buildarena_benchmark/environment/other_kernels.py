@@ -15,15 +15,16 @@ from dataclasses import asdict
 from typing import Final
 
 from buildarena_benchmark.environment.trials.processes import PARENT, end_with_parent
+from buildarena_benchmark.scores import simulate_task
+from buildarena_benchmark.tasks.document import TaskDocument
+from buildarena_benchmark.tasks.task import Task, task_of
 from buildarena_geometry import KeyPress, Machine, kernels
 from buildarena_simulation import (
     MachineNotSimulable,
-    Scenario,
     SimulationError,
     Trajectory,
     read_trajectory,
     require_engine,
-    simulate,
     write_trajectory,
 )
 
@@ -34,14 +35,14 @@ REFUSED: Final = 3
 
 def simulate_with(
     name: str,
+    task: Task,
     machine: Machine,
-    scenario: Scenario,
     engine: str,
     *,
     controls: Sequence[KeyPress] | None = None,
     seed: int | None = None,
 ) -> Trajectory:
-    """As `buildarena_simulation.simulate`, with the kernels that OpenBLAS calls by this name.
+    """As `simulate_task`, with the kernels that OpenBLAS calls by this name.
 
     Raises:
         UnknownEngineError: No engine of this name is installed.
@@ -53,7 +54,7 @@ def simulate_with(
         raise SimulationError(f"this processor has no kernels {name}")
     question = {
         "machine": machine.to_document(),
-        "scenario": scenario.model_dump_json(),
+        "task": task.as_document(),
         "engine": engine,
         "controls": None if controls is None else [asdict(press) for press in controls],
         "seed": seed,
@@ -83,9 +84,9 @@ def main() -> None:
     question = json.load(sys.stdin)
     controls = question["controls"]
     try:
-        trajectory = simulate(
+        trajectory = simulate_task(
+            task_of(TaskDocument.model_validate(question["task"])),
             Machine.from_document(question["machine"]),
-            Scenario.model_validate_json(question["scenario"]),
             question["engine"],
             controls=None if controls is None else tuple(KeyPress(**press) for press in controls),
             seed=question["seed"],

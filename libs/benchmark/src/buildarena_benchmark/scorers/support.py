@@ -122,10 +122,10 @@ def judge(
         NEVER_FELL: success and decided is None,
         SPAN_NOT_MEASURED: trajectory.bearing is None and terrain_sides(scenario) is not None,
     }
-    first = trajectory.breaks[0] if trajectory.breaks else None
+    ends_s = float(trajectory.time_s[-1 if decided is None else decided])
+    breaks = [one for one in trajectory.breaks if one.time_s <= ends_s]
     metrics: dict[str, Metric] = {
         "time_above_s": rounded(time_above),
-        "lowest_cargo_height": rounded(height.min()),
         "start_height": rounded(height[0]),
         "fall_time_s": None if fell is None else rounded(trajectory.time_s[fell]),
         "collapse_time_s": None if collapsed is None else rounded(trajectory.time_s[collapsed]),
@@ -133,8 +133,8 @@ def judge(
         "load_on_debris": None
         if collapsed is None
         else rounded(trajectory.cargo_mass[-1 if fell is None else fell]),
-        "load_at_first_break": first.cargo_mass if first else None,
-        "broken_joints": len(trajectory.breaks),
+        "load_at_first_break": breaks[0].cargo_mass if breaks else None,
+        "broken_joints": len(breaks),
         **_span_metrics(span),
     }
     if scoring.per_mass:

@@ -21,7 +21,7 @@ from buildarena_backend.process.context import Context
 from buildarena_backend.states import AttemptResult
 from buildarena_backend.telemetry.tracing import Attribute, span
 from buildarena_backend.trials.simulator import BESIEGE
-from buildarena_backend.trials.trial_checks import checked_versions
+from buildarena_backend.trials.trial_checks import checked_versions, require_decided
 from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
 from buildarena_backend.trials.trials import File, TrialResult
 from buildarena_simulation import Trajectory
@@ -147,6 +147,8 @@ class Outcomes:
                 controls=due.controls,
                 seed=due.request.seed,
             )
+            if simulator != BESIEGE:
+                require_decided(trajectory, due.task, seed=due.request.seed)
         annotations = said.annotations
         return TrialResult(
             trajectory=trajectory,

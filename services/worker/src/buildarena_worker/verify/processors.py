@@ -14,9 +14,10 @@ import numpy as np
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_benchmark import Task
 from buildarena_benchmark.environment.other_kernels import simulate_with
+from buildarena_benchmark.scores import simulate_task
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.kernels import runnable
-from buildarena_simulation import Trajectory, processor, simulate
+from buildarena_simulation import Trajectory, processor
 
 PROCESSOR: Final = "processor"
 """The key of a rollout's versions that says what simulated it, see `buildarena_simulation`."""
@@ -64,10 +65,9 @@ def simulated(
     Raises:
         BuildarenaSimulationError: As `buildarena_simulation.simulate`.
     """
-    play = machine, task.scenario, record.engine
+    play = task, machine, record.engine
     if name == processor()["blas"]:
-        held = None if controls is None else tuple(controls)
-        return simulate(*play, controls=held, seed=record.seed)
+        return simulate_task(*play, controls=controls, seed=record.seed)
     return simulate_with(name, *play, controls=controls, seed=record.seed)
 
 

@@ -53,7 +53,7 @@ class Evaluator:
         processes: int | None = None,
         timeout_s: float = LONGEST_TRIAL_S,
         trajectories: bool = False,
-        whole: bool = True,
+        whole: bool = False,
     ) -> None:
         self.task = chosen_task(task)
         self.simulator = checked_simulator(simulator)

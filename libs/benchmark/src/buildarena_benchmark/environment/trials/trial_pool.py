@@ -16,6 +16,7 @@ from buildarena_benchmark import Task, builtin_tasks, parse_task
 from buildarena_benchmark.environment.choices import is_builtin
 from buildarena_benchmark.environment.trials.trials import Trial, try_machine
 from buildarena_benchmark.environment.trials.warm_process import ProcessEndedError, WarmProcess
+from buildarena_benchmark.scores import simulate_task
 from buildarena_geometry import DocumentError, KeyPress, Machine
 from buildarena_simulation import (
     DEFAULT_ENGINE,
@@ -23,7 +24,6 @@ from buildarena_simulation import (
     SimulationError,
     Trajectory,
     read_trajectory,
-    simulate,
     write_trajectory,
 )
 
@@ -91,7 +91,7 @@ class _Question:
     machine: str
     simulator: str
     seed: int | None = None
-    whole: bool = True
+    whole: bool = False
     trajectory: bool = True
     scored: bool = True
     controls: Sequence[KeyPress] | None = None
@@ -121,7 +121,7 @@ class TrialPool:
         *,
         timeout_s: float = LONGEST_TRIAL_S,
         trajectories: bool = False,
-        whole: bool = True,
+        whole: bool = False,
         name: str = "trials",
     ) -> None:
         count = len(os.sched_getaffinity(0)) if processes is None else processes
@@ -300,12 +300,8 @@ def _answered(question: _Question) -> Any:
 def _simulated(task: Task, question: _Question) -> Trajectory | Exception:
     machine = Machine.from_document(json.loads(question.machine))
     try:
-        return simulate(
-            machine,
-            task.scenario,
-            question.simulator,
-            controls=question.controls,
-            seed=question.seed,
+        return simulate_task(
+            task, machine, question.simulator, controls=question.controls, seed=question.seed
         )
     except (MachineNotSimulable, SimulationError) as error:
         return error

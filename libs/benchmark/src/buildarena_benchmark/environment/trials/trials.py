@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.flags import is_disqualified, meaning
 from buildarena_benchmark.scorers.measures.series import rotations
-from buildarena_benchmark.scores import decision
+from buildarena_benchmark.scores import simulate_task
 from buildarena_geometry import Machine
-from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory, simulate
+from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory
 
 TOPPLED_DEG: Final = 60.0
 """A starting block that leans by more has toppled, degrees. Ours."""
@@ -93,7 +93,7 @@ def try_machine(
     simulator: str = DEFAULT_ENGINE,
     *,
     seed: int | None = None,
-    whole: bool = True,
+    whole: bool = False,
 ) -> Trial:
     """Checks a machine by the task's constraints, and simulates and scores it.
 
@@ -103,8 +103,7 @@ def try_machine(
         simulator: Name of the engine, see `buildarena_simulation.ENGINES`.
         seed: Varies the start as a fair repetition would; None for the exact one, which is the
             service's.
-        whole: False ends the trial when it is decided: success, indicator and flags are those of
-            the whole trial, other metrics and the trajectory of what was seen until then.
+        whole: See `simulate_task`.
 
     Raises:
         SimulationError: The simulator failed, which says nothing of the machine.
@@ -119,8 +118,7 @@ def try_machine(
             wall_s=time.perf_counter() - started,
         )
     try:
-        until = None if whole else decision(task, seed=seed)
-        trajectory = simulate(machine, task.scenario, simulator, seed=seed, until=until)
+        trajectory = simulate_task(task, machine, simulator, seed=seed, whole=whole)
     except MachineNotSimulable as refusal:
         return Trial(
             score=failed_score(task, machine),
