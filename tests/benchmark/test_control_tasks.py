@@ -72,6 +72,7 @@ def test_the_expert_passes_and_is_not_flagged(name, engine, seed) -> None:
 
 
 @pytest.mark.nightly
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("name", CONTROL)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_the_expert_passes_in_nine_of_ten_worlds(name, engine) -> None:

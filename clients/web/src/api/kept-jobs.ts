@@ -15,10 +15,13 @@ export interface Rows {
 type Value = string | number | null;
 
 const EQUAL: Readonly<Record<string, (job: JobView) => Value>> = {
+  task: (job) => job.task,
   task_version: (job) => job.task_version,
+  model: (job) => job.model,
   configuration: (job) => job.configuration,
   track: (job) => job.track,
   state: (job) => job.state,
+  outcome: (job) => job.outcome,
   reason: (job) => job.reason,
 };
 
@@ -27,9 +30,6 @@ const SORTED: Readonly<Record<string, (job: JobView) => Value>> = {
   finished: (job) => job.finished_at,
   indicator: (job) => job.indicator,
   cost: (job) => (job.state === "done" ? job.usage.cost_usd : null),
-  task: (job) => job.task,
-  model: (job) => job.model,
-  outcome: (job) => job.outcome,
 };
 
 /** The names of the tasks of each category, for lists of a category's jobs. */
