@@ -9,7 +9,7 @@ import socket
 import threading
 import time
 from collections import Counter
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from functools import wraps
 from types import SimpleNamespace
 from urllib.parse import urlsplit
@@ -176,6 +176,12 @@ def test_large_headers_are_refused_whole_or_in_pieces(context) -> None:
             if status == 431:
                 assert b"application/problem+json" in head
                 assert "32,768 bytes and 100 fields" in json.loads(body)["detail"]
+        endless = stack.enter_context(connect(url, line + b"X: "))
+        with suppress(OSError):
+            for sent in range(100):
+                endless.sendall(b"x" * 8_000)
+                time.sleep(0.02)
+        assert sent < 20
 
 
 def test_who_has_no_good_key_is_answered_before_the_body_comes(url) -> None:

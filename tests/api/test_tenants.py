@@ -273,6 +273,7 @@ def test_a_refused_request_changes_nothing(a, b, context) -> None:
     task = {"content": EXAMPLE.encode(), "headers": {"Content-Type": "application/yaml"}}
     assert a.ask("POST", "/v1/tasks", **task).status_code == 201
     done = a.post("/v1/jobs", {**JOB, "seed": 9})["id"]
+    open_session = a.post("/v1/sessions", {**SESSION, "seed": 1})["id"]
     work(context)
     before = everything(context.store.database)
     other = EXAMPLE.replace("final_mass: 200", "final_mass: 300").encode()
@@ -292,6 +293,8 @@ def test_a_refused_request_changes_nothing(a, b, context) -> None:
         (a, "POST", f"/v1/sweeps/{mine}/resume", {}),
         (a, "POST", "/v1/sweeps", {"json": {**SWEEP, "models": ["nobody"]}}),
         (a, "POST", "/v1/jobs", {"json": {**JOB, "task": "none"}}),
+        (b, "POST", f"/v1/sessions/{open_session}/submit", {}),
+        (b, "POST", f"/v1/sessions/{open_session}/calls", {"json": {"tool": "start"}}),
         (a, "POST", f"/v1/sessions/{session}/submit", {}),
         (a, "POST", f"/v1/sessions/{session}/calls", {"json": {"tool": "start"}}),
         (a, "PUT", f"/v1/keys/{a.id}/budget", {"json": {"max_requests": 5}}),

@@ -15,6 +15,7 @@ from buildarena_benchmark import score
 from buildarena_benchmark.scorers.measures.components import joined_to_start
 from buildarena_benchmark.scorers.measures.outline import extents
 from buildarena_benchmark.scorers.measures.spanning import terrain_sides
+from buildarena_benchmark.scores import decided_length
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
@@ -125,6 +126,14 @@ def test_a_bridge_that_sinks_onto_a_tower(tasks, car) -> None:
         until = 15.6 if spans else np.inf
         sunk = _shared(trial, floor=floor, south=(1 - floor) / 2, until=until)
         assert score(tasks["support-1"], car, sunk).success == spans
+
+
+def test_a_trial_goes_on_for_a_second_after_its_cargo_is_lost(tasks, car) -> None:
+    task = tasks["support-1"]
+    fallen, kept = _carried(car, fall_at=6.0), _carried(car)
+    lost = int(np.argmax(fallen.cargo_position[:, 2] < 4.0))
+    assert decided_length(task, fallen) == lost + 26
+    assert decided_length(task, kept) == task.scenario.sample_count
 
 
 def test_a_crash_onto_the_floor_after_the_break_that_starts_it_does_not_count(tasks, car) -> None:

@@ -26,7 +26,7 @@ from support.servers.runner_rig import (
 
 from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
 from buildarena_backend.errors import ArtifactStoreError
-from buildarena_backend.trials.trial_checks import checked_trajectory
+from buildarena_backend.trials.trial_checks import checked_trajectory, require_decided
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import SIMULATION_VERSION, Trajectory, simulate, write_trajectory
@@ -320,6 +320,12 @@ def checked(told: Trajectory, machine: Machine, seed: int | None = SEED) -> Traj
         scenario=LANDING.scenario,
         seed=seed,
     )
+
+
+def test_a_trial_is_as_long_as_it_takes_to_decide_it(honest) -> None:
+    require_decided(honest, LANDING, seed=SEED)
+    with pytest.raises(OutcomeRefusedError, match="when it is decided"):
+        require_decided(part_of(honest, len(honest.time_s) - 1), LANDING, seed=SEED)
 
 
 def piloting(**changes: Callable) -> Forgery:

@@ -230,4 +230,3 @@ def test_steps_outside_of_an_episode_need_a_reset_also_after_a_lost_simulator(mo
         environment.step(np.zeros(4))
     environment.close()
     environment.close()
-    assert environment.trial is None
