@@ -27,9 +27,11 @@ from support.servers.runner_rig import (
 from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
 from buildarena_backend.errors import ArtifactStoreError
 from buildarena_backend.trials.trial_checks import checked_trajectory, require_decided
+from buildarena_backend.trials.trials import TrialRequest
 from buildarena_benchmark import builtin_tasks
 from buildarena_geometry import Machine
 from buildarena_simulation import SIMULATION_VERSION, Trajectory, simulate, write_trajectory
+from buildarena_simworker.engines import EngineSimulator
 
 Forgery = Callable[[Trajectory], Trajectory]
 LONG = "x" * 500
@@ -320,6 +322,22 @@ def checked(told: Trajectory, machine: Machine, seed: int | None = SEED) -> Traj
         scenario=LANDING.scenario,
         seed=seed,
     )
+
+
+def test_a_varied_world_is_simulated_by_its_seed(pilot, honest) -> None:
+    request = TrialRequest(
+        job_id="job_0a",
+        number=0,
+        token=1,
+        version=SIMULATION_VERSION,
+        task=LANDING,
+        machine=pilot,
+        controls=None,
+        require_held=lambda: None,
+        seed=SEED,
+    )
+    told = EngineSimulator("mujoco").run(request).trajectory
+    assert write_trajectory(told) == write_trajectory(honest)
 
 
 def test_a_trial_is_as_long_as_it_takes_to_decide_it(honest) -> None:
