@@ -33,21 +33,21 @@ scoring:
 indicator: {name: load, unit: mass units}
 """
 VERSIONS = {
-    "transport-1": "1a6e4c9aace2",
-    "transport-2": "2f8eac5e5cbc",
-    "transport-3": "ac485b82739a",
-    "support-1": "dc2a9e577c96",
-    "support-2": "49ca415d7fa0",
-    "support-3": "024c9cf37d58",
-    "lift-1": "b4c0ca1433d4",
-    "lift-2": "65a071aa4121",
-    "lift-3": "c0ad99acb8b0",
-    "mechanisms-1": "00dcdd3aeed7",
-    "mechanisms-2": "19f65b3f6da0",
-    "mechanisms-3": "f6013c1e73b3",
-    "mechanisms-4": "1dd52cf611c6",
-    "flight-1": "41db632e0d4e",
-    "flight-2": "bbd7fca7436a",
+    "transport-1": "82476ba79289",
+    "transport-2": "f08d72435013",
+    "transport-3": "40a143703f52",
+    "support-1": "33f10656931c",
+    "support-2": "99656e2183d9",
+    "support-3": "d60a1ac22c57",
+    "lift-1": "6ec9a4344370",
+    "lift-2": "ff90bc8c4b9e",
+    "lift-3": "8fc8509c1eb2",
+    "mechanisms-1": "9d057efe81d4",
+    "mechanisms-2": "c5132a3fc17c",
+    "mechanisms-3": "eb14f4ec2e8e",
+    "mechanisms-4": "6ece6bfa6f98",
+    "flight-1": "f3d4a0701a51",
+    "flight-2": "51ddd7d0e09a",
 }
 """They change with the rules alone (`SCORER_VERSION`), and with what statements say of them."""
 
