@@ -132,6 +132,17 @@ def test_an_objection_ends_the_session(play, subtests) -> None:
             assert failure.detail == f"{role}: no rope"
 
 
+def test_a_malformed_objection_is_refused_and_ends_nothing(play, subtests) -> None:
+    draft = Completion(text="a drawing")
+    for arguments in ("no json", [1], {}, {"reason": ""}, {"reason": 3}, {"reason": "x", "y": 1}):
+        with subtests.test(arguments=arguments):
+            objection = ToolCall(id="c", name="raise_objection", arguments=arguments)
+            replies = [PLAN, draft, Completion(text="", calls=(objection,)), draft]
+            played = play(client=Scripted(*replies, last=call("raise_objection", reason="no")))
+            assert played.session.transcript.refusals == {"malformed_arguments": 1}
+            assert played.failure.detail == "reviewer: no"
+
+
 def test_parallel_calls_are_refused_and_do_nothing(play) -> None:
     twice = Completion(text="", calls=(*START.calls, ToolCall(id="c2", name="reset", arguments={})))
     model = Scripted(twice)
