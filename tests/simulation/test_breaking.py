@@ -24,7 +24,7 @@ from buildarena_simulation.machine import structure_of
 from buildarena_simulation.rollout import simulate_structure
 from buildarena_simulation.scenario import Control, ReleasedPlacement, SpanPlacement, gap_terrain
 from buildarena_simulation.structure.contacts import ContactForces
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH
+from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, UP
 
 KINDS = {
     "Hinge": "hinge",
@@ -341,3 +341,19 @@ def test_what_lies_does_not_hop(engine, tasks) -> None:
     _, trajectory = trial(tasks["support-1"], deck(5, 7, cross=True), engine)
     at_rest = (trajectory.time_s > 3.0) & (trajectory.time_s < 5.0)
     assert np.ptp(trajectory.cargo_position[at_rest, 2]) < 0.02
+
+
+def test_a_rope_gives_way_at_its_strength(engine) -> None:
+    rig = Rig()
+    tip = rig.row(rig.top, EAST, 3)[-1]
+    load = rig.attach(tip, DOWN)
+    for _ in range(4):
+        rig.do("shift_block", block_id=load, shift_real=[0.0, 0.0, -0.5])
+    rig.attach(rig.attach(load, DOWN, "Weight"), DOWN, "Weight")
+    rig.connect(tip, load, DOWN, UP, connector="Winch")
+    structure = structure_of(rig.machine)
+    scenario = Scenario(duration_s=2.0, control=Control(mode="agent"))
+    for limit, breaks in ((15.0, True), (60.0, False)):
+        weak = replace(structure, ropes=replace(structure.ropes, limit=np.array([limit])))
+        trajectory = simulate_structure(weak, scenario, engine)
+        assert [one.kind for one in trajectory.breaks] == ["rope"] * breaks, limit

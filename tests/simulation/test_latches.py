@@ -19,8 +19,10 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.clusters import find_clusters
-from buildarena_simulation.structure.free_directions import free_strains
+from buildarena_simulation.structure.free_directions import FreeDirections, free_strains
+from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.stiffness import StiffnessModel
+from buildarena_simulation.structure.vectors import turn_about
 from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP
 
 RELEASED = round(RELEASE_S * 25)
@@ -105,6 +107,27 @@ def test_a_braced_joint_bears_nothing_where_it_is_free() -> None:
             wrenches[tip] = load  # the ground is the first block
             borne = solver.solve(wrenches)[solver.inside.tolist().index(member)]
             assert free.T @ borne == pytest.approx(0.0, abs=1.0), (name, load)
+
+
+def test_a_stop_pushes_back_and_bears_nothing_else() -> None:
+    rig = Rig()
+    hinge = rig.placed(rig.row(rig.top, EAST, 2)[-1], EAST, "Hinge", UP)
+    rig.attach(hinge, EAST)
+    structure = structure_of(rig.machine)
+    clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool))
+    (arm,) = np.flatnonzero(clusters.parent >= 0)
+    axis = structure.joints.axes[clusters.seated[arm]]
+    for angle_deg, held in ((0.0, ()), (60.0, ()), (89.9, (-100.0,)), (-89.9, (100.0,))):
+        rotation = np.tile(np.eye(3), (len(clusters), 1, 1))
+        rotation[arm] = turn_about(axis, np.radians(angle_deg))
+        still = np.zeros((len(clusters), 3))
+        motion = Motion(position=still, rotation=rotation, velocity=still, spin=still)
+        for moment in (100.0, -100.0):
+            about = moment * axis[None].copy()
+            free = FreeDirections(structure, clusters)
+            free.bound(np.array([arm]), motion, np.zeros((1, 3)), about)
+            bears = moment if moment in held else np.copysign(0.01, moment)
+            assert about[0] @ axis == pytest.approx(bears), (angle_deg, moment)
 
 
 def test_letting_weights_go_lightens_no_load_that_stays() -> None:
