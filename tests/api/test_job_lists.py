@@ -75,6 +75,10 @@ def test_every_order_is_kept_over_pages(api, context, jobs, monkeypatch) -> None
         assert values == known + [None] * (len(values) - len(known)), "what is missing is last"
         assert known == sorted(known, reverse=order == "desc")
         assert ids(pages(api, 3, sort=sort, order=order)) == ids(whole), (sort, order, few)
+        for more in ({}, {"text": "lift"}):
+            some = {"sort": sort, "order": order, "state": "queued", **more}
+            queued = {*ids(pages(api, 200, state="queued", **more))}
+            assert ids(pages(api, 2, **some)) == [one for one in ids(whole) if one in queued]
 
 
 def test_filters_find_what_they_say_and_go_together(api, jobs, monkeypatch) -> None:

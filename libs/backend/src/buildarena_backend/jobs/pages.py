@@ -24,7 +24,13 @@ from sqlalchemy import (
 
 from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs, sweep_jobs
-from buildarena_backend.jobs.filters import MAX_SORTED, JobFilter, conditions_but_text, ways_to_hold
+from buildarena_backend.jobs.filters import (
+    MAX_SORTED,
+    JobFilter,
+    conditions_but_text,
+    conditions_of,
+    ways_to_hold,
+)
 from buildarena_backend.jobs.job import JOB_COLUMNS, Job
 from buildarena_backend.states import EXTERNAL_PROVIDER, JobState
 
@@ -106,6 +112,13 @@ def read_page(
         limit: Rows at most.
     """
     conditions = conditions_but_text(wanted)
+    if wanted.equals.get("state") not in (None, JobState.DONE) and order.by in _LACKING:
+        # None of them has such a figure, and looking for one would take all of its index.
+        among = conditions_of(connection, wanted)
+        are_few = _are_few(connection, wanted, among)
+        if after is not None:
+            among.append(order.further(jobs.c.id, after[1]))
+        return _first(connection, among, order.sorted(jobs.c.id), limit, are_few=are_few)
     if wanted.text is None:
         are_few = bool(conditions) and _are_few(connection, wanted, conditions)
         return _read(connection, conditions, order, after, limit, are_few=are_few)
