@@ -156,7 +156,7 @@ def plain_board(
     held = {key: [t for t in found if query.holds(t) and inside(t)] for key, found in cells.items()}
     return ranked_board(
         chosen,
-        lambda key: summarise(held[key], policy=query.policy) if held[key] else None,
+        lambda key: summarise(held[key]) if held[key] else None,
         {task: sum(len(held[key]) for key in keys) for task, keys in chosen.outdated.items()},
         overall=query.overall,
         weights=weights,

@@ -1,4 +1,4 @@
-"""Boards: cells, what flags do under each policy, ranks, tasks' versions, queries and duels."""
+"""Boards: cells, what flags do, ranks, tasks' versions, queries and duels."""
 
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -8,7 +8,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from buildarena_benchmark import flags
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import (
     BoardQuery,
     EndedJob,
@@ -22,7 +21,6 @@ from buildarena_benchmark.statistics import holm
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 ALL = BoardQuery()
-PUBLISHED = ScoringPolicy.PUBLISHED
 WEIGHTS = {
     "lift-1": {"precision": 3, "ambiguity": 1},
     "support-1": {"precision": 1, "ambiguity": 1},
@@ -77,15 +75,15 @@ def test_a_cell_of_a_hand_worked_case() -> None:
     assert cell.outcomes["construction_failed"] == 1
 
 
-def test_what_a_flag_does_under_each_policy(subtests) -> None:
-    """Ours makes a disqualified success a failure with nothing; the published one leaves out."""
+def test_what_a_flag_does(subtests) -> None:
+    """A disqualified success is a failure with nothing; another flag changes nothing."""
     plain = summarise(trials("lift-1", "a", 3, 4))
     for flag in (*known_flags().values(), None):
         name = flag.name if flag else "a flag of tomorrow"
         with subtests.test(flag=name):
             found = trials("lift-1", "a", 3, 4)
             found[0] = replace(found[0], flags=(name,), indicator=900.0)
-            ours, theirs = summarise(found), summarise(found, policy=PUBLISHED)
+            ours = summarise(found)
             assert ours.flags == {name: 1}
             if flag and flag.disqualifying:
                 assert (ours.flagged, ours.successes, ours.trials) == (1, 2, 4)
@@ -96,29 +94,20 @@ def test_what_a_flag_does_under_each_policy(subtests) -> None:
                 assert (ours.flagged, ours.successes, ours.trials) == (0, 3, 4)
                 assert (ours.success_low, ours.indicator_best) == (plain.success_low, 900.0)
                 assert ours.censored == (name == "never_fell")
-            left_out = bool(flag and flag.published)
-            figures = (1, 2, 3, 4) if left_out else (0, 3, 4, 4)
-            assert (theirs.flagged, theirs.successes, theirs.trials, theirs.ended) == figures
-            assert flags.is_left_out((name,), PUBLISHED) == left_out
-            assert not flags.is_left_out((name,), ScoringPolicy.OURS)
     assert flags.is_disqualified(("never_fell", "does_not_span"))
 
 
-def test_the_published_policy_reads_the_metric_that_was_published() -> None:
-    found = [replace(t, published=3.0 * t.seed) for t in trials("throw-1", "a", 2, 4)]
+def test_a_job_in_varied_worlds_counts_by_what_it_did_in_these() -> None:
+    found = trials("throw-1", "a", 2, 4)
     found[0] = replace(found[0], robustness=1.0, robust_indicator=50.0)
-    ours, published = summarise(found), summarise(found, policy=PUBLISHED)
-    assert (ours.indicator_mean, ours.indicator_best) == ((50.0 + 11.0) / 4, 50.0)
-    assert ours.score is not None
-    assert (published.indicator_mean, published.indicator_best) == (4.5, 9.0)
-    assert (published.successes, published.score) == (2, None)
-    counted = counted_trials(found, policy=PUBLISHED)
-    assert [trial.indicator for trial in counted] == [0.0, 3.0, 6.0, 9.0]
+    cell = summarise(found)
+    assert (cell.indicator_mean, cell.indicator_best) == ((50.0 + 11.0) / 4, 50.0)
+    assert cell.score is not None
     assert [t.indicator for t in counted_trials(found)] == [50.0, 11.0, 0.0, 0.0]
 
 
 def test_who_cheats_does_not_gain_by_it() -> None:
-    """Not in our policy: neither by far-off figures nor by having few trials that count."""
+    """Neither by far-off figures nor by having few trials that count."""
     cheat = trials("lift-1", "a", 60, 64, flags=("not_driven",), indicator=1e6)
     board = board_of(cheat, trials("lift-1", "b", 5, 64), trials("lift-1", "c", 30, 64))
     assert [row.cell.model for row in board.board(ALL).tasks[0].rows] == ["c", "b", "a"]

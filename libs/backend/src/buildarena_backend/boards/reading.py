@@ -10,7 +10,7 @@ from typing import Any
 from sqlalchemy import Row, func, select, text
 
 from buildarena_backend.boards.cells import BoardCells
-from buildarena_backend.boards.trials import TrialFilter, read_trials, trial_columns
+from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, read_trials
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import columns_of, value_of
 from buildarena_backend.database.tables import board_changes, jobs, rollouts, sweep_jobs
@@ -72,7 +72,7 @@ class Boards:
 
     def trials(self, wanted: TrialFilter) -> list[EndedJob]:
         """Single ended jobs, in no order; a million of them take a gigabyte."""
-        query = select(*trial_columns()).where(*wanted.conditions())
+        query = select(*TRIAL_COLUMNS).where(*wanted.conditions())
         with self._database.transaction() as connection:
             return list(read_trials(connection, query))
 
@@ -96,7 +96,7 @@ class Boards:
         """A sweep's ended jobs with their rounds, in a fixed order."""
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
         query = (
-            select(*trial_columns())
+            select(*TRIAL_COLUMNS)
             .where(jobs.c.state == JobState.DONE, jobs.c.id.in_(members))
             .order_by(jobs.c.task, jobs.c.model, jobs.c.seed, jobs.c.id)
         )

@@ -32,7 +32,7 @@ from sqlalchemy import (
     select,
 )
 
-from buildarena_backend.boards.trials import COUNTS, CellId, TrialFilter, decoding_of, published
+from buildarena_backend.boards.trials import COUNTS, CellId, TrialFilter, decoding_of
 from buildarena_backend.database.database import AS_THEY_ARE
 from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs
@@ -98,9 +98,7 @@ def cell_record(
 def tally_jobs(connection: Connection, wanted: TrialFilter) -> list[CellRecord]:
     """The cells of the jobs that are meant, made by two queries in one transaction."""
     found: dict[CellId, list[Row[Any]]] = {}
-    exact = func.coalesce(published(), jobs.c.indicator, 0.0)  # as `EndedJob.as_published`
-    indicators = _bytes_of(func.float8send(exact)).label("indicators")
-    figures: list[Any] = [*_GROUPS, indicators, *_EACH]
+    figures: list[Any] = [*_GROUPS, *_EACH]
     query = select(*figures).where(*wanted.conditions()).group_by(*_GROUPS)
     for row in connection.execute(query, execution_options=AS_THEY_ARE):
         found.setdefault(_id_of(row), []).append(row)
@@ -199,9 +197,8 @@ def _tally_of(row: Row[Any]) -> Tally:
         flags=tuple(row.flags),
         by_runner=row.by_runner,
         unverified=row.unverified,
-        indicators=_numbers(row.indicators, ">f8"),
         shares=_numbers(row.shares, ">f8"),
-        gained=_numbers(row.gained, ">f8"),
+        indicators=_numbers(row.gained, ">f8"),
         costs_usd=_numbers(row.costs, ">f8") if known else np.full(row.number, np.nan),
         output_tokens=_numbers(row.output_tokens, ">i8")
         if known

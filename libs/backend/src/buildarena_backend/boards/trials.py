@@ -6,7 +6,6 @@ import sys
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from functools import cache
 from typing import Any, Final, NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
@@ -15,7 +14,6 @@ from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs, sweep_jobs
 from buildarena_backend.states import EXTERNAL_PROVIDER, FILE_PROVIDER, Audit, JobState
 from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS, EndedJob
-from buildarena_benchmark.scorers.registry import published_metrics
 
 CHUNK: Final = 5000
 """Rows that are in memory twice at a time while all are read."""
@@ -98,19 +96,7 @@ COUNTS: Final = func.coalesce(jobs.c.audit, Audit.VERIFIED.value) == Audit.VERIF
 RANKED: Final = func.coalesce(jobs.c.model_config["provider"].as_string(), "") != FILE_PROVIDER
 
 
-@cache
-def published() -> ColumnElement[float]:
-    """As `EndedJob.published`: the metric that was published, where a job's scorer has one."""
-    return func.coalesce(*(jobs.c.metrics[name].as_float() for name in published_metrics()))
-
-
-@cache
-def trial_columns() -> tuple[Any, ...]:
-    """What `read_trials` reads of each job."""
-    return (*_COLUMNS, published().label("published"))
-
-
-_COLUMNS: Final = [
+TRIAL_COLUMNS: Final = [
     jobs.c.track,
     jobs.c.task,
     jobs.c.task_version,
@@ -143,7 +129,7 @@ _COLUMNS: Final = [
 
 
 def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
-    """The trials that a query of `trial_columns` finds."""
+    """The trials that a query of `TRIAL_COLUMNS` finds."""
     # A hundred thousand rows repeat a few dozen words and settings: one object serves them all.
     decodings: dict[str, Mapping[str, Any]] = {}
     result = connection.execution_options(stream_results=True).execute(query)
@@ -163,7 +149,6 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             reason=None if row.reason is None else sys.intern(row.reason),
             success=bool(row.success),
             indicator=row.indicator or 0.0,
-            published=row.published,
             robustness=row.robustness,
             robust_indicator=row.robust_indicator,
             parts=row.parts,

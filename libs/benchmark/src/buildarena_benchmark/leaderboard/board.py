@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard.cells import Cell, summarise
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows
@@ -25,7 +24,6 @@ class BoardQuery:
         models: Model names.
         since: Only jobs that ended then or later.
         until: Only jobs that ended before.
-        policy: The scoring policy: how flags are read.
         overall: Tasks of the overall ranking, if they are on the board.
     """
 
@@ -33,7 +31,6 @@ class BoardQuery:
     models: frozenset[str] | None = None
     since: datetime | None = None
     until: datetime | None = None
-    policy: ScoringPolicy = ScoringPolicy.OURS
     overall: frozenset[str] | None = None
 
     def holds(self, trial: EndedJob) -> bool:
@@ -237,7 +234,7 @@ class TrackBoard:
 
         def summary(key: CellKey) -> Cell | None:
             inside = self._inside(key, query)
-            return summarise(inside, policy=query.policy) if inside else None
+            return summarise(inside) if inside else None
 
         outdated = {
             task: sum(len(self._inside(key, query)) for key in keys)

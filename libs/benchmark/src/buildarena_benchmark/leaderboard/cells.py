@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.flags import ScoringPolicy, is_censored, is_disqualified, is_left_out
+from buildarena_benchmark.flags import is_censored, is_disqualified
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.tallies import Tally, Total, tallied, total_of
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
@@ -27,7 +27,7 @@ from buildarena_benchmark.statistics import (
     pass_at_k,
     pass_hat_k,
 )
-from buildarena_benchmark.tasks.loading import builtin_tasks, references
+from buildarena_benchmark.tasks.loading import references
 
 PASS_K: Final = (1, 2, 4, 8)
 """The k of pass@k and pass^k."""
@@ -119,18 +119,13 @@ class Cell:
     figures_hash: bytes = field(repr=False, compare=False)
 
 
-def counted_trials(
-    trials: Iterable[EndedJob], *, policy: ScoringPolicy = ScoringPolicy.OURS
-) -> list[EndedJob]:
+def counted_trials(trials: Iterable[EndedJob]) -> list[EndedJob]:
     """The trials that averages are made of: the same that `counted_tallies` counts."""
     counted = []
     for trial in trials:
-        if not trial.scored or is_left_out(trial.flags, policy):
+        if not trial.scored:
             continue
-        if policy != ScoringPolicy.OURS:
-            exact = replace(trial, robustness=None, robust_indicator=None)
-            counted.append(replace(exact, indicator=trial.as_published))
-        elif is_disqualified(trial.flags):
+        if is_disqualified(trial.flags):
             failed = replace(trial, robustness=None, robust_indicator=None)
             counted.append(replace(failed, success=False, indicator=0.0))
         else:
@@ -148,7 +143,7 @@ class CellName:
     decoding: Mapping[str, Any]
 
 
-def summarise(trials: Sequence[EndedJob], *, policy: ScoringPolicy = ScoringPolicy.OURS) -> Cell:
+def summarise(trials: Sequence[EndedJob]) -> Cell:
     """Summarises the trials of one model configuration on one task; at least one.
 
     The order of the trials does not matter.
@@ -160,22 +155,20 @@ def summarise(trials: Sequence[EndedJob], *, policy: ScoringPolicy = ScoringPoli
         configuration=first.configuration,
         decoding=first.decoding,
     )
-    return summarise_tallies(name, tallied(trials), policy=policy)
+    return summarise_tallies(name, tallied(trials))
 
 
-def summarise_tallies(
-    name: CellName, all_tallies: Sequence[Tally], *, policy: ScoringPolicy = ScoringPolicy.OURS
-) -> Cell:
+def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
     """Summarises a cell's tallies, whose order does not matter."""
     tallies = [tally for tally in all_tallies if not tally.unverified]
     scored = [tally for tally in tallies if tally.scored]
-    counted = counted_tallies(tallies, policy=policy)
+    counted = counted_tallies(tallies)
     number, ended = _number(counted), _number(tallies)
     successes = _sum(tally.shares for tally in counted)
     outcomes = _counts((tally.outcome, tally.number) for tally in tallies)
     low_high = exact_interval(successes, number) if counted else (None, None)
     figures = _figures(counted)
-    score, score_ends = _score(name.task, figures, policy)
+    score, score_ends = _score(name.task, figures)
     indicator_ends = mean_interval(figures[:, 1], figures[:, 0] > 0) if counted else None
     actions = sum(tally.actions for tally in counted)
     refused = sum(tally.refused_actions for tally in counted)
@@ -189,7 +182,7 @@ def summarise_tallies(
         ended=ended,
         errored=outcomes.get(Outcome.ERRORED, 0),
         cancelled=outcomes.get(Outcome.CANCELLED, 0),
-        flagged=_number(tally for tally in scored if _is_flagged(tally, policy)),
+        flagged=_number(tally for tally in scored if is_disqualified(tally.flags)),
         flags=_counts((flag, tally.number) for tally in scored for flag in set(tally.flags)),
         by_runner=_number(tally for tally in all_tallies if tally.by_runner),
         unverified=_number(all_tallies) - ended,
@@ -229,48 +222,35 @@ def summarise_tallies(
     )
 
 
-def counted_tallies(
-    tallies: Iterable[Tally], *, policy: ScoringPolicy = ScoringPolicy.OURS
-) -> list[Tally]:
-    """The tallies that averages are made of, under a scoring policy.
+def counted_tallies(tallies: Iterable[Tally]) -> list[Tally]:
+    """The tallies that averages are made of.
 
-    In ours a disqualified trial stays, as a failure with an indicator of 0: were it left out, a
+    A disqualified trial stays, as a failure with an indicator of 0: were it left out, a
     model would lose nothing by trying to cheat, and one whose machines blow up would gain. So does
     every failure: tasks say when a trial succeeds, and what fails has done nothing that counts.
-    A job that was tried in varied worlds counts by what it did in these; the published policy
-    knows the exact one alone, and the figure that was published where that is another.
+    A job that was tried in varied worlds counts by what it did in these.
     """
     counted = []
     for tally in tallies:
-        if not tally.scored or is_left_out(tally.flags, policy):
+        if not tally.scored:
             continue
-        nothing = np.zeros(tally.number)
-        if policy != ScoringPolicy.OURS:
-            counted.append(replace(tally, shares=nothing + tally.success))
-        elif is_disqualified(tally.flags):
+        if is_disqualified(tally.flags):
+            nothing = np.zeros(tally.number)
             counted.append(replace(tally, success=False, indicators=nothing, shares=nothing))
         else:
-            counted.append(replace(tally, indicators=tally.gained))
+            counted.append(tally)
     return counted
 
 
 def _score(
-    task: str, figures: NDArray[np.float64], policy: ScoringPolicy
+    task: str, figures: NDArray[np.float64]
 ) -> tuple[float | None, tuple[float, float] | None]:
     """The mean score beside the expert's indicator, and its interval."""
     reference = references().get(task)
     if reference is None or not len(figures):
         return None, None
-    if policy == ScoringPolicy.PUBLISHED and builtin_tasks()[task].published_metric:
-        return None, None
     scores = expert_scores(figures[:, 1], reference)
     return _mean(scores), mean_interval(scores, figures[:, 0] > 0)
-
-
-def _is_flagged(tally: Tally, policy: ScoringPolicy) -> bool:
-    if policy == ScoringPolicy.OURS:
-        return is_disqualified(tally.flags)
-    return is_left_out(tally.flags, policy)
 
 
 def _number(tallies: Iterable[Tally]) -> int:

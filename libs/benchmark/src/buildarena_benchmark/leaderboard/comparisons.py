@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard.cells import counted_trials
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.statistics import (
@@ -55,12 +54,7 @@ class Comparison:
     tasks: Sequence[TaskComparison]
 
 
-def compare_models(
-    first: Sequence[EndedJob],
-    second: Sequence[EndedJob],
-    *,
-    policy: ScoringPolicy = ScoringPolicy.OURS,
-) -> Comparison | None:
+def compare_models(first: Sequence[EndedJob], second: Sequence[EndedJob]) -> Comparison | None:
     """Compares two models; None when one of them has no trial.
 
     Each side has one model configuration; p-values are adjusted by Holm over the tests of both
@@ -68,7 +62,7 @@ def compare_models(
     """
     if not first or not second:
         return None
-    sides = [_by_task(counted_trials(side, policy=policy)) for side in (first, second)]
+    sides = [_by_task(counted_trials(side)) for side in (first, second)]
     shared = [task for task in sides[0] if task in sides[1]]
     tasks = [_compare_task(task, sides[0][task], sides[1][task]) for task in sorted(shared)]
     tests = [test for t in tasks for test in (t.success, t.indicator) if test]

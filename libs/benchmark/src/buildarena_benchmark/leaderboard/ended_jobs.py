@@ -34,7 +34,6 @@ class EndedJob:
         reason: Class of its failure, if any.
         success: Whether it met the task's criterion in the exact world.
         indicator: The task's performance indicator there.
-        published: What a published evaluation scores it by; None where that is the indicator.
         robustness: Share of varied worlds in which it succeeded; None where it was tried in none.
         robust_indicator: Mean indicator in varied worlds, 0 where it failed; None without any.
         parts: Parts of its machine, if there was one.
@@ -57,7 +56,6 @@ class EndedJob:
     outcome: str
     success: bool
     indicator: float
-    published: float | None = None
     robustness: float | None = None
     robust_indicator: float | None = None
     seed: int = 0
@@ -90,11 +88,6 @@ class EndedJob:
         if self.robust_indicator is None:
             return self.indicator if self.success else 0.0
         return self.robust_indicator
-
-    @property
-    def as_published(self) -> float:
-        """What the published policy reads in place of the indicator."""
-        return self.indicator if self.published is None else self.published
 
     @property
     def scored(self) -> bool:

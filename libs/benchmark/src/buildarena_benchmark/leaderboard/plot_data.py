@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard.cells import counted_tallies
 from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
 from buildarena_benchmark.leaderboard.tallies import Tally, tallied
@@ -56,29 +55,28 @@ def failure_row(model: str, configuration: str, tallies: Iterable[Tally]) -> Fai
 
 
 def cost_bins(
-    trials: Sequence[EndedJob], *, policy: ScoringPolicy, categories: Mapping[str, str]
+    trials: Sequence[EndedJob], *, categories: Mapping[str, str]
 ) -> dict[str, list[TokenBin]]:
     """Performance relative to the best job of the task, in bins of output tokens, by category.
 
     Args:
         trials: Ended jobs; those without known output tokens are left out.
-        policy: The scoring policy: how flags are read.
         categories: The category of each task; one without is a category by itself.
     """
     by_task: dict[str, list[EndedJob]] = {}
     for trial in trials:
         by_task.setdefault(trial.task, []).append(trial)
     tallies = {task: tallied(jobs) for task, jobs in by_task.items()}
-    return cost_bins_of(tallies, policy=policy, categories=categories)
+    return cost_bins_of(tallies, categories=categories)
 
 
 def cost_bins_of(
-    tallies: Mapping[str, Iterable[Tally]], *, policy: ScoringPolicy, categories: Mapping[str, str]
+    tallies: Mapping[str, Iterable[Tally]], *, categories: Mapping[str, str]
 ) -> dict[str, list[TokenBin]]:
     """The same from the tallies of each task."""
     pairs_by_category: dict[str, list[NDArray[np.float64]]] = {}
     for task, task_tallies in tallies.items():
-        counted = counted_tallies(task_tallies, policy=policy)
+        counted = counted_tallies(task_tallies)
         if not counted:
             continue
         indicators = np.concatenate([tally.indicators for tally in counted])

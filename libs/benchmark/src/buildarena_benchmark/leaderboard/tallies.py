@@ -45,10 +45,9 @@ class Tally:
         flags: Remarks on their scores.
         by_runner: Whether runners ran trials of theirs.
         unverified: Whether they wait for their verification, or were refuted.
-        indicators: (N,) float64, of each trial in the exact world, as `EndedJob.as_published`.
         shares: (N,) float64, 0 to 1, what each trial's success is worth: in varied worlds where
             there were any.
-        gained: (N,) float64, what each trial's indicator is worth, as `EndedJob.gained`.
+        indicators: (N,) float64, what each trial's indicator is worth, as `EndedJob.gained`.
         costs_usd: (N,) float64, of each trial; not a number where unknown.
         output_tokens: (N,) int64, of each trial; -1 where unknown.
         requests: Model requests.
@@ -66,9 +65,8 @@ class Tally:
     flags: tuple[str, ...]
     by_runner: bool
     unverified: bool
-    indicators: Floats
     shares: Floats
-    gained: Floats
+    indicators: Floats
     costs_usd: Floats
     output_tokens: Integers
     requests: Total
@@ -131,9 +129,8 @@ def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
         flags=flags,
         by_runner=by_runner,
         unverified=unverified,
-        indicators=np.array([trial.as_published for trial in trials], np.float64),
         shares=np.array([trial.share for trial in trials], np.float64),
-        gained=np.array([trial.gained for trial in trials], np.float64),
+        indicators=np.array([trial.gained for trial in trials], np.float64),
         costs_usd=np.array(
             [np.nan if t.cost_usd is None else t.cost_usd for t in trials], np.float64
         ),

@@ -24,7 +24,6 @@ _GROUNDED: Final = 0.1
 TWR_BELOW_ONE: Final = Flag(
     name="twr_below_one",
     meaning="A rocket rose although its thrust is less than its weight.",
-    published=True,
 )
 
 

@@ -52,13 +52,6 @@ def known_flags() -> Mapping[str, Flag]:
     return MappingProxyType(flags)
 
 
-@cache
-def published_metrics() -> tuple[str, ...]:
-    """Metrics that published evaluations score by, where that is not the indicator."""
-    named = {scorer.published: None for scorer in known_scorers().values() if scorer.published}
-    return tuple(named)
-
-
 def scoring_type() -> Any:
     """What a task file may say under `scoring`: the union of all scorers' parameters, by name."""
     union = reduce(or_, (scorer.parameters for scorer in known_scorers().values()))

@@ -24,14 +24,12 @@ class Flag:
         meaning: One sentence.
         disqualifying: Whether the trial counts as a failure in our rankings; otherwise the flag
             informs, and never changes a rank.
-        published: Whether the published evaluation calls such trials hacked and leaves them out.
         censoring: Whether the indicator is only known to be at least as great.
     """
 
     name: str
     meaning: str
     disqualifying: bool = True
-    published: bool = False
     censoring: bool = False
 
 
@@ -51,7 +49,6 @@ BASE_MOVED: Final = Flag(name="base_moved", meaning="The starting block did not 
 START_TOO_HIGH: Final = Flag(
     name="start_too_high",
     meaning="Something started at or above the height that the task allows.",
-    published=True,
 )
 FORCES_NOT_MEASURED: Final = Flag(
     name="forces_not_measured",
@@ -122,8 +119,6 @@ class Scorer:
             where the whole trial decides.
         ceiling: The greatest indicator that there is, given parameters and scenario, or what none
             reaches; None where only what can be built bounds it.
-        published: The metric that a published evaluation scores by, which boards read under that
-            policy; None where it is the indicator.
     """
 
     parameters: type[Document]
@@ -132,7 +127,6 @@ class Scorer:
     flags: tuple[Flag, ...] = ()
     decision: "Callable[[Any, Scenario], Decision] | None" = None
     ceiling: Callable[[Any, Scenario], float | None] = _unbounded
-    published: str | None = None
 
     @property
     def name(self) -> str:

@@ -41,7 +41,6 @@ NEVER_FELL: Final = Flag(
     meaning="The bridge carried everything there was: its load is at least the figure that is "
     "shown.",
     disqualifying=False,
-    published=True,
     censoring=True,
 )
 SPAN_NOT_MEASURED: Final = Flag(

@@ -393,5 +393,4 @@ SCORER: Final = Scorer(
         FORCES_NOT_MEASURED,
     ),
     ceiling=ceiling,
-    published="parabola",
 )

@@ -36,9 +36,7 @@ _RESTING = 1e-3
 """Slower movement has no direction worth judging, units/s."""
 
 
-NO_WHEELS: Final = Flag(
-    name="no_wheels", meaning="A vehicle got far without a single wheel.", published=True
-)
+NO_WHEELS: Final = Flag(name="no_wheels", meaning="A vehicle got far without a single wheel.")
 DRIVE_NOT_MEASURED: Final = Flag(
     name="drive_not_measured",
     meaning="The trial has no contacts of wheels, so whether they drove was not measured.",

@@ -67,11 +67,6 @@ class Task:
         return known_scorers()[self.scorer].ceiling(self.scoring, self.scenario)
 
     @property
-    def published_metric(self) -> str | None:
-        """The metric that the published policy reads; None where it is the indicator."""
-        return known_scorers()[self.scorer].published
-
-    @property
     def control(self) -> Literal["agent", "held", "none"]:
         """Who presses the keys."""
         return self.scenario.control.mode

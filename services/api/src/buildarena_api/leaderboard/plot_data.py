@@ -9,7 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field
 from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_benchmark import Task
-from buildarena_benchmark.flags import ScoringPolicy
 from buildarena_benchmark.leaderboard import Board, OverallRow, Tally, cost_bins_of, failure_row
 
 
@@ -101,7 +100,7 @@ def figures_view(
         by_task.setdefault(id_.task, []).extend(cell.tallies)
         by_row.setdefault((cell.model, id_.configuration), []).extend(cell.tallies)
     categories = {name: task.category for name, task in tasks.items()}
-    found = cost_bins_of(by_task, policy=ScoringPolicy.OURS, categories=categories)
+    found = cost_bins_of(by_task, categories=categories)
     failures = [failure_row(*row, tallies) for row, tallies in sorted(by_row.items())]
     return Figures(
         track=track,
