@@ -25,7 +25,8 @@ from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_backend.process.context import Context, open_context
 from buildarena_backend.settings import Settings
 from buildarena_backend.submission.submission import Submissions
-from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
+from buildarena_cli.local.postgres import EmbeddedPostgres
+from buildarena_cli.local.valkey import EmbeddedValkey
 
 MEBIBYTE = 1024 * 1024
 POLL_S = 0.05

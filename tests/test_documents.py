@@ -7,10 +7,14 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from typer.main import get_command
+
 from buildarena_backend.settings import Settings
-from buildarena_cli.command_table import ADMIN, COMMANDS
+from buildarena_cli.main import app
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
+COMMANDS = get_command(app).commands
+ADMIN = COMMANDS["admin"].commands
 ROOT = Path(__file__).parents[1]
 SOURCES = [
     folder

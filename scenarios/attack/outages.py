@@ -16,7 +16,7 @@ from redis import Redis
 from scenarios.attack.arena import Arena, Tried
 from support.servers.stacks import wait_until
 
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 
 
 def full_disk(arena: Arena) -> Tried:

@@ -28,7 +28,7 @@ from support.servers.api_process import Service
 from support.servers.stacks import wait_until
 
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 
 YAML = {"Content-Type": "application/yaml"}
 SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0, 1]}

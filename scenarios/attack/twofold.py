@@ -19,7 +19,7 @@ from support.clients.tenants import everything, new_tenant
 from support.servers.stacks import wait_until
 
 from buildarena_backend.database.database import Database
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 
 REVOKED_S = 1.0
 """Within so long every process refuses a key that another revoked."""

@@ -23,8 +23,8 @@ from support.servers.stacks import running_stack, wait_until
 
 from buildarena_backend.database.database import Database
 from buildarena_benchmark import builtin_tasks, score
-from buildarena_cli.local import ManagedProcess
 from buildarena_cli.local.stack import Stack
+from buildarena_cli.local.supervisor import ManagedProcess
 from buildarena_simulation import simulate
 
 pytestmark = pytest.mark.nightly

@@ -29,7 +29,7 @@ from support.clients.tenants import ADMIN, WITH_KEYS, Tenant, new_tenant, operat
 from support.servers.stacks import running_stack, wait_until
 
 from buildarena_backend.database.database import Database
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 from buildarena_cli.local.stack import Stack
 
 BATCH = 100

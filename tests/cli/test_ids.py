@@ -2,9 +2,6 @@
 
 import asyncio
 import json
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -58,42 +55,13 @@ def test_a_unique_prefix_is_enough_and_an_ambiguous_one_refused(url, ids, sweep)
     assert f"no job's id begins with 'job_{missing}'" in run_cli(url, "job", "show", missing).stderr
 
 
-def test_shells_are_offered_ids_tasks_and_models_and_nothing_where_no_api_answers(
-    url, ids, sweep
-) -> None:
-    # A busy machine's API is waited for; a shell's user would not.
-    program = (
-        "import sys\nfrom buildarena_cli.terminal import completion\n"
-        "from buildarena_cli.main import run\n"
-        "completion.WITHIN_S = 60\nsys.argv = ['buildarena']\nrun()"
-    )
-
-    def offered(line: str, url: str = url) -> list[str]:
-        completing = {
-            "_BUILDARENA_COMPLETE": "complete_bash",
-            "COMP_WORDS": line,
-            "COMP_CWORD": str(line.count(" ")),
-            "BUILDARENA_URL": url,
-        }
-        command, environment = [sys.executable, "-c", program], os.environ | completing
-        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-        assert done.stderr == ""
-        return done.stdout.split()
-
-    assert sorted(offered("buildarena job show ")) == ids
-    assert offered("buildarena sweep watch sw") == [sweep]
-    assert offered("buildarena job list --model builtin/e") == ["builtin/expert"]
-    for nowhere in ("http://127.0.0.1:1", "http://["):
-        assert offered("buildarena job show ", nowhere) == []
-
-
 def test_jobs_are_filtered_and_pages_follow_each_other(url, ids, context, subtests) -> None:
     found = finish(context, claim(context), "unsuccessful", reason="too_weak", flags=("odd",))
     words = ["--reason", "too_weak", "--flag", "odd", "--outcome", "unsuccessful"]
     _, row = printed(url, "job", "list", *words).splitlines()
     assert row.split()[0] == found
     for words, says in (
-        (["--task", "lift-9"], "did you mean lift-1 or"),
+        (["--task", "lift-9"], "did you mean lift-"),
         (["--model", "builtin/idel"], "did you mean builtin/idle?"),
         (["--outcome", "sucess"], "did you mean success"),
         (["--after", "x"], "not a cursor"),

@@ -15,7 +15,7 @@ from support.clients.terminals import BUILDARENA
 from support.servers.stacks import wait_until
 from support.stages import assert_verified, work
 
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 from buildarena_worker.builtin.designs import DESIGNS
 
 WANTED = {"task": "support-1", "agent": "mcp", "simulator": "mujoco"}

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from hashlib import sha256
-from html import escape
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -19,11 +18,9 @@ from support.servers.live_api import changed, live_api
 from support.stages import work
 
 from buildarena_api.dashboard.serving import POLICY
-from buildarena_cli.commands import site as command
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.site import pages as site_pages
 from buildarena_cli.site.folder import MARKER, Folder
-from buildarena_cli.site.previews import best_picture, head, job_preview
 from buildarena_cli.site.scope import Scope, chosen_jobs, read_choice
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 
@@ -91,7 +88,7 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     indexes = [read(site, f"jobs/{job}.json")["answers"] for job in rows["kept"]]
     wanted = {".nojekyll", MARKER, "index.html", "site.json", whole["jobs"]}
     wanted |= {"scheme.js", "assets/index-1.js"}
-    wanted |= {f"jobs/{job}.{ending}" for job in rows["kept"] for ending in ("json", "html")}
+    wanted |= {f"jobs/{job}.json" for job in rows["kept"]}
     for answers in (whole["answers"], *indexes):
         for question, name in answers.items():
             answer = asked(url, question, sweeps)
@@ -119,7 +116,6 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     assert re.findall(r'(?:src|href)="([^"]*)"', page) == ["./scheme.js", "./assets/index-1.js"]
     assert page.index("Content-Security-Policy") < page.index("<script")
     assert "/v1" not in page
-    assert re.search(r'og:image" content="(data/[^"]*\.png)"', page)[1] in files_of(site)
 
 
 def test_its_policy_is_the_services() -> None:
@@ -191,7 +187,7 @@ def test_a_site_stays_whole_while_it_is_written_again(url, idle, context, tmp_pa
     assert (site / "CNAME").exists(), "what somebody else has put beside it is theirs"
 
 
-def test_what_is_refused_leaves_no_site(url, idle, monkeypatch, tmp_path, subtests) -> None:
+def test_what_is_refused_leaves_no_site(url, idle, tmp_path, subtests) -> None:
     waiting = submitted(url, {**IDLE, "seeds": [9], "name": "waiting"})
     for folder, names in (("home", ["a.tex", "b.tex"]), ("newer", []), ("locked", [])):
         (tmp_path / folder).mkdir()
@@ -219,10 +215,6 @@ def test_what_is_refused_leaves_no_site(url, idle, monkeypatch, tmp_path, subtes
             assert not (tmp_path / out / "index.html").exists()
     lock.close()
     assert files_of(tmp_path / "home") == {"a.tex", "b.tex"}
-    monkeypatch.setattr(command, "LARGE_MB", 0)
-    done = run_cli(url, "site", idle, "--out", str(tmp_path / "site"))
-    assert "--yes writes it all the same" in done.stderr
-    assert not (tmp_path / "site").exists()
 
 
 def row(id_: str, **change: object) -> dict[str, object]:
@@ -256,19 +248,3 @@ def test_the_best_of_a_cell_are_kept() -> None:
         ("all", [job["id"] for job in rows if job["state"] == "done"]),
     ):
         assert [job["id"] for job in chosen_jobs(scope, read_choice(choice))] == kept
-
-
-def test_previews_hold_names_as_text(pages) -> None:
-    """Previews are what other programs read, whatever names are in it."""
-    hostile = 'agent/"><script>alert(1)</script>'
-    job = {"id": "job_1", "task": "support-1", "model": hostile, "seed": 3, "reason": None}
-    job |= {"outcome": "success", "success": True, "indicator": 1234.5}
-    page = job_preview(job, "data/ab/cd.png")
-    assert "<script" not in page
-    for told in (f"support-1 by {hostile}, seed 3", "success, 1,234.50", "../data/ab/cd.png"):
-        assert f'content="{escape(told)}"' in page
-    first = site_pages.first_page(pages, head("BuildArena", r'It holds "\1"', "data/a.png"))
-    assert escape(r'It holds "\1"') in first
-    jobs = [{"id": id_, "success": id_ != "a"} for id_ in "abc"]
-    stored = {job: {f"/v1/jobs/{job}/thumbnail.png": f"data/{job}.png"} for job in "ac"}
-    assert best_picture(jobs, stored) == "data/c.png", "of the best job that has one"

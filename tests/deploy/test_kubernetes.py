@@ -21,6 +21,7 @@ from support.documents.manifests import (
     rendered,
 )
 from support.documents.promtool import needs_promtool, promtool
+from typer.main import get_command
 
 from buildarena_backend import __version__
 from buildarena_backend.catalog.models import load_registry
@@ -28,7 +29,7 @@ from buildarena_backend.database.roles import OWNER
 from buildarena_backend.settings import ARTIFACT_CREDENTIALS, SECRETS, Settings
 from buildarena_backend.states import CONSTRUCT_QUEUE, simulate_queue
 from buildarena_backend.trials.installed_simulators import installed_engines
-from buildarena_cli.command_table import ADMIN
+from buildarena_cli.commands import admin
 
 SCHEMAS = json.loads((Path(__file__).parents[1] / "data/kubernetes-schemas.json").read_text())
 """Schemas of kinds that are not Kubernetes' own."""
@@ -215,7 +216,7 @@ def test_what_must_be_done_again_and_again_has_its_times(overlay, documents) -> 
         assert each["spec"]["concurrencyPolicy"] == "Forbid"
         (container,) = pods(documents)[name]["spec"]["containers"]
         assert container["args"] == MAINTENANCE[name]
-        assert container["args"][1] in ADMIN
+        assert container["args"][1] in get_command(admin.app).commands
         given = {entry["name"]: entry["value"] for entry in container["env"]}
         mounts = {mount["mountPath"] for mount in container["volumeMounts"]}
         assert "/artifacts" in mounts or "AWS_SECRET_ACCESS_KEY_FILE" in given, overlay

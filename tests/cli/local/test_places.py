@@ -6,7 +6,7 @@ import httpx
 import pytest
 from support.odd_places import Case, run_elsewhere, start_elsewhere
 
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 
 LONG = "/".join(["a-folder-with-a-long-name" * 8] * 4)
 """800 characters: what the programs' own paths add stays below Postgres' limit of 1,024."""
@@ -23,7 +23,8 @@ import sys
 from pathlib import Path
 import psycopg
 from redis import Redis
-from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
+from buildarena_cli.local.postgres import EmbeddedPostgres
+from buildarena_cli.local.valkey import EmbeddedValkey
 
 def once(statement):
     postgres = EmbeddedPostgres(data / "postgres", data / "postgres.log", durable=False)

@@ -4,8 +4,6 @@ import base64
 import gzip
 import inspect
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
 from html.parser import HTMLParser
@@ -84,21 +82,9 @@ def test_what_is_wrong_is_answered_as_a_model_reads_it_and_bad_calls_raise():
         machine.attach_block_to(**usual, colour="red")
     with pytest.raises(AttributeError, match="no 'atach_block_to'; its actions are start, attach"):
         machine.atach_block_to("1", "A", ROW)
-    with pytest.raises(AttributeError, match="has no 'Machin'; it has Feedback, Machine"):
+    with pytest.raises(AttributeError, match="has no attribute 'Machin'"):
         _ = ba.Machin
     assert all(getattr(ba, name) is not None for name in ba.__all__)
-
-
-def test_importing_it_loads_nothing_heavy():
-    code = (
-        "import sys, buildarena\n"
-        f"heavy = [name for name in {HEAVY} if name in sys.modules]\n"
-        "assert not heavy, heavy\n"
-        "buildarena.Machine().start()\n"
-        "assert 'mujoco' not in sys.modules and 'pydantic' not in sys.modules\n"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
 
 
 # Trials
@@ -143,7 +129,7 @@ def test_what_is_not_tried_says_why(tmp_path, monkeypatch):
     monkeypatch.setattr(trials, "Evaluator", partial(Evaluator, timeout_s=0.001))
     with pytest.raises(SimulationError, match="machine 0 could not be tried"):
         ba.simulate_all([row(3)], "support-1", processes=1)
-    assert repr(ba.tasks()).splitlines()[3] == "support-1     A bridge over a gap of 5"
+    assert ba.tasks()["support-1"].title == "A bridge over a gap of 5"
 
 
 # Pages of machines and trials

@@ -13,7 +13,9 @@ import httpx
 from support.servers.stacks import wait_until
 
 from buildarena_backend.database.database import Database
-from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey, free_port
+from buildarena_cli.local.postgres import EmbeddedPostgres
+from buildarena_cli.local.server import free_port
+from buildarena_cli.local.valkey import EmbeddedValkey
 
 
 @dataclass(frozen=True, kw_only=True)

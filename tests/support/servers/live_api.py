@@ -23,7 +23,7 @@ from buildarena_api.app import create_app
 from buildarena_api.http.door import server_config
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.process.context import Context, open_context
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 
 LOOPBACK = "http://127.0.0.1"
 """What a client in the test's process calls the API: a service without keys has no other name."""

@@ -18,7 +18,7 @@ import pytest
 import yaml
 from support.servers.stacks import wait_until
 
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 
 MONITORING = Path(__file__).resolve().parents[3] / "deploy" / "monitoring"
 PROMETHEUS = shutil.which("prometheus")

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 if TYPE_CHECKING:
-    from buildarena_cli.local import EmbeddedServer
+    from buildarena_cli.local.server import EmbeddedServer
 
 ADDRESS: Final = "TEST_SERVERS_SOCKET"
 """Variable with the path of the socket."""
@@ -59,7 +59,8 @@ class RunServers:
 
     def _start(self) -> tuple[str, str]:
         from buildarena_backend.database.database import Database
-        from buildarena_cli.local import EmbeddedPostgres, EmbeddedValkey
+        from buildarena_cli.local.postgres import EmbeddedPostgres
+        from buildarena_cli.local.valkey import EmbeddedValkey
 
         postgres = EmbeddedPostgres(self._folder / "pg", self._folder / "pg.log", durable=False)
         self._run(postgres)

@@ -12,7 +12,7 @@ import httpx
 import psutil
 
 from buildarena_backend.settings import Settings
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 from buildarena_cli.local.stack import Stack
 
 

@@ -8,13 +8,6 @@ from typing import Annotated, Any
 import typer
 
 from buildarena_cli.defaults import DEFAULT_URL
-from buildarena_cli.terminal.completion import (
-    complete_job,
-    complete_key,
-    complete_model,
-    complete_sweep,
-    complete_task,
-)
 
 __all__ = ["DEFAULT_URL"]
 
@@ -32,28 +25,13 @@ MaxRequestsOption = Annotated[
     int | None, typer.Option("--max-requests", help="Budget in model requests.", min=1)
 ]
 
-JobId = Annotated[
-    str,
-    typer.Argument(help="Id of the job, or its beginning.", autocompletion=complete_job),
-]
-SweepId = Annotated[
-    str,
-    typer.Argument(help="Id of the sweep, or its beginning.", autocompletion=complete_sweep),
-]
-KeyId = Annotated[
-    str,
-    typer.Argument(help="Id of the key, or its beginning.", autocompletion=complete_key),
-]
-TaskName = Annotated[str, typer.Argument(help="Task name.", autocompletion=complete_task)]
-ModelName = Annotated[str, typer.Argument(help="Model name.", autocompletion=complete_model)]
-TasksOption = Annotated[
-    list[str] | None,
-    typer.Option("--task", help="Only these tasks.", autocompletion=complete_task),
-]
-ModelsOption = Annotated[
-    list[str] | None,
-    typer.Option("--model", help="Only these models.", autocompletion=complete_model),
-]
+JobId = Annotated[str, typer.Argument(help="Id of the job, or its beginning.")]
+SweepId = Annotated[str, typer.Argument(help="Id of the sweep, or its beginning.")]
+KeyId = Annotated[str, typer.Argument(help="Id of the key, or its beginning.")]
+TaskName = Annotated[str, typer.Argument(help="Task name.")]
+ModelName = Annotated[str, typer.Argument(help="Model name.")]
+TasksOption = Annotated[list[str] | None, typer.Option("--task", help="Only these tasks.")]
+ModelsOption = Annotated[list[str] | None, typer.Option("--model", help="Only these models.")]
 TrackOption = Annotated[str | None, typer.Option("--track", help="Track; default: the first.")]
 AfterOption = Annotated[str | None, typer.Option("--after", help="Cursor of the previous page.")]
 AllOption = Annotated[bool, typer.Option("--all", help="Every page.")]

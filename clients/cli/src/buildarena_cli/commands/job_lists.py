@@ -15,7 +15,6 @@ from buildarena_cli.options import (
     JsonOption,
     UrlOption,
 )
-from buildarena_cli.terminal.completion import complete_model, complete_sweep, complete_task
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, warn
 
 MAX_LIMIT = 200
@@ -28,15 +27,9 @@ COLUMNS = columns(
 
 def list_jobs(
     *,
-    sweep: Annotated[
-        str | None, typer.Option(help="Only this sweep's.", autocompletion=complete_sweep)
-    ] = None,
-    task: Annotated[
-        str | None, typer.Option(help="Only this task's.", autocompletion=complete_task)
-    ] = None,
-    model: Annotated[
-        str | None, typer.Option(help="Only this model's.", autocompletion=complete_model)
-    ] = None,
+    sweep: Annotated[str | None, typer.Option(help="Only this sweep's.")] = None,
+    task: Annotated[str | None, typer.Option(help="Only this task's.")] = None,
+    model: Annotated[str | None, typer.Option(help="Only this model's.")] = None,
     state: Annotated[str | None, typer.Option(help="Only in this state.")] = None,
     outcome: Annotated[
         str | None, typer.Option(help="Only this outcome; errored shows the dead letters.")

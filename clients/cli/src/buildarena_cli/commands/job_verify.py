@@ -11,7 +11,6 @@ from buildarena_cli.client import Client, at
 from buildarena_cli.errors import DONE, FAILED, USAGE, CommandError
 from buildarena_cli.ids import whole_id
 from buildarena_cli.options import DEFAULT_URL, JsonOption, TasksOption, TrackOption, UrlOption
-from buildarena_cli.terminal.completion import complete_job, complete_model
 from buildarena_cli.terminal.output import print_json, say
 
 VERDICTS: Final = {
@@ -23,13 +22,11 @@ VERDICTS: Final = {
 
 
 def verify(
-    job_id: Annotated[
-        str | None, typer.Argument(help="The job.", autocompletion=complete_job)
-    ] = None,
+    job_id: Annotated[str | None, typer.Argument(help="The job.")] = None,
     *,
     model: Annotated[
         str | None,
-        typer.Option("--model", help="All results of a model.", autocompletion=complete_model),
+        typer.Option("--model", help="All results of a model."),
     ] = None,
     sample: Annotated[
         int | None, typer.Option(help="With --model: how many results; default: all.")

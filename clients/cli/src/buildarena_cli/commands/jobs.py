@@ -13,8 +13,8 @@ from buildarena_cli.commands.job_lists import list_jobs
 from buildarena_cli.commands.job_replay import replay
 from buildarena_cli.commands.job_verify import verify
 from buildarena_cli.given_paths import to_read
+from buildarena_cli.groups import new_group
 from buildarena_cli.ids import whole_id
-from buildarena_cli.lazy import new_group
 from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, ModelName, TaskName, UrlOption
 from buildarena_cli.terminal.output import minute_of, number, print_json, say
 

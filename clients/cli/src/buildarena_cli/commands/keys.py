@@ -10,8 +10,8 @@ import typer
 
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
+from buildarena_cli.groups import new_group
 from buildarena_cli.ids import whole_id
-from buildarena_cli.lazy import new_group
 from buildarena_cli.options import (
     DEFAULT_URL,
     JsonOption,

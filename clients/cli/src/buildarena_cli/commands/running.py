@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from dataclasses import asdict
 from datetime import datetime
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from buildarena_cli.local.service import ProcessFacts, Run
 
 MEBIBYTE = 1024 * 1024
-FOLLOW_EVERY_S = 0.2
 PROCESSES = columns(
     *("process", "pid", "MiB", "ports", "since"),
     numeric=("pid", "MiB"),
@@ -67,24 +65,12 @@ def status(data: DataOption = None, *, as_json: JsonOption = False) -> None:
         raise typer.Exit(FAILED)
 
 
-def complete_process(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Processes that have a log."""
-    from buildarena_cli.local.service import log_files
-
-    data = ctx.params.get("data")
-    folder = data_folder(Path(data) if data else None)
-    return [name for name in log_files(folder) if name.startswith(incomplete)]
-
-
 def logs(
     process: Annotated[
         str | None,
-        typer.Argument(help="Which process; default: all.", autocompletion=complete_process),
+        typer.Argument(help="Which process; default: all."),
     ] = None,
     *,
-    follow: Annotated[
-        bool, typer.Option("--follow", "-f", help="Keep printing new lines until Ctrl-C.")
-    ] = False,
     lines: Annotated[
         int, typer.Option("--lines", "-n", help="Lines of each log at most.", min=0)
     ] = 50,
@@ -106,13 +92,11 @@ def logs(
             )
         files = {name: files[name]}
     width = max(map(len, files)) if len(files) > 1 else 0
-    places = {}
     for name, file in files.items():
-        places[name] = _print_end(file, lines, f"{name:<{width}}  " if width else "")
-    while follow:
-        time.sleep(FOLLOW_EVERY_S)
-        for name, file in files.items():
-            places[name] = _print_new(file, places[name], f"{name:<{width}}  " if width else "")
+        with file.open("rb") as log:
+            for line in deque(log, maxlen=lines):
+                prefix = f"{name:<{width}}  " if width else ""
+                say(prefix + line.decode(errors="replace").rstrip("\n"))
 
 
 def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
@@ -124,18 +108,14 @@ def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
 
     client = Client(url)
     health = _health_at(url)
-    peak = _peak_memory_bytes(client.url) if health["status"] != "down" else None
     if as_json:
-        print_json({**health, "peak_memory_bytes": peak})
+        print_json(health)
     else:
         say(f"BuildArena at {client.url}: {health['status']}")
         rows = [
             ("ok" if check["ok"] else "!!", check["name"], check["detail"])
             for check in health["checks"]
         ]
-        if peak is not None:
-            shown = f"{peak / MEBIBYTE:,.0f} MiB at the peak, all processes"
-            rows.append(("ok", "memory", shown))
         print_table(columns("is", "check", "finding"), rows)
         for check in health["checks"]:
             if check["advice"]:
@@ -182,41 +162,3 @@ def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFac
     for check in health["checks"]:
         if not check["ok"]:
             say(f"!!  {check['name']}: {check['detail']} {check['advice']}".rstrip())
-
-
-def _print_end(file: Path, lines: int, prefix: str) -> int:
-    """Prints a log's last lines; the place behind them."""
-    with file.open("rb") as log:
-        for line in deque(log, maxlen=lines):
-            _print_line(line, prefix)
-        return log.tell()
-
-
-def _print_new(file: Path, place: int, prefix: str) -> int:
-    """Prints the whole lines behind a place; the place behind them."""
-    try:
-        with file.open("rb") as log:
-            size = log.seek(0, 2)
-            log.seek(place if place <= size else 0)
-            for line in log:
-                if not line.endswith(b"\n"):
-                    return log.tell() - len(line)
-                _print_line(line, prefix)
-            return log.tell()
-    except FileNotFoundError:
-        return 0
-
-
-def _print_line(line: bytes, prefix: str) -> None:
-    say(prefix + line.decode(errors="replace").rstrip("\n"))
-
-
-def _peak_memory_bytes(url: str) -> int | None:
-    """The peak that the local stack at this URL noted, if it is one of this folder's."""
-    from buildarena_cli.local.service import noted_run
-
-    data = data_folder(None)
-    for run in (noted_run(data), noted_run(data / "demo")):
-        if run is not None and run.url == url:
-            return run.peak_memory_bytes
-    return None

@@ -11,8 +11,8 @@ from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import gathered, show_cursor
 from buildarena_cli.commands.keys import spent
 from buildarena_cli.given_paths import to_read
+from buildarena_cli.groups import new_group
 from buildarena_cli.ids import whole_id
-from buildarena_cli.lazy import new_group
 from buildarena_cli.options import (
     DEFAULT_URL,
     AfterOption,
@@ -25,7 +25,6 @@ from buildarena_cli.options import (
     UrlOption,
     budget_of,
 )
-from buildarena_cli.terminal.completion import complete_model, complete_task
 from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
 from buildarena_cli.terminal.progress import (
     exit_code,
@@ -66,11 +65,11 @@ def run_sweep(
     detach: Annotated[bool, typer.Option("--detach", help="Submit without waiting.")] = False,
     task: Annotated[
         list[str] | None,
-        typer.Option("--task", help="Replaces the file's tasks.", autocompletion=complete_task),
+        typer.Option("--task", help="Replaces the file's tasks."),
     ] = None,
     model: Annotated[
         list[str] | None,
-        typer.Option("--model", help="Replaces the file's models.", autocompletion=complete_model),
+        typer.Option("--model", help="Replaces the file's models."),
     ] = None,
     samples: Annotated[
         int | None, typer.Option("--samples", help="Replaces the file's samples or seeds.")
@@ -146,15 +145,12 @@ def watch(sweep_id: SweepId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOptio
 def show_sweep(
     sweep_id: SweepId,
     *,
-    wait: Annotated[bool, typer.Option("--watch", help="As `sweep watch`.")] = False,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
     """Show a sweep's progress."""
     client = Client(url)
     whole = whole_id(client, "sweep", sweep_id)
-    if wait:
-        raise typer.Exit(exit_code(_watch(client, whole, as_json=as_json)))
     sweep = client.sweep(whole)
     _show(sweep, as_json=as_json)
     if not as_json and sweep["progress"]["done"] < sweep["progress"]["total"]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import yaml
@@ -11,15 +14,48 @@ from markupsafe import Markup
 
 from buildarena_benchmark import CANARY
 from buildarena_benchmark.scorers.registry import known_flags
-from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column
-from buildarena_cli.dataset.counts import Counts
-from buildarena_cli.dataset.escaping import markdown_cell
+from buildarena_cli.dataset.columns import JOBS, Column
 
 CARD: Final = "README.md"
-FILES: Final = {"jobs": "jobs.parquet", "actions": "actions.parquet"}
+FILE: Final = "jobs.parquet"
 SIZES: Final = (1_000, 10_000, 100_000, 1_000_000)
 SIZE_NAMES: Final = ("n<1K", "1K<n<10K", "10K<n<100K", "100K<n<1M", "1M<n<10M")
 """What the hub calls these sizes."""
+MARKDOWN: Final = re.compile(
+    r"[\\`*\[\]<>|&~$#]"  # code, emphasis, links, tags, columns, entities, formulas, headings
+    r"|(?<![^\W_])_|_(?![^\W_])"  # between two letters it is only itself
+    r"|(?<=:)/(?=/)|(?<=www)\.|@"  # addresses, which would become links
+)
+
+
+@dataclass(slots=True)
+class Counts:
+    """What a dataset holds.
+
+    Attributes:
+        jobs: Its jobs.
+        successes: Jobs with the outcome `success`.
+        machines: Jobs with a machine.
+        outcomes: Jobs by how they ended.
+        cells: Jobs by task and model.
+        licences: Licences of the rows.
+    """
+
+    jobs: int = 0
+    successes: int = 0
+    machines: int = 0
+    outcomes: Counter[str] = field(default_factory=Counter)
+    cells: Counter[tuple[str, str]] = field(default_factory=Counter)
+    licences: Counter[str] = field(default_factory=Counter)
+
+    def add(self, job: Mapping[str, Any]) -> None:
+        """Counts a job."""
+        self.jobs += 1
+        self.successes += job["outcome"] == "success"
+        self.machines += job["machine"] is not None
+        self.outcomes[job["outcome"]] += 1
+        self.cells[job["task"], job["model"]] += 1
+        self.licences[job["license"]] += 1
 
 
 def card(counts: Counts) -> str:
@@ -33,7 +69,6 @@ def card(counts: Counts) -> str:
         cells=sorted(counts.cells.items()),
         licences=sorted(counts.licences.items()),
         jobs=column_rows(JOBS),
-        actions=column_rows(ACTIONS),
         flags=known_flags().values(),
     )
 
@@ -68,19 +103,20 @@ def _front_matter(counts: Counts) -> dict[str, Any]:
         "task_categories": ["text-generation"],
         "tags": ["buildarena", "tool-use", "agents", "engineering", "physics"],
         "configs": [
-            {
-                "config_name": name,
-                **({"default": True} if name == "jobs" else {}),
-                "data_files": [{"split": "train", "path": file}],
-            }
-            for name, file in FILES.items()
+            {"config_name": "jobs", "data_files": [{"split": "train", "path": FILE}]},
         ],
     }
 
 
 def _escaped(value: Any) -> Any:
     """A value as text that is no markup; what is our own is given as `Markup`."""
-    return markdown_cell(value) if type(value) is str else value
+    return _one_line(value) if type(value) is str else value
+
+
+def _one_line(text: str) -> str:
+    """A text of strangers inside a line of Markdown, where nothing of it is markup."""
+    line = "".join(c if c.isprintable() else " " if c.isspace() else "\ufffd" for c in text)
+    return MARKDOWN.sub(lambda match: f"\\{match[0]}", line)
 
 
 def column_rows(columns: Sequence[Column]) -> list[tuple[str, str, str]]:

@@ -1,4 +1,4 @@
-"""The tables of a dataset: each column with its type and its meaning, which the card repeats."""
+"""The table of a dataset: each column with its type and its meaning, which the card repeats."""
 
 from __future__ import annotations
 
@@ -73,18 +73,6 @@ JOBS: Final[Sequence[Column]] = (
     Column("tools", _TEXT, "JSON: the tools as definitions of functions, as `tools=` takes them."),
     Column("machine", _TEXT, "JSON: the machine document, byte for byte as it is kept."),
     Column("machine_sha256", _TEXT, "SHA-256 of `machine` as UTF-8."),
-    Column(
-        "parts_sha256",
-        _TEXT,
-        "SHA-256 of the machine document without its logs, keys sorted and without spaces: what "
-        "was looked up on the way makes no difference.",
-    ),
-    Column(
-        "replayed_sha256",
-        _TEXT,
-        "`parts_sha256` of the machine that the actions of this row build when they are done "
-        "again; another one than `parts_sha256` where another version of the rules built it.",
-    ),
     Column("transcript_sha256", _TEXT, "SHA-256 of the transcript as the service keeps it."),
     Column("trajectory_sha256", pa.list_(_TEXT), "SHA-256 of each trial's trajectory, in order."),
     Column("versions", _TEXT, "JSON: versions of everything that can change the result."),
@@ -105,21 +93,7 @@ JOBS: Final[Sequence[Column]] = (
     Column("canary", _TEXT, "The same in every row: a corpus that has it holds benchmark data."),
 )
 
-ACTIONS: Final[Sequence[Column]] = (
-    Column("job_id", _TEXT, "The job; `jobs` has its row."),
-    Column("index", _WHOLE, "Place of the action in the session, from 0."),
-    Column("turn", _WHOLE, "Reply that asked for it, from 0; null for the session's own."),
-    Column("phase", _TEXT, "Phase of the workflow."),
-    Column("sub_structure", _TEXT, "Part of the machine that it is about, if it is about one."),
-    Column("role", _TEXT, "Who asked for it; `session` for key presses of a program."),
-    Column("tool", _TEXT, "Name of the tool, as it was asked for."),
-    Column("arguments", _TEXT, "JSON: what it was given."),
-    Column("accepted", _YES, "Whether it was carried out."),
-    Column("refusal", _TEXT, "Refusal class, if it was refused."),
-    Column("feedback", _TEXT, "What was read of a refusal; that of accepted ones is in `jobs`."),
-)
 
-
-def schema(columns: Sequence[Column]) -> Any:
-    """The Arrow schema of a table."""
-    return pa.schema([pa.field(column.name, column.type) for column in columns])
+def schema() -> Any:
+    """The Arrow schema of the table."""
+    return pa.schema([pa.field(column.name, column.type) for column in JOBS])

@@ -1,10 +1,9 @@
-"""A job as the rows of its dataset."""
+"""A job as a row of a dataset."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from functools import lru_cache
 from hashlib import sha256
@@ -17,7 +16,6 @@ from buildarena_benchmark import CANARY, TaskError, parse_task
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_cli.dataset.messages import chat, compact
 from buildarena_cli.dataset.reading import Fetched
-from buildarena_cli.dataset.replaying import action_rows, parts_hash, replayed_hash
 from buildarena_cli.errors import CommandError
 
 BASELINE: Final = "builtin/"
@@ -35,16 +33,8 @@ NO_VERSION: Final = frozenset({"model", "machine", "trajectory", "rollout", "see
 """Of a manifest: what is in columns of its own, or may name an operator's hosts."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Rows:
-    """A job's row, and those of its actions."""
-
-    job: Mapping[str, Any]
-    actions: list[dict[str, Any]]
-
-
-def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
-    """The rows of a job.
+def row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
+    """The row of a job.
 
     Args:
         fetched: The job.
@@ -55,7 +45,7 @@ def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         CommandError: The job's documents are not what they should be.
     """
     try:
-        return _rows_of(fetched, tools=tools, licence=licence)
+        return _row_of(fetched, tools=tools, licence=licence)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
         problem = f"{type(error).__name__}: {error}"
         raise CommandError(
@@ -64,13 +54,12 @@ def rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         ) from error
 
 
-def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
+def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
     job = fetched.job
     turns = _turns(fetched.transcript) if fetched.transcript else []
-    document = json.loads(fetched.machine) if fetched.machine else None
     manifest = job["manifest"] or {}
     track = manifest.get("track") or {}
-    row = {
+    return {
         **{name: job[name] for name in AS_THEY_ARE},
         **{name: job["usage"][name] for name in USAGE},
         **_of_task(fetched.task),
@@ -84,8 +73,6 @@ def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         "tools": tools,
         "machine": None if fetched.machine is None else fetched.machine.decode(),
         "machine_sha256": job["artifacts"].get("machine"),
-        "parts_sha256": None if document is None else parts_hash(document),
-        "replayed_sha256": replayed_hash(turns, document),
         "transcript_sha256": (
             None if fetched.transcript is None else sha256(fetched.transcript).hexdigest()
         ),
@@ -99,7 +86,6 @@ def _rows_of(fetched: Fetched, *, tools: str, licence: str) -> Rows:
         "license": OURS if job["model"].startswith(BASELINE) else licence,
         "canary": CANARY,
     }
-    return Rows(job=row, actions=action_rows(job["id"], turns, document))
 
 
 def _is_unproved(job: Mapping[str, Any]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any, Final, Self
@@ -12,12 +12,11 @@ from typing import Any, Final, Self
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from buildarena_cli.dataset.card import CARD, FILES, card
-from buildarena_cli.dataset.columns import ACTIONS, JOBS, Column, schema
-from buildarena_cli.dataset.counts import Counts
+from buildarena_cli.dataset.card import CARD, FILE, Counts, card
+from buildarena_cli.dataset.columns import schema
 from buildarena_cli.dataset.messages import tools
 from buildarena_cli.dataset.reading import Fetched
-from buildarena_cli.dataset.rows import rows_of
+from buildarena_cli.dataset.rows import row_of
 from buildarena_cli.errors import CommandError
 
 GROUP_ROWS: Final = 256
@@ -39,16 +38,11 @@ def write_dataset(fetched: Iterable[Fetched], out: Path, *, licence: str) -> Cou
     """
     definitions, counts = tools(), Counts()
     with new_folder(out) as folder:
-        with (
-            Table(folder / FILES["jobs"], JOBS) as jobs,
-            Table(folder / FILES["actions"], ACTIONS) as actions,
-        ):
+        with Table(folder / FILE) as jobs:
             for job in fetched:
-                rows = rows_of(job, tools=definitions, licence=licence)
-                jobs.add(rows.job)
-                for action in rows.actions:
-                    actions.add(action)
-                counts.add(rows.job, rows.actions)
+                row = row_of(job, tools=definitions, licence=licence)
+                jobs.add(row)
+                counts.add(row)
         if not counts.jobs:
             raise CommandError("no job that has ended is among those that were asked for")
         (folder / CARD).write_text(card(counts), encoding="utf-8")
@@ -75,8 +69,8 @@ def check_place(out: Path) -> None:
 class Table:
     """A Parquet file that gets row groups as they come."""
 
-    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
-        self._schema = schema(columns)
+    def __init__(self, path: Path) -> None:
+        self._schema = schema()
         self._writer = pq.ParquetWriter(path, self._schema, compression="zstd")
         self._rows: list[Mapping[str, Any]] = []
         self._size = 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import os
 import shutil
 import signal
@@ -74,7 +73,7 @@ class EmbeddedPostgres:
         self._account = unprivileged_account()
         self._install = installed_postgres()
         self._copy: ProgramCopy | None = None
-        self._cluster = _cluster_in(folder)
+        self._cluster = folder / "cluster"
         self._password = secret_in(folder / "password")
         self._log_file = log_file
         self._durable = durable
@@ -214,7 +213,7 @@ class EmbeddedPostgres:
 def url_of_running(folder: Path) -> str | None:
     """The address of the server that runs on a data folder's ``postgres``; None when none does."""
     try:
-        lines = (_cluster_in(folder.absolute()) / "postmaster.pid").read_text().split("\n")
+        lines = (folder.absolute() / "cluster" / "postmaster.pid").read_text().split("\n")
         port, password = lines[PORT_LINE].strip(), (folder / "password").read_text()
     except (OSError, IndexError):
         return None
@@ -238,25 +237,3 @@ def installed_postgres() -> Path:
             "set BUILDARENA_DATABASE_URL to a Postgres server"
         )
     return installs[0].parents[1]
-
-
-def _cluster_in(folder: Path) -> Path:
-    """The cluster of a data folder.
-
-    Clusters of folders that ``nobody`` can't enter once lay in /var/tmp; such a one comes home,
-    or stays there when that is another file system. Without its password it is of no use.
-    """
-    cluster = folder / "cluster"
-    name = hashlib.sha256(str(cluster).encode()).hexdigest()[:16]
-    former = Path("/var/tmp") / f"buildarena-postgres-{name}"  # noqa: S108 - 0700, and Postgres checks its owner
-    if (
-        (cluster / "PG_VERSION").exists()
-        or not (folder / "password").exists()
-        or not (former / "PG_VERSION").exists()
-    ):
-        return cluster
-    try:
-        former.rename(cluster)
-    except OSError:
-        return former
-    return cluster

@@ -28,15 +28,12 @@ from buildarena_backend.trials.installed_simulators import installed_engines
 from buildarena_backend.workers import Workers
 from buildarena_benchmark.environment.trials.processes import ALLOCATOR, PARENT, tree_memory_bytes
 from buildarena_cli.errors import CommandError
-from buildarena_cli.local import (
-    EmbeddedPostgres,
-    EmbeddedServer,
-    EmbeddedValkey,
-    ManagedProcess,
-    Supervisor,
-)
+from buildarena_cli.local.postgres import EmbeddedPostgres
 from buildarena_cli.local.programs import programs
+from buildarena_cli.local.server import EmbeddedServer
 from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
+from buildarena_cli.local.supervisor import ManagedProcess, Supervisor
+from buildarena_cli.local.valkey import EmbeddedValkey
 from buildarena_client.paths import HEALTH
 
 KEYS = ("admin_key", "previous_admin_key", "metrics_key")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 from buildarena_cli.client import Client, at
@@ -27,13 +27,11 @@ class Collected:
     Args:
         client: The API.
         scope: What the site is about.
-        progress: Called after each answer.
     """
 
-    def __init__(self, client: Client, scope: Scope, progress: Callable[[], None]) -> None:
+    def __init__(self, client: Client, scope: Scope) -> None:
         self._client = client
         self._scope = scope
-        self._progress = progress
         self.answers: Answers = {}
         self.left_out: list[str] = []
 
@@ -46,10 +44,6 @@ class Collected:
         self._models()
         self._sweeps()
 
-    def _put(self, key: str, answer: Answer | None) -> None:
-        self.answers[key] = answer
-        self._progress()
-
     def _boards(self) -> None:
         tasks = sorted({job["task"] for job in self._scope.ended})
         categories = sorted({task["category"] for task in self._listed if task["name"] in tasks})
@@ -61,13 +55,15 @@ class Collected:
         # Pages ask without a track first, and get that of the scope or the first.
         for track, part in itertools.product((None, *self._scope.tracks), parts):
             asked = {"track": track, **part}
-            self._put(question(BOARD, asked), self._board(asked))
-            self._put(question(f"{BOARD}/figures", asked), self._held(f"{BOARD}/figures", asked))
+            self.answers[question(BOARD, asked)] = self._board(asked)
+            self.answers[question(f"{BOARD}/figures", asked)] = self._held(
+                f"{BOARD}/figures", asked
+            )
             for form, ending in EXPORTS.items():
                 if track is not None:
                     exported = {**asked, "format": form}
                     answer = self._held(f"{BOARD}/export", exported, ending)
-                    self._put(question(f"{BOARD}/export", exported), answer)
+                    self.answers[question(f"{BOARD}/export", exported)] = answer
 
     def _held(self, path: str, asked: dict[str, Any], ending: str = "json") -> Answer | None:
         """The answer to what a page asks, held to the site's scope."""
@@ -101,7 +97,7 @@ class Collected:
             on_board = self._models_on(track)
             for first, second in itertools.permutations(filter(on_board.__contains__, models), 2):
                 asked = {"first": first, "second": second, "track": track}
-                self._put(question(path, asked), self._held(path, asked))
+                self.answers[question(path, asked)] = self._held(path, asked)
 
     def _models_on(self, track: str | None) -> set[str]:
         """Models that a board compares: those with a job that counts."""
@@ -112,27 +108,31 @@ class Collected:
     def _tasks(self) -> None:
         versions = {(job["task"], job["task_version"]) for job in self._scope.jobs}
         names = {name for name, _ in versions}
-        self._put("/v1/tasks", document([task for task in self._listed if task["name"] in names]))
+        self.answers["/v1/tasks"] = document(
+            [task for task in self._listed if task["name"] in names]
+        )
         for name, version in sorted({*versions, *((name, None) for name in names)}, key=str):
             path = at("tasks", name)
             content = ask(self._client, path, version=version)
             key = question(f"/v1/tasks/{name}", {"version": version})
-            self._put(key, None if content is None else Answer(content))
+            self.answers[key] = None if content is None else Answer(content)
 
     def _models(self) -> None:
         used = {job["model"] for job in self._scope.jobs}
-        self._put("/v1/versions", document(self._client.get("/v1/versions")))
+        self.answers["/v1/versions"] = document(self._client.get("/v1/versions"))
         listed = self._client.get("/v1/models")
-        self._put("/v1/models", document([model for model in listed if model["name"] in used]))
+        self.answers["/v1/models"] = document([model for model in listed if model["name"] in used])
 
     def _sweeps(self) -> None:
         sweeps = list(self._scope.sweeps)
         page = {"sweeps": sweeps, "next_cursor": None}
-        self._put(question("/v1/sweeps", {"limit": LISTED_SWEEPS}), document(page))
+        self.answers[question("/v1/sweeps", {"limit": LISTED_SWEEPS})] = document(page)
         for sweep in sweeps:
-            self._put(f"/v1/sweeps/{sweep['id']}", document(sweep))
+            self.answers[f"/v1/sweeps/{sweep['id']}"] = document(sweep)
             troubles = ask(self._client, at("sweeps", sweep["id"], "troubles"))
-            self._put(f"/v1/sweeps/{sweep['id']}/troubles", (troubles and Answer(troubles)) or None)
+            self.answers[f"/v1/sweeps/{sweep['id']}/troubles"] = (
+                troubles and Answer(troubles)
+            ) or None
 
 
 def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:
@@ -140,14 +140,3 @@ def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:
     return document(
         {"jobs": list(scope.jobs), "kept": [job["id"] for job in chosen], "sweeps": scope.places}
     )
-
-
-def questions(scope: Scope) -> Iterator[int]:
-    """About how many questions there are, as a sum of parts; for progress bars."""
-    tasks = len({job["task"] for job in scope.ended}) + 1
-    models = min(MAX_COMPARED, len({job["model"] for job in scope.ended}))
-    tracks = len(scope.tracks)
-    yield tasks * (2 * (tracks + 1) + len(EXPORTS) * tracks)
-    yield models * (models - 1) * (tracks + 1)
-    yield 2 * tasks + 2
-    yield len(scope.sweeps) * (len(scope.sweeps) + 2)

@@ -89,7 +89,8 @@ class Folder:
 
     def keep(self, content: bytes, ending: str) -> str:
         """Keeps a content once; returns its path within the site."""
-        name = name_of(content, ending)
+        digest = sha256(content).hexdigest()
+        name = f"{DATA}/{digest[:2]}/{digest[2:40]}.{ending}"
         if not (self.path / name).is_file():
             self.write(name, content)
         return name
@@ -136,12 +137,6 @@ class Folder:
             for file in sorted((self.path / place).rglob("*")):
                 if file.is_file() and file.relative_to(self.path).as_posix() not in wanted:
                     file.unlink()
-
-
-def name_of(content: bytes, ending: str) -> str:
-    """The path of a content within a site."""
-    digest = sha256(content).hexdigest()
-    return f"{DATA}/{digest[:2]}/{digest[2:40]}.{ending}"
 
 
 def job_file(job_id: str) -> str:

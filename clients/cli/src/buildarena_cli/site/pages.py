@@ -55,18 +55,17 @@ def page_files(folder: Path) -> list[Path]:
     ]
 
 
-def first_page(folder: Path, preview: str = "") -> str:
+def first_page(folder: Path) -> str:
     """The first page of a site: it finds its files beside itself, and reads stored answers.
 
     Args:
         folder: The folder of the built pages.
-        preview: Further elements of its head.
 
     Raises:
         CommandError: The built page is not as expected: pages and program are of two versions.
     """
     text, heads = _BEGIN.subn(
-        lambda _: _HEAD + preview, (folder / INDEX).read_text(encoding="utf-8"), count=1
+        lambda _: _HEAD, (folder / INDEX).read_text(encoding="utf-8"), count=1
     )
     text, addresses = _ADDRESS.subn(r'\1="./', text)
     if not (heads and addresses):

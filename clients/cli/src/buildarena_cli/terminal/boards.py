@@ -1,37 +1,24 @@
-"""Leaderboards on a terminal: one overview, and the details of a task.
-
-The overview has success, its interval and the indicator of each model on each task. Through a pipe
-there is a row for each model. A terminal gets that, or a row for each task, whichever takes fewer
-blocks: what does not fit beside the names is continued below, so that nothing is left out. Where
-not even one column fits beside the names, the intervals give way.
-"""
+"""Leaderboards on a terminal: an overview, and the details of a task."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from buildarena_cli.terminal.output import (
     NOTHING,
     columns,
     emphasised,
-    harmless,
     in_words,
-    is_terminal,
     number,
-    padded,
-    print_lines,
     print_table,
     say,
-    terminal_width,
-    width_of,
 )
 
-GAP = "   "
 ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "#": lambda row: _rank(row["rank"]),
-    "model": lambda row: _marked([row]),
+    "model": lambda row: row["model"] + _marks(row),
     "success": lambda row: f"{row['successes']:g}/{row['trials']}",
     "95 %": lambda row: _interval(row["success_low"], row["success_high"]),
     "indicator": lambda row: number(row["indicator_mean"], at_least=_is_censored(row)),
@@ -46,8 +33,11 @@ ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "USD": lambda row: number(row["cost_usd_mean"], 2),
 }
 """The columns of a row on a task: what each shows of the API's answer."""
-RESULTS = ("success", "95 %", "indicator")
+RESULTS = ("#", "model", "success", "95 %", "indicator")
 LEAVING = ("requests", "parts", "tokens", "USD", "best", "score", "of it 95 %", "95 %", "indicator")
+OVERVIEW = columns(
+    "task", *RESULTS, numeric=("#", "success", "95 %", "indicator"), leaving=("95 %", "indicator")
+)
 OVERALL = columns(
     *("#", "model", "place", "mean rank", "score", "success", "USD", "front"),
     numeric=("#", "place", "mean rank", "score", "success", "USD"),
@@ -55,33 +45,18 @@ OVERALL = columns(
 )
 
 
-class _Row(NamedTuple):
-    """A model of the overview: its rank, its name, and its row of each task."""
-
-    rank: str
-    name: str
-    by_task: Mapping[str, Mapping[str, Any]]
-
-
 def overview(board: Mapping[str, Any]) -> None:
-    """Prints models x tasks: success with its interval, indicator; and the overall rank.
+    """Prints each model's success with its interval and indicator on each task.
 
     Args:
         board: The API's answer.
     """
-    ranks = {(row["model"], row["configuration"]): row["rank"] for row in board["overall"]}
-    rows: dict[tuple[str, str], dict[str, Any]] = {}
-    for task in board["tasks"]:
-        for row in task["rows"]:
-            rows.setdefault((row["model"], row["configuration"]), {})[task["task"]] = row
-    ordered = sorted(rows, key=lambda key: (ranks.get(key) is None, ranks.get(key), key[0]))
-    names = [_marked(list(rows[key].values())) for key in ordered]
-    tasks = [task["task"] for task in board["tasks"]]
-    _print_matrix(
-        tasks,
+    print_table(
+        OVERVIEW,
         [
-            _Row(_rank(ranks.get(key)), harmless(name), rows[key])
-            for key, name in zip(ordered, names, strict=True)
+            (task["task"], *(ROW[name](row) for name in RESULTS))
+            for task in board["tasks"]
+            for row in task["rows"]
         ],
     )
     say()
@@ -91,9 +66,9 @@ def overview(board: Mapping[str, Any]) -> None:
 
 def task_table(task: Mapping[str, Any]) -> None:
     """Prints all models on one task."""
-    _print_rows(
-        tuple(ROW),
-        task["rows"],
+    print_table(
+        columns(*ROW, numeric=[name for name in ROW if name != "model"], leaving=LEAVING),
+        [[shown(row) for shown in ROW.values()] for row in task["rows"]],
         title=emphasised(f"{task['task']}: {in_words(task['indicator'], task['unit'])}"),
         notes=[
             "* baseline; # is shared by statistically tied models",
@@ -103,19 +78,6 @@ def task_table(task: Mapping[str, Any]) -> None:
             *_of_runners(task["rows"]),
         ],
     )
-
-
-def _print_rows(
-    names: Sequence[str],
-    rows: Sequence[Mapping[str, Any]],
-    *,
-    title: str,
-    notes: Sequence[str] = (),
-) -> None:
-    numeric = [name for name in names if name != "model"]
-    cells = [[ROW[name](row) for name in names] for row in rows]
-    shown = columns(*names, numeric=numeric, leaving=LEAVING)
-    print_table(shown, cells, title=title, notes=notes)
 
 
 def overall_table(board: Mapping[str, Any]) -> None:
@@ -168,81 +130,6 @@ def _interval(low: float | None, high: float | None) -> str:
     return NOTHING if low is None or high is None else f"{100 * low:.0f}-{100 * high:.0f} %"
 
 
-def _print_matrix(tasks: Sequence[str], rows: Sequence[_Row]) -> None:
-    """Prints models x tasks in the way that takes the fewest blocks."""
-    room = terminal_width() if is_terminal() else None
-    for intervals in (True, False):
-        ways = [_by_model(tasks, rows, intervals=intervals)]
-        if room is not None:
-            ways.append(_by_task(tasks, rows, intervals=intervals))
-        fitting = [way for way in ways if room is None or _narrowest(way) <= room]
-        if fitting:
-            break
-    fewest = min((_groups(way, room) for way in fitting or ways), key=len)
-    for place, group in enumerate(fewest):
-        lines = [GAP.join(parts).rstrip() for parts in zip(*group, strict=True)]
-        print_lines([*([""] if place else []), emphasised(lines[0]), *lines[1:]])
-
-
-def _by_model(tasks: Sequence[str], rows: Sequence[_Row], *, intervals: bool) -> list[list[str]]:
-    """A row for each model: the column of names, and one of each task."""
-    names = _aligned([("#", "model"), *((row.rank, row.name) for row in rows)], right=(0,))
-    columns_ = [_cells([row.by_task.get(task) for row in rows], intervals) for task in tasks]
-    return [names, *(_column([task], cells) for task, cells in zip(tasks, columns_, strict=True))]
-
-
-def _by_task(tasks: Sequence[str], rows: Sequence[_Row], *, intervals: bool) -> list[list[str]]:
-    """A row for each task: the column of tasks, and one of each model below its rank."""
-    names = _aligned([(text,) for text in ("model", "#", *tasks)], right=())
-    columns_ = [_cells([row.by_task.get(task) for task in tasks], intervals) for row in rows]
-    return [
-        names,
-        *(_column([row.name, row.rank], cells) for row, cells in zip(rows, columns_, strict=True)),
-    ]
-
-
-def _groups(way: Sequence[list[str]], room: int | None) -> list[list[list[str]]]:
-    """The names with as many columns beside them as there is room for, and so on."""
-    names, *others = way
-    groups = [[names]]
-    for column in others:
-        if len(groups[-1]) > 1 and room is not None and _width([*groups[-1], column]) > room:
-            groups.append([names])
-        groups[-1].append(column)
-    return groups
-
-
-def _narrowest(way: Sequence[list[str]]) -> int:
-    return max(_width([way[0], column]) for column in way[1:])
-
-
-def _width(shown: Sequence[list[str]]) -> int:
-    return sum(width_of(column[0]) for column in shown) + len(GAP) * (len(shown) - 1)
-
-
-def _column(headings: Sequence[str], cells: Sequence[str]) -> list[str]:
-    width = max(map(width_of, [*headings, *cells]))
-    return [padded(text, width, right=True) for text in (*headings, *cells)]
-
-
-def _cells(rows: Sequence[Mapping[str, Any] | None], intervals: bool) -> list[str]:
-    """Success, interval and indicator of rows, aligned among themselves."""
-    names = [name for name in RESULTS if intervals or name != "95 %"]
-    cells = [[NOTHING if row is None else ROW[name](row) for name in names] for row in rows]
-    return _aligned(cells, right=range(len(names)))
-
-
-def _aligned(rows: Sequence[Sequence[str]], right: Sequence[int]) -> list[str]:
-    widths = [max(map(width_of, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            padded(cell, width, right=i in right)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        )
-        for row in rows
-    ]
-
-
 def _legend(board: Mapping[str, Any]) -> list[str]:
     """What the figures are: the indicators by tasks, and the marks."""
     indicators: dict[str, list[str]] = {}
@@ -253,25 +140,19 @@ def _legend(board: Mapping[str, Any]) -> list[str]:
     return [
         "Successes of jobs, the rate's exact 95 % interval, and the mean indicator:",
         *(f"  {', '.join(tasks)}: {name}" for name, tasks in indicators.items()),
-        "* baseline; # is the overall rank, shared by statistically tied models",
+        "* baseline; # is shared by statistically tied models",
         *_remarks(rows),
         *_meanings(board, rows),
         *_of_runners(rows),
     ]
 
 
-def _marked(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A row's model with its marks, and the limits of its sessions, if they had any.
-
-    Args:
-        rows: One model configuration, on one task or several.
-    """
-    first = rows[0]
-    limits = first.get("decoding", {}).get("limits", {})
+def _marks(row: Mapping[str, Any]) -> str:
+    """The marks of a row's model, and the limits of its sessions, if they had any."""
+    limits = row.get("decoding", {}).get("limits", {})
     spelled = ", ".join(f"{name} {value}" for name, value in limits.items())
-    marks = "*" if first.get("baseline") else ""
-    marks += "†" if any(row.get("by_runner") for row in rows) else ""
-    return f"{first['model']}{marks}" + (f" ({spelled})" if spelled else "")
+    marks = ("*" if row.get("baseline") else "") + ("†" if row.get("by_runner") else "")
+    return marks + (f" ({spelled})" if spelled else "")
 
 
 def _remarks(rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -1,4 +1,4 @@
-"""`buildarena machine check`, `export` and `import`: machines as files and pictures."""
+"""`buildarena machine check` and `export`: machines as files and pictures."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from buildarena_cli.machines import (
     MachineFile,
     chosen_task,
     controlled,
-    read_imported,
     read_machine,
     shown_errors,
 )
@@ -64,14 +63,10 @@ def _facts(machine: Machine) -> dict[str, Any]:
     }
 
 
-def _print_size(facts: dict[str, Any]) -> None:
+def _print_facts(facts: dict[str, Any]) -> None:
     size = " x ".join(f"{length:.2f}" for length in facts["size"])
     say(f"{facts['parts']} parts, mass {facts['mass']:.2f}, cost {facts['cost']}")
     say(f"{size} units east x north x up")
-
-
-def _print_facts(facts: dict[str, Any]) -> None:
-    _print_size(facts)
     for problem in facts["problems"]:
         say(problem)
     if not facts["problems"]:
@@ -142,41 +137,3 @@ def _game_file(machine: Machine, name: str, task: str | None, controls: Path | N
     run_id = uuid.uuid4().hex
     run = prepare_run(machine, scenario, name=name, run_id=run_id, controls=presses)
     return run.machine_file
-
-
-def import_file(
-    file: Annotated[
-        Path,
-        typer.Argument(help="A machine file of the game's (.bsg).", callback=to_read),
-    ],
-    out: Annotated[
-        Path | None, typer.Option(help="Write the machine document (.json) to this file.")
-    ] = None,
-    *,
-    as_json: JsonOption = False,
-) -> None:
-    """Read a machine file of the game's, and tell what it says beyond.
-
-    Keys and settings that a machine here does not have are named and left out.
-    """
-    with shown_errors():
-        imported = read_imported(file)
-        if out is not None:
-            from buildarena_geometry.machine_files import machine_bytes
-
-            out.write_bytes(machine_bytes(imported.machine))
-        facts = {
-            "name": imported.name,
-            **_facts(imported.machine),
-            "not_understood": list(imported.not_understood),
-        }
-        if as_json:
-            print_json(facts)
-            return
-        _print_size(facts)
-        for remark in imported.not_understood:
-            say(remark)
-        if not imported.not_understood:
-            say("Everything was understood.")
-        if out is not None:
-            say(str(out))
