@@ -1,7 +1,6 @@
-"""Writes the tasks of Inspect's adapter, and the numbers of their versions.
+"""Writes the numbers of the versions that tasks have in Inspect.
 
-Registers and `inspect list tasks` read a file of tasks without running it, so each task has a function
-in it. The number of a task's version rises when its results stop being comparable to earlier ones.
+A number rises when the task's results stop being comparable to earlier ones.
 """
 
 from __future__ import annotations
@@ -14,36 +13,7 @@ from buildarena_geometry import FEEDBACK_VERSION
 from buildarena_simulation import SIMULATION_VERSION
 
 PACKAGE = Path(__file__).parents[1] / "integrations/inspect/src/buildarena_inspect"
-TASKS = PACKAGE / "tasks.py"
 VERSIONS = PACKAGE / "versions.json"
-HEAD = '''\
-"""Inspect's tasks, one for each of BuildArena's. `make generate NAME=inspect` writes this file."""
-
-from typing import Unpack
-
-from inspect_ai import Task, task
-
-from buildarena_inspect.task_factory import TASK_NAMES, TaskArguments, task_of
-'''
-FUNCTION = '''
-
-@task
-def {function}(**arguments: Unpack[TaskArguments]) -> Task:
-    """{title}."""
-    return task_of({name}, **arguments)
-'''
-
-
-def tasks_file() -> str:
-    """The text of `tasks.py`."""
-    functions = [
-        FUNCTION.format(function=name.replace("-", "_"), title=task.title, name=f'"{name}"')
-        for name, task in builtin_tasks().items()
-    ]
-    everything = FUNCTION.format(
-        function="all_tasks", title="All tasks, each a sample", name="*TASK_NAMES"
-    ).replace("@task\n", '@task(name="all")\n')
-    return "".join([HEAD, *functions, everything])
 
 
 def compared(name: str) -> str:
@@ -65,7 +35,6 @@ def versions_file(present: str) -> str:
 
 
 if __name__ == "__main__":
-    TASKS.write_text(tasks_file(), encoding="utf-8")
     VERSIONS.write_text(
         versions_file(VERSIONS.read_text(encoding="utf-8") if VERSIONS.exists() else "{}"),
         encoding="utf-8",

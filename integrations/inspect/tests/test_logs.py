@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from inspect_ai import Task
 from inspect_ai.dataset import Sample
-from inspect_ai.log import read_eval_log, write_eval_log
+from inspect_ai.log import read_eval_log
 from inspect_ai.model import ModelOutput
-from scripted_models import EXPERTS, call, listed, only
+from scripted_models import EXPERTS, listed, only
 
 from buildarena_inspect.__main__ import main
 from buildarena_inspect.logs import LoggedSample, logged_samples
@@ -17,28 +17,11 @@ from buildarena_inspect.logs import LoggedSample, logged_samples
 pytestmark = pytest.mark.nightly
 
 
-def test_models_of_several_logs_are_ranked_over_their_tasks(run, tmp_path, capsys) -> None:
-    run("buildarena/all", sample_id=["support-1", "lift-1"], epochs=3)
-    lazy = listed(call("start", {}), call("submit", {}))
-    log = run("buildarena/all", lazy, sample_id=["support-1", "lift-1"], epochs=3)
-    other = tmp_path / "lazy.json"
-    whole = read_eval_log(log.location, resolve_attachments="full")
-    whole.eval.model = "mockllm/lazy"
-    write_eval_log(whole, str(other))
-    Path(log.location).unlink()
-    assert main(["rank", str(tmp_path / "logs"), str(other)]) == 0
-    *counts, heading, first, second = capsys.readouterr().out.splitlines()
-    assert sorted(line.partition(": ")[2] for line in counts) == ["6 of 6 samples"] * 2
-    assert heading.split()[-1] == "model"
-    assert first.split() == ["1", "1.00", "100%", "6", "mockllm-model"]
-    assert second.split()[1:] == ["2.00", "0%", "6", "mockllm-lazy"]
-
-
 def test_what_is_no_log_of_ours_is_refused_in_plain_words(run, tmp_path, capsys) -> None:
     nothing, garbage = tmp_path / "nothing.eval", tmp_path / "garbage.eval"
     garbage.write_bytes(b"PK no")
     for path, message in ((nothing, "No such file"), (garbage, "is no log of Inspect")):
-        assert main(["rank", str(path)]) == 2
+        assert main(["import", str(path)]) == 2
         assert message in capsys.readouterr().err
     talking = listed(ModelOutput.from_content("mockllm", "Hello"))
     strange = run(Task([Sample(input="Say hello.")]), talking)

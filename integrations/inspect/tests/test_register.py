@@ -11,19 +11,9 @@ from scripted_models import call, listed
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.tasks.task import SCORER_VERSION
 from buildarena_geometry import FEEDBACK_VERSION
-from buildarena_inspect import tasks as task_file
-from buildarena_inspect.task_factory import TASKS
 from buildarena_simulation import SIMULATION_VERSION, engine_version
 
 pytestmark = pytest.mark.nightly
-
-
-def test_each_task_has_a_function_under_both_names(run) -> None:
-    functions = {name: value for name, value in vars(task_file).items() if name in TASKS}
-    assert functions.keys() | {"all"} == TASKS.keys()
-    nothing = listed(call("submit", {}))
-    for name in ("buildarena/support_1", "buildarena_inspect/support_1"):
-        assert run(name, nothing, message_limit=4).eval.task == name
 
 
 def test_versions_have_the_registers_form_and_logs_name_all_of_them(run) -> None:

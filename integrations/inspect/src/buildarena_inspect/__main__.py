@@ -1,4 +1,4 @@
-"""Commands on logs: `python -m buildarena_inspect import LOG…` and `… rank LOG…`."""
+"""Brings logs into a service: `python -m buildarena_inspect import LOG…`."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ from pathlib import Path
 from buildarena_client import Client, ClientError
 from buildarena_inspect.errors import BuildarenaInspectError
 from buildarena_inspect.importing import Imported, bring
-from buildarena_inspect.logs import LoggedSample, Unusable, logged_samples, state_of
-from buildarena_inspect.ranking import ranked
+from buildarena_inspect.logs import Unusable, logged_samples, state_of
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Carries out a command; 1 when something was left out or is not as the log says."""
+    """Carries out the command; 1 when something was left out or is not as the log says."""
     given = _parser().parse_args(arguments)
     try:
         return int(given.command(given))
@@ -35,9 +34,6 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--limit", type=int, help="only so many samples of each log")
     one.add_argument("--wait", type=float, default=600.0, help="seconds for a job to end")
     one.set_defaults(command=_import)
-    two = commands.add_parser("rank", help="rank the models of logs over their tasks")
-    two.add_argument("logs", nargs="+", type=Path, metavar="LOG")
-    two.set_defaults(command=_rank)
     return parser
 
 
@@ -68,28 +64,6 @@ def _told(found: Imported | Unusable) -> bool:
     for difference in found.differences:
         _say(f"  {difference}")
     return found.outcome is not None and not found.differences
-
-
-def _rank(given: argparse.Namespace) -> int:
-    samples: list[LoggedSample] = []
-    clean = True
-    for path in _files(given.logs):
-        clean &= _counted(path)
-        for sample in logged_samples(path):
-            if isinstance(sample, Unusable):
-                clean = False
-                _say(f"{sample.sample} epoch {sample.epoch}: left out: {sample.why}")
-            else:
-                samples.append(sample)
-    for simulator, rows in ranked(samples).items():
-        _say(f"{simulator}: rank  mean rank  success  trials  model")
-        for row in rows:
-            rank = "-" if row.rank is None else str(row.rank)
-            mean = "-" if row.mean_rank is None else f"{row.mean_rank:.2f}"
-            rate = "-" if row.success_rate_mean is None else f"{row.success_rate_mean:.0%}"
-            before = " " * len(f"{simulator}: ")
-            _say(f"{before}{rank:>4}  {mean:>9}  {rate:>7}  {row.trials:>6}  {row.model}")
-    return 0 if clean else 1
 
 
 def _counted(path: Path) -> bool:

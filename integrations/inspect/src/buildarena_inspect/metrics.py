@@ -63,7 +63,7 @@ def mean_rank() -> Metric:
     """Mean rank over tasks and both figures, beside the built-in expert: 1 is better in all.
 
     1.5 is as good, 2 is behind in everything. It is the leaderboards' rank aggregation; models of
-    several logs are ranked among each other by `buildarena_inspect.ranking`.
+    several logs are ranked by a service that they are brought into.
     """
 
     def compute(scores: list[SampleScore]) -> Value:

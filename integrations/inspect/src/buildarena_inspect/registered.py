@@ -1,6 +1,5 @@
 """What Inspect loads by the entry points `buildarena` and `buildarena_inspect`."""
 
-from buildarena_inspect import tasks
 from buildarena_inspect.metrics import indicator_by_task, mean_rank, success_interval
 from buildarena_inspect.roles import five_roles
 from buildarena_inspect.scorers import indicator, reward, success
@@ -17,6 +16,5 @@ __all__ = [
     "reward",
     "success",
     "success_interval",
-    "tasks",
     "workbench",
 ]
