@@ -21,7 +21,7 @@ from buildarena_api.dashboard.files import BASE_NAME, INDEX, read_pages
 from buildarena_backend.errors import StartupError
 from buildarena_backend.process.context import Context
 from buildarena_backend.settings import OWN_PATHS, Settings, load_settings
-from buildarena_cli.local import free_port
+from buildarena_cli.local.server import free_port
 from buildarena_cli.main import app
 
 BASE = "/tools/arena"

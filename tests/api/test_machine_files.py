@@ -19,7 +19,7 @@ from support.warm_work import make
 
 from buildarena_api import machine_uploads
 from buildarena_api.checking import Checker, CheckFailedError
-from buildarena_api.machine_uploads import MAX_BYTES, shared_checker
+from buildarena_api.machine_uploads import MAX_BYTES, read_uploaded, shared_checker
 from buildarena_backend.jobs import files
 from buildarena_geometry import Machine
 from buildarena_simulation.constants import MAX_PARTS
@@ -215,8 +215,8 @@ def test_bombs_are_answered_in_words_and_leave_the_process_well(api) -> None:
 @pytest.fixture
 def process() -> psutil.Process:
     """The process that reads files, when it is ready."""
-    shared_checker().read(written())
-    return psutil.Process(shared_checker()._checker._process.pid)
+    read_uploaded(written())
+    return psutil.Process(shared_checker()._process.pid)
 
 
 @contextmanager
@@ -258,14 +258,14 @@ def test_a_process_that_is_killed_or_takes_too_long_loses_nothing(
 ) -> None:
     with ThreadPoolExecutor(1) as threads, stopped(process):
         trying = threads.submit(attempt, api, written())
-        wait_until(shared_checker()._checker._lock.locked, 10, "the file is asked about")
+        wait_until(shared_checker()._lock.locked, 10, "the file is asked about")
         process.kill()
         assert trying.result().status_code == 202
-    second = psutil.Process(shared_checker()._checker._process.pid)
+    second = psutil.Process(shared_checker()._process.pid)
     assert second.pid != process.pid
     assert attempt(api, written()).status_code == 200
     assert len(context.store.jobs.page(limit=10)) == 1
-    monkeypatch.setattr(shared_checker()._checker, "_longest_s", 0.3)
+    monkeypatch.setattr(shared_checker(), "_longest_s", 0.3)
     with stopped(second):
         answer = check(api, written())
     assert answer.status_code == 422

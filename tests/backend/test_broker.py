@@ -20,11 +20,11 @@ from support.servers.live_api import changed, live_api
 from support.servers.stacks import wait_until
 
 from buildarena_api.http import places
-from buildarena_api.http.rate_limits import CircuitBreaker, RateLimits
+from buildarena_api.http.rate_limits import RateLimits
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.queue.queues import MAX_WAITING, Queues
 from buildarena_backend.queue.watchdog import ConsumerWatchdog, reconnect
-from buildarena_cli.local import EmbeddedValkey
+from buildarena_cli.local.valkey import EmbeddedValkey
 from buildarena_worker.providers import throttle as throttle_module
 from buildarena_worker.providers.throttle import Throttle
 
@@ -181,31 +181,6 @@ def test_heartbeats_go_on_whatever_they_meet(context) -> None:
     keeper.start()
     wait_until(lambda: len(beats) >= 2, 5, "a second beat after the first failed")
     keeper.stop()
-
-
-def test_a_breaker_is_open_until_a_probe_is_answered() -> None:
-    """Of a server that is not there, a probe that breaks, and the server again."""
-    answers: list[bool | Exception] = [False, OSError("refused"), RuntimeError("?"), True]
-
-    async def probe() -> bool:
-        answer = answers.pop(0)
-        if isinstance(answer, Exception):
-            raise answer
-        return answer
-
-    async def main() -> None:
-        breaker = CircuitBreaker(probe, period_s=SOON_S)
-        assert not breaker.is_open
-        breaker.failed()
-        breaker.failed()
-        assert breaker.is_open
-        for _ in range(500):
-            await asyncio.sleep(SOON_S * breaker.is_open)
-        assert not breaker.is_open
-        assert answers == []
-        await breaker.close()
-
-    asyncio.run(main())
 
 
 class Consumer:

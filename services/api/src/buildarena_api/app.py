@@ -18,6 +18,7 @@ from buildarena_api.dashboard.serving import Dashboard, is_page
 from buildarena_api.dependencies import Services
 from buildarena_api.events.hub import EventHub
 from buildarena_api.http.bodies import BodyLimitMiddleware
+from buildarena_api.http.etags import ResponseCache
 from buildarena_api.http.key_checks import KeyChecks
 from buildarena_api.http.locality import LocalOnlyMiddleware
 from buildarena_api.http.log import RequestLog
@@ -32,7 +33,6 @@ from buildarena_api.http.parts import Parts
 from buildarena_api.http.places import OpenRequests, usual_places
 from buildarena_api.http.problems import add_problem_handlers, problem_responses
 from buildarena_api.http.rate_limits import RateLimits
-from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.replays.views import (
     PartView,
@@ -43,6 +43,8 @@ class BenchPartView(PartView):
 class SubStructureView(BaseModel):
     """A copy of a machine in an assembly."""
 
+    model_config = ConfigDict(from_attributes=True)
+
     letter: str
     source: str = Field(description="The machine that it is a copy of")
 
@@ -73,14 +75,10 @@ def machine_view(name: str, machine: Machine) -> BenchMachineView:
             *(_block(block, machine) for block in machine.blocks.values()),
             *(_connector(link) for link in machine.connectors.values()),
         ],
-        control_sequence=[
-            PressView(time_s=one.time_s, key=one.key, hold_for_s=one.hold_for_s)
-            for one in machine.control_sequence
-        ],
+        control_sequence=[PressView.model_validate(one) for one in machine.control_sequence],
         controller=machine.controller,
         sub_structures=[
-            SubStructureView(letter=one.letter, source=one.source)
-            for one in machine.sub_structures.values()
+            SubStructureView.model_validate(one) for one in machine.sub_structures.values()
         ],
         available=list(machine.available),
         mass=machine.mass,

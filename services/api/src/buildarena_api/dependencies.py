@@ -14,12 +14,12 @@ from buildarena_backend.process.context import Context
 
 if TYPE_CHECKING:
     from buildarena_api.events.hub import EventHub
+    from buildarena_api.http.etags import ResponseCache
     from buildarena_api.http.key_checks import KeyChecks
     from buildarena_api.http.metrics import ServiceMetrics
     from buildarena_api.http.parts import Parts
     from buildarena_api.http.places import Kind, Places
     from buildarena_api.http.rate_limits import RateLimits
-    from buildarena_api.http.response_cache import ResponseCache
     from buildarena_api.leaderboard.cache import BoardCache
     from buildarena_api.replays.making import Replays
     from buildarena_api.runners.service import RunnerService

@@ -61,40 +61,28 @@ class Upload:
     fault: str | None
 
 
-class UploadChecker:
-    """Reads machines' files, one at a time."""
-
-    def __init__(self) -> None:
-        self._checker = Checker(
-            "machine files", _reading, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S
-        )
-
-    def read(self, data: bytes) -> Upload:
-        """The machine of a file, told apart by content.
-
-        Args:
-            data: A machine document (JSON), or a machine file of the game (.bsg).
-
-        Raises:
-            ProblemError: It is none of these, is not sound, or can't be read within the bounds.
-        """
-        try:
-            answer: Upload | str = self._checker.ask(data)
-        except CheckFailedError as error:
-            raise refused(f"the file is too much: {error}") from error
-        if isinstance(answer, str):
-            raise refused(answer)
-        return answer
-
-    def close(self) -> None:
-        """Ends the process."""
-        self._checker.close()
-
-
 @cache
-def shared_checker() -> UploadChecker:
+def shared_checker() -> Checker:
     """This process' checker; its own process begins with the first file and ends with this one."""
-    return UploadChecker()
+    return Checker("machine files", _reading, spare_bytes=SPARE_BYTES, longest_s=LONGEST_S)
+
+
+def read_uploaded(data: bytes) -> Upload:
+    """The machine of a file, told apart by content.
+
+    Args:
+        data: A machine document (JSON), or a machine file of the game (.bsg).
+
+    Raises:
+        ProblemError: It is none of these, is not sound, or can't be read within the bounds.
+    """
+    try:
+        answer: Upload | str = shared_checker().ask(data)
+    except CheckFailedError as error:
+        raise refused(f"the file is too much: {error}") from error
+    if isinstance(answer, str):
+        raise refused(answer)
+    return answer
 
 
 def _reading() -> Callable[[Any], Upload | str]:

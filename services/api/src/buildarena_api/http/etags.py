@@ -1,10 +1,14 @@
-"""Answers that are not sent again to a reader who has them."""
+"""Answers that are not sent again to a reader who has them, nor made again while there is room."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
+from threading import Lock
 
+from cachetools import LRUCache
 from fastapi import Request, Response
 
 
@@ -28,3 +32,41 @@ def conditional(request: Request, answer: Answer, media_type: str) -> Response:
     if answer.etag in known or "*" in known:
         return Response(status_code=304, headers=headers)
     return Response(answer.body, media_type=media_type, headers=headers)
+
+
+class ResponseCache:
+    """The answers that were used last, by what they are made from.
+
+    Args:
+        max_bytes: Their bytes together at most.
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        self._cached: LRUCache[str, Answer] = LRUCache(
+            max_bytes, getsizeof=lambda answer: len(answer.body)
+        )
+        self._lock = Lock()
+        self._making = Lock()
+
+    def get_or_make(self, key: str, make: Callable[[], bytes]) -> Answer:
+        """The answer with a key.
+
+        Args:
+            key: Names everything that it is made from.
+            make: Makes its body, one at a time in the process: a large one takes all of a core.
+        """
+        cached = self._find(key)
+        if cached is not None:
+            return cached
+        with self._making:
+            cached = self._find(key)
+            if cached is None:
+                cached = Answer.of(make())
+                # One that is larger than the cache is not stored.
+                with self._lock, suppress(ValueError):
+                    self._cached[key] = cached
+            return cached
+
+    def _find(self, key: str) -> Answer | None:
+        with self._lock:
+            return self._cached.get(key)

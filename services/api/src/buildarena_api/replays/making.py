@@ -7,9 +7,8 @@ from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Any, Final
 
-from buildarena_api.http.etags import Answer
+from buildarena_api.http.etags import Answer, ResponseCache
 from buildarena_api.http.problems import ProblemError
-from buildarena_api.http.response_cache import ResponseCache
 from buildarena_api.replays.views import replay_view
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_backend.replays.chapters import Chapter, Replay, ReplayStep
 from buildarena_geometry import AttemptedBlock, Block, Connector
@@ -34,6 +34,8 @@ class PartView(PlacedView):
 
 class PressView(BaseModel):
     """A key that is held for a while."""
+
+    model_config = ConfigDict(from_attributes=True)
 
     time_s: float
     key: str
@@ -118,9 +120,7 @@ def _step(step: ReplayStep) -> StepView:
         rebound=_parts(changed.rebound),
         control_sequence=None
         if pressed is None
-        else [
-            PressView(time_s=one.time_s, key=one.key, hold_for_s=one.hold_for_s) for one in pressed
-        ],
+        else [PressView.model_validate(one) for one in pressed],
         attempted=[_attempted(block) for block in step.attempted],
     )
 

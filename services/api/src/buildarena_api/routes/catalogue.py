@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_benchmark.scorers.registry import known_scorers
 from buildarena_geometry import module_set
+from buildarena_geometry.modules.module import Face
 
 router = APIRouter(prefix="/v1", tags=["catalogue"])
 
 
-class ModelView(BaseModel):
+def _labels(faces: Iterable[Face]) -> list[str]:
+    return [face.label for face in faces]
+
+
+class _View(BaseModel):
+    model_config = ConfigDict(from_attributes=True)
+
+
+class ModelView(_View):
     """A model that jobs can name."""
 
     name: str = Field(examples=["openai/gpt-5"])
@@ -24,7 +34,7 @@ class ModelView(BaseModel):
     baseline: bool
 
 
-class ModuleView(BaseModel):
+class ModuleView(_View):
     """A module that machines are made of."""
 
     name: str
@@ -35,13 +45,15 @@ class ModuleView(BaseModel):
     size: tuple[float, float, float] | None = Field(
         description="Extents along its own x, y and z, units; null for connectors"
     )
-    faces: list[str] = Field(description="Labels of the faces that take a block")
+    faces: Annotated[list[str], BeforeValidator(_labels)] = Field(
+        description="Labels of the faces that take a block"
+    )
     actions: list[str] = Field(description="What keys can be bound to")
     categories: list[str] = Field(description="Groups it is looked up in; none for basic modules")
     simulated: bool = Field(description="Whether both engines have its physics")
 
 
-class ScorerFlag(BaseModel):
+class ScorerFlag(_View):
     """A remark that a scorer may make on a trial."""
 
     name: str
@@ -63,10 +75,7 @@ class ScorerView(BaseModel):
 @router.get("/models")
 def list_models(registry: RegistryDep) -> list[ModelView]:
     """Lists the models of the registry."""
-    return [
-        ModelView(name=m.name, provider=m.provider, model=m.model, baseline=m.baseline)
-        for m in registry.models.values()
-    ]
+    return [ModelView.model_validate(model) for model in registry.models.values()]
 
 
 @router.get("/modules", responses=problem_responses(404, 422, 503))
@@ -89,21 +98,7 @@ def list_modules(
         if task is None
         else context.tasks.find(task, version).task.constraints.catalogue
     )
-    return [
-        ModuleView(
-            name=m.name,
-            kind=m.kind,
-            mass=m.mass,
-            cost=m.cost,
-            description=m.description,
-            size=m.size,
-            faces=[face.label for face in m.faces],
-            actions=list(m.actions),
-            categories=list(m.categories),
-            simulated=m.simulated,
-        )
-        for m in catalogue.values()
-    ]
+    return [ModuleView.model_validate(module) for module in catalogue.values()]
 
 
 @router.get("/scorers")
@@ -114,7 +109,7 @@ def list_scorers() -> list[ScorerView]:
             name=scorer.name,
             description=scorer.description,
             parameters=scorer.parameters.model_json_schema(),
-            flags=[ScorerFlag.model_validate(flag, from_attributes=True) for flag in scorer.flags],
+            flags=[ScorerFlag.model_validate(flag) for flag in scorer.flags],
         )
         for scorer in known_scorers().values()
     ]

@@ -12,9 +12,8 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.machine_uploads import (
     MAX_BYTES,
-    UploadChecker,
+    read_uploaded,
     refused,
-    shared_checker,
     uploaded,
 )
 from buildarena_api.replays.views import PressView
@@ -44,11 +43,6 @@ FILE: Final[dict[str, Any]] = {
 }
 
 
-async def _checker() -> UploadChecker:
-    return shared_checker()
-
-
-CheckerDep = Annotated[UploadChecker, Depends(_checker)]
 FileDep = Annotated[bytes, Depends(uploaded)]
 TaskName = Annotated[Name | None, Query(description="Also hold it against this task's rules")]
 
@@ -84,14 +78,12 @@ class MachineCheckView(BaseModel):
     responses=problem_responses(404, 413, 422, 503),
     openapi_extra=FILE,
 )
-def check_machine(
-    data: FileDep, checker: CheckerDep, context: ContextDep, task: TaskName = None
-) -> Response:
+def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> Response:
     """Reads a machine from a file and says what it is and what is wrong with it.
 
     A file that holds no machine is refused, and named what makes it so.
     """
-    upload = checker.read(data)
+    upload = read_uploaded(data)
     content, machine = upload.content, upload.content.machine
     view = MachineCheckView(
         name=content.name,
@@ -102,10 +94,7 @@ def check_machine(
         parts=machine.part_count,
         mass=machine.mass,
         bounds=_bounds(machine),
-        control_sequence=[
-            PressView(time_s=one.time_s, key=one.key, hold_for_s=one.hold_for_s)
-            for one in machine.control_sequence
-        ],
+        control_sequence=[PressView.model_validate(one) for one in machine.control_sequence],
         scene=machine_scene(machine),
     )
     return Response(view.model_dump_json(), media_type="application/json")
@@ -122,7 +111,6 @@ def check_machine(
 )
 def try_file(
     data: FileDep,
-    checker: CheckerDep,
     *,
     wanted: Annotated[TrialQuery, Query()],
     context: ContextDep,
@@ -134,7 +122,7 @@ def try_file(
     The same machine, task, simulator and seed give the same job; its score, trajectory and scene
     are those of any job.
     """
-    upload = checker.read(data)
+    upload = read_uploaded(data)
     if upload.fault is not None:
         raise refused(upload.fault)
     job, fresh = request_trial(

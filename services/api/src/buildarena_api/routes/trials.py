@@ -11,7 +11,6 @@ from fastapi import APIRouter, Query, Request, Response
 from buildarena_api.access import limited
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.etags import conditional
-from buildarena_api.http.negotiation import prefers
 from buildarena_api.http.problems import ProblemError, problem_responses
 from buildarena_api.scenes import SceneView, scene_view
 from buildarena_api.withholding import require_told
@@ -57,7 +56,7 @@ def get_trajectory(
     metadata under `buildarena.trajectory`.
     """
     digest = _trajectory_hash(context, context.store.jobs.get(job_id), number)
-    as_arrow = prefers(request.headers.get("accept", ""), ARROW, over=PARQUET)
+    as_arrow = ARROW in request.headers.get("accept", "").lower()
     media_type = ARROW if as_arrow else PARQUET
     headers = {"ETag": f'"{digest}{"-arrow" if as_arrow else ""}"', "Vary": "Accept"}
     if headers["ETag"] in request.headers.get("if-none-match", ""):

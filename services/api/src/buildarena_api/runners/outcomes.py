@@ -21,7 +21,12 @@ from buildarena_backend.process.context import Context
 from buildarena_backend.states import AttemptResult
 from buildarena_backend.telemetry.tracing import Attribute, span
 from buildarena_backend.trials.simulator import BESIEGE
-from buildarena_backend.trials.trial_checks import checked_versions, require_decided
+from buildarena_backend.trials.trial_checks import (
+    checked_trajectory,
+    checked_versions,
+    require_decided,
+    require_refusable,
+)
 from buildarena_backend.trials.trial_repository import DueTrial, TrialRepository
 from buildarena_backend.trials.trials import File, TrialResult
 from buildarena_simulation import Trajectory
@@ -129,21 +134,23 @@ class Outcomes:
         files = self._files(named, due.request.number, said.files)
         if said.trajectory is None:
             log_file = files.get(f"log-{due.request.number}.txt")
-            self._checker.require_refusable(
+            self._checker.ask(
+                require_refusable,
+                due.machine,
+                due.task.scenario,
                 simulator=simulator,
-                machine=due.machine,
-                scenario=due.task.scenario,
                 controls=due.controls,
                 versions=said.versions,
                 log=None if log_file is None else log_file.data,
             )
         else:
-            trajectory = self._checker.checked(
-                self._uploads.take(named, said.trajectory),
+            trajectory = self._checker.ask(
+                checked_trajectory,
+                due.machine,
+                due.task.scenario,
+                data=self._uploads.take(named, said.trajectory),
                 simulator=simulator,
                 version=version,
-                machine=due.machine,
-                scenario=due.task.scenario,
                 controls=due.controls,
                 seed=due.request.seed,
             )

@@ -48,7 +48,7 @@ class GameLock:
 
 def screen_name() -> str:
     """What tells this process's screen from others on the machine."""
-    if sys.platform in {"win32", "darwin"}:
+    if sys.platform == "win32":
         return f"the screen of {os.environ.get('USERNAME') or os.environ.get('USER', '')}"
     return f"the screen {os.environ.get('DISPLAY', '')}"
 

@@ -226,7 +226,7 @@ def executable_stem(name: str) -> str:
 
 def _screen_of(process: psutil.Process) -> str:
     """Which X11 screen a process shows its windows on; one for all elsewhere."""
-    if sys.platform in {"win32", "darwin"}:
+    if sys.platform == "win32":
         return ""
     return str(process.environ().get("DISPLAY", ""))
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
+import sys
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from buildarena_simworker.besiege.commands import command_words
 from buildarena_simworker.besiege.time_limits import TimeLimits
 
 LEVEL_FIELD = "{level}"
@@ -101,12 +102,25 @@ class BesiegeSettings(BaseSettings):
     def words(self, level: Path | None) -> list[str]:
         """The command that starts the game with a level; empty where none is set."""
         text = "" if level is None else str(level)
-        return [word.replace(LEVEL_FIELD, text) for word in command_words(self.command)]
+        return [word.replace(LEVEL_FIELD, text) for word in _words(self.command)]
 
     @property
     def opens_levels(self) -> bool:
         """Whether the game can be started with a level."""
         return LEVEL_FIELD in self.command
+
+
+def _words(command: str, *, windows: bool = sys.platform == "win32") -> list[str]:
+    r"""The words of a command; on Windows ``\`` is a letter, and only double quotes hold together.
+
+    Raises:
+        ValueError: A quotation has no end.
+    """
+    if not windows:
+        return shlex.split(command)
+    lexer = shlex.shlex(command, posix=False)
+    lexer.whitespace_split, lexer.quotes, lexer.commenters = True, '"', ""
+    return [word.replace('"', "") for word in lexer]
 
 
 def level_digest(level: bytes | None) -> str:

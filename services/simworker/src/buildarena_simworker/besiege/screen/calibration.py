@@ -8,10 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection
+from dataclasses import asdict, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Final
+from typing import Annotated, Final, TypeVar
+
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 
 from buildarena_simworker.besiege.errors import NotSetUpError
 from buildarena_simworker.besiege.whole_files import write_whole
@@ -42,6 +46,21 @@ PIXELS: Final = MappingProxyType(
 corner whatever its size. Source: the mod's public code; its log begins at (284, 124), and is as
 high as its lines, so that only its first line is always there."""
 
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Pixels = Annotated[int, Field(ge=0, strict=True)]
+Places = TypeVar("Places", bound=Collection[str])
+
+
+def _just(known: Collection[str]) -> AfterValidator:
+    """Refuses what does not name all of some places and no other."""
+
+    def check(places: Places) -> Places:
+        if set(places) != set(known):
+            raise ValueError(f"it must name just {', '.join(known)}")
+        return places
+
+    return AfterValidator(check)
+
 
 @dataclass(frozen=True, slots=True)
 class PathClick:
@@ -53,9 +72,9 @@ class PathClick:
         wait_s: How long the game needs before it can be clicked, seconds.
     """
 
-    x: float
-    y: float
-    wait_s: float
+    x: Fraction
+    y: Fraction
+    wait_s: Annotated[float, Field(ge=0, le=MAX_WAIT_S)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,14 +90,14 @@ class Calibration:
         path: The way from the game's title to the level, for a game that was restarted.
     """
 
-    positions: dict[str, tuple[float, float]] = field(
+    positions: Annotated[dict[str, tuple[Fraction, Fraction]], _just(POSITIONS)] = field(
         default_factory=lambda: {name: place for name, (place, _) in POSITIONS.items()}
     )
-    pixels: dict[str, tuple[int, int]] = field(
+    pixels: Annotated[dict[str, tuple[Pixels, Pixels]], _just(PIXELS)] = field(
         default_factory=lambda: {name: place for name, (place, _) in PIXELS.items()}
     )
-    window: tuple[int, int] | None = None
-    screen: tuple[int, int] | None = None
+    window: tuple[Pixels, Pixels] | None = None
+    screen: tuple[Pixels, Pixels] | None = None
     installed: dict[str, str] = field(default_factory=dict)
     path: tuple[PathClick, ...] = ()
 
@@ -109,73 +128,13 @@ def load_calibration(file: Path) -> Calibration:
         raise NotSetUpError(f"{file} cannot be read ({error}): {advice}") from error
     if not isinstance(content, dict) or content.get("version") != CALIBRATION_VERSION:
         raise NotSetUpError(f"{file} is no calibration of this version: {advice}")
-    places = content.get("positions")
-    if not isinstance(places, dict) or set(places) != set(POSITIONS):
-        wanted = ", ".join(POSITIONS)
-        raise NotSetUpError(f"{file}: positions must name just {wanted}: {advice}")
-    pixels, recorded = content.get("pixels"), content.get("installed")
-    if not isinstance(pixels, dict) or set(pixels) != set(PIXELS):
-        raise NotSetUpError(f"{file}: pixels must name just {', '.join(PIXELS)}: {advice}")
-    return Calibration(
-        positions={name: _position(file, name, places[name]) for name in POSITIONS},
-        pixels={name: _pixel(file, name, pixels[name]) for name in PIXELS},
-        window=_size(content.get("window")),
-        screen=_size(content.get("screen")),
-        installed=dict(recorded) if isinstance(recorded, dict) else {},
-        path=_path(file, content.get("path", [])),
-    )
-
-
-def _path(file: Path, value: object) -> tuple[PathClick, ...]:
-    clicks = [_click(entry) for entry in value] if isinstance(value, list) else [None]
-    whole = tuple(click for click in clicks if click is not None)
-    if len(whole) != len(clicks):
-        raise NotSetUpError(
-            f"{file}: path is no list of clicks with x, y and wait_s: "
-            "run `buildarena besiege calibrate --path`"
-        )
-    return whole
-
-
-def _click(value: object) -> PathClick | None:
-    names = ("x", "y", "wait_s")
-    if not isinstance(value, dict) or set(value) != set(names):
-        return None
-    if not all(isinstance(value[name], int | float) for name in names):
-        return None
-    x, y, wait_s = (float(value[name]) for name in names)
-    sound = 0 <= x <= 1 and 0 <= y <= 1 and 0 <= wait_s <= MAX_WAIT_S
-    return PathClick(x=x, y=y, wait_s=wait_s) if sound else None
-
-
-def _position(file: Path, name: str, value: object) -> tuple[float, float]:
-    if (
-        isinstance(value, list)
-        and len(value) == 2  # noqa: PLR2004 - x and y
-        and all(isinstance(part, int | float) and 0 <= part <= 1 for part in value)
-    ):
-        return (float(value[0]), float(value[1]))
-    raise NotSetUpError(
-        f"{file}: position {name} is {value!r}, not two fractions of the window from 0 to 1: "
-        "run `buildarena besiege calibrate`"
-    )
-
-
-def _pixel(file: Path, name: str, value: object) -> tuple[int, int]:
-    size = _size(value)
-    if size is None or min(size) < 0:
-        raise NotSetUpError(
-            f"{file}: pixel {name} is {value!r}, not two whole numbers: "
-            "run `buildarena besiege calibrate`"
-        )
-    return size
-
-
-def _size(value: object) -> tuple[int, int] | None:
-    if (
-        isinstance(value, list)
-        and len(value) == 2  # noqa: PLR2004 - width and height
-        and all(isinstance(part, int) and not isinstance(part, bool) for part in value)
-    ):
-        return (value[0], value[1])
-    return None
+    told = {**dict.fromkeys(("positions", "pixels")), **content}
+    del told["version"]
+    try:
+        return TypeAdapter(Calibration).validate_python(told)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        path = " --path" * (first["loc"][0] == "path")
+        problem = f"{file}: {where}: {first['msg']}, got {first['input']!r}"
+        raise NotSetUpError(f"{problem}: run `buildarena besiege calibrate{path}`") from error

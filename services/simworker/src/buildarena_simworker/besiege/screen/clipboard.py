@@ -39,7 +39,7 @@ def open_clipboard() -> Clipboard:
     Raises:
         NotSetUpError: There is no program to reach it.
     """
-    return _SystemClipboard() if sys.platform in {"win32", "darwin"} else _X11Clipboard()
+    return _SystemClipboard() if sys.platform == "win32" else _X11Clipboard()
 
 
 class _SystemClipboard:

@@ -14,7 +14,7 @@ from buildarena_simworker.besiege.errors import DesktopError, NotSetUpError, Scr
 from buildarena_simworker.besiege.screen.clipboard import open_clipboard
 
 MODIFIERS: Final = ("ctrl", "shift", "alt", "command", "win")
-SELECT: Final = "command" if sys.platform == "darwin" else "ctrl"
+SELECT: Final = "ctrl"
 """The modifier of "select all" and "copy"."""
 KEY_S: Final = 0.05
 """How long a key of a shortcut stays down, and from one to the next: three frames of a game."""
@@ -146,7 +146,7 @@ class ScreenInput:
 
 def _need_no_authority() -> None:
     """Python's Xlib insists on a file of authorities, also on a screen that asks for none."""
-    if sys.platform in {"win32", "darwin"} or "XAUTHORITY" in os.environ:
+    if sys.platform == "win32" or "XAUTHORITY" in os.environ:
         return
     if not Path("~/.Xauthority").expanduser().exists():
         os.environ["XAUTHORITY"] = os.devnull

@@ -20,10 +20,6 @@ def open_windows(wanted: Wanted) -> Windows:
         from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
 
         return Win32Windows(wanted)
-    if sys.platform == "darwin":
-        from buildarena_simworker.besiege.screen.windows_mac import MacWindows
-
-        return MacWindows(wanted)
     from buildarena_simworker.besiege.screen.windows_x11 import X11Windows
 
     return X11Windows(wanted)
