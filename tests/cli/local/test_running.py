@@ -76,7 +76,6 @@ def test_a_note_without_a_lock_is_of_a_run_that_is_over(tmp_path) -> None:
         "pid": os.getpid(),
         "state": "ready",
         "processes": {},
-        "peak_memory_bytes": 1,
     }
     (tmp_path / "run.json").write_text(json.dumps(note))
     assert running(tmp_path) is None

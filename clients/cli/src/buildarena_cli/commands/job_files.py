@@ -13,11 +13,8 @@ from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import whole_id
 from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, UrlOption
 from buildarena_cli.suggestions import did_you_mean
-from buildarena_cli.terminal.output import columns, print_json, print_table, say
+from buildarena_cli.terminal.output import print_json, print_table, say
 
-COLUMNS = columns(
-    "file", "type", "bytes", "sha256", numeric=("bytes",), leaving=("sha256", "type", "bytes")
-)
 ENDINGS = {"application/json": ".json", "application/vnd.apache.parquet": ".parquet"}
 
 
@@ -47,7 +44,9 @@ def job_files(
             say(f"{file['path']}: {file['size']:,} bytes")
     else:
         print_table(
-            COLUMNS, [(f["name"], f["media_type"], f"{f['size']:,}", f["hash"]) for f in files]
+            ("file", "type", "bytes", "sha256"),
+            [(f["name"], f["media_type"], f"{f['size']:,}", f["hash"]) for f in files],
+            numeric=("bytes",),
         )
 
 

@@ -15,14 +15,10 @@ from buildarena_cli.options import (
     JsonOption,
     UrlOption,
 )
-from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, warn
+from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, warn
 
 MAX_LIMIT = 200
-COLUMNS = columns(
-    *("job", "task", "model", "seed", "state", "reason", "flags", "indicator", "created"),
-    numeric=("seed", "indicator"),
-    leaving=("created", "flags", "reason", "seed", "indicator", "model", "task", "state"),
-)
+COLUMNS = ("job", "task", "model", "seed", "state", "reason", "flags", "indicator", "created")
 
 
 def list_jobs(
@@ -60,7 +56,7 @@ def list_jobs(
     if as_json:
         print_json(page)
         return
-    print_table(COLUMNS, [_row(job) for job in page["jobs"]])
+    print_table(COLUMNS, [_row(job) for job in page["jobs"]], numeric=("seed", "indicator"))
     show_cursor(page)
 
 

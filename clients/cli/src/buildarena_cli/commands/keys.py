@@ -22,16 +22,13 @@ from buildarena_cli.options import (
     UrlOption,
     budget_of,
 )
-from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
+from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say
 
 app = new_group(
     "Make, list, rotate, revoke and reinstate API keys. Needs a key with the scope admin in "
     "BUILDARENA_KEY."
 )
-COLUMNS = columns(
-    *("key", "name", "scopes", "used", "state", "spent"),
-    leaving=("used", "scopes", "spent", "state", "name"),
-)
+COLUMNS = ("key", "name", "scopes", "used", "state", "spent")
 
 
 @app.command("create")

@@ -17,12 +17,9 @@ from buildarena_cli.options import (
     UrlOption,
 )
 from buildarena_cli.terminal.boards import overall_table, overview, task_table
-from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+from buildarena_cli.terminal.output import number, print_json, print_table, say
 
 COMPARED = ("first", "second", "diff %", "95 %", "pairs", "p success", "p indicator")
-COMPARISON = columns(
-    "task", *COMPARED, numeric=COMPARED, leaving=("pairs", "p indicator", "p success", "95 %")
-)
 
 CategoryOption = Annotated[
     list[str] | None,
@@ -124,8 +121,9 @@ def compare(
             )
         )
     print_table(
-        COMPARISON,
+        ("task", *COMPARED),
         rows,
+        numeric=COMPARED,
         title=f"{first} against {second}",
         notes=[
             "diff %: difference of success rates with its 95 % interval",

@@ -5,10 +5,9 @@ from __future__ import annotations
 from buildarena_cli.client import Client
 from buildarena_cli.groups import new_group
 from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
-from buildarena_cli.terminal.output import columns, print_json, print_table
+from buildarena_cli.terminal.output import print_json, print_table
 
 app = new_group("Look at models.")
-COLUMNS = columns("model", "provider", "snapshot", leaving=("snapshot", "provider"))
 
 
 @app.command("list")
@@ -19,7 +18,7 @@ def list_models(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) ->
         print_json(models)
         return
     print_table(
-        COLUMNS,
+        ("model", "provider", "snapshot"),
         [(m["name"] + ("*" if m["baseline"] else ""), m["provider"], m["model"]) for m in models],
         notes=["* baseline"] if any(m["baseline"] for m in models) else [],
     )

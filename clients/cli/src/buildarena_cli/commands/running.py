@@ -14,17 +14,12 @@ from buildarena_cli.defaults import data_folder
 from buildarena_cli.errors import FAILED, CommandError
 from buildarena_cli.options import DEFAULT_URL, DataOption, JsonOption, UrlOption
 from buildarena_cli.suggestions import did_you_mean
-from buildarena_cli.terminal.output import columns, number, print_json, print_table, say
+from buildarena_cli.terminal.output import number, print_json, print_table, say
 
 if TYPE_CHECKING:
     from buildarena_cli.local.service import ProcessFacts, Run
 
 MEBIBYTE = 1024 * 1024
-PROCESSES = columns(
-    *("process", "pid", "MiB", "ports", "since"),
-    numeric=("pid", "MiB"),
-    leaving=("since", "ports", "MiB"),
-)
 
 
 def down(data: DataOption = None) -> None:
@@ -116,7 +111,7 @@ def doctor(url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
             ("ok" if check["ok"] else "!!", check["name"], check["detail"])
             for check in health["checks"]
         ]
-        print_table(columns("is", "check", "finding"), rows)
+        print_table(("is", "check", "finding"), rows)
         for check in health["checks"]:
             if check["advice"]:
                 say(f"{check['name']}: {check['advice']}")
@@ -158,7 +153,7 @@ def _show(run: Run, folder: Path, health: dict[str, Any], facts: list[ProcessFac
                 "gone" if gone else f"{since:%Y-%m-%d %H:%M:%S}",
             )
         )
-    print_table(PROCESSES, rows)
+    print_table(("process", "pid", "MiB", "ports", "since"), rows, numeric=("pid", "MiB"))
     for check in health["checks"]:
         if not check["ok"]:
             say(f"!!  {check['name']}: {check['detail']} {check['advice']}".rstrip())

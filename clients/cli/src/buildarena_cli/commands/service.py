@@ -30,7 +30,6 @@ DEMO_SWEEP: dict[str, Any] = {
     "worlds": 1,
     "seeds": [0, 1, 2, 3],
 }
-MEBIBYTE = 1024 * 1024
 
 
 def up(
@@ -104,9 +103,7 @@ def demo(
         stack.require_running()
         say()
         overview(client.get("/v1/leaderboard"))
-    peak = stack.peak_memory_bytes / MEBIBYTE
     say()
-    say(f"Peak memory of all processes: {peak:,.0f} MiB.")
     say(f"Results are kept in {settings.data.absolute()}.")
     say(
         f"See them again with `buildarena up --data {settings.data}`: "

@@ -25,7 +25,7 @@ from buildarena_cli.options import (
     UrlOption,
     budget_of,
 )
-from buildarena_cli.terminal.output import columns, minute_of, number, print_json, print_table, say
+from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say
 from buildarena_cli.terminal.progress import (
     exit_code,
     forecast_lines,
@@ -39,16 +39,8 @@ if TYPE_CHECKING:
 app = new_group("Submit and watch sweeps.")
 
 MAX_LIMIT = 100
-LIST = columns(
-    *("sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created"),
-    numeric=("ended", "jobs", "USD"),
-    leaving=("created", "outcomes", "USD", "name", "jobs", "ended", "state"),
-)
-ESTIMATE = columns(
-    *("model", "jobs", "requests", "tokens in", "tokens out", "USD"),
-    numeric=("jobs", "requests", "tokens in", "tokens out", "USD"),
-    leaving=("tokens in", "tokens out", "requests", "jobs"),
-)
+LIST = ("sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created")
+ESTIMATE = ("model", "jobs", "requests", "tokens in", "tokens out", "USD")
 
 
 @app.command("run")
@@ -129,7 +121,8 @@ def list_sweeps(
     if as_json:
         print_json(page)
         return
-    print_table(LIST, [_row(sweep) for sweep in page["sweeps"]])
+    rows = [_row(sweep) for sweep in page["sweeps"]]
+    print_table(LIST, rows, numeric=("ended", "jobs", "USD"))
     show_cursor(page)
 
 
@@ -276,6 +269,7 @@ def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
             )
             for model in estimate["models"]
         ],
+        numeric=ESTIMATE[1:],
         title=f"{estimate['jobs']:,} jobs, about ${estimate['cost_usd']:,.2f}",
         notes=[
             "From the mean figures that the paper reports; models without a known price: -",

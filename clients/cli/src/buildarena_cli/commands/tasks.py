@@ -14,15 +14,12 @@ from buildarena_cli.given_paths import to_read
 from buildarena_cli.groups import new_group
 from buildarena_cli.options import DEFAULT_URL, JsonOption, TaskName, UrlOption
 from buildarena_cli.suggestions import did_you_mean, suggested_field
-from buildarena_cli.terminal.output import columns, in_words, print_json, print_table, say, warn
+from buildarena_cli.terminal.output import in_words, print_json, print_table, say, warn
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Task, ValidationIssue
 
 app = new_group("Look at tasks, and add your own.")
-COLUMNS = columns(
-    "task", "title", "indicator", "version", leaving=("version", "indicator", "title")
-)
 
 TaskFile = Annotated[Path, typer.Argument(help="YAML file of the task.", callback=to_read)]
 
@@ -35,7 +32,7 @@ def list_tasks(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> 
         print_json(tasks)
         return
     print_table(
-        COLUMNS,
+        ("task", "title", "indicator", "version"),
         [
             (
                 task["name"] + ("+" if task["custom"] else ""),

@@ -45,7 +45,6 @@ class Run:
         pid: The process that started all others.
         ready: Whether everything answered once.
         processes: Process ids by name.
-        peak_memory_bytes: Of all processes together.
         stop_grace_s: Seconds that its programs have to stop.
     """
 
@@ -53,7 +52,6 @@ class Run:
     pid: int
     ready: bool
     processes: Mapping[str, int]
-    peak_memory_bytes: int
     stop_grace_s: float
 
 
@@ -99,7 +97,6 @@ def noted_run(data: Path) -> Run | None:
             pid=noted["pid"],
             ready=noted["state"] == READY,
             processes=noted["processes"],
-            peak_memory_bytes=noted["peak_memory_bytes"],
             stop_grace_s=noted.get("stop_grace_s", UNSTATED_GRACE_S),
         )
     except (OSError, ValueError, KeyError, TypeError):

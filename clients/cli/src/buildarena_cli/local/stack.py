@@ -26,7 +26,7 @@ from buildarena_backend.settings import PREFIX, SECRETS, Settings
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.trials.installed_simulators import installed_engines
 from buildarena_backend.workers import Workers
-from buildarena_benchmark.environment.trials.processes import ALLOCATOR, PARENT, tree_memory_bytes
+from buildarena_benchmark.environment.trials.processes import ALLOCATOR, PARENT
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import EmbeddedPostgres
 from buildarena_cli.local.programs import programs
@@ -40,10 +40,6 @@ KEYS = ("admin_key", "previous_admin_key", "metrics_key")
 """Settings that are keys: no process gets them where none are asked for."""
 READY_WITHIN_S = 60.0
 NOTED_EVERY_S = 0.5
-CLOSELY_S = 180.0
-"""How long memory is measured each time: a demo's whole life."""
-MEMORY_EVERY_S = 10.0
-"""How often later: the kernel walks all pages of all processes for it."""
 LOCK_ATTEMPTS = 5
 LOCK_AGAIN_S = 0.05
 
@@ -72,15 +68,12 @@ class Stack:
         self.environment: dict[str, str] = {}
         self.url = f"http://{settings.host}:{settings.port}"
         self.supervisor = Supervisor(stop_within_s=settings.stop_grace_s)
-        self.peak_memory_bytes = 0
         self._noted: dict[str, Any] = {}
         self._tell = tell
         self._simulators = installed_engines() if simulators is None else simulators
         self._lock: IO[str] | None = None
         self._ready = False
-        self._memory_thread = threading.Thread(
-            target=self._watch_memory, name="memory", daemon=True
-        )
+        self._noting = threading.Thread(target=self._note_often, name="noting", daemon=True)
         self._stopped = threading.Event()
 
     def __enter__(self) -> Self:
@@ -105,8 +98,8 @@ class Stack:
     def stop(self) -> None:
         """Stops everything that was started."""
         self._stopped.set()
-        if self._memory_thread.is_alive():
-            self._memory_thread.join()
+        if self._noting.is_alive():
+            self._noting.join()
         self.supervisor.stop()
         if self._lock is not None:
             self._write_run()
@@ -137,7 +130,7 @@ class Stack:
             self._tell(f"starting the {program.name}")
             self._launch_program(program.name, program.words, environment)
         self.supervisor.watch()
-        self._memory_thread.start()
+        self._noting.start()
         self._wait_until_healthy()
         self._ready = True
 
@@ -255,13 +248,8 @@ class Stack:
             f"not ready within {READY_WITHIN_S:.0f} s, missing: {missing} (see {self.logs})"
         )
 
-    def _watch_memory(self) -> None:
-        begun_at = measured_at = time.monotonic()
+    def _note_often(self) -> None:
         while not self._stopped.wait(NOTED_EVERY_S):
-            now = time.monotonic()
-            if now - begun_at < CLOSELY_S or now - measured_at >= MEMORY_EVERY_S:
-                measured_at = now
-                self.peak_memory_bytes = max(self.peak_memory_bytes, tree_memory_bytes())
             self._write_run()
 
     def _write_run(self) -> None:
@@ -274,7 +262,6 @@ class Stack:
                 for managed in tuple(self.supervisor.managed)
                 if managed.process is not None
             },
-            "peak_memory_bytes": self.peak_memory_bytes,
             "stop_grace_s": self.settings.stop_grace_s,
         }
         if run == self._noted:

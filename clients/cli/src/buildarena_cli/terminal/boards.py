@@ -8,7 +8,6 @@ from typing import Any
 
 from buildarena_cli.terminal.output import (
     NOTHING,
-    columns,
     emphasised,
     in_words,
     number,
@@ -34,15 +33,7 @@ ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
 }
 """The columns of a row on a task: what each shows of the API's answer."""
 RESULTS = ("#", "model", "success", "95 %", "indicator")
-LEAVING = ("requests", "parts", "tokens", "USD", "best", "score", "of it 95 %", "95 %", "indicator")
-OVERVIEW = columns(
-    "task", *RESULTS, numeric=("#", "success", "95 %", "indicator"), leaving=("95 %", "indicator")
-)
-OVERALL = columns(
-    *("#", "model", "place", "mean rank", "score", "success", "USD", "front"),
-    numeric=("#", "place", "mean rank", "score", "success", "USD"),
-    leaving=("front", "USD", "mean rank", "score", "place", "success"),
-)
+OVERALL = ("#", "model", "place", "mean rank", "score", "success", "USD", "front")
 
 
 def overview(board: Mapping[str, Any]) -> None:
@@ -52,12 +43,13 @@ def overview(board: Mapping[str, Any]) -> None:
         board: The API's answer.
     """
     print_table(
-        OVERVIEW,
+        ("task", *RESULTS),
         [
             (task["task"], *(ROW[name](row) for name in RESULTS))
             for task in board["tasks"]
             for row in task["rows"]
         ],
+        numeric=("#", "success", "95 %", "indicator"),
     )
     say()
     for text in _legend(board):
@@ -67,8 +59,9 @@ def overview(board: Mapping[str, Any]) -> None:
 def task_table(task: Mapping[str, Any]) -> None:
     """Prints all models on one task."""
     print_table(
-        columns(*ROW, numeric=[name for name in ROW if name != "model"], leaving=LEAVING),
+        list(ROW),
         [[shown(row) for shown in ROW.values()] for row in task["rows"]],
+        numeric=[name for name in ROW if name != "model"],
         title=emphasised(f"{task['task']}: {in_words(task['indicator'], task['unit'])}"),
         notes=[
             "* baseline; # is shared by statistically tied models",
@@ -102,6 +95,7 @@ def overall_table(board: Mapping[str, Any]) -> None:
     print_table(
         OVERALL,
         rows,
+        numeric=("#", "place", "mean rank", "score", "success", "USD"),
         title=emphasised(scope),
         notes=[
             "# is shared by statistically tied models; place: its 95 % interval",

@@ -6,7 +6,7 @@ import statistics
 from typing import TYPE_CHECKING, Any
 
 from buildarena_cli.machines import progress_bar
-from buildarena_cli.terminal.output import columns, emphasised, print_json, print_table
+from buildarena_cli.terminal.output import emphasised, print_json, print_table
 
 if TYPE_CHECKING:
     from buildarena_benchmark import Robustness, Task
@@ -86,4 +86,4 @@ def _print(task: Task, engine: str, measured: Robustness) -> None:
         *([("flags", ", ".join(flags))] if flags else []),
         *([("failed seeds", ", ".join(failed))] if failed else []),
     ]
-    print_table(columns("figure", "value"), rows, title=emphasised(f"{task.title} on {engine}"))
+    print_table(("figure", "value"), rows, title=emphasised(f"{task.title} on {engine}"))

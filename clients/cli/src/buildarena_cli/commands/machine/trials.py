@@ -1,4 +1,4 @@
-"""`buildarena machine simulate` and `render`: trials here, without any server."""
+"""`buildarena machine simulate`: trials here, without any server."""
 
 from __future__ import annotations
 
@@ -20,12 +20,10 @@ from buildarena_cli.machines import (
     film,
     progress_bar,
     read_imported,
-    read_machine,
     shown_errors,
 )
 from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import (
-    columns,
     emphasised,
     number,
     print_json,
@@ -67,7 +65,7 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
         Path | None, typer.Option(help="Write a film (.mp4, .gif) or six pictures (.png).")
     ] = None,
     trajectory: Annotated[
-        Path | None, typer.Option(help="Write the trajectory (.parquet), for `render`.")
+        Path | None, typer.Option(help="Write the trajectory (.parquet).")
     ] = None,
     trace: Annotated[
         Path | None,
@@ -140,26 +138,6 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
             print_json(score_report(chosen, result, rollout))
         else:
             print_score(chosen, result, rollout)
-
-
-def render(
-    file: MachineFile,
-    task: TaskName,
-    trajectory: Annotated[
-        Path, typer.Option(help="A trajectory (.parquet) of this machine.", callback=to_read)
-    ],
-    video: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
-) -> None:
-    """Draw a trial that was simulated before."""
-    from buildarena_simulation import read_trajectory
-
-    with shown_errors():
-        chosen, machine = chosen_task(task), read_machine(file)
-        rollout = read_trajectory(trajectory.read_bytes())
-        missing = [block for block in rollout.block_ids if block not in machine.blocks]
-        if missing:
-            raise CommandError(f"{trajectory}: block {missing[0]} is not in {file}")
-        film(machine, chosen, rollout, video)
 
 
 def _require_program(machine: Machine, trace: Path | None) -> None:
@@ -282,4 +260,4 @@ def print_score(task: Task, result: Score, rollout: Trajectory | None) -> None:
         *(("flag", f"{flag}: {meaning(flag)}") for flag in result.flags),
         *((name, "" if value is None else str(value)) for name, value in result.metrics.items()),
     ]
-    print_table(columns("figure", "value"), rows, title=emphasised(f"{task.title}{engine}"))
+    print_table(("figure", "value"), rows, title=emphasised(f"{task.title}{engine}"))
