@@ -14,7 +14,7 @@ run() {
 }
 
 case $name in
-attack | soak | gameday | containers) run "$name" "$@" ;;
+attack | soak | containers) run "$name" "$@" ;;
 hunt)
     # The search's library brings 80 MB along, which nobody needs who does not hunt.
     "$python" -c 'import ribs' 2>/dev/null || bash mk/install_tool.sh "$python" ribs
@@ -30,7 +30,7 @@ besiege)
     BESIEGE_FILES=10000 .venv/bin/pytest --timeout=3600 tests/besiege/test_hostile_files.py
     ;;
 *)
-    echo "no scenario '$name'; there are: attack besiege chaos containers gameday hunt soak" >&2
+    echo "no scenario '$name'; there are: attack besiege chaos containers hunt soak" >&2
     exit 2
     ;;
 esac

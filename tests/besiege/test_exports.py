@@ -1,6 +1,5 @@
 """Machine files and levels hold what the published library saves; every module type comes back."""
 
-import json
 import math
 from xml.etree import ElementTree as ET
 
@@ -10,12 +9,12 @@ from tests.besiege.golden import (
     LEVELS,
     content,
     dangles,
-    golden,
     goldens,
     played_document,
     scenario_of,
     task_of,
 )
+from tests.besiege.normal import normal_form
 from tests.besiege.test_reading_files import assert_alike, contents
 
 from buildarena_benchmark import builtin_tasks
@@ -26,8 +25,6 @@ from buildarena_besiege import (
     prepare_run,
     read_machine_file,
 )
-from buildarena_besiege.__main__ import main
-from buildarena_besiege.normal import normal_form
 from buildarena_geometry import Machine, module_set
 from buildarena_geometry.modules.module import Module
 from buildarena_geometry.rotations import multiply
@@ -72,33 +69,6 @@ def assert_published(found, theirs) -> None:
         assert_same_place(ours, theirs)
     if theirs["category"] in ("transport", "support"):
         assert set(ours["tracked"]) == set(theirs["tracked"])
-
-
-def test_the_command_prints_the_normal_form(tmp_path, capsys) -> None:
-    file = tmp_path / "machine.json"
-    found = golden("single-9")
-    export = next(e for e in found.exports if e["category"] == "transport")
-    file.write_text(json.dumps(played_document(found, export)), encoding="utf-8")
-    assert main(["export", str(file), "--task", task_of(export)]) == 0
-    printed = json.loads(capsys.readouterr().out)
-    assert printed == json.loads(json.dumps(normal_form_of(found, export)))
-    assert main(["export", str(file)]) == 0
-    assert json.loads(capsys.readouterr().out)["category"] == "plain"
-
-
-def test_the_command_says_what_is_wrong(tmp_path, capsys, subtests) -> None:
-    for text, words, says in [
-        ("{}", (), "neither a machine document nor an action log"),
-        ("[1]", (), "a list of objects"),
-        ("{", (), "not valid JSON"),
-        ("<Machine/>", (), "no blocks"),
-        ("[]", ("--task", "lift-9"), "no task 'lift-9'; there are transport-1"),
-    ]:
-        with subtests.test(text=text):
-            file = tmp_path / "machine.json"
-            file.write_text(text, encoding="utf-8")
-            assert main(["export", str(file), *words]) == 1
-            assert says in capsys.readouterr().err
 
 
 def normal_form_of(found, export):

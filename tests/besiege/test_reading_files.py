@@ -9,6 +9,7 @@ import pytest
 from support.machine_files import RICH, published_files
 from tests.besiege.foreign_files import block, foreign
 from tests.besiege.golden import golden, goldens, scenario_of
+from tests.besiege.normal import normal_form
 from tests.besiege.playing import act, press, vehicle
 from tests.besiege.round_trips import round_trip
 
@@ -19,7 +20,6 @@ from buildarena_besiege import (
     read_any_machine,
     read_machine_file,
 )
-from buildarena_besiege.normal import normal_form
 from buildarena_geometry import DocumentError, Machine
 
 EXPORTS = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any, Final, Literal
 
@@ -221,17 +222,7 @@ class BudgetView(_Answer):
         """The view of a budget, if there is one."""
         if budget is None:
             return None
-        limits = budget.limits
-        return BudgetView(
-            max_cost_usd=None if limits.max_cost_usd is None else float(limits.max_cost_usd),
-            max_tokens=limits.max_tokens,
-            max_requests=limits.max_requests,
-            spent_cost_usd=float(budget.spent_cost_usd),
-            spent_tokens=budget.spent_tokens,
-            spent_requests=budget.spent_requests,
-            lost_cost_usd=float(budget.lost_cost_usd),
-            lost_requests=budget.lost_requests,
-        )
+        return BudgetView.model_validate(asdict(budget) | asdict(budget.limits))
 
 
 class SweepView(_Answer):

@@ -69,4 +69,4 @@ class _LeasedInDatabase:
 
 def simulate_handler(context: Context, simulator: Simulator) -> SimulateHandler:
     """What does the simulate stage, from a process' connections."""
-    return SimulateHandler(TrialRepository.of(context), simulator)
+    return SimulateHandler(TrialRepository(context), simulator)

@@ -142,12 +142,8 @@ def file_track(simulator: str, version: str) -> Track:
         simulator: Simulator name.
         version: Its version, see `simulation_version`.
     """
-    return _promptless(FILE_WORKFLOW, simulator, version)
-
-
-def _promptless(workflow: str, simulator: str, version: str) -> Track:
     return Track(
-        workflow=workflow,
+        workflow=FILE_WORKFLOW,
         simulator=simulator,
         simulation_version=version,
         prompts="none",

@@ -48,6 +48,13 @@ def add_jobs(new: Sequence[NewJobs], *, connection: Connection) -> list[str]:
     return found
 
 
+ALIKE: Final = (
+    *("task", "task_version", "model", "model_hash", "model_config", "track", "track_config"),
+    *("limits", "owner", "payer", "traceparent"),
+)
+"""What all of these jobs have in common, by the names of columns."""
+
+
 def _insertion(new: NewJobs, place: int) -> Any:
     draws = SystemRandom()
     single = (
@@ -60,17 +67,7 @@ def _insertion(new: NewJobs, place: int) -> Any:
         .render_derived()
     )
     alike = {
-        "task": new.task,
-        "task_version": new.task_version,
-        "model": new.model,
-        "model_hash": new.model_hash,
-        "model_config": dict(new.model_config),
-        "track": new.track,
-        "track_config": dict(new.track_config),
-        "limits": dict(new.limits),
-        "owner": new.owner,
-        "payer": new.payer,
-        "traceparent": new.traceparent,
+        **{name: getattr(new, name) for name in ALIKE},
         "stage": Stage.CONSTRUCT,
         "queue": CONSTRUCT_QUEUE,
         "state": JobState.QUEUED,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import timedelta
 from typing import Any
 
@@ -118,16 +118,7 @@ class ExternalCalls:
         if changed.rowcount != 1:
             raise StaleLeaseError(lease.job.id, lease.token)
         connection.execute(
-            insert(external_calls).values(
-                job_id=lease.job.id,
-                sequence=sequence,
-                machine=call.machine,
-                tool=call.tool,
-                arguments=call.arguments,
-                ok=call.ok,
-                reason=call.reason,
-                feedback=call.feedback,
-            )
+            insert(external_calls).values(job_id=lease.job.id, sequence=sequence, **asdict(call))
         )
         events.record_jobs(connection, [lease.job.id], TURN, {"index": sequence})
 

@@ -40,16 +40,11 @@ class Usage:
     cost_usd: Decimal = field(default_factory=Decimal)
 
     def __add__(self, other: Usage) -> Usage:
-        return Usage(
-            requests=self.requests + other.requests,
-            input_tokens=self.input_tokens + other.input_tokens,
-            output_tokens=self.output_tokens + other.output_tokens,
-            cached_tokens=self.cached_tokens + other.cached_tokens,
-            reasoning_tokens=self.reasoning_tokens + other.reasoning_tokens,
-            cost_usd=self.cost_usd + other.cost_usd,
-        )
+        summed = {name: getattr(self, name) + getattr(other, name) for name in _USED}
+        return Usage(**summed)
 
 
+_USED = tuple(Usage.__dataclass_fields__)
 GARBAGE = "garbage"
 """Finish word of an answer that can't be read."""
 OUT_OF_TIME = "out_of_time"
@@ -137,6 +132,12 @@ _OF_JOB = (
     select(journal).where(journal.c.job_id == bindparam("job_id")).order_by(journal.c.sequence)
 )
 
+_KEPT = (
+    *("sequence", "stage", "role", "request_hash", "latency_s", "tries"),
+    "provider_request_id",
+)
+"""Fields of an entry that are columns as they are."""
+
 
 class Journal:
     """Appends to and reads the journals of jobs."""
@@ -153,7 +154,6 @@ class Journal:
         Raises:
             StaleLeaseError: The lease is over; nothing was written.
         """
-        usage = entry.usage
         with self._database.statement() as connection:
             written = connection.execute(
                 _APPEND,
@@ -161,20 +161,9 @@ class Journal:
                     "job_id": lease.job.id,
                     "token": lease.token,
                     "answers": entry.answers,
-                    "sequence": entry.sequence,
-                    "stage": entry.stage,
-                    "role": entry.role,
-                    "request_hash": entry.request_hash,
+                    **{name: getattr(entry, name) for name in _KEPT},
+                    **{name: getattr(entry.usage, name) for name in _USED},
                     "reply": json.dumps(entry.reply),
-                    "requests": usage.requests,
-                    "input_tokens": usage.input_tokens,
-                    "output_tokens": usage.output_tokens,
-                    "cached_tokens": usage.cached_tokens,
-                    "reasoning_tokens": usage.reasoning_tokens,
-                    "cost_usd": usage.cost_usd,
-                    "latency_s": entry.latency_s,
-                    "tries": entry.tries,
-                    "provider_request_id": entry.provider_request_id,
                     "told": None if entry.told is None else json.dumps(entry.told),
                 },
             )
@@ -186,22 +175,9 @@ class Journal:
         with self._database.statement() as connection:
             return [
                 JournalEntry(
-                    sequence=row.sequence,
-                    stage=row.stage,
-                    role=row.role,
-                    request_hash=row.request_hash,
+                    **{name: getattr(row, name) for name in _KEPT},
+                    usage=Usage(requests=1, **{name: getattr(row, name) for name in _USED[1:]}),
                     reply=row.reply,
-                    usage=Usage(
-                        requests=1,
-                        input_tokens=row.input_tokens,
-                        output_tokens=row.output_tokens,
-                        cached_tokens=row.cached_tokens,
-                        reasoning_tokens=row.reasoning_tokens,
-                        cost_usd=row.cost_usd,
-                    ),
-                    latency_s=row.latency_s,
-                    tries=row.tries,
-                    provider_request_id=row.provider_request_id,
                     created_at=row.created_at,
                     told=row.told,
                 )

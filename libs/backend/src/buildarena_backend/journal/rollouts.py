@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from typing import Any
 
@@ -92,18 +92,7 @@ class Rollouts:
     def request(self, job_id: str, request: RolloutRequest, *, connection: Connection) -> None:
         """Adds a rollout that is to be simulated."""
         controls = None if request.controls is None else [dict(press) for press in request.controls]
-        connection.execute(
-            _REQUEST,
-            {
-                "job_id": job_id,
-                "number": request.number,
-                "final": request.final,
-                "engine": request.engine,
-                "machine_hash": request.machine_hash,
-                "controls": controls,
-                "seed": request.seed,
-            },
-        )
+        connection.execute(_REQUEST, {"job_id": job_id, **asdict(request), "controls": controls})
 
     def complete(
         self, job_id: str, number: int, *, connection: Connection, **values: Any

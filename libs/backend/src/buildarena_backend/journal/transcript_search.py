@@ -110,12 +110,7 @@ def search_transcripts(
     return TranscriptMatches(
         matches=[
             TranscriptMatch(
-                job_id=row.job_id,
-                task=row.task,
-                model=row.model,
-                seed=row.seed,
-                outcome=row.outcome,
-                turn=row.turn,
+                **{name: getattr(row, name) for name in ("job_id", *FOUND)},
                 where=row.place,
                 excerpt=_pieces(row.excerpt),
             )
@@ -138,6 +133,7 @@ def _pieces(excerpt: str) -> list[tuple[str, bool]]:
     return found
 
 
+FOUND: Final = ("task", "model", "seed", "outcome", "turn")
 TEXTS: Final = ("words", "task", "model", "sweep")
 WANTED: Final = """
     (CAST(:task AS text) IS NULL OR jobs.task = :task)

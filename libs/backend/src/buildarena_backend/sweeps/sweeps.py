@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from decimal import Decimal
 from typing import Any, Final
@@ -126,18 +126,7 @@ class Sweeps:
 
     def add(self, sweep: NewSweep, job_ids: Sequence[str], *, connection: Connection) -> None:
         """Stores a sweep with its jobs, which exist already."""
-        connection.execute(
-            insert(sweeps).values(
-                id=sweep.id,
-                name=sweep.name,
-                spec=dict(sweep.spec),
-                state=SweepState.ACTIVE,
-                owner=sweep.owner,
-                request_key=sweep.request_key,
-                request_hash=sweep.request_hash,
-                jobs_hash=sweep.jobs_hash,
-            )
-        )
+        connection.execute(insert(sweeps).values(state=SweepState.ACTIVE, **asdict(sweep)))
         members = select(literal(sweep.id), func.unnest(bound_texts(sorted(job_ids))))
         connection.execute(insert(sweep_jobs).from_select(["sweep_id", "job_id"], members))
         events.record_sweep(connection, sweep.id, "submitted", {"jobs": len(job_ids)})

@@ -12,18 +12,15 @@ from dataclasses import dataclass
 from random import SystemRandom
 from typing import Any
 
-from buildarena_backend.artifacts.storing import ArtifactInfo, ArtifactStore
-from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.artifacts.storing import ArtifactInfo
 from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_backend.errors import PermanentError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
-from buildarena_backend.queue.queues import Queues
 from buildarena_backend.results.audits import is_unproved, runner_key
 from buildarena_backend.states import CONSTRUCT_QUEUE, EXTERNAL_QUEUE, Stage
-from buildarena_backend.store import Store
 from buildarena_backend.trials.known_simulators import configured_simulators
 from buildarena_backend.trials.scoring import task_of
 from buildarena_backend.trials.trials import PARQUET, File, TrialResult
@@ -71,43 +68,20 @@ class TrialRepository:
     """Finds what is to be simulated, and writes what came of it.
 
     Args:
-        store: Where jobs and rollouts are.
-        artifacts: Where machines and trajectories are.
-        queues: Where construct workers are woken.
-        tasks: The tasks.
-        audited_shares: Of simulators whose trials a verification can repeat, the share of the
-            trials by runners that is verified before it counts, 0 to 1.
+        context: Connections, tasks, and the share of the trials by runners that is verified before
+            it counts, on simulators whose trials a verification can repeat.
     """
 
-    def __init__(
-        self,
-        *,
-        store: Store,
-        artifacts: ArtifactStore,
-        queues: Queues,
-        tasks: TaskCatalog,
-        audited_shares: Mapping[str, float],
-    ) -> None:
-        self._store = store
-        self._artifacts = artifacts
-        self._queues = queues
-        self._tasks = tasks
-        self._audited_shares = audited_shares
-
-    @staticmethod
-    def of(context: Context) -> TrialRepository:
-        """The repository of a process' connections."""
-        return TrialRepository(
-            store=context.store,
-            artifacts=context.artifacts,
-            queues=context.queues,
-            tasks=context.tasks,
-            audited_shares={
-                name: context.settings.audited_share
-                for name, simulator in configured_simulators(context.settings).items()
-                if simulator.repeatable
-            },
-        )
+    def __init__(self, context: Context) -> None:
+        self._store = context.store
+        self._artifacts = context.artifacts
+        self._queues = context.queues
+        self._tasks = context.tasks
+        self._audited_shares = {
+            name: context.settings.audited_share
+            for name, simulator in configured_simulators(context.settings).items()
+            if simulator.repeatable
+        }
 
     def due(self, job: Job) -> DueTrial:
         """The trial that a job in the simulate stage waits for.

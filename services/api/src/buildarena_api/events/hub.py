@@ -112,22 +112,6 @@ class EventHub:
             with suppress(asyncio.CancelledError):
                 await self._task
 
-    async def open_job(self, job_id: str) -> Channel:
-        """The channel of a job.
-
-        Raises:
-            UnknownIdError: There is no such job.
-        """
-        return await self._open(job_id, sweep=False)
-
-    async def open_sweep(self, sweep_id: str) -> Channel:
-        """The channel of a sweep and its jobs.
-
-        Raises:
-            UnknownIdError: There is no such sweep.
-        """
-        return await self._open(sweep_id, sweep=True)
-
     async def listen(
         self, channel: Channel, *, last_id: int, key_id: str | None
     ) -> AsyncIterator[bytes]:
@@ -156,8 +140,14 @@ class EventHub:
         finally:
             self._leave(channel, listener)
 
-    async def _open(self, id_: str, *, sweep: bool) -> Channel:
-        """One channel for all that listen to the same, found by one look at the database."""
+    async def open(self, id_: str, *, sweep: bool) -> Channel:
+        """The channel of a job, or of a sweep and its jobs.
+
+        There is one for all that listen to the same, found by one look at the database.
+
+        Raises:
+            UnknownIdError: There is no such job or sweep.
+        """
         known = self._channels.get(id_)
         if known is not None:
             return known

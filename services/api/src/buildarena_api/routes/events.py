@@ -9,7 +9,7 @@ from sse_starlette import EventSourceResponse
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ServicesDep
-from buildarena_api.events.hub import Channel, EventHub
+from buildarena_api.events.hub import EventHub
 from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(
@@ -42,8 +42,7 @@ async def stream_job(
     job_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Streams the events of a job, from the beginning or after a given one."""
-    hub = services.hub
-    return _streamed(hub, await hub.open_job(job_id), last_event_id, caller.key_id)
+    return await _streamed(services.hub, job_id, last_event_id, caller.key_id, sweep=False)
 
 
 @router.get(
@@ -55,12 +54,12 @@ async def stream_sweep(
     sweep_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
 ) -> EventSourceResponse:
     """Streams the events of a sweep and its jobs, from the beginning or after a given one."""
-    hub = services.hub
-    return _streamed(hub, await hub.open_sweep(sweep_id), last_event_id, caller.key_id)
+    return await _streamed(services.hub, sweep_id, last_event_id, caller.key_id, sweep=True)
 
 
-def _streamed(
-    hub: EventHub, channel: Channel, last_id: int, key_id: str | None
+async def _streamed(
+    hub: EventHub, id_: str, last_id: int, key_id: str | None, *, sweep: bool
 ) -> EventSourceResponse:
+    channel = await hub.open(id_, sweep=sweep)
     texts = hub.listen(channel, last_id=last_id, key_id=key_id)
     return EventSourceResponse(texts, ping=PING_S, send_timeout=SEND_TIMEOUT_S)

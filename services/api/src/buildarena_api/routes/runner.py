@@ -178,7 +178,7 @@ def get_leased_trial(named: NamedDep, caller: RunnerDep, context: ContextDep) ->
     try:
         lease = context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
         return _view(
-            Leased(lease, TrialRepository.of(context).due(lease.job)), context.settings.lease_s
+            Leased(lease, TrialRepository(context).due(lease.job)), context.settings.lease_s
         )
     except (StaleLeaseError, PermanentError) as error:
         raise stale(named) from error

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import asdict
 
 from fastapi import APIRouter
 from pydantic import BaseModel, Field
@@ -38,10 +39,7 @@ def list_simulators(context: ContextDep) -> list[SimulatorView]:
     serving = Counter(context.store.workers.counts().serving)
     return [
         SimulatorView(
-            name=simulator.name,
-            version=simulator.version,
-            kind=simulator.kind,
-            repeatable=simulator.repeatable,
+            **asdict(simulator),
             default=simulator.name == DEFAULT_ENGINE,
             workers=serving[simulate_queue(simulator.name)],
             served=serving[simulate_queue(simulator.name)] > 0,

@@ -66,7 +66,7 @@ class LeaseQueue:
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._trials = TrialRepository.of(context)
+        self._trials = TrialRepository(context)
         self._turns: dict[LeaseQuery, _Turn] = {}
 
     async def granted(

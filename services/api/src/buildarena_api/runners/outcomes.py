@@ -49,7 +49,7 @@ class Outcomes:
 
     def __init__(self, context: Context, uploads: Uploads) -> None:
         self._context = context
-        self._trials = TrialRepository.of(context)
+        self._trials = TrialRepository(context)
         self._uploads = uploads
         self._checker = shared_checker()
 
