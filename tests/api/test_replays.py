@@ -173,7 +173,8 @@ def test_arrow_says_what_parquet_says_and_the_scene_draws_it(
     assert tuple(facts["block_ids"]) == trajectory.block_ids
     assert len(facts["joint_peaks"]) == len(trajectory.joint_peaks) > 0
     scene = api.get(f"/v1/jobs/{job}/scene").json()
-    assert scene["scenario"]["duration_s"] == (count - 1) / 25
+    # The trial ends when it is decided, which may be earlier.
+    assert scene["scenario"]["duration_s"] >= trajectory.time_s[-1]
     assert scene["scenario"]["cargo"]
     _check_places(scene["machine"], trajectory, blocks)
     known = {"Accept": ARROW, "If-None-Match": answer.headers["etag"]}
