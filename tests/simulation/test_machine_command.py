@@ -66,11 +66,10 @@ def test_json_tells_the_score_and_nothing_else(run, stored) -> None:
 @pytest.mark.parametrize(("kind", "count"), [("png", 1), ("mp4", 26)])
 def test_a_film_shows_the_trial(run, stored, tmp_path, kind, count) -> None:
     video, data, file = tmp_path / f"film.{kind}", tmp_path / "beam.parquet", stored("beam")
-    done = run("simulate", file, "--engine", "mujoco", "--trajectory", str(data))
+    words = ("--engine", "mujoco", "--trajectory", str(data), "--video", str(video))
+    done = run("simulate", file, *words)
     assert done.exit_code == 0, done.output
     assert len(read_trajectory(data.read_bytes()).time_s) == 26
-    done = run("render", file, "--trajectory", str(data), "--video", str(video))
-    assert done.exit_code == 0, done.output
     with av.open(str(video)) as film:
         frames = [frame.to_image() for frame in film.decode(video=0)]
     assert len(frames) == count
