@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment import REWARDS, UnknownChoiceError
 from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_verifiers.taskset import BuildTaskConfig, BuildTasksetConfig
+from buildarena_verifiers.trial_runners import RUNNERS
 
 ID = "buildarena_verifiers"
 
@@ -27,6 +29,19 @@ class BuildEnv(vf.Env[BuildEnvConfig]):
     async def run(self, task: vf.Task[Any, Any, Any], agents: vf.Agents) -> None:
         """Has the one agent play the task."""
         await agents.agent.run(task)
+
+    async def start(self) -> None:
+        """Keeps the engines for as long as rollouts are served."""
+        RUNNERS.hold(*self._trials)
+
+    async def stop(self) -> None:
+        """Ends the engines' processes, if no other environment uses them."""
+        await asyncio.to_thread(RUNNERS.release, *self._trials)
+
+    @property
+    def _trials(self) -> tuple[int | None, float, bool]:
+        config = self.config.taskset.task
+        return (config if isinstance(config, BuildTaskConfig) else BuildTaskConfig()).trials
 
 
 def load_environment(

@@ -49,15 +49,30 @@ class TrialRunners:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._runners: dict[tuple[int, Asked], TrialRunner] = {}
+        self._holders: dict[tuple[int, Asked], int] = {}
 
     def get(self, *asked: *Asked) -> TrialRunner:
         """The runner of this kind; made when it is first asked for."""
-        # A forked program must not talk to its parent's processes.
-        key = os.getpid(), asked
         with self._lock:
-            if key not in self._runners:
-                self._runners[key] = TrialRunner(*asked)
-            return self._runners[key]
+            return self._got(asked)
+
+    def hold(self, *asked: *Asked) -> None:
+        """Keeps a runner until as many releases."""
+        key = _key(asked)
+        with self._lock:
+            self._got(asked)
+            self._holders[key] = self._holders.get(key, 0) + 1
+
+    def release(self, *asked: *Asked) -> None:
+        """Ends a runner's processes when its last holder releases it."""
+        key = _key(asked)
+        with self._lock:
+            self._holders[key] = self._holders.get(key, 1) - 1
+            unused = self._runners.pop(key, None) if self._holders[key] <= 0 else None
+            if self._holders[key] <= 0:
+                del self._holders[key]
+        if unused is not None:
+            unused.close()
 
     def close(self) -> None:
         """Ends all processes of this program."""
@@ -66,6 +81,17 @@ class TrialRunners:
             unused = [self._runners.pop(key) for key in mine]
         for runner in unused:
             runner.close()
+
+    def _got(self, asked: Asked) -> TrialRunner:
+        key = _key(asked)
+        if key not in self._runners:
+            self._runners[key] = TrialRunner(*asked)
+        return self._runners[key]
+
+
+def _key(asked: Asked) -> tuple[int, Asked]:
+    # A forked program must not talk to its parent's processes.
+    return os.getpid(), asked
 
 
 RUNNERS = TrialRunners()
