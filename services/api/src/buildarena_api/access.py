@@ -148,9 +148,7 @@ async def runner_of(
 async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None) -> Caller:
     """Who sent the request, counted; what they may do is not looked at."""
     services = services_of(request)
-    # Of a request with a body, admission has found it out.
-    caller = getattr(request.state, "caller", None)
-    caller = caller or _reader_of_metrics(request, services.context.settings, given)
+    caller = _reader_of_metrics(request, services.context.settings, given)
     caller = caller or await _identified(services, request.scope, given)
     request.state.caller = caller
     await _count(services.rate_limits, _name(caller, request.scope))
@@ -175,12 +173,10 @@ def admission(services: Services) -> Admit:
         secret = _secret(scope)
         given = secret and HTTPAuthorizationCredentials(scheme="Bearer", credentials=secret)
         try:
-            caller = await _identified(services, scope, given or None)
+            return _name(await _identified(services, scope, given or None), scope)
         except (OperationalError, PoolTimeoutError) as error:
             # Before the routes, whose handlers answer the same.
             raise database_problem(error) from error
-        scope.setdefault("state", {})["caller"] = caller
-        return _name(caller, scope)
 
     return admit
 
