@@ -20,7 +20,7 @@ from redis.exceptions import RedisError
 TIMEOUT_S = 0.3
 """How long a request waits for its count."""
 AGAIN_S = 1.0
-"""How long a store that failed is not asked: requests wait for it once a second at most."""
+"""How long a store that failed is left alone before one request asks it again."""
 GROUP = "buildarena"
 
 log = structlog.get_logger(__name__)
@@ -47,20 +47,25 @@ class RateLimits:
         self._storage = RedisStorage(f"async+{broker_url}", implementation="redispy", **handed_on)
         self._shared = SharedLimiter(self._storage)
         self._own = OwnLimiter(MemoryStorage())
-        self._asked_again_at = -math.inf
+        self._failed, self._asked_again_at = False, 0.0
         self.spelled = rate.replace("/", " per ")
 
     async def hit(self, who: str) -> int | None:
         """Counts a request; None when it may pass, otherwise in how many seconds it may."""
-        if time.monotonic() >= self._asked_again_at:
+        if not self._failed or time.monotonic() >= self._asked_again_at:
+            # Of a store that failed one request asks; the others go on without it.
+            self._asked_again_at = time.monotonic() + AGAIN_S
             try:
-                if await self._shared.hit(self._item, GROUP, who):
+                passes = await self._shared.hit(self._item, GROUP, who)
+                self._failed = False
+                if passes:
                     return None
                 return _wait_s(await self._shared.get_window_stats(self._item, GROUP, who))
             # What uvloop says of a connection that ended while nobody looked is a RuntimeError.
             except (RedisError, OSError, RuntimeError) as error:
-                log.warning("rate_limits_unreachable", error=str(error))
-                self._asked_again_at = time.monotonic() + AGAIN_S
+                if not self._failed:
+                    log.warning("rate_limits_unreachable", error=str(error))
+                self._failed = True
         if self._own.hit(self._item, GROUP, who):
             return None
         return _wait_s(self._own.get_window_stats(self._item, GROUP, who))
