@@ -114,6 +114,15 @@ def _held_by_teeth(structure: Structure, label: Sequence[int], free: Sequence[in
     return held
 
 
+def limits_of(structure: Structure, clusters: Clusters, c: int) -> tuple[float, float] | None:
+    """The smallest and largest place of a cluster on its joint; None if nothing stops it."""
+    joint = structure.parts[clusters.seated[c]].module.joint
+    if joint is None or joint.limits is None:
+        return None
+    low, high = joint.limits
+    return (low, high) if clusters.seated_is_outer[c] else (-high, -low)
+
+
 def connected_components(count: int, edges: Iterable[tuple[int, int]]) -> list[list[int]]:
     """Connected components of a graph, each ascending, ordered by their smallest node."""
     leader = list(range(count))

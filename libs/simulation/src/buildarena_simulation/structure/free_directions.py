@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from buildarena_geometry.modules.joints import MovingJoint
-from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.clusters import Clusters, limits_of
 from buildarena_simulation.structure.model import FloatArray, IntArray, Members, Part, Structure
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.vectors import cross
@@ -32,22 +32,19 @@ class FreeDirections:
         count = len(clusters)
         self._axes = np.zeros((count, 3))
         self._bounds = np.full(count, np.inf)
-        self._limits = np.tile([-np.inf, np.inf], (count, 1))
+        self._limits = np.zeros((count, 2))
         kinds = np.full(count, "", dtype="U17")
         meshed = {block for mesh in structure.joints.meshes for block in (mesh.first, mesh.second)}
         for c in np.flatnonzero(clusters.parent >= 0).tolist():
             seated = int(clusters.seated[c])
-            # Teeth and the weak wheels of vehicles are looked at where loads are found.
+            # Teeth turn meshed cogs, and `LoadModel` projects a simple wheel's axle itself.
             if structure.joints.simple[seated] or seated in meshed:
                 continue
             part = structure.parts[seated]
             self._axes[c] = structure.joints.axes[seated]
             self._bounds[c] = most_along(part.module.joint)
             kinds[c] = part.physics.joint_type
-            if part.module.joint is not None and part.module.joint.limits is not None:
-                low, high = part.module.joint.limits
-                outer = clusters.seated_is_outer[c]
-                self._limits[c] = (low, high) if outer else (-high, -low)
+            self._limits[c] = limits_of(structure, clusters, c) or (-np.inf, np.inf)
         self._turning = np.isin(kinds, ("axle", "hinge"))
         self._sliding = kinds == "slider"
         self._other = np.isin(kinds, ("ball", "constant_velocity"))

@@ -16,11 +16,10 @@ from buildarena_simulation.engines.shared.joint_frames import (
     driven_clusters,
     engaged,
     is_simple,
-    limits_of,
     seat_of,
     swing_axes,
 )
-from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.clusters import Clusters, limits_of
 from buildarena_simulation.structure.model import FloatArray, Structure
 
 _STOP_SOLREF = (0.008, 1.0)

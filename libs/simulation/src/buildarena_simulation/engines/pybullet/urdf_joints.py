@@ -4,11 +4,10 @@ import numpy as np
 
 from buildarena_simulation.engines.shared.joint_frames import (
     is_simple,
-    limits_of,
     seat_of,
     swing_axes,
 )
-from buildarena_simulation.structure.clusters import Clusters
+from buildarena_simulation.structure.clusters import Clusters, limits_of
 from buildarena_simulation.structure.model import FloatArray, Structure
 
 _STRAIGHT = '<origin xyz="0 0 0" rpy="0 0 0"/>'

@@ -60,15 +60,6 @@ def sign_of(clusters: Clusters, c: int) -> float:
     return 1.0 if clusters.seated_is_outer[c] else -1.0
 
 
-def limits_of(structure: Structure, clusters: Clusters, c: int) -> tuple[float, float] | None:
-    """The smallest and largest place of a cluster on its joint; None if nothing stops it."""
-    joint = structure.parts[clusters.seated[c]].module.joint
-    if joint is None or joint.limits is None:
-        return None
-    low, high = joint.limits
-    return (low, high) if clusters.seated_is_outer[c] else (-high, -low)
-
-
 def swing_axes(structure: Structure, clusters: Clusters, c: int) -> FloatArray:
     """The axes of a constant-velocity joint's three hinges, columns, machine frame, (3, 3).
 
