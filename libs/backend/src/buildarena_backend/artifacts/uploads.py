@@ -7,6 +7,7 @@ trial's outcome names becomes one when the outcome was accepted.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -57,7 +58,7 @@ class Uploads:
             UploadError: The lease may upload no more.
             ArtifactStoreError: The file can't be kept now.
         """
-        size = file.seek(0, 2)
+        size = file.seek(0, os.SEEK_END)
         file.seek(0)
         path = self._path(lease, sha256)
         others = self._objects(_folder(lease))

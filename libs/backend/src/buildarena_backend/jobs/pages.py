@@ -111,7 +111,6 @@ def read_page(
         after: What the last job of the page before is sorted by, and its id.
         limit: Rows at most.
     """
-    conditions = conditions_but_text(wanted)
     if wanted.equals.get("state") not in (None, JobState.DONE) and order.by in _LACKING:
         # None of them has such a figure, and looking for one would take all of its index.
         among = conditions_of(connection, wanted)
@@ -119,6 +118,7 @@ def read_page(
         if after is not None:
             among.append(order.further(jobs.c.id, after[1]))
         return _first(connection, among, order.sorted(jobs.c.id), limit, are_few=are_few)
+    conditions = conditions_but_text(wanted)
     if wanted.text is None:
         are_few = bool(conditions) and _are_few(connection, wanted, conditions)
         return _read(connection, conditions, order, after, limit, are_few=are_few)
