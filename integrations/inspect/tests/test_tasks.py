@@ -25,6 +25,7 @@ from scripted_models import (
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment import TrialPool, UnknownChoiceError, tools_of_models
+from buildarena_benchmark.scores import decided_length
 from buildarena_geometry import Machine
 from buildarena_inspect.errors import ChoiceError
 from buildarena_inspect.log_artifacts import MACHINE, TRAJECTORY
@@ -86,7 +87,7 @@ def test_what_the_log_keeps_of_a_sample_and_is_scored_again_from(run) -> None:
     machine = Machine.from_document(sample.store[MACHINE])
     assert machine_hash(machine) == sample.scores["success"].metadata["machine_hash"]
     trajectory = read_trajectory(base64.b64decode(sample.store[TRAJECTORY]))
-    assert len(trajectory.time_s) == builtin_tasks()["support-1"].scenario.sample_count
+    assert len(trajectory.time_s) == decided_length(builtin_tasks()["support-1"], trajectory)
     pictured = sample.messages[-1]
     assert pictured.content[1].image.startswith("data:image/png;base64,")
     assert all("image" not in str(event.input) for event in sample.events if event.event == "model")
