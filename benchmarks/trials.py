@@ -23,11 +23,11 @@ from support.machines.expert_calls import built
 from support.machines.families import car, deck
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import KeyPress, Machine, catalogue_of
 from buildarena_simulation import ENGINES, Play, Scenario, simulate, simulate_many
 from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control
-from buildarena_worker.builtin.designs import DESIGNS
 
 TASK: Final = "support-1"
 BLOCKS: Final = 20
@@ -76,7 +76,7 @@ def trials(machine: Machine, engine: str, repeats: int) -> dict[str, float]:
 
 def experts_bridge() -> Machine:
     """What the expert builds for the task."""
-    return built(DESIGNS[TASK](0), Machine(catalogue=catalogue_of("all")))
+    return built(expert_designs()[TASK](0), Machine(catalogue=catalogue_of("all")))
 
 
 def bridge() -> Machine:

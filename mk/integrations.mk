@@ -13,7 +13,7 @@ check-integrations: $(INTEGRATION_STAMPS)
 # What adapters have or test with, and only the worker's designs tell.
 EXPERT_CALLS := build/expert_calls.json
 DRIVEN := integrations/gymnasium/src/buildarena_gymnasium/machines.json
-DESIGNS := $(shell find services/worker/src/buildarena_worker/builtin libs/benchmark/src libs/geometry/src libs/simulation/src -type f -not -name '*.pyc')
+DESIGNS := $(wildcard libs/benchmark/src/buildarena_benchmark/tasks/*/expert.py)
 
 $(EXPERT_CALLS): tests/support/machines/expert_calls.py $(DESIGNS) $(STAMP)
 	@mkdir -p $(@D)

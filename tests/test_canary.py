@@ -10,7 +10,7 @@ from support.machines import drive_machines
 
 from buildarena_backend.agents.briefing import briefing
 from buildarena_benchmark import CANARY, builtin_tasks
-from buildarena_worker.builtin.designs import DESIGNS
+from buildarena_benchmark.experts import expert_designs
 
 ROOT = Path(__file__).parents[1]
 NUMBER = CANARY.rpartition(" ")[2]
@@ -22,7 +22,7 @@ MAX_TOLD = 0.5
 def solutions() -> dict[str, list[set[str]]]:
     """The expert's calls for each task, each in the spellings that documents and logs have."""
     spelled = {}
-    for task, make in DESIGNS.items():
+    for task, make in expert_designs().items():
         actions = [action for part in make(0).parts.values() for action in part.actions]
         calls = {json.dumps(arguments): (name, dict(arguments)) for name, arguments in actions}
         spelled[task] = [spellings(*call) for call in calls.values()]
@@ -70,11 +70,9 @@ def documents() -> list[Path]:
 
 
 def test_statements_and_solutions_have_the_canary_and_no_model_reads_it() -> None:
-    tasks = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/catalogue"
-    designs = ROOT / "services/worker/src/buildarena_worker/builtin/designs"
-    sources = [*tasks.glob("*.yaml"), *designs.glob("*.py"), *designs.rglob("*.lua")]
+    tasks = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks"
+    sources = [*tasks.glob("*/*.yaml"), *tasks.glob("*/expert.py"), *tasks.glob("*/*.lua"), *tasks.glob("*/README.md")]
     assert len(sources) > len(builtin_tasks())
-    sources.append(ROOT / "docs/expert.md")
     assert not [file.name for file in sources if NUMBER not in file.read_text(encoding="utf-8")]
     assert NUMBER in drive_machines.written()
     told = {task.name: task.statement + briefing(task) for task in builtin_tasks().values()}
@@ -90,7 +88,7 @@ def test_no_document_holds_a_whole_solution_or_tells_most_of_one(solutions) -> N
 
 
 def test_a_page_with_a_solution_would_be_found(solutions) -> None:
-    (part,) = DESIGNS["support-1"](0).parts.values()
+    (part,) = expert_designs()["support-1"](0).parts.values()
     forms = (
         lambda name, given: f"1. {name}: {', '.join(str(v) for v in given.values() if v)}",
         lambda name, given: f"    {name} {given}",

@@ -3,7 +3,7 @@
 import numpy as np
 from scenarios.hunt.evidence import Evidence, Floats, path_of
 
-from buildarena_benchmark.scorers.measures.thrown import loose_ball
+from buildarena_benchmark.scoring.measures.thrown import loose_ball
 
 
 def no_key_before_it_flies(evidence: Evidence) -> bool:

@@ -11,9 +11,9 @@ from scenarios.hunt.variation.genome import Genome, grown
 from scenarios.hunt.variation.kinds import ALIKE, kind_of
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.environment.expert_calls import control_of
+from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.builtin.designs.calls import control_of
 
 DATA: Final = Path(__file__).parents[2] / "tests" / "data"
 EXPLOITS: Final = DATA / "exploits.json"
@@ -65,12 +65,12 @@ def seeds_of(task_name: str) -> list[Genome]:
     task = builtin_tasks()[task_name]
     whole = task.constraints.min_sub_structures < 2
     found = [Genome(actions=[{"op": "start", "params": {}, "makes": "1"}])] if whole else []
-    if whole and task.beginning is None and task_name in DESIGNS:
+    if whole and task.beginning is None and task_name in expert_designs():
         found.append(expert_genome(task_name))
     stored = list(_stored())
     families = {_family(other) for other, _ in stored}
     if _family(task_name) not in families:
-        alike = [name for name in DESIGNS if kind_of(name) == kind_of(task_name)]
+        alike = [name for name in expert_designs() if kind_of(name) == kind_of(task_name)]
         found += [
             expert_genome(name)
             for name in alike
@@ -91,7 +91,7 @@ def _family(task_name: str) -> str:
 
 def expert_genome(task_name: str) -> Genome:
     """The expert's machine, with its keys or its program."""
-    design = DESIGNS[task_name](0)
+    design = expert_designs()[task_name](0)
     log = [*next(iter(design.parts.values())).actions, *control_of(design.control or {})]
     actions = [{"op": op, "params": dict(params)} for op, params in log]
     return grown(Genome(actions=actions, program=design.program), most=sys.maxsize)[1]

@@ -22,10 +22,10 @@ from support.machines.drafts import KeyedDraft
 from support.machines.headroom import drafted
 
 from buildarena_benchmark import broken_constraint, builtin_tasks, score
+from buildarena_benchmark.experts.drafting import EAST, UP
+from buildarena_benchmark.tasks.courses.expert import courier
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
-from buildarena_worker.builtin.designs.couriers import courier
-from buildarena_worker.builtin.designs.drafting import EAST, UP
 
 pytestmark = pytest.mark.nightly
 
@@ -152,7 +152,7 @@ def _pushed() -> Machine:
     [
         ("throw-1", car_with_boulder, "travels"),
         ("throw-1", _dropped, "no key before it flies"),
-        ("deliver-1", _pushed, "cargo runs ahead"),
+        ("deliver-2", _pushed, "cargo runs ahead"),
     ],
 )
 def test_checks_name_what_throws_and_brings_in_another_way(task, machine, check) -> None:
@@ -162,7 +162,7 @@ def test_checks_name_what_throws_and_brings_in_another_way(task, machine, check)
     assert check in suspicions(found)
 
 
-@pytest.mark.parametrize("task", ["throw-1", "deliver-1", "drive-1"])
+@pytest.mark.parametrize("task", ["throw-1", "deliver-2", "drive-4"])
 def test_checks_find_nothing_odd_in_the_experts(task) -> None:
     found = tried(task, expert_genome(task))
     assert found is not None
@@ -227,12 +227,12 @@ def test_machines_of_every_scorer_and_kind_can_be_hunted(task) -> None:
 
 
 def test_checks_name_a_program_that_looks_at_nothing() -> None:
-    expert = expert_genome("balance-1")
-    honest = tried("balance-1", expert)
+    expert = expert_genome("balance-2")
+    honest = tried("balance-2", expert)
     assert honest is not None
     assert honest.success
     assert not honest.suspicions
-    task = builtin_tasks()["balance-1"]
+    task = builtin_tasks()["balance-2"]
     easy = replace(task, scoring=task.scoring.model_copy(update={"min_s": 0.04}))
     machine = grown(expert)[0].with_controller(IDLE)
     trajectory = simulate(machine, task.scenario, "mujoco")
@@ -243,7 +243,7 @@ def test_checks_name_a_program_that_looks_at_nothing() -> None:
 
 
 def test_programs_are_changed_and_stay_with_their_machines() -> None:
-    draw, first, second = np.random.default_rng(2), *map(expert_genome, ("hover-3", "landing-1"))
+    draw, first, second = np.random.default_rng(2), *map(expert_genome, ("hover-4", "landing-2"))
     programs = {mutated(first, "control", draw).program for _ in range(12)}
     assert len(programs) > 4
     child = crossed(first, second, draw)

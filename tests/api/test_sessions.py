@@ -184,7 +184,7 @@ def test_what_a_submission_would_try_can_be_had_and_tried_before(api, session, a
 
 
 def test_a_program_is_set_and_asked_in_a_session(api, open_session, act) -> None:
-    session = open_session(task="landing-1", worlds=1)
+    session = open_session(task="landing-2", worlds=1)
     act(session, "start", START)
     assert act(session, "attach_block_to", {**ATTACH, "face": "E", "new_block": "Flying Block"})[
         "ok"

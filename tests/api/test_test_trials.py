@@ -10,7 +10,7 @@ from support.stages import verdict, work
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.families.unknowns import drawn_numbers
-from buildarena_worker.builtin.designs.risers import riser
+from buildarena_benchmark.tasks.design.expert import riser
 
 TASK = builtin_tasks()["identify-1"]
 DRAW = 7_654_321_987_654

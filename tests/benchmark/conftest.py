@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from pathlib import Path as Folder
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from support.machines.building import BLOCK, built
 from support.machines.headroom import Presses, drafted
 from support.machines.piloted import FASTER_FIRST, experts_machine
 
-from buildarena_benchmark import Task, builtin_tasks, score
+from buildarena_benchmark import Task, builtin_tasks, load_task, score
+from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import Machine
 from buildarena_simulation import Bearing, Trajectory, simulate
-from buildarena_worker.builtin.designs import DESIGNS
 
 Path = Callable[[np.ndarray], np.ndarray]
+TASK_FILES = Folder(__file__).parents[1] / "data" / "tasks"
 
 
 def make_trajectory(
@@ -155,7 +157,7 @@ def expert(name: str, presses: Presses | None = None) -> Machine:
     if task.takes_programs and presses is None:
         return experts_machine(task)
     modules = "all" if name.startswith("throw") else "workshop"
-    return drafted(DESIGNS[name](0), presses, modules=modules)
+    return drafted(expert_designs()[name](0), presses, modules=modules)
 
 
 @cache
@@ -174,7 +176,8 @@ def engine(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="session")
 def tasks() -> dict[str, Task]:
-    return dict(builtin_tasks())
+    """The built-in tasks, and two whose scorers are tried where they have more to judge."""
+    return dict(builtin_tasks()) | {file.stem: load_task(file) for file in TASK_FILES.glob("*")}
 
 
 @pytest.fixture

@@ -22,11 +22,7 @@ TASKS: Final = builtin_tasks()
 CONTROL: Final = [name for name, task in TASKS.items() if task.category == "control"]
 DRIVEN: Final = [name for name in TASKS if re.match("throw|deliver|drive|fetch|orbit", name)]
 SEEDED: Final = [
-    ("throw-3", 6),  # the ring lies at 40.7
-    ("throw-3", 3),  # at 17.1
     ("throw-4", 8),  # it stands at 16.4
-    ("throw-5", 11),  # at 11.3
-    ("orbit-1", 1),
     ("orbit-2", 2),
 ]
 
@@ -56,7 +52,6 @@ def test_a_statement_tells_every_range_that_a_seed_draws_from(subtests) -> None:
 @pytest.mark.parametrize(
     ("name", "engine", "seed"),
     [
-        ("drive-1", "mujoco", None),
         *(
             nightly(name, engine, seed)
             for name, seed in [*((name, None) for name in (*CONTROL, *DRIVEN)), *SEEDED]
@@ -84,7 +79,7 @@ def test_the_expert_passes_in_nine_of_ten_worlds(name, engine) -> None:
 @pytest.mark.parametrize(
     ("name", "seed"),
     # In worlds 2 and 3 a walker faces within 15° of how it does in the exact one.
-    [*((name, seed) for name in CONTROL for seed in (0, 1)), ("throw-3", 6), ("throw-4", 8)],
+    [*((name, seed) for name in CONTROL for seed in (0, 1)), ("throw-4", 8)],
 )
 def test_what_it_did_in_one_world_passes_in_no_other(name, seed) -> None:
     """The best schedule that there is for one world: its program's answers, to the last bit."""
@@ -106,7 +101,7 @@ THRESHOLDS: Final = {
         "max_start_height": 1,
         "max_error": 1e-6,
     },
-    "deliver-1": {"min_height": 0.5},
+    "deliver-2": {"min_height": 2.0},
     "balance-2": {"max_tilt_deg": 0.5, "min_height": 2.5, "min_clearance": 0.6},
     "walk-1": {"max_tilt_deg": 1, "max_part_tilt_deg": 1, "lane": 0.01},
     "place-2": {"clearance": 2.5, "max_loose": 0.05, "min_carry": 15},
@@ -131,7 +126,7 @@ def test_each_threshold_decides(name, subtests) -> None:
 
 
 def test_each_figure_of_a_landing_decides() -> None:
-    task, machine, trial = honest("landing-1")
+    task, machine, trial = honest("landing-2")
     metrics = score(task, machine, trial).metrics
     for threshold, metric in {
         "max_sink": "sink_at_landing",
@@ -184,7 +179,7 @@ def index_of(machine: Machine, module: str) -> int:
         ("throw-1", "not_free", since(2.6, (0, 3, 0)), "Boulder"),
         ("throw-1", "not_borne", since(1.22, (0, -2.0, 2.0), 1.3), "Boulder"),
         ("throw-1", "not_borne", off(30), "Bomb Holder"),  # it flies along
-        ("deliver-1", "let_go", off(30), slice(1, None)),
+        ("deliver-2", "let_go", off(30), slice(1, None)),
         ("line-1", "not_driven", stiff, slice(None)),
         nightly("balance-2", "came_apart", off(300), 2),
         nightly("walk-1", "came_apart", off(100), -1),
@@ -199,7 +194,7 @@ def test_a_trial_that_breaks_one_rule(name, flag, change, part) -> None:
     assert (result.success, result.flags) == (False, (flag,))
     if name == "balance-2":
         assert result.metrics["balanced_s"] == pytest.approx(300 / 25 - 0.04)
-    elif name not in {"deliver-1", "walk-1"}:
+    elif name not in {"deliver-2", "walk-1"}:
         assert result.indicator == 0
 
 
@@ -238,34 +233,26 @@ def test_recoil_after_the_throw_does_not_count_and_the_published_score_is_told()
     rise = path[:, 2].max() - path[0, 2]
     assert rise > 10
     assert metrics["parabola"] == pytest.approx(distance * (1 + rise), rel=0.02)
-    ring = TASKS["throw-3"].scenario.marks[0]  # where it lands, and so far beside that it misses
-    end = metrics["distance"] + task.scenario.gates[0].center[1]
-    for aside, success in ((0.0, True), (ring.radius + 2.0, False)):
-        mark = ring.model_copy(update={"center": (aside, end, 0)})
-        scenario = task.scenario.model_copy(update={"marks": (mark,)})
-        result = score(strict(replace(task, scenario=scenario), target="ring"), machine, trial)
-        assert result.success == (result.metrics["miss"] <= ring.radius) == success
-        assert result.indicator == pytest.approx(1 / (1 + result.metrics["miss"]), abs=1e-5)
 
 
 def test_a_ring_is_passed_in_the_air_and_with_all_of_the_boulder() -> None:
     """The same flight by rings beside it, so small that it would touch them, and behind its end."""
-    task, machine, trial = honest("throw-5")
+    task, machine, trial = honest("throw-4")
     marks = {mark.name: mark for mark in task.scenario.marks}
     for name, changed in (
-        ("near", {"center": (5, 8, 23)}),
+        ("ring", {"center": (5, 24, 16)}),
         ("ring", {"radius": 0.9}),
         ("ring", {"center": (0, 60, 12)}),
     ):
         others = {**marks, name: marks[name].model_copy(update=changed)}
         scenario = task.scenario.model_copy(update={"marks": tuple(others.values())})
         result = score(replace(task, scenario=scenario), machine, trial)
-        assert (result.success, result.metrics["rings"]) == (False, 1), changed
-        assert 1.0 < result.indicator < 2.0
+        assert (result.success, result.metrics["rings"]) == (False, 0), changed
+        assert result.indicator < 1.0
 
 
 def test_a_ball_that_is_thrown_on_and_caught_or_taken_round_the_line() -> None:
-    task, machine, trial = honest("deliver-1")
+    task, machine, trial = honest("deliver-2")
     ahead, beside = trial.cargo_position.copy(), trial.cargo_position.copy()
     ahead[60:90, 1] += 2.0
     beside[:, 0] += 8.0

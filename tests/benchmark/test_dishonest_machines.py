@@ -11,10 +11,10 @@ from support.machines.piloted import scored
 from tests.benchmark.conftest import expert, strict
 
 from buildarena_benchmark import builtin_tasks, score
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_simulation.scenario import Push
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 TASKS: Final = builtin_tasks()
 IDLE: Final = "function control() return {} end"
@@ -65,7 +65,7 @@ def third_wheel() -> KeyedDraft:
     ],
 )
 def test_who_does_nothing_does_not_balance(build, flags, engine) -> None:
-    result = scored(TASKS["balance-1"], build().machine.with_controller(IDLE), engine, None)
+    result = scored(TASKS["balance-2"], build().machine.with_controller(IDLE), engine, None)
     assert not result.success, result
     assert result.indicator < 15
     assert result.flags == flags
@@ -76,7 +76,7 @@ def test_who_does_nothing_does_not_balance(build, flags, engine) -> None:
 @pytest.mark.parametrize("share", ["1", "t % 0.4 < 0.2 and 1 or -1"])
 def test_driving_on_and_shaking_do_not_balance(engine, share) -> None:
     machine = moved_by(cart(), f"spinning_forward = {share}")
-    assert not scored(TASKS["balance-1"], machine, engine, 1).success
+    assert not scored(TASKS["balance-2"], machine, engine, 1).success
 
 
 @pytest.mark.nightly
@@ -88,7 +88,7 @@ def test_spinning_in_place_does_not_balance(engine) -> None:
         draft.attach(draft.attach(draft.attach(top, way, "Log"), way, "Log"), way, "Log")
     share = "math.min(1, t / 2)"
     spins = f'["3.spinning_forward"] = {share}, ["5.spinning_forward"] = -{share}'
-    result = scored(TASKS["balance-1"], moved_by(draft, spins), engine, None)
+    result = scored(TASKS["balance-2"], moved_by(draft, spins), engine, None)
     assert (result.success, result.indicator < 5) == (False, True)
 
 
@@ -96,7 +96,7 @@ def test_spinning_in_place_does_not_balance(engine) -> None:
 
 WALK: Final = TASKS["walk-1"]
 LEVEL: Final = WALK.scenario.model_copy(
-    update={"placement": TASKS["balance-1"].scenario.placement, "terrain": (), "draws": {}}
+    update={"placement": TASKS["balance-2"].scenario.placement, "terrain": (), "draws": {}}
 )
 """The same trial on flat ground, facing north: what fails there fails by its rule."""
 
@@ -189,7 +189,7 @@ def cross() -> KeyedDraft:
 
 FLIGHTS: Final[Mapping[str, tuple[str, str]]] = {
     "touches and flies on": (
-        "landing-1",
+        "landing-2",
         """
         local height, speed = sense.position.z - 0.5, sense.velocity.z
         touched = touched or height < 0.3
@@ -197,16 +197,16 @@ FLIGHTS: Final[Mapping[str, tuple[str, str]]] = {
         return { fly = asked / 32.81 * 4.65 / 13 }""",
     ),
     "hovers above the ground": (
-        "landing-1",
+        "landing-2",
         """
         local asked = 32.81 + 4 * (0.8 - sense.position.z) - 4 * sense.velocity.z
         if sense.position.z > 8 then asked = 32.81 + 2.5 * (-8 - sense.velocity.z) end
         return { fly = asked / 32.81 * 4.65 / 13 }""",
     ),
     # It falls, brakes, and sinks slowly by the clock until the ground comes, wherever that is.
-    "slow by the clock": ("landing-1", "return { fly = t < 1.2 and 0 or t < 1.7 and 1 or 0.351 }"),
+    "slow by the clock": ("landing-2", "return { fly = t < 1.2 and 0 or t < 1.7 and 1 or 0.351 }"),
     "slows down all the way": ("landing-2", "return { fly = 0.351 }"),
-    "held up by just its weight": ("hover-3", "return { fly = t < 1.5 and 0.5 or 4.65 / 13 }"),
+    "held up by just its weight": ("hover-4", "return { fly = t < 1.5 and 0.5 or 4.65 / 13 }"),
 }
 
 
@@ -217,7 +217,7 @@ def test_what_flies_without_a_look_or_lands_in_no_way(engine, how) -> None:
     program = f"local touched = false\nfunction control(t, sense)\n{answer}\nend"
     result = scored(TASKS[name], cross().machine.with_controller(program), engine, 2)
     assert not result.success, result
-    assert result.indicator == 0 or name == "hover-3"
+    assert result.indicator == 0 or name == "hover-4"
 
 
 @pytest.mark.nightly
@@ -230,7 +230,7 @@ def test_a_tower_at_the_place_is_no_flight(engine) -> None:
         for block in draft.row(top, way, 2):
             draft.attach(block, UP, "Ballast")
     machine = draft.machine.with_controller(IDLE)
-    for task in (TASKS["hover-3"], strict(TASKS["hover-3"], radius=12.0)):
+    for task in (TASKS["hover-4"], strict(TASKS["hover-4"], radius=12.0)):
         result = scored(task, machine, engine, None)
         assert (result.success, result.indicator) == (False, 0.0)
 

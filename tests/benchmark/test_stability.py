@@ -7,7 +7,7 @@ from support.machines.building import BLOCK, attach, built
 from tests.benchmark.conftest import make_trajectory, shifted, with_bearing, with_pieces
 
 from buildarena_benchmark import score
-from buildarena_benchmark.scorers.measures.energy import gains_energy
+from buildarena_benchmark.scoring.measures.energy import gains_energy
 from buildarena_geometry import Machine, module_set
 from buildarena_simulation import Trajectory
 from buildarena_simulation.constants import GRAVITY
@@ -107,7 +107,7 @@ def test_what_nothing_drives_gains_no_energy(tasks, car) -> None:
     for presses, gains in (("[]", True), ('[["UpArrow",0.0,1.0]]', False), ('[["x",0,1]]', True)):
         trial = _flown(car, climb=20.0, presses=presses)
         assert gains_energy(tasks["transport-1"].scenario, car, trial, 300) == gains, presses
-    scenario = tasks["flight-1"].scenario
+    scenario = tasks["flight-3"].scenario
     for module, gains in ((BLOCK, True), ("Balloon", False), ("Sqr Balloon", False)):
         machine = built(("1", "E", BLOCK), catalogue=module_set("workshop"))
         assert attach(machine, "2", "E", module).ok

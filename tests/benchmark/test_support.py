@@ -12,10 +12,10 @@ from support.machines.families import beam
 from tests.benchmark.conftest import Path, make_trajectory, shifted, with_bearing, with_pieces
 
 from buildarena_benchmark import score
-from buildarena_benchmark.scorers.measures.components import joined_to_start
-from buildarena_benchmark.scorers.measures.outline import extents
-from buildarena_benchmark.scorers.measures.spanning import terrain_sides
 from buildarena_benchmark.scores import decided_length
+from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.measures.outline import extents
+from buildarena_benchmark.scoring.measures.spanning import terrain_sides
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY

@@ -2,7 +2,6 @@
 
 import json
 import time
-from importlib import resources
 
 import pytest
 import yaml
@@ -43,10 +42,6 @@ VERSIONS = {
     "lift-2": "ff90bc8c4b9e",
     "lift-3": "8fc8509c1eb2",
     "mechanisms-1": "9d057efe81d4",
-    "mechanisms-2": "c5132a3fc17c",
-    "mechanisms-3": "eb14f4ec2e8e",
-    "mechanisms-4": "6ece6bfa6f98",
-    "flight-1": "f3d4a0701a51",
     "flight-2": "51ddd7d0e09a",
 }
 """They change with the rules alone (`SCORER_VERSION`), and with what statements say of them."""
@@ -65,17 +60,8 @@ def test_tasks_are_read_as_anybodys_are_and_their_document_is_the_task_again(tas
     for task in (*tasks.values(), own):
         assert load_task(yaml.safe_dump(dict(task.as_document()))) == task
         assert all(1 <= weight <= 3 for weight in task.difficulty.values())
-    for name, task in tasks.items():
-        text = resources.files("buildarena_benchmark.tasks") / "catalogue" / f"{name}.yaml"
-        assert load_task(text.read_text(encoding="utf-8")) == task
 
 
-TOLD = {
-    ("mechanisms-2", "min_gates"): "at least four gates",
-    ("mechanisms-5", "min_gates"): "at least seven gates",
-    ("flight-1", "height"): "between z = 8.5 and z = 11.5",
-    ("flight-1", "band"): "between z = 8.5 and z = 11.5",
-}
 FOR_THROWS = {
     "max_error": "strays by at most 3 %",
     "max_unexplained": "at most 5 % more energy",
@@ -99,7 +85,7 @@ def test_a_statement_tells_what_is_measured_and_every_threshold(tasks, subtests)
             for field, value in task.scoring.model_dump().items():
                 if isinstance(value, int | float) and not isinstance(value, bool):
                     thrown = FOR_THROWS.get(field) if task.scoring.name == "throw" else None
-                    told = thrown or TOLD.get((name, field), f"{value:g}")
+                    told = thrown or f"{value:g}"
                     assert told in text, field
             for place in (*scenario.gates, *scenario.marks):
                 planar = task.scoring.name == "tour"  # heights of its marks mean nothing
@@ -202,23 +188,20 @@ def test_what_no_machine_can_do_is_refused(tasks, subtests) -> None:
         ("throw-1", released, "is not ground"),
         ("throw-1", {"gusts": {"strength": 2}}, "would throw as well"),
         ("throw-1", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
-        ("throw-1", {"scoring": {"target": "ring"}}, "there is no mark 'ring'"),
         ("throw-1", {"scoring": {"rings": ["hoop"]}}, "there is no mark 'hoop'"),
         ("throw-1", {"scoring": {"borne_s": 20}}, "borne_s 20 is longer"),
-        ("deliver-1", {"gates": []}, "there is no gate 'line': there are none"),
-        ("deliver-1", {"cargo": None}, "needs shape: ball"),
-        ("deliver-1", {"gates": BALL_BEYOND}, "already"),
-        ("deliver-1", {"pushes": [{"at_s": 1, "velocity": [0, 5]}]}, "would deliver as well"),
-        ("deliver-1", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
+        ("deliver-2", {"gates": []}, "there is no gate 'line': there are none"),
+        ("deliver-2", {"cargo": None}, "needs shape: ball"),
+        ("deliver-2", {"gates": BALL_BEYOND}, "already"),
+        ("deliver-2", {"pushes": [{"at_s": 1, "velocity": [0, 5]}]}, "would deliver as well"),
+        ("deliver-2", {"tracked_blocks": ["1"]}, "only if all blocks are tracked"),
         ("place-2", {"cargo": None, "draws": {}}, "has none: give cargo.at"),
         ("place-2", no_mark, "there is no mark 'goal'"),
         ("place-2", {"duration_s": 2, "draws": {}}, "rest_s 2 is longer"),
-        ("balance-1", released, "not alone on flat"),
-        ("balance-1", {"terrain": [{"center": [0, 9, 1], "size": [2, 2, 2]}]}, "not alone on flat"),
-        ("balance-1", {"duration_s": 15}, "min_s 20 is longer"),
-        ("walk-2", released, "not put on the ground"),
-        ("walk-2", {"scoring": {"corner": "nowhere"}}, "no mark 'nowhere'"),
-        ("walk-2", {"scoring": {"corner_slack": 6}}, "not north of the start"),
+        ("balance-2", released, "not alone on flat"),
+        ("balance-2", {"terrain": [{"center": [0, 9, 1], "size": [2, 2, 2]}]}, "not alone on flat"),
+        ("balance-2", {"duration_s": 15}, "min_s 20 is longer"),
+        ("walk-1", released, "not put on the ground"),
         ("line-1", {"line": None, "draws": {}}, "scenario.line is missing"),
         ("line-1", {"line": {"radius": 12, "bends": [[0.4, 0.2]]}, "draws": {}}, "are 0.6 in all"),
         ("line-1", {"draws": {"line.bends.3": [[0, 0], [0.1, 0.1]]}}, "there is no '3'"),
@@ -226,18 +209,22 @@ def test_what_no_machine_can_do_is_refused(tasks, subtests) -> None:
             ("line-1", {"scoring": {which: 13}}, "stretches")
             for which in ("min_stretches", "all_stretches")
         ),
-        ("landing-1", {"placement": {"kind": "ground"}, "draws": {}}, "kind is not released"),
-        ("landing-1", no_mark, "there is no mark 'goal'"),
-        ("landing-1", {"duration_s": 2}, "hold_s 3 is longer"),
-        ("hover-3", no_mark, "there is no mark 'goal'"),
-        ("hover-3", {"duration_s": 4}, "from_s 5 is not within"),
+        ("landing-2", {"placement": {"kind": "ground"}, "draws": {}}, "kind is not released"),
+        ("landing-2", no_mark, "there is no mark 'goal'"),
+        ("landing-2", {"duration_s": 2}, "hold_s 3 is longer"),
+        ("hover-4", no_mark, "there is no mark 'goal'"),
+        ("hover-4", {"duration_s": 4}, "from_s 5 is not within"),
         ("slalom-2", {"gates": [], "draws": {}}, "has 0"),
         ("slalom-2", {"draws": {"gates.gate 9.center": [[0, 0], [1, 1]]}}, "no 'gate 9'"),
-        ("landing-1", {"marks": MOVING}, r"moves \(drift\), and this scorer's marks stay"),
-        ("mechanisms-4", {"marks": MOVING}, r"moves \(drift\), and this scorer's marks stay"),
+        ("landing-2", {"marks": MOVING}, r"moves \(drift\), and this scorer's marks stay"),
+        (
+            "place-2",
+            {"marks": MOVING, "draws": {}},
+            r"moves \(drift\), and this scorer's marks stay",
+        ),
         *(
-            (f"{name}-1", {"control": {"mode": "none"}}, "control")
-            for name in ("throw", "deliver", "balance", "walk", "line", "landing")
+            (name, {"control": {"mode": "none"}}, "control")
+            for name in ("throw-1", "deliver-2", "balance-2", "walk-1", "line-1", "landing-2")
         ),
     ):
         with subtests.test(name=name, told=told):

@@ -15,8 +15,8 @@ from support.clients.terminals import BUILDARENA
 from support.servers.stacks import wait_until
 from support.stages import assert_verified, work
 
+from buildarena_benchmark.experts import expert_designs
 from buildarena_cli.local.server import free_port
-from buildarena_worker.builtin.designs import DESIGNS
 
 WANTED = {"task": "support-1", "agent": "mcp", "simulator": "mujoco"}
 BLOCK = {"base_block": "1", "face": "A", "new_block": "Small Wooden Block"}
@@ -50,7 +50,7 @@ async def play(transport, simulate) -> dict[str, object]:
         assert "gap" in opened
         here = {"session": opened.split()[1]}
         await refused(session, "attach_block_to", {**here, **BLOCK, "new_block": "Torch"})
-        for name, arguments in DESIGNS["support-1"](0).parts["bridge"].actions:
+        for name, arguments in expert_designs()["support-1"](0).parts["bridge"].actions:
             await said(session, name, {**here, **arguments})
         assert "not ended" in await said(session, "submit", here)
         await asyncio.to_thread(simulate)

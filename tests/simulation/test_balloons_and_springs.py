@@ -8,7 +8,8 @@ import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.trials import press
 
-from buildarena_benchmark.scorers.measures.components import joined_to_start
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
+from buildarena_benchmark.scoring.measures.components import joined_to_start
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
 from buildarena_simulation import Scenario, Trajectory, simulate
@@ -16,7 +17,6 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.trajectory import Break
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")

@@ -8,11 +8,11 @@ import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.piloted import FASTER_FIRST
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, WEST
 from buildarena_geometry import module_set
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.scenario import SpanPlacement, TerrainBox
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, WEST
 
 SLOPE_DEG = 15
 

@@ -11,6 +11,7 @@ from support.machines.rigs import Rig
 from support.machines.trials import trial
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, UP
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, rollout, simulate
 from buildarena_simulation.constants import (
@@ -24,7 +25,6 @@ from buildarena_simulation.machine import structure_of
 from buildarena_simulation.rollout import simulate_structure
 from buildarena_simulation.scenario import Control, ReleasedPlacement, SpanPlacement, gap_terrain
 from buildarena_simulation.structure.contacts import ContactForces
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, UP
 
 KINDS = {
     "Hinge": "hinge",

@@ -10,10 +10,10 @@ from support.machines.references import load_machine
 from support.machines.trials import trial
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import NORTH, SOUTH, UP
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_simulation.scenario import SpanPlacement, gap_terrain
-from buildarena_worker.builtin.designs.drafting import NORTH, SOUTH, UP
 
 
 @pytest.mark.ci

@@ -10,13 +10,13 @@ from support.machines.families import car, rocket
 from support.machines.trials import trial
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import EAST, UP, WEST
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, SpanPlacement, TerrainBox
 from buildarena_simulation.structure.clusters import find_clusters
-from buildarena_worker.builtin.designs.drafting import EAST, UP, WEST
 
 CATALOGUE = load_catalogue()
 

@@ -7,6 +7,7 @@ import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, car
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SIDES, SOUTH, UP, WEST
 from buildarena_geometry import Machine, load_catalogue
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY
@@ -16,7 +17,6 @@ from buildarena_simulation.scenario import (
     TerrainBox,
     gap_terrain,
 )
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SIDES, SOUTH, UP, WEST
 
 BLOCK = load_catalogue()["Small Wooden Block"].physics
 

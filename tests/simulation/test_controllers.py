@@ -11,6 +11,7 @@ from support.machines.families import car, rocket
 from support.machines.trials import press
 
 from buildarena_benchmark import broken_constraint
+from buildarena_benchmark.experts.drafting import EAST, NORTH, UP
 from buildarena_simulation import (
     ControllerFailed,
     Scenario,
@@ -22,7 +23,6 @@ from buildarena_simulation import (
 from buildarena_simulation.control import read_presses
 from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Cargo, Control, Drift, Gate, Mark
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, UP
 
 AGENT = Control(mode="agent")
 SERIES = ("time_s", "positions", "quaternions", "heated", "pieces", "joint_loads")

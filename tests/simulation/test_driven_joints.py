@@ -7,9 +7,9 @@ import pytest
 from support.machines.rigs import Rig, catalogue, place_of, turned_by
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, UP, WEST
 from buildarena_simulation import Trajectory
 from buildarena_simulation.constants import GRAVITY
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, UP, WEST
 
 RPM_100 = 100 * 2 * math.pi / 60
 

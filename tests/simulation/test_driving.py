@@ -11,6 +11,7 @@ from support.machines.families import car, rocket
 from support.machines.references import REFERENCES, load_machine
 from support.machines.trials import press
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, UP
 from buildarena_geometry import KeyPress, Machine, load_catalogue
 from buildarena_geometry.flames import heating
 from buildarena_simulation import (
@@ -32,7 +33,6 @@ from buildarena_simulation.engines.base import Engine
 from buildarena_simulation.machine import bindings_of, structure_of
 from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control, Gate, SpanPlacement
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, UP
 
 MOTOR = load_catalogue()["Powered Wheel"].motor
 

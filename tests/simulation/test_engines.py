@@ -17,6 +17,7 @@ from support.machines.families import beam, rocket
 from support.machines.module_files import BASIC, like, module_file
 
 from buildarena_benchmark import failed_score, score
+from buildarena_benchmark.experts.drafting import EAST, UP
 from buildarena_geometry import Catalogue, Machine, load_catalogue
 from buildarena_simulation import (
     MachineNotSimulable,
@@ -34,7 +35,6 @@ from buildarena_simulation.engines.registry import create_engine
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, ReleasedPlacement
 from buildarena_simulation.structure.motion import Motion
-from buildarena_worker.builtin.designs.drafting import EAST, UP
 
 
 def test_an_empty_machine_is_no_machine(engine, tasks) -> None:

@@ -8,6 +8,7 @@ import pytest
 from support.machines.drafts import KeyedDraft
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, UP, WEST, Direction
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
 from buildarena_simulation import Scenario, Trajectory, simulate
@@ -15,7 +16,6 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, ReleasedPlacement
 from buildarena_simulation.structure.aerodynamics import wings_of
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, UP, WEST, Direction
 
 WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")

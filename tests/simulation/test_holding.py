@@ -6,13 +6,13 @@ from support.machines.building import attach
 from support.machines.drafts import KeyedDraft
 from support.machines.trials import press
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 from buildarena_geometry import KeyPress, Machine
 from buildarena_geometry.modules.sets import module_set
 from buildarena_simulation import Scenario, Trajectory, read_trajectory, simulate, write_trajectory
 from buildarena_simulation.constants import COLLISION_MARGIN, GRAVITY, JOINT_STRENGTH
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Cargo, Control, ReleasedPlacement, TerrainBox
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 WORKSHOP = module_set("workshop")
 

@@ -2,11 +2,9 @@
 
 import json
 from collections.abc import Callable
-from pathlib import Path
+from importlib import resources
 
 import pytest
-from support.machines.drafts import KeyedDraft
-from support.machines.expert_calls import built as built_by
 from support.machines.families import beam, car, rocket_parts
 from support.machines.headroom import drafted, propped_beam
 from support.machines.references import GOLDENS, REFERENCES, built_designs, outcome, stored
@@ -14,23 +12,18 @@ from support.machines.trials import changed, trial
 from support.marks import nightly
 
 from buildarena_benchmark import (
-    Task,
     TaskError,
     broken_constraint,
     load_task,
-    parse_custom_task,
-    score,
 )
-from buildarena_benchmark.scorers.registry import known_flags
-from buildarena_benchmark.tasks import loading
+from buildarena_benchmark.experts import expert_designs
+from buildarena_benchmark.experts.drafting import DOWN, EAST, SIDES, UP, Draft
+from buildarena_benchmark.scoring.registry import known_flags
+from buildarena_benchmark.tasks.flight.expert import stepping_hoverer
+from buildarena_benchmark.tasks.lift.expert import payload_rocket
+from buildarena_benchmark.tasks.mechanisms.expert import loaded_lift
+from buildarena_benchmark.tasks.transport.expert import touring_car
 from buildarena_geometry import Machine
-from buildarena_simulation import simulate
-from buildarena_worker.builtin.designs import DESIGNS, LEVEL_DESIGNS
-from buildarena_worker.builtin.designs.arms import geared_lift, loaded_lift
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, SIDES, UP, Draft
-from buildarena_worker.builtin.designs.flyers import stepping_hoverer
-from buildarena_worker.builtin.designs.rockets import payload_rocket
-from buildarena_worker.builtin.designs.rovers import touring_car
 
 LOAD = 300.0
 
@@ -48,8 +41,6 @@ def test_a_long_bridge_counts_and_tells_its_load_over_its_mass(engine, tasks) ->
     assert (result.success, result.flags) == (True, ())
     ratio = result.indicator / machine.mass
     assert result.metrics["load_per_mass"] == pytest.approx(ratio, abs=1e-5)
-    asking = {name for name, task in tasks.items() if "per_mass" in task.scoring.model_dump()}
-    assert asking == {f"support-{level}" for level in (4, 5, 6, 7)}
 
 
 @pytest.mark.ci
@@ -75,40 +66,19 @@ LIGHT = ("with ballast", "braced beam", "hanging post", "three pieces")
 @pytest.mark.parametrize("name", ["expert", LIGHT[0], *map(nightly, LIGHT[1:])])
 def test_a_light_bridge_is_worth_its_load_over_its_mass(engine, tasks, name) -> None:
     expert = name == "expert"
-    machine = drafted(DESIGNS["budget-1"](0), []) if expert else stored(f"light bridge {name}")
+    machine = (
+        drafted(expert_designs()["budget-1"](0), []) if expert else stored(f"light bridge {name}")
+    )
     result, _ = trial(tasks["budget-1"], machine, engine)
     assert (result.success, result.flags) == (True, ())
     assert result.indicator == pytest.approx(LOAD / machine.mass, abs=1e-5)
 
 
 def test_a_load_that_is_whole_only_after_the_trial_is_refused() -> None:
-    folder = loading.resources.files("buildarena_benchmark.tasks") / "catalogue"
+    folder = resources.files("buildarena_benchmark.tasks") / "design"
     text = (folder / "budget-1.yaml").read_text(encoding="utf-8")
     with pytest.raises(TaskError, match="the cargo weighs its 300 only when the trial has ended"):
         load_task(text.replace("ramp_s: 8", "ramp_s: 11.5"))
-
-
-def test_a_geared_lift_is_a_winch_with_its_counterweight(engine, tasks) -> None:
-    design, draft = geared_lift(0), KeyedDraft(modules="workshop")
-    for name, arguments in design.parts["lift"].actions:
-        draft.do(name, **arguments)
-    for config in design.control["control_config"]:
-        draft.bind(config["block"], config["action"], "UpArrow")
-    draft.press("UpArrow", 0.0, 1.2)
-    task = tasks["mechanisms-3"]
-    control = task.scenario.control.model_copy(update={"until_s": 1.5})
-    result, _ = trial(changed(task, control=control, duration_s=10.0), draft.machine, engine)
-    assert result.success, result
-    assert result.metrics["gear_turn"] > 45.0
-
-
-@pytest.mark.ci
-@pytest.mark.nightly(engine="pybullet")
-def test_balloons_that_rise_hover(engine, tasks) -> None:
-    for height in (0, 3):
-        machine = stored(f"mast that rises to {height}")
-        result, _ = trial(tasks["flight-1"], machine, engine, duration_s=17.0)
-        assert result.success, result
 
 
 @pytest.mark.nightly(engine="pybullet")
@@ -228,19 +198,3 @@ def test_a_token_frame_is_refused(tasks) -> None:
         assert (reason, told.startswith(problem)) == ("constraint_violated", True), told
     for draw, height in ((_cross, 2), (_with_a_foot, 4), (_column(7), 2)):
         assert broken_constraint(tasks["lift-3"], _framed(draw, height=height)) is None
-
-
-FOLDER = Path(__file__).parents[2] / "examples" / "tasks" / "besiegefield"
-
-
-def level(name: str) -> Task:
-    return parse_custom_task((FOLDER / f"{name}.yaml").read_text(), origin=name)
-
-
-@pytest.mark.ci
-@pytest.mark.parametrize("name", sorted(LEVEL_DESIGNS))
-def test_the_experts_design_solves_a_level_of_besiegefield(name, engine) -> None:
-    task = level(name)
-    made = built_by(LEVEL_DESIGNS[name](0), task.new_machine(task.constraints.catalogue))
-    told = score(task, made, simulate(made, task.scenario, engine))
-    assert told.success, told

@@ -8,13 +8,13 @@ from support.machines.building import built
 from support.machines.rigs import Rig, period_of, place_of, rotation_of, tried, turned_by
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 from buildarena_geometry import module_set
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.engines import base
 from buildarena_simulation.scenario import Control, SpanPlacement, TerrainBox
 from buildarena_simulation.structure.model import Structure
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 
 def _swinging(rig: Rig, joint: str) -> tuple[float, float, np.ndarray]:

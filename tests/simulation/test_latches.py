@@ -13,6 +13,7 @@ from support.machines.latches import (
 from support.machines.rigs import Rig
 from support.machines.trials import press
 
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory, simulate
 from buildarena_simulation.constants import GRAVITY
@@ -23,7 +24,6 @@ from buildarena_simulation.structure.free_directions import FreeDirections, free
 from buildarena_simulation.structure.motion import Motion
 from buildarena_simulation.structure.stiffness import StiffnessModel
 from buildarena_simulation.structure.vectors import turn_about
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP
 
 RELEASED = round(RELEASE_S * 25)
 """The last sample before the latch lets go."""

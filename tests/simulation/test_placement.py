@@ -6,12 +6,12 @@ from pydantic import ValidationError
 from support.machines.drafts import KeyedDraft
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import NORTH, UP
 from buildarena_geometry import KeyPress
 from buildarena_simulation import MachineNotSimulable, Scenario, simulate
 from buildarena_simulation.control import ended_presses
 from buildarena_simulation.engines.base import rotation_of
 from buildarena_simulation.scenario import Cargo, Control
-from buildarena_worker.builtin.designs.drafting import NORTH, UP
 
 BOX = {"size": [1, 1, 1], "initial_mass": 2, "final_mass": 2, "ramp_s": 1}
 

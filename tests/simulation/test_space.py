@@ -12,11 +12,11 @@ from support.machines.building import attach, built, connect
 from support.machines.drafts import KeyedDraft
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, UP, WEST
 from buildarena_geometry import KeyPress, Machine, module_set
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST
 
 RADIUS, PULL = 600.0, 23.0
 

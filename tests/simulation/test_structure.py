@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, car, deck
 
+from buildarena_benchmark.experts.drafting import EAST, NORTH, UP, WEST
 from buildarena_geometry import Machine
 from buildarena_simulation.constants import JointKind
 from buildarena_simulation.engines.base import CargoBox, CargoPose, World
@@ -19,7 +20,6 @@ from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces, EvenSharing
 from buildarena_simulation.structure.model import JOINT_KINDS, Structure
 from buildarena_simulation.structure.motion import Motion, at_rest
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, UP, WEST
 
 
 def _clusters(structure: Structure) -> Clusters:

@@ -19,11 +19,11 @@ from buildarena_benchmark import (
     parse_task,
     score,
 )
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
 from buildarena_benchmark.families.cars import drawn_car
 from buildarena_benchmark.families.given import edits_between, whole_machine
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Direction
 
 
 @pytest.mark.ci
@@ -194,7 +194,7 @@ def test_a_lever_that_turns_over_on_the_ground_does_not_count(engine, length) ->
 
 
 def test_files_that_nobody_could_play_are_refused() -> None:
-    folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
+    folder = resources.files("buildarena_benchmark.tasks") / "design"
     text = (folder / "identify-1.yaml").read_text()
     for was, becomes, says in (
         ("cargo: {size: [2, 2, 1], at: [0, 0, 0],", "cargo: {size: [2, 2, 1],", "cargo.at"),

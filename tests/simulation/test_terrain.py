@@ -9,13 +9,13 @@ from support.machines.drafts import KeyedDraft
 from support.machines.piloted import FASTER_FIRST
 from support.marks import nightly
 
+from buildarena_benchmark.experts.drafting import UP
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate
 from buildarena_simulation.line import Line
 from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.terrain import shape_of
-from buildarena_worker.builtin.designs.drafting import UP
 
 QUARTER = {
     "shape": "pipe",

@@ -10,13 +10,13 @@ from pydantic import ValidationError
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam as beam_of
 
+from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, UP, WEST
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate, write_trajectory
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.gusts import Wind
 from buildarena_simulation.offered import Senses
 from buildarena_simulation.scenario import Control, Gusts
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, UP, WEST
 
 FALL = {"kind": "released", "height": 50}
 

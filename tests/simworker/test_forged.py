@@ -35,7 +35,7 @@ from buildarena_simworker.engines import EngineSimulator
 
 Forgery = Callable[[Trajectory], Trajectory]
 LONG = "x" * 500
-LANDING = builtin_tasks()["landing-1"]
+LANDING = builtin_tasks()["landing-2"]
 SEED = 7
 
 

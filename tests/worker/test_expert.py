@@ -25,7 +25,7 @@ from buildarena_worker.session.results import Failed
 
 TASKS = sorted(builtin_tasks())
 SEEDS = range(int(os.environ.get("EXPERT_SEEDS", "1")))
-ON_PYBULLET = ["flight-1", "lift-3", "support-1", "transport-1", "mechanisms-2"]
+ON_PYBULLET = ["flight-3", "lift-3", "support-1", "transport-1", "mechanisms-1"]
 """One task of each category; PyBullet takes several times as long, the rest is nightly."""
 TRIALS = [
     (task, engine) if engine == "mujoco" or task in ON_PYBULLET else nightly(task, engine)

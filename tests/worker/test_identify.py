@@ -18,12 +18,12 @@ from buildarena_backend.trials.scoring import best_rollout, task_of
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment import Environment
 from buildarena_benchmark.environment.briefing import briefing
+from buildarena_benchmark.environment.expert_calls import calls_with
 from buildarena_benchmark.families.unknowns import drawn_numbers
+from buildarena_benchmark.tasks.design import expert as risers
+from buildarena_benchmark.tasks.design.expert import riser
 from buildarena_simulation import read_trajectory
 from buildarena_worker.builtin import expert
-from buildarena_worker.builtin.designs import risers
-from buildarena_worker.builtin.designs.calls import calls_with
-from buildarena_worker.builtin.designs.risers import riser
 
 pytestmark = pytest.mark.nightly
 

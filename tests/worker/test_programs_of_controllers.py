@@ -25,7 +25,7 @@ from buildarena_worker.workflow.control import (
     rendered_piloting,
 )
 
-TASK = "landing-1"
+TASK = "landing-2"
 FALLS = "function control() return {} end"
 KEYS = json.dumps(
     {
@@ -76,7 +76,7 @@ def test_a_controller_reads_the_contract_and_what_its_task_offers() -> None:
     for words in ("control(t, sense)", "sense.marks[name]", "place 0.05", "0.04 s old"):
         assert words in told, words
     assert "sense.gates" not in told
-    _, model = answered(KEYS, task="flight-1")
+    _, model = answered(KEYS, task="flight-3")
     assert "## Program" not in model.read[0]
 
 
@@ -134,7 +134,7 @@ def test_who_never_writes_one_that_can_be_read_has_not_built() -> None:
 
 
 def test_a_program_is_no_answer_where_keys_alone_count() -> None:
-    played, model = answered(fenced(FALLS), KEYS.replace('"4"', '"2"'), task="flight-1")
+    played, model = answered(fenced(FALLS), KEYS.replace('"4"', '"2"'), task="flight-3")
     assert len(model.read) >= 2
     assert "That can't be used: " in model.read[1]
     assert "```lua" not in model.read[1]

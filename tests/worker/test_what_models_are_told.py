@@ -136,7 +136,7 @@ def test_a_plans_modules_are_found_by_their_names(subtests) -> None:
         ("cog medium powered, log", {"Cog Medium Powered", "Log"}),
     ]:
         with subtests.test(plan=plan):
-            given = builtin_tasks()["mechanisms-2"]
+            given = builtin_tasks()["mechanisms-1"]
             text = parts_of(given, plan)
             connectors = set(given.constraints.catalogue.connectors)
             listed = set(re.findall(r"^- ([^:]+):", text, re.MULTILINE))

@@ -12,7 +12,7 @@ afterAll(() => browser.close());
 it(
   "a program is set, asked what it would do, and tried live",
   async () => {
-    const id = await openSession(`lua-${process.pid}`, 0, { task: "landing-1", kind: "human", worlds: 1 });
+    const id = await openSession(`lua-${process.pid}`, 0, { task: "landing-2", kind: "human", worlds: 1 });
     await act(id, "start", {});
     await act(id, "attach_block_to", { base_block: "1", face: "E", new_block: "Flying Block" });
     const page = await opened(browser, `/build?session=${id}`);

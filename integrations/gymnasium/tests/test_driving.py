@@ -22,7 +22,7 @@ from buildarena_simulation.trial import Trial
 pytestmark = pytest.mark.nightly
 
 IDS = buildarena_gymnasium.drive_ids()
-HOVER = builtin_tasks()["hover-3"]
+HOVER = builtin_tasks()["hover-4"]
 SHORT = replace(HOVER, scenario=HOVER.scenario.model_copy(update={"duration_s": 6.0}))
 TICKS = 150
 
@@ -56,7 +56,7 @@ def test_each_task_that_takes_programs_can_be_driven() -> None:
     assert "BuildArena/Drive-Hover-3-v0" in IDS
     assert len(IDS) == len(piloted)
     usual = gymnasium.make("buildarena_gymnasium:BuildArena/Drive-v0").unwrapped
-    assert usual.task.name == "hover-3"
+    assert usual.task.name == "hover-4"
     assert gymnasium.make("BuildArena/Drive-v0", task="slalom-2").unwrapped.task.level == 2
 
 
@@ -71,7 +71,7 @@ def test_gymnasiums_checker_is_content(name) -> None:
 def test_what_a_program_answers_makes_its_trial(engine, seed, experts, monkeypatch) -> None:
     (program,) = (
         call["arguments"]["program"]
-        for call in experts["hover-3"]["calls"]
+        for call in experts["hover-4"]["calls"]
         if call["tool"] == "set_controller"
     )
     answers, answer = [], Program.answer
@@ -81,7 +81,7 @@ def test_what_a_program_answers_makes_its_trial(engine, seed, experts, monkeypat
         return answers[-1]
 
     monkeypatch.setattr(Program, "answer", listened)
-    machine = fixed_machine("hover-3").with_controller(program)
+    machine = fixed_machine("hover-4").with_controller(program)
     trajectory = simulate(machine, SHORT.scenario, engine, seed=seed)
     assert len(answers) == TICKS
 
@@ -173,18 +173,18 @@ def test_a_machine_that_blows_up_truncates_the_episode(monkeypatch) -> None:
 def test_what_cannot_be_driven_is_refused_with_the_choices() -> None:
     with pytest.raises(UnknownChoiceError, match="no task 'hover-9'"):
         gymnasium.make("BuildArena/Drive-v0", task="hover-9")
-    with pytest.raises(ValueError, match="support-1 offers no senses: choose from landing-1"):
+    with pytest.raises(ValueError, match="support-1 offers no senses: choose from balance-2"):
         DriveEnv("support-1")
     with pytest.raises(UnknownChoiceError, match="no simulator 'game'"):
         DriveEnv(simulator="game")
-    with pytest.raises(UnknownChoiceError, match="driven in task 'mine': choose from landing-1"):
+    with pytest.raises(UnknownChoiceError, match="driven in task 'mine': choose from balance-2"):
         DriveEnv(replace(HOVER, name="mine"))
     with pytest.raises(ValueError, match="no render mode 'film'"):
         DriveEnv(render_mode="film")
     with pytest.raises(ValueError, match="no option 'state': there are none"):
         short().reset(options={"state": 1})
     # Wheels are no modules of this task.
-    with pytest.raises(ValueError, match="this is no machine for hover-3: "):
+    with pytest.raises(ValueError, match="this is no machine for hover-4: "):
         DriveEnv(machine=fixed_machine("slalom-2"))
 
 

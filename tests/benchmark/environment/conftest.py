@@ -9,8 +9,8 @@ from support.machines import expert_calls
 from support.machines.expert_calls import played
 
 from buildarena_benchmark.environment import Environment
+from buildarena_benchmark.environment.expert_calls import Call
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs.calls import Call
 
 
 @pytest.fixture(scope="session")

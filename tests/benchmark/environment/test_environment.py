@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from support.documents.code_blocks import run_document
-from support.machines.expert_calls import REFERENCES, played, scored
+from support.machines.expert_calls import played, scored
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment import (
@@ -34,7 +34,6 @@ ALL = {"success": 1.0, "indicator": 1.0, "accepted_share": 0.1, "constraint_prog
 
 @pytest.mark.nightly
 def test_what_the_expert_builds_is_scored_as_the_references_say() -> None:
-    assert json.loads(REFERENCES.read_text()) == references()
     assert list(references()) == list(builtin_tasks())
     found = {task: scored(task) for task in references()}
     assert [task for task, score in found.items() if not score["success"] or score["flags"]] == []

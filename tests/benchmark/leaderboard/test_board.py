@@ -16,7 +16,7 @@ from buildarena_benchmark.leaderboard import (
     counted_trials,
     summarise,
 )
-from buildarena_benchmark.scorers.registry import known_flags
+from buildarena_benchmark.scoring.registry import known_flags
 from buildarena_benchmark.statistics import holm
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -205,8 +205,8 @@ def test_the_ranking_is_over_the_asked_tasks_that_are_there_or_over_what_there_i
     everything = ["lift-1", "own-1", "support-1"]
     for asked, chosen, ranked in (
         (["support-1", "lift-1"], {}, ["lift-1", "support-1"]),
-        (["lift-1", "hover-3"], {}, ["lift-1"]),
-        (["hover-3"], {}, everything),
+        (["lift-1", "hover-4"], {}, ["lift-1"]),
+        (["hover-4"], {}, everything),
         (["lift-1"], {"tasks": frozenset({"own-1"})}, ["own-1"]),
     ):
         board = found.board(BoardQuery(overall=frozenset(asked), **chosen))

@@ -25,7 +25,7 @@ SESSIONS = (
     ("support-1", 0),
     ("transport-1", 2),
     ("lift-3", 0),
-    ("mechanisms-4", 0),
+    ("mechanisms-7", 0),
     ("flight-2", 0),
 )
 """Tasks, and how many simulated trials each session is told about."""

@@ -2,8 +2,8 @@
 
 from support.machines.drafts import KeyedDraft
 
+from buildarena_benchmark.experts.drafting import EAST, SOUTH, UP, WEST
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs.drafting import EAST, SOUTH, UP, WEST
 
 
 def car_with_boulder() -> Machine:

@@ -1,6 +1,6 @@
 """Drafting machines for trials: the expert's draft, with keys and presses."""
 
-from buildarena_worker.builtin.designs.drafting import Direction, Draft
+from buildarena_benchmark.experts.drafting import Direction, Draft
 
 
 class KeyedDraft(Draft):

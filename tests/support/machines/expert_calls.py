@@ -11,22 +11,20 @@ from pathlib import Path
 from typing import Any
 
 from buildarena_benchmark import builtin_tasks, score
+from buildarena_benchmark.categories import categories
 from buildarena_benchmark.environment import Environment, references
+from buildarena_benchmark.environment.expert_calls import Call, calls_with, control_of
 from buildarena_benchmark.environment.trials.trials import score_text
+from buildarena_benchmark.experts import expert_designs
+from buildarena_benchmark.experts.design import Design, Seen
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import simulate
-from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.builtin.designs.calls import Call, calls_with, control_of
-from buildarena_worker.builtin.designs.design import Design, Seen
 from buildarena_worker.builtin.reading import figures_of
-
-ROOT = Path(__file__).parents[3]
-REFERENCES = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks/references.json"
 
 
 def calls_of(task: str, seed: int = 0) -> list[Call]:
     """As the library's, with what a design that measures its world finds there."""
-    design = DESIGNS[task](seed)
+    design = expert_designs()[task](seed)
     answer = measured_for(design, task, seed) if design.steer else design.control or {}
     return calls_with(design, answer)
 
@@ -92,8 +90,11 @@ def scored(task: str) -> dict[str, Any]:
 
 if __name__ == "__main__":
     if "--references" in sys.argv:
-        made = {task: round(scored(task)["indicator"], 4) for task in builtin_tasks()}
-        REFERENCES.write_text(json.dumps(made, indent=1) + "\n", encoding="utf-8")
+        for category in categories():
+            file = category.folder / "category.yaml"
+            lines = [f"  {task}: {scored(task)['indicator']:.4f}" for task in category.references]
+            kept = file.read_text("utf-8").partition("references:\n")
+            file.write_text("".join(kept[:2]) + "\n".join(lines) + "\n", encoding="utf-8")
     else:
         experts = Experts()
         Path(sys.argv[1]).write_text(json.dumps({task: experts[task] for task in references()}))

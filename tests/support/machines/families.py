@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 from support.machines.drafts import KeyedDraft
 
-from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs.drafting import (
+from buildarena_benchmark.experts.drafting import (
     DOWN,
     EAST,
     NORTH,
@@ -20,6 +19,7 @@ from buildarena_worker.builtin.designs.drafting import (
     Direction,
     Draft,
 )
+from buildarena_geometry import Machine
 
 REACH = {"t": 1, "b": 1, "1": 4, "2": 4}
 """Blocks that a brace spans, by its kind; the other kinds span all."""

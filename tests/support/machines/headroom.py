@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from support.machines.drafts import KeyedDraft
 
+from buildarena_benchmark.experts.design import Design
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs.design import Design
-from buildarena_worker.builtin.designs.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST
 
 Presses = Sequence[tuple[float, str, float]]
 """Time, key and duration, seconds."""

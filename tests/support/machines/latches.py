@@ -5,8 +5,7 @@ from collections.abc import Callable
 from support.machines.drafts import KeyedDraft
 from support.machines.trials import press
 
-from buildarena_geometry import KeyPress, Machine
-from buildarena_worker.builtin.designs.drafting import (
+from buildarena_benchmark.experts.drafting import (
     DOWN,
     EAST,
     NORTH,
@@ -17,7 +16,8 @@ from buildarena_worker.builtin.designs.drafting import (
     Direction,
     Draft,
 )
-from buildarena_worker.builtin.designs.throwers import Shape, catapult_draft, leaning
+from buildarena_benchmark.tasks.throwing.expert import Shape, catapult_draft, leaning
+from buildarena_geometry import KeyPress, Machine
 
 RELEASE_S = 1.5
 PRESSES: tuple[KeyPress, ...] = (press("Alpha1", 0.2, 8.0), press("Alpha2", RELEASE_S, 0.5))

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Final
 
 from buildarena_benchmark import Score, Task, score
+from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import Machine
 from buildarena_simulation import ENGINES, simulate
 from buildarena_simulation.controllers.program import Program
-from buildarena_worker.builtin.designs import DESIGNS
 
 Answer = dict[str, float]
 FASTER_FIRST: Final = tuple(reversed(ENGINES))
@@ -16,7 +16,7 @@ FASTER_FIRST: Final = tuple(reversed(ENGINES))
 
 def experts_machine(task: Task, seed: int = 0) -> Machine:
     """The expert's machine for a task that takes programs."""
-    design = DESIGNS[task.name](seed)
+    design = expert_designs()[task.name](seed)
     machine = task.new_machine(task.constraints.catalogue)
     for tool, arguments in next(iter(design.parts.values())).actions:
         outcome = machine.act(tool, arguments)

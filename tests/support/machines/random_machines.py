@@ -12,8 +12,8 @@ import numpy as np
 from support.machines.building import attach, connect
 from support.machines.families import beam, car, deck, rocket, rocket_assembly
 
+from buildarena_benchmark.experts.drafting import BRACE, SIDES
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs.drafting import BRACE, SIDES
 
 Draw = np.random.Generator
 _GAPS: Final = {"support-1": 5, "support-2": 10, "support-3": 20}

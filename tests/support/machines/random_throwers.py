@@ -12,11 +12,11 @@ import numpy as np
 from support.machines.random_workshop import add_parts, bind, starts_clear, varied
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.experts.drafting import Draft
+from buildarena_benchmark.tasks.throwing import expert as throwers
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs import throwers
-from buildarena_worker.builtin.designs.drafting import Draft
 
-TASKS: Final = ("throw-1", "throw-2")
+TASKS: Final = ("throw-1", "throw-4")
 """Names of the tasks machines are drawn for: those of key presses."""
 
 _HUB, _TIP = 0.5, 0.75

@@ -12,12 +12,12 @@ import numpy as np
 from support.machines.building import attach
 
 from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import Machine
 from buildarena_simulation.clearance import require_clear_start
 from buildarena_simulation.errors import MachineNotSimulable
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.placement import start_of
-from buildarena_worker.builtin.designs import DESIGNS
 
 Draw = np.random.Generator
 
@@ -76,7 +76,7 @@ def starts_clear(task: str, machine: Machine) -> bool:
 
 
 def _drawn(task: str, draw: Draw) -> Machine:
-    design = DESIGNS[task](int(draw.integers(0, 1000)))
+    design = expert_designs()[task](int(draw.integers(0, 1000)))
     machine = Machine(catalogue=builtin_tasks()[task].constraints.catalogue)
     (part,) = design.parts.values()
     for name, arguments in part.actions:

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from support.machines.drafts import KeyedDraft
 
 from buildarena_benchmark import Task
+from buildarena_benchmark.experts import expert_designs
+from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, WEST
 from buildarena_benchmark.families.cars import KEY, PRESS, drawn_car
 from buildarena_benchmark.families.given import given_machine
 from buildarena_geometry import Block, Machine
-from buildarena_worker.builtin.designs import DESIGNS
-from buildarena_worker.builtin.designs.drafting import EAST, NORTH, SOUTH, WEST
 
 
 def faulty(task: Task) -> Machine:
@@ -21,7 +21,7 @@ def faulty(task: Task) -> Machine:
 def repaired(task: Task, count: int | None = None) -> Machine:
     """The car with the expert's edits, or the first actions of them."""
     machine = faulty(task)
-    (part,) = DESIGNS[task.name](task.seed).parts.values()
+    (part,) = expert_designs()[task.name](task.seed).parts.values()
     for name, arguments in list(part.actions)[:count]:
         assert machine.act(name, arguments).ok
     return machine

@@ -9,6 +9,7 @@ from support.machines.building import BLOCK
 from support.machines.drafts import KeyedDraft
 from support.machines.module_files import like
 
+from buildarena_benchmark.experts.drafting import DOWN
 from buildarena_geometry import Catalogue, Machine, module_set
 from buildarena_geometry.modules.catalogue import read_modules
 from buildarena_simulation import Scenario, Trajectory
@@ -19,7 +20,6 @@ from buildarena_simulation.rollout import simulate_structure
 from buildarena_simulation.scenario import Control
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.model import Structure
-from buildarena_worker.builtin.designs.drafting import DOWN
 
 
 @cache

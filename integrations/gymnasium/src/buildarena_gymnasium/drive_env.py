@@ -29,7 +29,7 @@ from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
 Figures = NDArray[np.float64]
 
-TASK: Final = "hover-3"
+TASK: Final = "hover-4"
 MAX_WORLD_SEED: Final = 2**31
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from buildarena_benchmark.scorers.registry import known_flags
+from buildarena_benchmark.scoring.registry import known_flags
 
 
 def is_disqualified(flags: Collection[str]) -> bool:

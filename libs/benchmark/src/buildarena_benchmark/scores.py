@@ -8,9 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_benchmark.scorers.measures.stability import is_unstable
-from buildarena_benchmark.scorers.registry import known_scorers
-from buildarena_benchmark.scorers.scorer import UNSTABLE, Metric
+from buildarena_benchmark.flags import meaning
+from buildarena_benchmark.scoring.measures.stability import is_unstable
+from buildarena_benchmark.scoring.registry import known_scorers
+from buildarena_benchmark.scoring.scorer import FORCES_NOT_MEASURED, UNSTABLE, Metric
 from buildarena_benchmark.tasks.task import Task
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory, simulate, world_of
@@ -68,6 +69,22 @@ def score(task: "Task", machine: "Machine", trajectory: "Trajectory") -> Score:
         metrics=metrics,
         flags=flags,
     )
+
+
+def explain(task: "Task", found: Score) -> str:
+    """Return what happened in a trial, in words for builders and for visitors of pages.
+
+    Args:
+        task: The task.
+        found: The trial's score.
+
+    Returns:
+        One sentence that names the figure which decided, and one for each flag.
+    """
+    said = [meaning(flag) for flag in found.flags]
+    if FORCES_NOT_MEASURED.name not in found.flags:
+        said.insert(0, known_scorers()[task.scorer].explain(task.scoring, task.scenario, found))
+    return " ".join(said)
 
 
 def simulate_task(

@@ -15,7 +15,7 @@ from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.process.context import Context
 from buildarena_benchmark import ValidationIssue
-from buildarena_benchmark.scorers.registry import known_flags
+from buildarena_benchmark.scoring.registry import known_flags
 
 
 def job_filter(

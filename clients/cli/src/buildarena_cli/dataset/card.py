@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from buildarena_benchmark import CANARY
-from buildarena_benchmark.scorers.registry import known_flags
+from buildarena_benchmark.scoring.registry import known_flags
 from buildarena_cli.dataset.columns import JOBS, Column
 
 CARD: Final = "README.md"

@@ -26,7 +26,7 @@ it("an address names its scope, whatever it asks for", () => {
 
 it("says what the ranking is over", () => {
   expect(rankedOver([], 4)).toBe("");
-  expect(rankedOver(["flight-1", "flight-2"], 2)).toBe("Ranked over flight-1, flight-2.");
-  expect(rankedOver(["flight-1"], 2)).toBe("Ranked over flight-1; 1 other task below is not in it.");
+  expect(rankedOver(["flight-2", "flight-3"], 2)).toBe("Ranked over flight-2, flight-3.");
+  expect(rankedOver(["flight-2"], 2)).toBe("Ranked over flight-2; 1 other task below is not in it.");
   expect(rankedOver(Array<string>(12).fill("t"), 14)).toBe("Ranked over 12 tasks; 2 other tasks below are not in it.");
 });

@@ -18,8 +18,8 @@ from buildarena_benchmark import Task, failed_score
 from buildarena_benchmark.families.unknowns import drawn_numbers
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS
-from buildarena_benchmark.scorers.registry import known_scorers
 from buildarena_benchmark.scores import AFTER_S
+from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 

@@ -22,7 +22,7 @@ from pydantic_core import PydanticCustomError
 from buildarena_benchmark.families.given import Beginning
 from buildarena_benchmark.families.unknowns import Unknowns, drawn_scenario
 from buildarena_benchmark.fields import Count, Document
-from buildarena_benchmark.scorers.registry import known_scorers, scoring_type
+from buildarena_benchmark.scoring.registry import known_scorers, scoring_type
 from buildarena_geometry import (
     MODULE_SETS,
     Catalogue,

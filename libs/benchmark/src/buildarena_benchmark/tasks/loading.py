@@ -1,82 +1,48 @@
 """Reads task files: the built-in ones and custom ones."""
 
-import json
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 from typing import Final
 
 import yaml
 
+from buildarena_benchmark.categories import categories
 from buildarena_benchmark.errors import SourceError, TaskError, ValidationIssue
 from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.sources import read_model, read_source
 from buildarena_benchmark.tasks.task import Task, task_of
 
-_PAPER: Final = tuple(
-    f"{category}-{level}" for category in ("transport", "support", "lift") for level in (1, 2, 3)
-)
-_WORKSHOP: Final = (*(f"mechanisms-{level}" for level in (1, 2, 3, 4)), "flight-1", "flight-2")
-_HEADROOM: Final = (
-    *("support-4", "support-5", "mechanisms-5", "mechanisms-6", "transport-4"),
-    *("flight-3", "lift-4", "mechanisms-7", "support-6", "support-7"),
-)
-_FAMILIES: Final = ("budget-1", "repair-1", "identify-1")
-_CONTROL: Final = (
-    "landing-1",
-    "landing-2",
-    "slalom-2",
-    "hover-3",
-    "hover-4",
-    "balance-1",
-    "balance-2",
-    "walk-1",
-    "walk-2",
-    "place-2",
-    "line-1",
-)
-_THROWING: Final = ("throw-1", "throw-2", "throw-3", "throw-4", "throw-5")
-_SPACE: Final = ("orbit-1", "orbit-2")
-_COURSES: Final = (
-    "deliver-1",
-    "deliver-2",
-    "deliver-3",
-    "drive-1",
-    "drive-2",
-    "drive-3",
-    "drive-4",
-    "fetch-1",
-)
 _OWN: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @cache
 def builtin_tasks() -> Mapping[str, Task]:
-    """The built-in tasks by name: the paper's nine in its order, the workshop's, then the rest."""
-    folder = resources.files("buildarena_benchmark.tasks") / "catalogue"
+    """Return the built-in tasks by name, category by category."""
     tasks = {}
-    further = (*_HEADROOM, *_FAMILIES, *_CONTROL, *_THROWING, *_SPACE, *_COURSES)
-    for name in (*_PAPER, *_WORKSHOP, *further):
-        text = (folder / f"{name}.yaml").read_text(encoding="utf-8")
-        # Ours: read by libyaml, five times as fast as by what strangers' texts are read by.
-        content = yaml.load(text, Loader=_OWN)  # noqa: S506 - makes plain values
-        tasks[name] = task_of(TaskDocument.model_validate(content))
+    for category in categories():
+        for file in sorted(category.folder.glob("*-*.yaml")):
+            # Ours: read by libyaml, five times as fast as by what strangers' texts are read by.
+            content = yaml.load(file.read_text(encoding="utf-8"), Loader=_OWN)  # noqa: S506 - makes plain values
+            tasks[file.stem] = task_of(TaskDocument.model_validate(content))
     return MappingProxyType(tasks)
 
 
 @cache
 def paper_tasks() -> Mapping[str, Task]:
-    """The paper's nine tasks by name: those that the overall ranking is over."""
-    return MappingProxyType({name: builtin_tasks()[name] for name in _PAPER})
+    """Return the paper's nine tasks by name: those that the overall ranking is over."""
+    names = [name for category in categories() for name in category.paper]
+    return MappingProxyType({name: builtin_tasks()[name] for name in names})
 
 
 @cache
 def references() -> Mapping[str, float]:
-    """The built-in expert's indicators on MuJoCo, by built-in task."""
-    text = (resources.files("buildarena_benchmark.tasks") / "references.json").read_text("utf-8")
-    return MappingProxyType({str(name): float(value) for name, value in json.loads(text).items()})
+    """Return the built-in expert's indicators on MuJoCo, by built-in task."""
+    known: dict[str, float] = {}
+    for category in categories():
+        known |= category.references
+    return MappingProxyType(known)
 
 
 def load_task(source: str | Path) -> Task:

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, Self
 
 from buildarena_benchmark.families.given import Beginning, given_machine
 from buildarena_benchmark.families.unknowns import Unknowns, drawn_scenario
-from buildarena_benchmark.scorers.registry import known_scorers
+from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_benchmark.tasks.document import Constraints, Indicator, Scoring, TaskDocument
 from buildarena_geometry import Catalogue, Machine
 from buildarena_simulation import Scenario

@@ -18,7 +18,7 @@ from buildarena_benchmark.leaderboard import (
     Cell,
     verdict_of,
 )
-from buildarena_benchmark.scorers.registry import known_flags
+from buildarena_benchmark.scoring.registry import known_flags
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_benchmark.scorers.registry import known_scorers
+from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import module_set
 from buildarena_geometry.modules.module import Face
 

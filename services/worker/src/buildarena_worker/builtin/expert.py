@@ -10,9 +10,9 @@ import json
 from collections.abc import Sequence
 from functools import lru_cache
 
-from buildarena_worker.builtin.designs import DESIGNS, LEVEL_DESIGNS
-from buildarena_worker.builtin.designs.design import Design
-from buildarena_worker.builtin.designs.drafting import Action
+from buildarena_benchmark.experts import expert_designs
+from buildarena_benchmark.experts.design import Design
+from buildarena_benchmark.experts.drafting import Action
 from buildarena_worker.builtin.reading import Situation, read_situation
 from buildarena_worker.session.messages import Completion, Request, ToolCall
 
@@ -20,8 +20,6 @@ DONE = "TERMINATE"
 DESCRIBE = "describe_module"
 STEPS = 10
 """Steps that it tells a builder at a time."""
-KNOWN = {**DESIGNS, **LEVEL_DESIGNS}
-"""By task name, what it has a design for."""
 DESIGNERS = ("planner", "drafter", "guidance", "engineer")
 """The roles that must know modules; guidance only where it has no drawing."""
 
@@ -29,7 +27,7 @@ DESIGNERS = ("planner", "drafter", "guidance", "engineer")
 def reply(request: Request) -> Completion:
     """The next thing to say or do; an objection to tasks it has no design for."""
     situation = read_situation(request)
-    if situation.task not in KNOWN:
+    if situation.task not in expert_designs():
         return Completion(text=f"I have no design for {situation.task or 'this task'}. {DONE}")
     return answered(_design(situation.task, request.seed), situation, request)
 
@@ -60,7 +58,7 @@ def answered(design: Design, situation: Situation, request: Request) -> Completi
 
 @lru_cache(maxsize=1024)  # sessions that one process may play at once
 def _design(task: str, seed: int) -> Design:
-    return KNOWN[task](seed)
+    return expert_designs()[task](seed)
 
 
 def _look_up(design: Design, situation: Situation, request: Request) -> Completion | None:

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 from buildarena_benchmark.environment.tools import LOOKUPS
-from buildarena_worker.builtin.designs.design import Seen
+from buildarena_benchmark.experts.design import Seen
 from buildarena_worker.session.messages import Message, Request
 
 _ROLE = re.compile(r"^# Role: (\S+)", re.MULTILINE)

@@ -15,8 +15,8 @@ from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.trials.scoring import best_rollout
 from buildarena_benchmark import Task, builtin_tasks
+from buildarena_benchmark.experts import expert_designs
 from buildarena_geometry import Machine
-from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.session.results import Failed, Finished, SessionEnded, SessionResult
 from buildarena_worker.session.session import Session
 from buildarena_worker.workflow.analyst import analyse
@@ -119,11 +119,11 @@ def example_for(task: Task, pack: PromptPack) -> str:
     and the first example of all if none is.
     """
     name = f"{task.category}-1"
-    if name not in DESIGNS:
-        others = [name for name in DESIGNS if name != task.name]
+    if name not in expert_designs():
+        others = [name for name in expert_designs() if name != task.name]
         alike = [name for name in others if builtin_tasks()[name].scorer == task.scorer]
-        name = next(iter(alike or DESIGNS))
-    part = next(iter(DESIGNS[name](EXAMPLE_SEED).parts.values()))
+        name = next(iter(alike or expert_designs()))
+    part = next(iter(expert_designs()[name](EXAMPLE_SEED).parts.values()))
     actions = "\n".join(
         f"{number}. {action}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
         for number, (action, arguments) in enumerate(part.actions, start=1)

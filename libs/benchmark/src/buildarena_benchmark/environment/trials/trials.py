@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
 from buildarena_benchmark.flags import is_disqualified, meaning
-from buildarena_benchmark.scorers.measures.series import rotations
 from buildarena_benchmark.scores import simulate_task
+from buildarena_benchmark.scoring.measures.series import rotations
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory
 

@@ -1,0 +1,70 @@
+"""Designs as the calls of one who builds alone, for programs that have no session."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from buildarena_benchmark.environment import ASSEMBLY, MAIN
+from buildarena_benchmark.experts import expert_designs
+from buildarena_benchmark.experts.design import Design
+from buildarena_benchmark.experts.drafting import Action
+
+Call = dict[str, Any]
+"""`machine`, `tool` and `arguments`, as an `Environment` takes them."""
+
+
+def calls_of(task: str, seed: int) -> list[Call] | None:
+    """What builds and drives the expert's machine for a task, call by call.
+
+    Args:
+        task: The task's name.
+        seed: Varies the design within its tolerances.
+
+    Returns:
+        The calls; None where there is no design, or it must see trials before it is whole.
+    """
+    make = expert_designs().get(task)
+    design = None if make is None else make(seed)
+    if design is None or design.steer is not None:
+        return None
+    return calls_with(design, design.control or {})
+
+
+def calls_with(design: Design, answer: Mapping[str, Any]) -> list[Call]:
+    """What builds a design, and does what its controller says.
+
+    Args:
+        design: What is built.
+        answer: What the controller says: key bindings and presses.
+    """
+    calls = [
+        call(name if design.assembly else MAIN, *action)
+        for name, part in design.parts.items()
+        for action in part.actions
+    ]
+    whole = ASSEMBLY if design.assembly else MAIN
+    calls += [call(whole, *action) for action in (*design.assembly, *control_of(answer))]
+    if design.program:
+        calls.append(call(whole, "set_controller", {"program": design.program}))
+    return calls
+
+
+def call(machine: str, tool: str, arguments: Mapping[str, Any]) -> Call:
+    """One call."""
+    return {"machine": machine, "tool": tool, "arguments": dict(arguments)}
+
+
+def control_of(answer: Mapping[str, Any]) -> list[Action]:
+    """What a controller says, as actions."""
+    actions: list[Action] = []
+    for bound in answer.get("control_config", ()):
+        for number, key in enumerate(bound["keys"]):
+            tool = "add_control_key" if number else "change_control_key"
+            told = {"block_id": bound["block"], "action": bound["action"], "new_key": key}
+            actions.append((tool, told))
+    pressed = answer.get("control_sequence", ())
+    return actions + [("add_control_sequence", dict(press)) for press in pressed]

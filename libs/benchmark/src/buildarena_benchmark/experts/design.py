@@ -1,0 +1,63 @@
+"""What a design consists of."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from buildarena_benchmark.experts.drafting import Action
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PartDesign:
+    """A sub-structure and the actions that build it.
+
+    Attributes:
+        description: Shape and size, for the plan.
+        actions: Tool names and arguments, in order.
+    """
+
+    description: str
+    actions: Sequence[Action]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """A trial that the controller has seen.
+
+    Attributes:
+        program: Its answer.
+        measured: What it was told then: figures by name.
+    """
+
+    program: Mapping[str, Any]
+    measured: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A whole machine.
+
+    Attributes:
+        overall: What it is, for the plan.
+        parts: Sub-structures by name, in building order.
+        assembly: Actions that put several sub-structures together.
+        control: The controller's answer, for tasks that are driven.
+        program: The controller's answer in its place, for tasks that take programs: Lua.
+        steer: What it answers after the trials it has seen, where that depends on them.
+    """
+
+    overall: str
+    parts: Mapping[str, PartDesign]
+    assembly: Sequence[Action] = ()
+    control: Mapping[str, Any] | None = None
+    program: str = ""
+    steer: Callable[[Sequence[Seen]], Mapping[str, Any]] | None = None
+
+
+Designs = Mapping[str, Callable[[int], Design]]
+"""By a task's name: the design for a seed, which varies it within its tolerances."""

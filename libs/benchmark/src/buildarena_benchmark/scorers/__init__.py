@@ -1,1 +1,0 @@
-"""Scorers: from a machine and its trajectory to a verdict; pure, and blind to the simulator."""

@@ -1,0 +1,189 @@
+"""Haul: how heavy a cargo, which grows heavier, is when a machine raises it."""
+
+from collections.abc import Iterable, Iterator
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.carrying import bears_cargo, is_airborne, stands
+from buildarena_benchmark.scoring.measures.commands import motor_presses, presses_of
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
+from buildarena_benchmark.scoring.measures.gears import gear_turn_deg
+from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    NOT_CARRIED,
+    Deciding,
+    Finding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    final_mass,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+
+NOT_STANDING: Final = Flag(
+    name="not_standing",
+    meaning="The ground did not bear machine and cargo while the cargo was held.",
+)
+NOT_GEARED: Final = Flag(
+    name="not_geared",
+    meaning="The cargo rose before a motor was told to turn, or not through a gear wheel that one "
+    "turned.",
+)
+
+_SETTLED: Final = 13
+"""So many samples after it begins, forces summed over half a second are those of the lift."""
+
+_SHARE: Final = 0.5
+"""Smallest share of a weight that is borne: what is lifted by a swing presses less for a while."""
+
+
+class HaulScoring(Document):
+    """How heavy a cargo is raised.
+
+    Attributes:
+        by: "gears": the machine stands on the ground, and a large gear wheel that motors turn lies
+            between it and the cargo; "flight": it is in the air.
+        min_rise: How high above where it stood the cargo is to be, units.
+        start_rise: The lift begins when it was last lower than that above where it stood, units.
+        min_gear_turn_deg: How far a large gear wheel must turn in the lift, degrees.
+    """
+
+    name: Literal["haul"]
+    by: Literal["gears", "flight"]
+    min_rise: Threshold = 5.0
+    start_rise: Annotated[float, Field(gt=0, le=100)] = 0.5
+    min_gear_turn_deg: Annotated[float, Field(gt=0, le=180)] = 20.0
+
+
+def infeasible(scoring: HaulScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None or scenario.cargo.at is None:
+        return "the cargo is raised from its place, but scenario.cargo has none: give cargo.at"
+    if scoring.start_rise >= scoring.min_rise:
+        return f"start_rise {scoring.start_rise:g} is not below min_rise {scoring.min_rise:g}"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: HaulScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the cargo's mass at the beginning of a lift, the greatest of all lifts.
+
+    A lift is from when the cargo was last near where it stood until it is high enough. All the
+    while, its first half second aside, the machine must bear it, be whole, and stand on the ground
+    or be in the air, as asked for.
+
+    Args:
+        scoring: Thresholds.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_carried`: it got high enough, but the machine did not bear it. `came_apart`: parts came
+        off. `not_standing`: the machine does not stand. `not_geared`: it was not raised by gears.
+        `not_airborne`: the machine is not in the air. `forces_not_measured`: cannot be judged.
+    """
+    del scenario
+    lacking = unmeasured(trajectory, cargo=True)
+    if lacking is not None:
+        return lacking
+    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
+    assert trajectory.cargo_mass is not None  # noqa: S101
+    joined = joined_to_start(machine, trajectory)
+    height = trajectory.cargo_position[:, 2].astype(np.float64)
+    height -= height[0]
+    lifts = list(_lifts(scoring, height))
+    rules: dict[Flag, list[bool]] = {
+        NOT_CARRIED: _all_along(lifts, bears_cargo(trajectory, share=_SHARE)),
+        CAME_APART: _all_along(lifts, np.asarray(joined.all(axis=1))),
+    }
+    if scoring.by == "gears":
+        rules[NOT_STANDING] = _all_along(lifts, stands(machine, trajectory, joined, share=_SHARE))
+        rules[NOT_GEARED] = [_is_geared(scoring, machine, trajectory, *lift) for lift in lifts]
+    else:
+        rules[NOT_AIRBORNE] = _all_along(lifts, is_airborne(machine, trajectory, joined))
+    counts = np.all(list(rules.values()), axis=0)
+    good = [lift for lift, counting in zip(lifts, counts, strict=True) if counting]
+    loads = [float(trajectory.cargo_mass[begin]) for begin, _ in good]
+    decided = good[int(np.argmax(loads))][1] + 1 if good else len(height)
+    flags = [flag for flag in rules if not loads and _alone(rules, flag)]
+    metrics: dict[str, Metric] = {
+        "lifts": len(loads),
+        "max_height": rounded(height.max(initial=0.0)),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=bool(loads),
+        indicator=rounded(max(loads, default=0.0)),
+        metrics=metrics,
+        flags=tuple(flags),
+        deciding=Deciding(samples=decided, members=joined, cargo=True),
+    )
+
+
+def _lifts(scoring: HaulScoring, height: "Series") -> "Iterator[tuple[int, int]]":
+    """Each time the cargo gets high enough: when it was last low, and when it is there."""
+    low = height < scoring.start_rise
+    high = np.flatnonzero((height[1:] >= scoring.min_rise) & (height[:-1] < scoring.min_rise)) + 1
+    for end in high:
+        begin = int(np.flatnonzero(low[:end])[-1])
+        if not (height[begin + 1 : end] >= scoring.min_rise).any():
+            yield begin, int(end)
+
+
+def _all_along(lifts: "Iterable[tuple[int, int]]", holds: Mask) -> list[bool]:
+    """Whether a rule holds throughout each lift, which lasts long enough to tell."""
+    return [
+        begin + _SETTLED <= end and bool(holds[begin + _SETTLED : end + 1].all())
+        for begin, end in lifts
+    ]
+
+
+def _is_geared(
+    scoring: HaulScoring, machine: "Machine", trajectory: "Trajectory", begin: int, end: int
+) -> bool:
+    """Whether motors that were told to raised the cargo through a large gear wheel."""
+    presses = motor_presses(machine, presses_of(machine, trajectory))
+    first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
+    if trajectory.time_s[begin] < first_s:
+        return False
+    turn = gear_turn_deg(machine, trajectory, presses, first=begin, last=end)
+    return (turn or 0.0) >= scoring.min_gear_turn_deg
+
+
+def _alone(rules: dict[Flag, list[bool]], flag: Flag) -> bool:
+    """Whether some lift would have counted but for one of the rules."""
+    others = [holds for other, holds in rules.items() if other != flag]
+    return bool(np.all(others, axis=0).any())
+
+
+def explain(scoring: HaulScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    rose = found.metrics.get("max_height", 0.0)
+    if found.success:
+        return f"A cargo of {found.indicator:.2f} was raised by {scoring.min_rise:g}."
+    if rose < scoring.min_rise:
+        return f"The cargo rose by {rose:.1f}; {scoring.min_rise:g} is asked."
+    return f"The cargo got {rose:.1f} high, but no lift counts."
+
+
+SCORER: Final = Scorer(
+    parameters=HaulScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_CARRIED, CAME_APART, NOT_STANDING, NOT_GEARED, NOT_AIRBORNE, FORCES_NOT_MEASURED),
+    ceiling=final_mass,
+)

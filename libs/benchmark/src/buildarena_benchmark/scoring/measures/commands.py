@@ -1,0 +1,57 @@
+"""Which keys were pressed in a trial, and what they asked of the motors."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_geometry import Block, KeyPress, Machine
+from buildarena_simulation import Trajectory
+from buildarena_simulation.control import PRESSES, channel, held_during, read_presses
+
+
+def presses_of(machine: "Machine", trajectory: "Trajectory") -> "Sequence[KeyPress]":
+    """The key presses of a trial: the machine's own where the trajectory does not tell.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+    """
+    written = trajectory.settings.get(PRESSES)
+    return machine.control_sequence if written is None else read_presses(str(written))
+
+
+def motor_presses(
+    machine: "Machine", presses: "Sequence[KeyPress]"
+) -> "Mapping[str, Sequence[KeyPress]]":
+    """The presses that reach each motor, by the block's id; motors that none reaches are left out.
+
+    Args:
+        machine: Gives motors and bindings.
+        presses: As from `presses_of`.
+    """
+    reached = {
+        block.id: [press for press in presses if press.key in _motor_keys(block)]
+        for block in machine.blocks.values()
+    }
+    return {block: pressed for block, pressed in reached.items() if pressed}
+
+
+def held(
+    block: "Block", action: str | None, presses: "Sequence[KeyPress]", trajectory: "Trajectory"
+) -> Mask:
+    """At which samples a key of one of a block's actions is held, (T,)."""
+    keys = keys_of(block, action) if action else ()
+    return held_during(presses, keys, np.asarray(trajectory.time_s))
+
+
+def keys_of(block: "Block", action: str) -> tuple[str, ...]:
+    """What asks for a block's action: its keys, and a controller's name for it."""
+    return (*block.bindings.get(action, ()), channel(block.id, action))
+
+
+def _motor_keys(block: "Block") -> set[str]:
+    motor = block.module.motor
+    if motor is None:
+        return set()
+    return {key for way in (motor.forward, motor.backward) for key in keys_of(block, way)}

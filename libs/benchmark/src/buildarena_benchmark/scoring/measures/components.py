@@ -1,0 +1,152 @@
+"""Which blocks still belong to the machine: the piece that holds the starting block."""
+
+import math
+from collections.abc import Iterable, Iterator
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.scoring.measures.series import starting_block
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+
+Mask = NDArray[np.bool_]
+
+
+def joined_to_start(machine: "Machine", trajectory: "Trajectory") -> Mask:
+    """Which tracked blocks are joined to the starting block at each sample, (T, N).
+
+    Joints, axles, braces and ropes join as long as they hold; of several starting blocks the first
+    counts. Without pieces in the trajectory, all blocks are joined.
+
+    Args:
+        machine: Gives starting block and ropes.
+        trajectory: Gives pieces and breaks.
+    """
+    groups = groups_of(machine, trajectory)
+    if groups is None:
+        return np.ones(trajectory.positions.shape[:2], dtype=bool)
+    start = starting_block(machine, trajectory)
+    return np.asarray(groups == groups[:, start, None])
+
+
+def groups_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.int16] | None:
+    """Which tracked blocks joints, axles, braces and ropes still join, (T, N); None if not known.
+
+    Blocks of one number are joined.
+
+    Args:
+        machine: Gives ropes.
+        trajectory: Gives pieces and breaks.
+    """
+    pieces = trajectory.pieces
+    if pieces is None:
+        return None
+    ropes = _ropes(machine, trajectory)
+    rope_ends = np.searchsorted(trajectory.time_s, [end for _, _, end in ropes])
+    groups = pieces.copy()
+    for first, last in spans_of(pieces, rope_ends.tolist()):
+        row, time_s = pieces[first], trajectory.time_s[first]
+        ties = [(row[a], row[b]) for a, b, end in ropes if time_s < end]
+        for piece in np.unique(row):
+            reached = _reached(piece, ties)
+            groups[first:last, np.isin(row, reached)] = min(reached)
+    return groups
+
+
+def spans_of(pieces: NDArray[np.int16], further: Iterable[int] = ()) -> Iterator[tuple[int, int]]:
+    """First sample, and the one after the last, of each time in which no piece breaks.
+
+    Args:
+        pieces: (T, N) as in `Trajectory`.
+        further: Samples at which another time begins as well.
+    """
+    changed = np.flatnonzero(np.any(np.diff(pieces, axis=0) != 0, axis=1)) + 1
+    yield from pairwise(sorted({0, len(pieces), *changed.tolist(), *further}))
+
+
+def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> float:
+    """Mass of some of the tracked blocks, with half of each connector that ends on one.
+
+    Args:
+        machine: The machine.
+        trajectory: Names the tracked blocks; those that are not tracked count as members.
+        members: (N,) which of the tracked blocks.
+    """
+    lost = {i for i, member in zip(trajectory.block_ids, members, strict=True) if not member}
+    blocks = [block.module.mass for block in machine.blocks.values() if block.id not in lost]
+    halves = [
+        link.module.mass / 2
+        for link in machine.connectors.values()
+        for end in (link.start[0], link.end[0])
+        if end not in lost
+    ]
+    return math.fsum([*blocks, *halves])
+
+
+def center_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
+    """Where the mass of some of the tracked blocks has its centre, (T, 3), world frame, units.
+
+    A block's mass lies at its centre, and half of each connector's there as well.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        members: (T, N) which of the tracked blocks.
+    """
+    weights = masses_of_blocks(machine, trajectory) * members
+    center = np.einsum("tn,tnk->tk", weights, trajectory.positions.astype(np.float64))
+    return np.asarray(center / np.maximum(weights.sum(axis=1), 1e-9)[:, None])
+
+
+def masses_of_blocks(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.float64]:
+    """Mass of each tracked block, (N,), with half of each connector that ends on it, mass units."""
+    index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
+    for link in machine.connectors.values():
+        for end in (link.start[0], link.end[0]):
+            if end in index:
+                masses[index[end]] += link.module.mass / 2
+    return masses
+
+
+def masses_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> NDArray[np.float64]:
+    """`mass_of` at each sample, (T,), for members (T, N)."""
+    masses = np.empty(len(members))
+    changed = np.flatnonzero(np.any(members[1:] != members[:-1], axis=1)) + 1
+    for first, last in pairwise([0, *changed.tolist(), len(members)]):
+        masses[first:last] = mass_of(machine, trajectory, members[first])
+    return masses
+
+
+def _ropes(machine: "Machine", trajectory: "Trajectory") -> list[tuple[int, int, float]]:
+    """Tracked blocks that a rope or spring ties, and when it gives way, seconds."""
+    index = {block: i for i, block in enumerate(trajectory.block_ids)}
+    broken = {event.joint: event.time_s for event in trajectory.breaks if event.kind == "rope"}
+    ties = [
+        (link.start[0], link.end[0], f"{link.module.name} {key}")
+        for key, link in machine.connectors.items()
+        if link.module.link in {"rope", "spring"}
+    ]
+    if any(block.module.rope_mount for block in machine.blocks.values()):
+        ties += [
+            (joint.base, joint.part, f"{joint.base}-{joint.part}")
+            for joint in machine.joints
+            if joint.holds and machine.blocks[joint.part].module.rope_mount
+        ]
+    return [
+        (index[first], index[second], broken.get(name, np.inf))
+        for first, second, name in ties
+        if first in index and second in index
+    ]
+
+
+def _reached(piece: int, ties: list[tuple[int, int]]) -> list[int]:
+    reached = {piece}
+    grown = True
+    while grown:
+        near = {b for a, b in ties if a in reached} | {a for a, b in ties if b in reached}
+        grown = not near <= reached
+        reached |= near
+    return list(reached)

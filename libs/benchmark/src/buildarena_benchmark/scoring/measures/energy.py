@@ -1,0 +1,91 @@
+"""Whether a machine that nothing drives has more energy than it was released with."""
+
+from typing import Final
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.commands import keys_of, presses_of
+from buildarena_benchmark.scoring.measures.components import masses_of_blocks
+from buildarena_benchmark.scoring.measures.series import Series, lifted, release_speed
+from buildarena_geometry import Block, Machine
+from buildarena_simulation import Scenario, Trajectory
+
+SHARE: Final = 0.05
+"""By which share of its energy at the release a machine may have more: engines are not exact."""
+
+RISE: Final = 0.5
+"""By how much it may besides, as a height to which all of it is raised, units."""
+
+LASTING: Final = 3
+"""So many samples in a row must have more: an impact's correction is over sooner."""
+
+
+def gains_energy(
+    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", samples: int
+) -> bool:
+    """Whether machine and cargo have more energy than they had, and the growing cargo brought.
+
+    Energies are those of the blocks' and the cargo's centres, of motion and height. Where
+    something drives the machine (a key, a balloon, a spring, wind, a push), or not all of it was
+    recorded, that is not known, and it does not.
+
+    Args:
+        scenario: Gives gravity, and the speed at the release.
+        machine: The machine.
+        trajectory: The trial.
+        samples: How many samples are looked at, from the first on.
+    """
+    known = set(trajectory.block_ids) == set(machine.blocks)
+    if not known or samples <= LASTING or _is_driven(scenario, machine, trajectory):
+        return False
+    time_s, gravity = trajectory.time_s[:samples], scenario.gravity
+    masses = masses_of_blocks(machine, trajectory)
+    positions = trajectory.positions[:samples].astype(np.float64)
+    whole = float(masses.sum())
+    energy = _energies(scenario, time_s, positions) @ masses
+    released = whole * release_speed(scenario) ** 2 / 2 + float(
+        lifted(scenario, positions[0]) @ masses
+    )
+    brought = np.zeros(samples - 1)
+    if trajectory.cargo_position is not None and trajectory.cargo_mass is not None:
+        cargo = trajectory.cargo_mass[:samples]
+        path = trajectory.cargo_position[:samples].astype(np.float64)
+        each = _energies(scenario, time_s, path[:, None])[:, 0]
+        energy = energy + cargo[1:] * each
+        released += gravity * float(path[0, 2]) * float(cargo[0])
+        brought = np.cumsum(np.diff(cargo) * each)
+        whole += float(cargo[0])
+    most = (released + brought) * (1.0 + SHARE) + RISE * gravity * whole
+    beyond = energy > most
+    runs = np.convolve(beyond.astype(int), np.ones(LASTING, dtype=int))
+    return bool((runs >= LASTING).any())
+
+
+def _energies(scenario: "Scenario", time_s: Series, positions: Series) -> Series:
+    """Energy per mass of points in each step, (T - 1, N), units²/s²."""
+    speed = np.diff(positions, axis=0) / np.diff(time_s)[:, None, None]
+    middle = (positions[1:] + positions[:-1]) / 2
+    return np.asarray((speed**2).sum(axis=2) / 2 + lifted(scenario, middle))
+
+
+def _is_driven(scenario: "Scenario", machine: "Machine", trajectory: "Trajectory") -> bool:
+    blocks = machine.blocks.values()
+    if any(_drives_itself(block) for block in blocks):
+        return True
+    if scenario.gusts is not None or scenario.pushes:
+        return True
+    if any(link.module.spring for link in machine.connectors.values()):
+        return True
+    if scenario.control.mode == "held":
+        return any(block.module.thrust for block in blocks)
+    bound = {key for block in blocks for action in block.bindings for key in keys_of(block, action)}
+    pressed = {press.key for press in presses_of(machine, trajectory)}
+    return scenario.control.mode == "agent" and bool(bound & pressed)
+
+
+def _drives_itself(block: "Block") -> bool:
+    """Whether a block moves, lifts or pushes with no key pressed."""
+    module = block.module
+    joint = module.joint
+    runs = joint is not None and joint.drive is not None and joint.drive.default_mode == "forward"
+    return runs or bool(module.lift or module.altitude)

@@ -1,0 +1,24 @@
+"""When a path crosses a gate's line."""
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_simulation.scenario import Gate
+
+
+def ahead_of(gate: "Gate") -> Series:
+    """The direction in which a gate is crossed, (2,), unit length."""
+    heading = np.radians(gate.heading_deg)
+    return np.array([np.sin(heading), np.cos(heading)])
+
+
+def crossings(path: Series, gate: "Gate") -> list[int]:
+    """Samples after which a path, (T, 2) or (T, 3), has crossed a gate's line in its direction."""
+    ahead = ahead_of(gate)
+    right = np.array([ahead[1], -ahead[0]])
+    apart = path[:, :2] - np.array(gate.center)
+    along, aside = apart @ ahead, apart @ right
+    steps = np.flatnonzero((along[:-1] < 0.0) & (along[1:] >= 0.0))
+    share = -along[steps] / (along[steps + 1] - along[steps])
+    at = aside[steps] + share * (aside[steps + 1] - aside[steps])
+    return [int(step) + 1 for step in steps[np.abs(at) <= gate.half_width]]

@@ -1,0 +1,151 @@
+"""Whether a train of gears raised the cargo: what lies between the base and what holds it."""
+
+from collections.abc import Collection, Iterator
+from typing import Final
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.series import rotations, starting_block
+from buildarena_geometry import Machine
+from buildarena_geometry.modules.joints import MOVING_JOINTS
+from buildarena_simulation import Trajectory
+from buildarena_simulation.constants import JointKind
+from buildarena_simulation.machine import structure_of
+from buildarena_simulation.structure.clusters import connected_components, find_clusters
+from buildarena_simulation.structure.model import JOINT_KINDS, Structure
+
+LARGE_RADIUS: Final = 1.5
+"""Smallest pitch radius of a large gear wheel, units."""
+
+_NEAR: Final = 0.75
+"""What holds a cargo without a gripper lies so near to it, from its centre, units: a block's half,
+and a quarter."""
+
+_TURNING: Final = (JOINT_KINDS.index(JointKind.AXLE), JOINT_KINDS.index(JointKind.HINGE))
+_COLLINEAR: Final = 1e-3
+
+
+def gear_turn_deg(
+    machine: "Machine",
+    trajectory: "Trajectory",
+    driven: Collection[str],
+    *,
+    first: int,
+    last: int,
+) -> float | None:
+    """How far the large gear wheel turned through which the machine raised its cargo, degrees.
+
+    Such a wheel is driven through teeth, by others if need be, and lies between the starting block
+    and what holds the cargo: with its axle opened, and what turns about the same line, nothing
+    joins the two, and the wheel is joined to the cargo's side. Its turning is seen from what it is
+    mounted on.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial, with cargo.
+        driven: The blocks whose motors were told to turn.
+        first: Sample from which the turning counts.
+        last: Sample up to which it does; what holds the cargo is looked at then.
+
+    Returns:
+        The most of all such wheels; None without one.
+    """
+    structure = structure_of(machine)
+    ids = structure.block_ids
+    holders = [ids.index(block) for block in _holders(machine, trajectory, last)]
+    start = ids.index(trajectory.block_ids[starting_block(machine, trajectory)])
+    turns = [
+        _turn_deg(trajectory, ids[wheel], ids[mount], first, last)
+        for wheel, mount, axle in _driven_wheels(structure, {ids.index(b) for b in driven})
+        if _lies_between(structure, wheel, axle, start, holders)
+    ]
+    return max(turns, default=None)
+
+
+def _holders(machine: "Machine", trajectory: "Trajectory", sample: int) -> list[str]:
+    """The grippers that hold the cargo at a sample; without one, the blocks that lie at it."""
+    holding: set[str] = set()
+    for event in trajectory.events:
+        if event.time_s <= trajectory.time_s[sample] and event.held == "cargo":
+            (holding.add if event.what == "grabbed" else holding.discard)(event.joint)
+    if holding:
+        return [block for block in machine.blocks if block in holding]
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    assert trajectory.cargo_quaternion is not None  # noqa: S101
+    turn = rotations(trajectory.cargo_quaternion[sample : sample + 1])[0]
+    apart = trajectory.positions[sample].astype(np.float64) - trajectory.cargo_position[sample]
+    outside = np.maximum(np.abs(apart @ turn) - np.array(trajectory.cargo_size) / 2, 0.0)
+    distances = np.linalg.norm(outside, axis=1)
+    near = np.flatnonzero(distances <= max(_NEAR, float(distances.min())))
+    return [trajectory.block_ids[block] for block in near]
+
+
+def _driven_wheels(structure: "Structure", driven: set[int]) -> Iterator[tuple[int, int, int]]:
+    """Large gear wheels that turn with motors: the wheel, what it is mounted on, its axle."""
+    clusters = find_clusters(structure, np.ones(len(structure.members), dtype=bool)).cluster_of
+    members = structure.members
+    axles = {
+        int(members.second[k]): k
+        for k in range(len(members))
+        if JOINT_KINDS[members.kind[k]] in MOVING_JOINTS
+        and clusters[members.first[k]] != clusters[members.second[k]]
+    }
+    reached, grown = {i for i in driven if i in axles}, True
+    while grown:
+        turning = {
+            other
+            for mesh in structure.joints.meshes
+            for cog, other in ((mesh.first, mesh.second), (mesh.second, mesh.first))
+            if cog in reached and other in axles
+        }
+        bodies = {clusters[i] for i in reached}
+        turning |= {i for i in axles if clusters[i] in bodies}
+        grown = not turning <= reached
+        reached |= turning
+    in_mesh = {i for mesh in structure.joints.meshes for i in (mesh.first, mesh.second)}
+    for i in sorted(reached & in_mesh - driven):
+        gear = structure.parts[i].module.gear
+        if gear is not None and gear.pitch_radius >= LARGE_RADIUS:
+            yield i, int(members.first[axles[i]]), axles[i]
+
+
+def _lies_between(
+    structure: "Structure", wheel: int, axle: int, start: int, holders: list[int]
+) -> bool:
+    """Whether opening a wheel's axle parts what holds the cargo, and the wheel, from the start."""
+    members, ropes = structure.members, structure.ropes
+    opened = {k for k in range(len(members)) if k == axle or _same_line(structure, k, axle)}
+    edges = [
+        (int(members.first[k]), int(members.second[k]))
+        for k in range(len(members))
+        if k not in opened
+    ]
+    edges += zip(ropes.first.tolist(), ropes.second.tolist(), strict=True)
+    pieces = connected_components(len(structure), edges)
+    base = next(piece for piece in pieces if start in piece)
+    beyond = next(piece for piece in pieces if wheel in piece)
+    return beyond is not base and bool(holders) and set(holders) <= set(beyond)
+
+
+def _same_line(structure: "Structure", k: int, other: int) -> bool:
+    """Whether two joints turn about the same line."""
+    members, joints = structure.members, structure.joints
+    if members.kind[k] not in _TURNING:
+        return False
+    first, second = members.second[[k, other]]
+    apart = joints.points[second] - joints.points[first]
+    axis = joints.axes[second]
+    return bool(
+        np.linalg.norm(np.cross(joints.axes[first], axis)) < _COLLINEAR
+        and np.linalg.norm(np.cross(apart, axis)) < _COLLINEAR
+    )
+
+
+def _turn_deg(trajectory: "Trajectory", wheel: str, mount: str, first: int, last: int) -> float:
+    """The greatest angle by which a wheel is turned against how it stood first, degrees."""
+    rows = slice(first, last + 1)
+    columns = [trajectory.block_ids.index(block) for block in (mount, wheel)]
+    base, turned = (rotations(trajectory.quaternions[rows, column]) for column in columns)
+    relative = np.einsum("tji,tjk->tik", base, turned)
+    cosine = (np.einsum("tij,ij->t", relative, relative[0]) - 1.0) / 2.0
+    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).max(initial=0.0))

@@ -1,0 +1,70 @@
+"""Where a machine's bodies reach to, as it moves."""
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_benchmark.scoring.measures.series import Series, rotations
+from buildarena_geometry import Block, Machine
+from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
+from buildarena_simulation import Trajectory
+
+
+def lowest_points(machine: "Machine", trajectory: "Trajectory", members: Mask) -> Series:
+    """Height of the lowest point of some of the tracked blocks, (T,), units; infinite of none.
+
+    Args:
+        machine: Gives the blocks' bodies.
+        trajectory: The trial.
+        members: (T, N) which of the tracked blocks.
+    """
+    low, _ = extents(machine, trajectory, axis=2)
+    return np.asarray(np.where(members, low, np.inf).min(axis=1, initial=np.inf))
+
+
+def extents(machine: "Machine", trajectory: "Trajectory", *, axis: int) -> tuple[Series, Series]:
+    """From where to where each tracked block reaches along a world axis, (T, N) each, units.
+
+    Args:
+        machine: Gives the blocks' bodies.
+        trajectory: The trial.
+        axis: 0 east, 1 north, 2 up.
+    """
+    return reaches(machine, trajectory, np.eye(3)[axis])
+
+
+def reaches(
+    machine: "Machine", trajectory: "Trajectory", direction: Series
+) -> tuple[Series, Series]:
+    """The same along any direction (3,), unit length, world frame."""
+    low = np.full(trajectory.positions.shape[:2], np.inf)
+    high = -low
+    for column, name in enumerate(trajectory.block_ids):
+        block = machine.blocks[name]
+        way = direction @ rotations(trajectory.quaternions[:, column])
+        place = trajectory.positions[:, column].astype(np.float64) @ direction
+        for solid in block.module.body:
+            middle, reach = _along(block, solid, way)
+            low[:, column] = np.minimum(low[:, column], place + middle - reach)
+            high[:, column] = np.maximum(high[:, column], place + middle + reach)
+    return low, high
+
+
+def _along(block: "Block", solid: "Solid", way: Series) -> tuple[Series, Series]:
+    """Where a solid's middle lies from its block's shown position, and how far it reaches, (T,).
+
+    Args:
+        block: The block.
+        solid: One of its body.
+        way: (T, 3) the direction, block frame.
+    """
+    shown = np.array(block.module.center)
+    if isinstance(solid, Cylinder):
+        pose = solid.block_from_axis
+        along = way @ np.array(pose.rotation)[:, 2]
+        across = np.sqrt(np.maximum(0.0, 1.0 - along**2))
+        reach = solid.length / 2 * np.abs(along) + solid.radius * across
+        return way @ (np.array(pose.position) - shown), reach
+    middle = way @ (np.array(solid.center) - shown)
+    if isinstance(solid, Ball):
+        return middle, np.full(len(way), solid.radius)
+    return middle, np.abs(way) @ (np.array(solid.size) / 2)

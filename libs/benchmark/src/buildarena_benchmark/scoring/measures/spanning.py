@@ -1,0 +1,246 @@
+"""Whether a bridge spans: how long it carries the cargo, and where the load goes meanwhile."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.scoring.measures.components import groups_of, spans_of
+from buildarena_benchmark.scoring.measures.outline import extents
+from buildarena_benchmark.scoring.measures.series import gravity_of
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.scenario import SpanPlacement, TerrainBox
+from buildarena_simulation.terrain import shape_of
+
+MAX_ON_FLOOR: Final = 0.1
+"""Largest share of the vertical force that the gap's floor may bear."""
+
+MAX_GROWTH_ON_FLOOR: Final = 0.2
+"""Largest share of a growing load that the floor may take up, however heavy the machine is."""
+
+MIN_ON_TERRAIN: Final = 0.01
+"""Smallest share of the vertical force that each side's terrain must bear."""
+
+MIN_GROWTH: Final = 0.05
+"""Smallest share of a growing load that each side's terrain must take up: dead weight that lies on
+a terrain beside the machine takes up nothing."""
+
+MIN_CARRIED: Final = 0.9
+"""Smallest share of the force that holds the cargo up that must come from the machine."""
+
+COLLAPSE_S: Final = 1.5
+"""A bridge that gives way may be in pieces for so long before the cargo is lost, seconds: what
+carries the load from then on does not count. At most half of the time it carried it."""
+
+MAX_ASIDE: Final = 1.0
+"""How far from the gap's middle a cargo may always be, units, towards either terrain."""
+
+MAX_ASIDE_SHARE: Final = 1.0 / 8.0
+"""The same as a share of the gap, where that is more: a bridge bears more near its ends."""
+
+_REACHES: Final = 0.25
+"""What ends so near to a terrain's edge, units, may rest on it, or press against its side."""
+
+_EDGE = 1e-6
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Span:
+    """Where the load went; shares of sums over the time the cargo was carried.
+
+    Attributes:
+        floor: The floor's share of the vertical force on the machine, until a collapse begins.
+        least_terrain: The share of the side whose terrain bore less, likewise.
+        floor_growth: What the floor takes up of each further unit of load, before a collapse.
+        least_growth: What the side that takes up less does.
+        carried: The machine's share of the force that held the cargo up.
+    """
+
+    floor: float
+    least_terrain: float
+    floor_growth: float
+    least_growth: float
+    carried: float
+
+    @property
+    def spans(self) -> bool:
+        """Whether the load went to both terrains."""
+        return (
+            self.floor <= MAX_ON_FLOOR
+            and self.floor_growth <= MAX_GROWTH_ON_FLOOR
+            and self.least_terrain >= MIN_ON_TERRAIN
+            and self.least_growth >= MIN_GROWTH
+            and self.carried >= MIN_CARRIED
+        )
+
+
+def deciding_sample(
+    scenario: "Scenario", trajectory: "Trajectory", *, fall_height: float
+) -> int | None:
+    """The first sample at which the cargo is not carried any more; None if it always is.
+
+    From then on its centre is below the fall height, or too far from the gap's middle: what is
+    carried near a terrain, or lies on it, is not carried over the gap.
+
+    Args:
+        scenario: Gives the gap, if it has one.
+        trajectory: The trial, with cargo.
+        fall_height: Units.
+    """
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    lost = np.flatnonzero(is_lost(scenario, trajectory.cargo_position, fall_height=fall_height))
+    return int(lost[0]) if len(lost) else None
+
+
+def is_lost(
+    scenario: "Scenario", position: NDArray[np.float32], *, fall_height: float
+) -> NDArray[np.bool_]:
+    """(T,) whether a cargo at these positions (T, 3) is not carried over the gap."""
+    at = position.astype(np.float64)
+    lost = ~(at[:, 2] >= fall_height)
+    if isinstance(scenario.placement, SpanPlacement):
+        lost |= np.abs(at[:, 1]) > max_aside(scenario.placement.gap) + _EDGE
+    return np.asarray(lost)
+
+
+def max_aside(gap: float) -> float:
+    """How far towards a terrain the cargo's centre may be from the gap's middle, units."""
+    return min(max(MAX_ASIDE, MAX_ASIDE_SHARE * gap), gap / 2)
+
+
+def collapsed_sample(
+    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory"
+) -> int | None:
+    """The first sample at which no part in one piece reaches from terrain to terrain any more.
+
+    None where one always does, none ever did, or that is not known.
+
+    Args:
+        scenario: Gives the gap.
+        machine: Gives bodies and ropes.
+        trajectory: Gives pieces.
+    """
+    groups = groups_of(machine, trajectory)
+    if groups is None or not groups.shape[1] or not isinstance(scenario.placement, SpanPlacement):
+        return None
+    edge = scenario.placement.gap / 2 - _REACHES
+    low, high = extents(machine, trajectory, axis=1)
+    south, north = low <= -edge, high >= edge
+    spans = np.zeros(len(groups), dtype=bool)
+    for first, last in spans_of(groups):
+        for group in np.unique(groups[first]):
+            members = groups[first] == group
+            rows = slice(first, last)
+            spans[rows] |= south[rows][:, members].any(axis=1) & north[rows][:, members].any(axis=1)
+    if not spans.any():
+        return None
+    lost = np.flatnonzero(~spans[spans.argmax() :])
+    return int(spans.argmax() + lost[0]) if len(lost) else None
+
+
+def measure_span(
+    scenario: "Scenario", trajectory: "Trajectory", decided: int | None
+) -> Span | None:
+    """Where the load went until it was decided; None where that is not defined.
+
+    It is not where the scenario has no gap between terrains, or where the trajectory has no
+    contact forces.
+
+    Args:
+        scenario: Gives gap and terrains.
+        trajectory: The trial, with cargo.
+        decided: As from `deciding_sample`: debris of a bridge that collapsed is looked at too.
+    """
+    bearing, sides = trajectory.bearing, terrain_sides(scenario)
+    if bearing is None or sides is None:
+        return None
+    until = len(trajectory.time_s) if decided is None else decided + 1
+    last = _standing(trajectory.time_s, bearing.cargo, decided)
+    standing, whole = slice(last), slice(_first_break(trajectory, last, until))
+    ground = bearing.ground[:until].astype(np.float64)
+    terrain = bearing.terrain[:until].astype(np.float64)
+    load = bearing.cargo[:until].astype(np.float64)
+    total = max(float(ground[whole].sum() + terrain[whole].sum()), 0.0)
+    sums = [float(terrain[whole][:, side].sum()) for side in sides]
+    growths = [_growth(terrain[standing][:, side].sum(axis=1), load[standing]) for side in sides]
+    return Span(
+        floor=_share(float(ground[whole].sum()), total),
+        least_terrain=_share(min(sums), total),
+        floor_growth=_growth(ground[standing], load[standing]),
+        least_growth=min(growths),
+        carried=_share(float(load[1:].sum()), _needed(trajectory, until)),
+    )
+
+
+def _standing(time_s: NDArray[np.float64], load: NDArray[np.float32], decided: int | None) -> int:
+    """How many samples there are before a collapse."""
+    if decided is None:
+        return len(time_s)
+    touching = np.flatnonzero(load[: decided + 1] > 0.0)
+    carried_s = float(time_s[decided] - time_s[touching[0]]) if len(touching) else 0.0
+    ended_s = float(time_s[decided]) - min(COLLAPSE_S, carried_s / 2)
+    return int(np.searchsorted(time_s, ended_s, side="right"))
+
+
+def _first_break(trajectory: "Trajectory", standing: int, until: int) -> int:
+    """How many samples there are before the break that starts a collapse, if one does.
+
+    Args:
+        trajectory: The trial.
+        standing: Samples before a collapse may begin.
+        until: Samples until the load is decided.
+    """
+    if standing >= until:
+        return until
+    times = [one.time_s for one in trajectory.breaks if one.time_s >= trajectory.time_s[standing]]
+    return min(int(np.searchsorted(trajectory.time_s, min(times, default=np.inf))), until)
+
+
+def terrain_sides(scenario: "Scenario") -> tuple[list[int], list[int]] | None:
+    """Indices of the terrain boxes south and north of the gap; None unless both have some.
+
+    Boxes that stand in the gap are part of the scenario and belong to neither side.
+    """
+    if not isinstance(scenario.placement, SpanPlacement):
+        return None
+    edge = scenario.placement.gap / 2 - _EDGE
+    reach = [
+        (box.center[1] - reach, box.center[1] + reach)
+        for box, reach in ((box, _reach(box)) for box in scenario.terrain)
+    ]
+    south = [i for i, (_, high) in enumerate(reach) if high <= -edge]
+    north = [i for i, (low, _) in enumerate(reach) if low >= edge]
+    return (south, north) if south and north else None
+
+
+def _reach(box: TerrainBox) -> float:
+    """How far a terrain box reaches to the north and south of its centre, units."""
+    return float(shape_of(box).reach()[1]) if box.heading_deg else box.size[1] / 2
+
+
+def _share(part: float, whole: float) -> float:
+    return part / whole if whole > 0.0 else 0.0
+
+
+def _growth(force: Floats, load: Floats) -> float:
+    """Slope of a force over the load, by least squares; 0 without any load."""
+    away = load - load.mean()
+    spread = float(away @ away)
+    return float(away @ (force - force.mean())) / spread if spread > 0.0 else 0.0
+
+
+def _needed(trajectory: "Trajectory", until: int) -> float:
+    """Sum of the vertical force that moved the cargo as it moved, mass·g times samples.
+
+    That is its weight, and its mass times its acceleration: a cargo in free fall needs none.
+    """
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    assert trajectory.cargo_mass is not None  # noqa: S101
+    step = float(np.median(np.diff(trajectory.time_s)))
+    height = trajectory.cargo_position[:until, 2].astype(np.float64)
+    lift = np.diff(height, 2) / (step * step * gravity_of(trajectory))
+    return float((trajectory.cargo_mass[1 : until - 1] * (1.0 + lift)).sum())

@@ -1,0 +1,123 @@
+"""Tells a rollout that blew up from one that merely went badly."""
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.energy import gains_energy
+from buildarena_benchmark.scoring.measures.series import Series, lifted, release_speed
+from buildarena_benchmark.scoring.scorer import Deciding
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import GRAVITY
+from buildarena_simulation.scenario import TerrainBox
+
+_MARGIN = 1.5
+_SLACK = 15.0
+"""Speed any solver's correction may add for a moment, units/s."""
+
+_LASTING = 3
+"""So many samples in a row must be beyond the bound: an impact's correction is over sooner."""
+
+
+def is_unstable(
+    scenario: "Scenario",
+    machine: "Machine",
+    trajectory: "Trajectory",
+    deciding: Deciding | None = None,
+) -> bool:
+    """Whether what decides the trial moves as no thrust, fall or wheel can explain.
+
+    Either something of it is not finite, or its energy exceeds, over several samples in a row,
+    what it could have become: what lies highest at the start falling all the way, all its cannons
+    pushing all the time, all at the speed of a wheel's rim at the machine's full size; with a
+    margin. Blocks are taken together by mass, the cargo for itself. Where nothing drives the
+    machine, it may have no more energy than it began with; see `gains_energy`.
+
+    Args:
+        scenario: Gives the terrains' heights.
+        machine: Gives masses, cannons and wheels.
+        trajectory: The trial.
+        deciding: Which blocks decide it, and until when; None for all, to the end.
+    """
+    samples = len(trajectory.time_s) if deciding is None else deciding.samples
+    positions = trajectory.positions[:samples].astype(np.float64)
+    members = (
+        np.ones(positions.shape[:2], dtype=bool) if deciding is None else deciding.members[:samples]
+    )
+    cargo = trajectory.cargo_position if deciding is None or deciding.cargo else None
+    judged: list[np.ndarray] = [
+        positions[members],
+        trajectory.quaternions[:samples][members],
+    ]
+    if cargo is not None:
+        judged.append(cargo[:samples].astype(np.float64))
+    if not all(np.isfinite(values).all() for values in judged):
+        return True
+    if samples < 2 or not positions.shape[1]:  # noqa: PLR2004 - no step, no speed
+        return False
+    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
+    bound = _bound(scenario, machine, trajectory, masses * members)
+    steps = np.diff(trajectory.time_s[:samples])
+    weights = (masses * members)[1:] * members[:-1]
+    inside = np.where(members[:, :, None], positions, 0.0)
+    energies = [_energies(scenario, inside, steps, weights)]
+    if cargo is not None:
+        path = cargo[:samples].astype(np.float64)[:, None]
+        energies.append(_energies(scenario, path, steps, np.ones((samples - 1, 1))))
+    return any(_lasts(energy > bound) for energy in energies) or gains_energy(
+        scenario, machine, trajectory, samples
+    )
+
+
+def _energies(scenario: "Scenario", positions: Series, steps: Series, weights: Series) -> Series:
+    """Mean energy per mass in each step, (T - 1,), units²/s²; of K points weighed (T - 1, K)."""
+    speed = np.diff(positions, axis=0) / steps[:, None, None]
+    each = 0.5 * (speed**2).sum(axis=2) + lifted(scenario, positions[1:])
+    return np.asarray((each * weights).sum(axis=1) / np.maximum(weights.sum(axis=1), 1e-9))
+
+
+def _bound(
+    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", weights: Series
+) -> Series:
+    """Greatest plausible energy per mass in each step, (T - 1,), units²/s².
+
+    Args:
+        scenario: Gives the terrains' heights.
+        machine: Gives cannons and wheels.
+        trajectory: Gives the start.
+        weights: (T, N) the masses of the blocks that decide, 0 for the others.
+    """
+    start = trajectory.positions[0].astype(np.float64)
+    tops = [_top(box) for box in scenario.terrain]
+    height = max([0.0, float(start[:, 2].max()), *tops])
+    if trajectory.cargo_position is not None:
+        height = max(height, float(trajectory.cargo_position[0, 2]))
+    fall = np.sqrt(2.0 * scenario.gravity * height) + release_speed(scenario)
+    modules = [machine.blocks[block].module for block in trajectory.block_ids]
+    thrusts = np.array(
+        [
+            (module.thrust.heated if module.thrust else 0.0) + module.greatest_push
+            for module in modules
+        ]
+    )
+    push = (
+        GRAVITY
+        * max(scenario.drive_strength, 1.0)
+        * (((weights > 0.0) @ thrusts) / np.maximum(weights.sum(axis=1), 1e-9))
+    )
+    gained = np.concatenate([[0.0], np.cumsum(push[1:] * np.diff(trajectory.time_s[: len(push)]))])
+    spin = max((module.motor.speed for module in modules if module.motor), default=0.0)
+    extent = start.max(axis=0) - start.min(axis=0)
+    rim = spin * (float(np.linalg.norm(extent)) + 2.0)
+    return np.asarray(0.5 * (_MARGIN * (fall + gained[1:] + rim) + _SLACK) ** 2)
+
+
+def _top(box: "TerrainBox") -> float:
+    """Height that no corner of a terrain box exceeds, units."""
+    tilt = np.sin(np.radians(abs(box.slope_deg)))
+    return float(box.center[2] + (box.size[2] + tilt * (box.size[0] + box.size[1])) / 2)
+
+
+def _lasts(beyond: np.ndarray) -> bool:
+    """Whether so many samples in a row are beyond the bound."""
+    run = np.convolve(beyond.astype(int), np.ones(_LASTING, dtype=int))
+    return bool((run >= min(_LASTING, len(beyond))).any())

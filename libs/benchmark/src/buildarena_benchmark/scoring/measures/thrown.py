@@ -1,0 +1,174 @@
+"""How a loose ball leaves a machine, flies, and comes down."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.series import Series, rotations
+from buildarena_geometry import Block, Machine
+from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.structure.model import Shape
+from buildarena_simulation.terrain import shape_of
+
+TOUCH: Final = 0.12
+"""A ball this near to something touches it: bodies are a little smaller to engines, units."""
+
+_FEWEST: Final = 3
+"""So many samples in the air are a flight: its velocity is that between the first two."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Flight:
+    """A ball's way from the machine to the first thing it touches. Samples count from 0.
+
+    Attributes:
+        released: The last sample at which it touched the machine.
+        landed: The first one at which it touches ground or terrain.
+        start: (3,) where it is at the sample after the release, units.
+        velocity: (3,) its velocity there, units/s.
+        end: (3,) where its centre is when it touches down, units.
+        error: How far it strays from a free flight with that beginning, as a share of its way.
+    """
+
+    released: int
+    landed: int
+    start: Series
+    velocity: Series
+    end: Series
+    error: float
+
+
+def loose_ball(machine: "Machine", trajectory: "Trajectory") -> int | None:
+    """Index of the first tracked block that lies loose and is a ball; None if there is none."""
+    for index, name in enumerate(trajectory.block_ids):
+        module = machine.blocks[name].module
+        if module.is_loose and isinstance(module.body[0], Ball):
+            return index
+    return None
+
+
+def radius_of(machine: "Machine", trajectory: "Trajectory", ball: int) -> float:
+    """Radius of a ball among the tracked blocks, units."""
+    body = machine.blocks[trajectory.block_ids[ball]].module.body
+    return next(solid.radius for solid in body if isinstance(solid, Ball))
+
+
+def gaps_to_parts(machine: "Machine", trajectory: "Trajectory", ball: int) -> Series:
+    """From a ball's surface to each tracked block's body, (T, N), units; infinite to itself."""
+    center = trajectory.positions[:, ball].astype(np.float64)
+    gaps = distances_to_parts(machine, trajectory, center) - radius_of(machine, trajectory, ball)
+    gaps[:, ball] = np.inf
+    return gaps
+
+
+def distances_to_parts(machine: "Machine", trajectory: "Trajectory", center: Series) -> Series:
+    """From a point that moves, (T, 3), to each tracked block's body, (T, N), units; 0 inside."""
+    gaps = np.full(trajectory.positions.shape[:2], np.inf)
+    for column, name in enumerate(trajectory.block_ids):
+        block = machine.blocks[name]
+        turns = rotations(trajectory.quaternions[:, column])
+        apart = center - trajectory.positions[:, column].astype(np.float64)
+        local = np.einsum("tji,tj->ti", turns, apart) + np.array(block.module.center)
+        for solid in block.module.body:
+            gaps[:, column] = np.minimum(gaps[:, column], _distances(solid, local))
+    return gaps
+
+
+def gap_to_world(scenario: "Scenario", center: Series, radius: float) -> Series:
+    """From a ball's surface to ground and terrain, (T,), of its centres (T, 3), units."""
+    gap = center[:, 2].copy()
+    for shape in map(shape_of, scenario.terrain):
+        gap = np.minimum(gap, _box_distances(shape, center))
+    return gap - radius
+
+
+def flight_of(
+    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", ball: int, gaps: Series
+) -> Flight | None:
+    """How a ball flew until it first touched ground or terrain; None if it did not.
+
+    Args:
+        scenario: Gives gravity and terrain.
+        machine: Gives the ball's drag and the blocks' bodies.
+        trajectory: The trial.
+        ball: Index of the ball.
+        gaps: As from `gaps_to_parts`.
+    """
+    block = machine.blocks[trajectory.block_ids[ball]]
+    path = trajectory.positions[:, ball].astype(np.float64)
+    radius = radius_of(machine, trajectory, ball)
+    down = np.flatnonzero(gap_to_world(scenario, path, radius) <= TOUCH)
+    landed = int(down[0]) if len(down) else 0
+    touched = np.flatnonzero(gaps.min(axis=1)[:landed] <= TOUCH)
+    if not len(touched) or landed - int(touched[-1]) - 1 < _FEWEST:
+        return None
+    released = int(touched[-1])
+    first, last, step = released + 1, landed - 1, 1.0 / SAMPLE_RATE_HZ
+    drag = _drag(block)
+    velocity = _velocity(path[first], path[first + 1], step, scenario.gravity, drag)
+    free = _flown(path[first], velocity, (last - first) * step, scenario.gravity, drag)
+    way = max(float(np.linalg.norm(path[last] - path[first])), 1e-9)
+    return Flight(
+        released=released,
+        landed=landed,
+        start=path[first],
+        velocity=velocity,
+        end=_touching_down(path, landed, radius, scenario.gravity),
+        error=float(np.linalg.norm(path[last] - free)) / way,
+    )
+
+
+def _touching_down(path: Series, landed: int, radius: float, gravity: float) -> Series:
+    """Where its centre is when it first touches, between two samples, (3,), units."""
+    before, step = path[landed - 1], 1.0 / SAMPLE_RATE_HZ
+    velocity = (before - path[landed - 2]) / step - np.array([0.0, 0.0, gravity * step / 2])
+    fall = velocity[2] ** 2 + 2.0 * gravity * (before[2] - radius)
+    time_s = (velocity[2] + np.sqrt(max(fall, 0.0))) / gravity
+    if not 0.0 <= time_s <= step:  # it touches a side or a top before the ground
+        return np.asarray(path[landed])
+    return np.asarray(before + velocity * time_s - np.array([0.0, 0.0, gravity * time_s**2 / 2]))
+
+
+def _drag(block: "Block") -> float:
+    return 0.0 if block.module.physics is None else block.module.physics.linear_drag
+
+
+def _flown(start: Series, velocity: Series, time_s: float, gravity: float, drag: float) -> Series:
+    """Where a free ball is after a time: v' = -drag v - g, (3,), units."""
+    down = np.array([0.0, 0.0, -gravity])
+    if drag == 0.0:
+        return np.asarray(start + velocity * time_s + down * time_s**2 / 2)
+    lasting = -np.expm1(-drag * time_s) / drag
+    return np.asarray(start + velocity * lasting + down * (time_s - lasting) / drag)
+
+
+def _velocity(start: Series, after: Series, time_s: float, gravity: float, drag: float) -> Series:
+    """With which velocity a free ball comes from one place to another in a time, (3,), units/s."""
+    still = _flown(start, np.zeros(3), time_s, gravity, drag)
+    lasting = time_s if drag == 0.0 else -np.expm1(-drag * time_s) / drag
+    return np.asarray((after - still) / lasting)
+
+
+def _distances(solid: "Solid", points: Series) -> Series:
+    """From points (T, 3) to a solid, both in the block's frame, (T,), units; 0 inside."""
+    if isinstance(solid, Cylinder):
+        pose = solid.block_from_axis
+        local = (points - np.array(pose.position)) @ np.array(pose.rotation)
+        along = np.maximum(np.abs(local[:, 2]) - solid.length / 2, 0.0)
+        across = np.maximum(np.hypot(local[:, 0], local[:, 1]) - solid.radius, 0.0)
+        return np.asarray(np.hypot(along, across))
+    local = points - np.array(solid.center)
+    if isinstance(solid, Ball):
+        return np.asarray(np.maximum(np.linalg.norm(local, axis=1) - solid.radius, 0.0))
+    return _outside(local, np.array(solid.size) / 2)
+
+
+def _box_distances(shape: Shape, points: Series) -> Series:
+    return _outside((points - shape.center) @ shape.rotation, shape.half_extents)
+
+
+def _outside(local: Series, half: Series) -> Series:
+    return np.asarray(np.linalg.norm(np.maximum(np.abs(local) - half, 0.0), axis=1))

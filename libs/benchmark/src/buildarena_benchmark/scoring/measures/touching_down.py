@@ -1,0 +1,51 @@
+"""When a machine in the air first touches something, and how fast it is then."""
+
+from typing import Final
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.carrying import from_below
+from buildarena_benchmark.scoring.measures.components import Mask, masses_of
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+
+_TOUCH: Final = 0.02
+"""Smallest share of the machine's weight that the ground bears when it is touched."""
+
+_LAST_SAMPLES: Final = 3
+"""The speed at landing is the greatest over so many steps before the ground is touched."""
+
+
+def first_touch(machine: "Machine", trajectory: "Trajectory", joined: Mask) -> int | None:
+    """The sample at which ground or terrain first bears the machine; None if they never do.
+
+    Args:
+        machine: The machine.
+        trajectory: A trial with forces.
+        joined: (T, N) as `joined_to_start` says.
+    """
+    touching = from_below(trajectory) > _TOUCH * masses_of(machine, trajectory, joined)
+    return int(touching.argmax()) if touching.any() else None
+
+
+def speeds_before(
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, sample: int
+) -> tuple[float, float]:
+    """How fast the machine's mass falls, and how fast it goes aside, before a sample, units/s.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        joined: (T, N) as `joined_to_start` says: those of the sample count.
+        sample: Which.
+    """
+    # The step into the sample that touches may be braked by the ground already.
+    end = max(sample, 2)
+    rows = slice(max(end - _LAST_SAMPLES - 1, 0), end)
+    masses = np.array([machine.blocks[block].module.mass for block in trajectory.block_ids])
+    weights = masses * joined[sample]
+    path = np.einsum("tnk,n->tk", trajectory.positions[rows].astype(np.float64), weights)
+    steps = np.diff(trajectory.time_s[rows])
+    speeds = np.diff(path / max(float(weights.sum()), 1e-9), axis=0) / steps[:, None]
+    aside = np.linalg.norm(speeds[:, :2], axis=1)
+    return float((-speeds[:, 2]).max(initial=0.0)), float(aside.max(initial=0.0))

@@ -1,0 +1,17 @@
+"""Trials without forces: mechanisms and flight cannot be judged by positions alone."""
+
+from buildarena_benchmark.scoring.scorer import FORCES_NOT_MEASURED, Verdict
+from buildarena_simulation import Trajectory
+
+
+def unmeasured(trajectory: "Trajectory", *, cargo: bool) -> Verdict | None:
+    """A failure, flagged, of a trial that lacks what its scorer reads; None of one that has it.
+
+    Args:
+        trajectory: The trial.
+        cargo: Whether the scorer reads the cargo.
+    """
+    lacks = trajectory.bearing is None or (cargo and trajectory.cargo_position is None)
+    if not lacks:
+        return None
+    return Verdict(success=False, indicator=0.0, flags=(FORCES_NOT_MEASURED,))

@@ -1,0 +1,28 @@
+"""The wheels of a vehicle, and until when it has them all."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+
+
+def wheels_of(machine: "Machine", trajectory: "Trajectory") -> list[int]:
+    """The tracked blocks that are wheels, by their numbers; of a trial with forces."""
+    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
+    wheels = set(trajectory.bearing.wheel_ids)
+    wheels |= {block.id for block in machine.blocks.values() if block.module.motor}
+    return [k for k, block in enumerate(trajectory.block_ids) if block in wheels]
+
+
+def has_wheels(joined: Mask, wheels: Sequence[int]) -> Mask:
+    """Until when every wheel is joined to the starting block, (T,); never without wheels.
+
+    Args:
+        joined: (T, N) as `joined_to_start` says.
+        wheels: The numbers of the blocks that are wheels.
+    """
+    whole = joined[:, wheels].all(axis=1) if len(wheels) else np.zeros(len(joined), dtype=bool)
+    return np.asarray(np.logical_and.accumulate(whole))

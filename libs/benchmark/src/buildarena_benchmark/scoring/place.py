@@ -1,0 +1,226 @@
+"""Pick and place: how near to a mark a cargo is put down, perhaps beyond a wall."""
+
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.carrying import bears_cargo
+from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.measures.marks import (
+    MarkName,
+    center_of_mark,
+    lacking_mark,
+    moving_mark,
+)
+from buildarena_benchmark.scoring.measures.series import Series, rotations, starting_block
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    BASE_MOVED,
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    NOT_CARRIED,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+_NEAREST: Final = 0.1
+"""Nearer to the mark usually counts no more, units: the cargo's place is drawn as finely."""
+
+_BORNE_SAMPLES: Final = 5
+"""Whether the cargo is borne is judged over a fifth of a second: a throw shows."""
+
+_PUT_DOWN: Final = 0.1
+"""Largest share of its weight that the machine bears of a cargo that was put down."""
+
+_SLACK: Final = 0.05
+"""A cargo that slides along the wall's top sinks in so far, units."""
+
+
+class PlaceScoring(Document):
+    """How near to a mark a cargo is put down.
+
+    Attributes:
+        mark: Name of the mark in the scenario.
+        max_distance: Farthest from the mark that the cargo may rest, units.
+        min_carry: Least horizontal distance from where the cargo stood, units.
+        clearance: Least height of the cargo's underside halfway between its place and the mark,
+            units.
+        rest_s: How long it must be at rest at the end, seconds.
+        max_speed: While it rests it is slower, units/s.
+        max_base_shift: The starting block must stay nearer to where it was, units.
+        max_loose: Farthest that the cargo may move, in all, while the machine does not bear it,
+            units.
+        nearest: Nearer to the mark counts no more, units.
+        must_rest: Whether the indicator counts only for a cargo that is at rest at the end, and
+            that the machine has let go.
+    """
+
+    name: Literal["place"]
+    mark: MarkName = "goal"
+    max_distance: Threshold = 1.0
+    min_carry: Threshold = 6.0
+    clearance: Threshold = 2.0
+    rest_s: Annotated[float, Field(gt=0, le=600)] = 2.0
+    max_speed: Threshold = 0.1
+    max_base_shift: Threshold = 0.5
+    max_loose: Threshold = 1.5
+    nearest: Annotated[float, Field(gt=0, le=1, exclude_if=lambda value: value == _NEAREST)] = (
+        _NEAREST
+    )
+    must_rest: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
+
+
+def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None or scenario.cargo.at is None:
+        return "the cargo is carried from its place, but scenario.cargo has none: give cargo.at"
+    lacking = lacking_mark(scoring.mark, scenario) or moving_mark(scenario)
+    if lacking is not None:
+        return lacking
+    way = center_of_mark(scoring.mark, scenario)[:2] - np.array(scenario.cargo.at[:2])
+    if np.linalg.norm(way) + scoring.max_distance < scoring.min_carry:
+        return f"the mark is nearer to the cargo than min_carry {scoring.min_carry:g}"
+    if scoring.rest_s >= scenario.duration_s:
+        return f"rest_s {scoring.rest_s:g} is longer than the trial"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: PlaceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is one over the distance from the mark at which the cargo comes to rest.
+
+    It counts for a cargo that the machine carried over what is between: whose underside was high
+    enough halfway, and that moved little while the machine did not bear it. A cargo that was
+    thrown, kicked, pushed along the ground or taken round a wall scores 0.
+
+    Args:
+        scoring: Thresholds, and the mark.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_carried`: it lies at the mark, but was not carried there. `base_moved`: the starting
+        block did not stay. `came_apart`: parts came off. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=True)
+    if lacking is not None:
+        return lacking
+    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
+    mark = center_of_mark(scoring.mark, scenario)
+    path = trajectory.cargo_position.astype(np.float64)
+    joined = joined_to_start(machine, trajectory)
+    base = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    base_shift = float(np.linalg.norm(base - base[0], axis=1).max())
+    loose = _loose_way(trajectory, path)
+    apart = float(np.linalg.norm(path[-1, :2] - mark[:2]))
+    carried = loose <= scoring.max_loose and _passes_over(scoring, trajectory, path, mark[:2])
+    stays = base_shift < scoring.max_base_shift
+    whole = bool(joined.all())
+    rests = _rests(scoring, trajectory, path)
+    lies = (
+        apart <= scoring.max_distance
+        and float(np.linalg.norm(path[-1, :2] - path[0, :2])) >= scoring.min_carry
+        and rests
+    )
+    flags = {
+        NOT_CARRIED: lies and not carried,
+        BASE_MOVED: lies and not stays,
+        CAME_APART: lies and not whole,
+    }
+    metrics: dict[str, Metric] = {
+        "distance_to_mark": rounded(apart),
+        "carried": carried,
+        "loose_way": rounded(loose),
+        "base_shift": rounded(base_shift),
+        "max_height": rounded(path[:, 2].max() - path[0, 2]),
+        "broken_joints": len(trajectory.breaks),
+    }
+    counts = carried and stays and whole
+    return Verdict(
+        success=lies and counts,
+        indicator=rounded(1.0 / max(apart, scoring.nearest))
+        if counts and (rests or not scoring.must_rest)
+        else 0.0,
+        metrics=metrics,
+        flags=raised(flags),
+        deciding=Deciding(samples=len(path), members=joined, cargo=True),
+    )
+
+
+def _loose_way(trajectory: "Trajectory", path: Series) -> float:
+    """How far the cargo moved in all while the machine did not bear it, units."""
+    borne = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
+    return float(steps.sum(where=~borne[1:]))
+
+
+def _passes_over(
+    scoring: PlaceScoring, trajectory: "Trajectory", path: Series, mark: Series
+) -> bool:
+    """Whether the cargo was high enough, and borne, each time it came halfway to the mark."""
+    assert trajectory.cargo_quaternion is not None  # noqa: S101 - there is a cargo
+    assert trajectory.cargo_size is not None  # noqa: S101
+    way = mark - path[0, :2]
+    ahead = (path[:, :2] - path[0, :2]) @ way / max(float(way @ way), 1e-9) - 0.5
+    samples = np.flatnonzero((ahead[:-1] < 0.0) & (ahead[1:] >= 0.0)) + 1
+    if not len(samples):
+        return False
+    half = np.array(trajectory.cargo_size) / 2
+    reach = np.abs(rotations(trajectory.cargo_quaternion)[:, 2]) @ half
+    underside = path[:, 2] - reach
+    borne = bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    high = underside >= scoring.clearance - _SLACK
+    return bool((high & borne)[samples].all())
+
+
+def _rests(scoring: PlaceScoring, trajectory: "Trajectory", path: Series) -> bool:
+    """Whether the cargo lies still at the end, and not on the machine."""
+    assert trajectory.bearing is not None  # noqa: S101 - the caller looked
+    assert trajectory.cargo_mass is not None  # noqa: S101
+    count = round(scoring.rest_s * SAMPLE_RATE_HZ)
+    if count >= len(path):
+        return False
+    steps = np.linalg.norm(np.diff(path[-count - 1 :], axis=0), axis=1) * SAMPLE_RATE_HZ
+    load = float(np.abs(trajectory.bearing.cargo[-count:]).mean())
+    weight = float(trajectory.cargo_mass[-count:].mean())
+    return bool((steps < scoring.max_speed).all()) and load <= _PUT_DOWN * weight
+
+
+def explain(scoring: PlaceScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if "distance_to_mark" not in told:
+        return "Nothing was put down."
+    if told["distance_to_mark"] > scoring.max_distance:
+        return (
+            f"The cargo ended {told['distance_to_mark']:.2f} from its mark; at most "
+            f"{scoring.max_distance:g} is allowed."
+        )
+    if found.success:
+        return f"The cargo was put down {told['distance_to_mark']:.2f} from its mark."
+    if told["loose_way"] > scoring.max_loose:
+        return f"The cargo moved {told['loose_way']:.1f} while nothing held it."
+    return "The cargo is near its mark, but was not carried there and put down at rest."
+
+
+SCORER: Final = Scorer(
+    parameters=PlaceScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_CARRIED, BASE_MOVED, CAME_APART, FORCES_NOT_MEASURED),
+    ceiling=lambda scoring, _scenario: 1.0 / scoring.nearest,
+)

@@ -1,0 +1,182 @@
+"""What a scorer is: its parameters, the rule it judges by, and the flags it may raise."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.fields import Document
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.trial import Decision
+
+Metric = float | int | bool | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Flag:
+    """A remark on a score.
+
+    Attributes:
+        name: What scores and the API call it.
+        meaning: One sentence.
+        disqualifying: Whether the trial counts as a failure in our rankings; otherwise the flag
+            informs, and never changes a rank.
+        censoring: Whether the indicator is only known to be at least as great.
+    """
+
+    name: str
+    meaning: str
+    disqualifying: bool = True
+    censoring: bool = False
+
+
+NOT_DRIVEN: Final = Flag(
+    name="not_driven",
+    meaning="The machine's height and a toppling explain the distance; no wheel in contact drove "
+    "it.",
+)
+NOT_CARRIED: Final = Flag(
+    name="not_carried",
+    meaning="The cargo got there, but the machine did not bear it on its way.",
+)
+CAME_APART: Final = Flag(
+    name="came_apart", meaning="Parts came off the machine before its work was done."
+)
+BASE_MOVED: Final = Flag(name="base_moved", meaning="The starting block did not stay where it was.")
+START_TOO_HIGH: Final = Flag(
+    name="start_too_high",
+    meaning="Something started at or above the height that the task allows.",
+)
+FORCES_NOT_MEASURED: Final = Flag(
+    name="forces_not_measured",
+    meaning="The trial has no contact forces, without which mechanisms and flight cannot be "
+    "judged.",
+)
+UNSTABLE: Final = Flag(
+    name="unstable", meaning="The simulation blew up: its figures are not those of a machine."
+)
+"""Any trial may get it, whichever scorer judges."""
+REFUTED: Final = Flag(
+    name="refuted",
+    meaning="Verification came to other figures than the score has: it counts nowhere.",
+)
+"""A job gets it when it is refuted; no scorer gives it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Deciding:
+    """What decided a trial, and until when.
+
+    Attributes:
+        samples: How many samples were looked at, from the first on.
+        members: (T, N) the tracked blocks whose motion decides.
+        cargo: Whether the cargo's motion does, too.
+    """
+
+    samples: int
+    members: NDArray[np.bool_]
+    cargo: bool
+
+
+class Finding(Protocol):
+    """What `explain` reads of a score or a verdict."""
+
+    @property
+    def success(self) -> bool:
+        """Whether the task's criterion is met."""
+
+    @property
+    def indicator(self) -> float:
+        """The task's figure."""
+
+    @property
+    def metrics(self) -> Mapping[str, Any]:
+        """The scorer's metrics, with the machine's own in a score."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """A scorer's finding; fields as in `Score`, metrics without the machine's own.
+
+    Attributes:
+        success: As in `Score`.
+        indicator: As in `Score`.
+        metrics: The category's secondary metrics.
+        flags: Remarks on it.
+        deciding: What decided it; None where everything did, to the end.
+    """
+
+    success: bool
+    indicator: float
+    metrics: Mapping[str, Metric] = field(default_factory=dict)
+    flags: tuple[Flag, ...] = ()
+    deciding: Deciding | None = None
+
+
+def _unbounded(scoring: Any, scenario: Scenario) -> None:
+    del scoring, scenario
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scorer:
+    """One way to judge a trial, under the name that task files give.
+
+    Attributes:
+        parameters: What a task file says under `scoring`; its field `name` is a literal, the
+            scorer's name.
+        judge: Called with the parameters, the scenario, the machine and its trajectory.
+        explain: Called with the parameters, the scenario and what was found: what happened, when
+            and by how much it missed, in one sentence for builders and visitors of pages.
+        infeasible: Why no machine can pass, given parameters and scenario: the scorer asks for
+            what the scenario does not have. None where somebody could.
+        flags: All that `judge` may raise, in the order in which they are documented.
+        decision: Tells, given parameters and scenario, when a running trial is decided; None
+            where the whole trial decides.
+        ceiling: The greatest indicator that there is, given parameters and scenario, or what none
+            reaches; None where only what can be built bounds it.
+    """
+
+    parameters: type[Document]
+    judge: "Callable[[Any, Scenario, Machine, Trajectory], Verdict]"
+    explain: Callable[[Any, Scenario, Finding], str]
+    infeasible: Callable[[Any, Scenario], str | None]
+    flags: tuple[Flag, ...] = ()
+    decision: "Callable[[Any, Scenario], Decision] | None" = None
+    ceiling: Callable[[Any, Scenario], float | None] = _unbounded
+
+    @property
+    def name(self) -> str:
+        """The parameters' literal name."""
+        (name,) = self.parameters.model_fields["name"].annotation.__args__  # type: ignore[union-attr]  # a Literal
+        return str(name)
+
+    @property
+    def description(self) -> str:
+        """What its indicator is, in one sentence."""
+        return (self.judge.__doc__ or "").partition("\n")[0]
+
+
+def final_mass(scoring: Any, scenario: Scenario) -> float | None:
+    """The ceiling of what is ranked by the mass of a cargo that grows."""
+    del scoring
+    return None if scenario.cargo is None else scenario.cargo.final_mass
+
+
+def undriven(scenario: Scenario) -> str | None:
+    """Why a machine that is moved by keys cannot pass: no key is pressed."""
+    if scenario.control.mode == "agent":
+        return None
+    return "nobody presses a key: scenario.control.mode must be agent"
+
+
+def raised(flags: Mapping[Flag, bool]) -> tuple[Flag, ...]:
+    """The flags whose condition holds."""
+    return tuple(flag for flag, holds in flags.items() if holds)
+
+
+def rounded(value: float) -> float:
+    """A metric to six decimals, so that scores compare equal across machines."""
+    return round(float(value), 6) + 0.0  # no -0.0

@@ -1,0 +1,152 @@
+"""Slalom: gates passed in order by a vehicle that keeps its wheels."""
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+import numpy as np
+
+from buildarena_benchmark.fields import Count, Document
+from buildarena_benchmark.scoring.measures.components import Mask, center_of, joined_to_start
+from buildarena_benchmark.scoring.measures.gates import crossings
+from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.measures.vehicles import has_wheels, wheels_of
+from buildarena_benchmark.scoring.scorer import (
+    FORCES_NOT_MEASURED,
+    NOT_DRIVEN,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+
+
+class SlalomScoring(Document):
+    """How many gates a vehicle passes in order.
+
+    Attributes:
+        min_gates: Fewest gates of a trial that passes.
+    """
+
+    name: Literal["slalom"]
+    min_gates: Count = 4
+
+
+def infeasible(scoring: SlalomScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    count = len(scenario.gates)
+    if not count or count < scoring.min_gates:
+        return f"{scoring.min_gates} gates are asked for, but scenario.gates has {count}"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: SlalomScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the number of gates passed, and the share of the time that was left then.
+
+    A gate is passed once the centre of the machine's mass and the middle of its wheels have both
+    crossed its line in its direction, driven by wheels, with all of them, and neither a later gate
+    before. So more gates are always better, and of trials with as many gates the faster one.
+
+    Args:
+        scoring: Gates and thresholds.
+        scenario: What the machine was put through.
+        machine: Gives the wheels.
+        trajectory: The trial.
+
+    Flags:
+        `not_driven`: gates enough, but not by wheels. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    wheels = wheels_of(machine, trajectory)
+    whole = has_wheels(joined, wheels)
+    paths = [center_of(machine, trajectory, joined)]
+    if len(wheels):
+        paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
+    driven = [whole & _drives(machine, trajectory, joined, path) for path in paths]
+    passed = _passed(scenario, paths, driven)
+    anyhow = _passed(scenario, paths, [whole] * len(paths))
+    gates = len(passed)
+    last_s = float(trajectory.time_s[passed[-1]]) if passed else scenario.duration_s
+    indicator = gates + (1.0 - last_s / scenario.duration_s if gates else 0.0)
+    metrics: dict[str, Metric] = {
+        "gates": gates,
+        "last_gate_s": rounded(last_s) if passed else None,
+        "wheels_lost": not bool(whole[-1]),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=gates >= scoring.min_gates,
+        indicator=rounded(indicator),
+        metrics=metrics,
+        flags=(NOT_DRIVEN,) if len(anyhow) >= scoring.min_gates > gates else (),
+        deciding=Deciding(samples=len(whole), members=joined, cargo=False),
+    )
+
+
+def _passed(scenario: Scenario, paths: Sequence[Series], counts: Sequence[Mask]) -> list[int]:
+    """Samples at which gates were passed by all of some paths, in order.
+
+    Args:
+        scenario: Gives the gates.
+        paths: (T, 3) each.
+        counts: (T,) each: at which samples crossings of the path count.
+    """
+    passed = []
+    for path, counting in zip(paths, counts, strict=True):
+        crossed = sorted(
+            (sample, number)
+            for number, gate in enumerate(scenario.gates)
+            for sample in crossings(path, gate)
+            if counting[sample]
+        )
+        passed.append(_in_order(crossed))
+    common = set.intersection(*(set(samples) for samples in passed))
+    return sorted(max(samples[gate] for samples in passed) for gate in common)
+
+
+def _in_order(crossed: list[tuple[int, int]]) -> dict[int, int]:
+    """The sample of each gate that counts, of crossings (sample, gate) in order of time."""
+    samples: dict[int, int] = {}
+    for sample, gate in crossed:
+        if gate > max(samples, default=-1):
+            samples[gate] = sample
+    return samples
+
+
+def _drives(machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series) -> Mask:
+    """At which samples wheels explain where the machine is, (T,)."""
+    driven = driven_distances(machine, trajectory, joined, path)
+    if driven is None:
+        return np.zeros(len(path), dtype=bool)
+    moved = np.linalg.norm(path[:, :2] - path[0, :2], axis=1)
+    return np.asarray(moved <= np.minimum(driven, moved_upright(trajectory, joined, path)))
+
+
+def explain(scoring: SlalomScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    gates, last = found.metrics.get("gates", 0), found.metrics.get("last_gate_s")
+    passed = f"It passed {gates} of {len(scenario.gates)} gates"
+    if last is not None:
+        passed += f", the last after {last:.1f} s"
+    return f"{passed}." if found.success else f"{passed}; {scoring.min_gates} are asked."
+
+
+SCORER: Final = Scorer(
+    parameters=SlalomScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, scenario: len(scenario.gates) + 1.0,
+)

@@ -1,0 +1,1 @@
+"""Machines that a program steers by what it senses."""

@@ -1,0 +1,155 @@
+"""Balance: how long a machine stands on two wheels of one axle, its mass above them."""
+
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.measures.outline import lowest_points
+from buildarena_benchmark.scoring.measures.series import lasts, starting_block
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_benchmark.tasks.control.balancing import (
+    axle_turn_deg,
+    height_over_wheels,
+    lean_deg,
+    two_wheels,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.scenario import GroundPlacement
+
+NOT_ON_TWO_WHEELS: Final = Flag(
+    name="not_on_two_wheels",
+    meaning="The machine did not begin on exactly two wheels of one axle that lies east and west.",
+)
+PROPPED: Final = Flag(
+    name="propped",
+    meaning="The machine stood upright for long enough, but something other than its wheels came "
+    "near the ground, its mass was too low, or it turned away.",
+)
+
+
+class BalanceScoring(Document):
+    """How long a machine stands on two wheels.
+
+    Attributes:
+        min_s: How long it must, seconds.
+        max_tilt_deg: Of the starting block against how it was built, degrees.
+        min_height: Height of its centre of mass above the middle between the wheels, units.
+        min_clearance: Height above the ground of whatever is no wheel, units.
+        max_turn_deg: Of the axle against the line from west to east, degrees.
+    """
+
+    name: Literal["balance"]
+    min_s: Annotated[float, Field(gt=0, le=600)] = 20.0
+    max_tilt_deg: Annotated[float, Field(gt=0, lt=90)] = 25.0
+    min_height: Threshold = 1.5
+    min_clearance: Threshold = 0.2
+    max_turn_deg: Annotated[float, Field(gt=0, lt=90)] = 30.0
+
+
+def infeasible(scoring: BalanceScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if not isinstance(scenario.placement, GroundPlacement) or scenario.terrain or scenario.cargo:
+        return "a balance is judged, but the machine is not alone on flat ground"
+    if scoring.min_s > scenario.duration_s:
+        return f"min_s {scoring.min_s:g} is longer than the trial"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: BalanceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is for how long it balances, seconds, and if to the end how near to its start.
+
+    Nearness is the mean of 1 / (1 + distance) over the trial, of the starting block as seen
+    from above.
+
+    It balances until, for the first time, something came off, the starting block leans too far,
+    the centre of the mass is too low above the wheels, something but the wheels is too near the
+    ground, or the axle is turned too far. A mass above the axle falls if nobody acts, whatever is
+    braked; one that turns about the vertical might not.
+
+    Args:
+        scoring: Thresholds.
+        scenario: What the machine was put through.
+        machine: Gives the wheels.
+        trajectory: The trial.
+
+    Flags:
+        `not_on_two_wheels`: the wheels are not as they must be. `came_apart`: it would have
+        passed, but lost parts. `propped`: it would have passed but for the rules on what stands.
+        `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    wheels = two_wheels(machine, trajectory)
+    if wheels is None:
+        return Verdict(success=False, indicator=0.0, flags=(NOT_ON_TWO_WHEELS,))
+    joined = joined_to_start(machine, trajectory)
+    start = starting_block(machine, trajectory)
+    whole, others = joined.all(axis=1), np.ones_like(joined)
+    others[:, wheels] = False
+    upright = lean_deg(machine, trajectory, start) < scoring.max_tilt_deg
+    above = height_over_wheels(machine, trajectory, joined, wheels) >= scoring.min_height
+    clear = lowest_points(machine, trajectory, others) >= scoring.min_clearance
+    ahead = axle_turn_deg(trajectory, wheels) < scoring.max_turn_deg
+    time_s, path = trajectory.time_s, trajectory.positions[:, start, :2].astype(np.float64)
+    away = np.linalg.norm(path - path[0], axis=1)
+    end = lasts(whole & upright & above & clear & ahead)
+    balanced_s = float(time_s[end])
+    nearness = float((1.0 / (1.0 + away)).mean()) if end == len(away) - 1 else 0.0
+    success = balanced_s >= scoring.min_s
+    stood_s = {
+        flag: float(time_s[lasts(upright & rest)])
+        for flag, rest in ((CAME_APART, above & clear & ahead), (PROPPED, whole))
+    }
+    metrics: dict[str, Metric] = {
+        "balanced_s": rounded(balanced_s),
+        "farthest_from_start": rounded(away[: end + 1].max()),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=success,
+        indicator=rounded(balanced_s + nearness),
+        metrics=metrics,
+        flags=raised(
+            {flag: lasted >= scoring.min_s and not success for flag, lasted in stood_s.items()}
+        ),
+        deciding=Deciding(samples=end + 1, members=joined, cargo=False),
+    )
+
+
+def explain(scoring: BalanceScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    held = found.metrics.get("balanced_s", 0.0)
+    if found.success:
+        return f"It balanced for {held:.1f} s."
+    fell = f"It fell, or stood on more than two wheels, after {held:.1f} s"
+    return f"{fell}; {scoring.min_s:g} s is asked."
+
+
+SCORER: Final = Scorer(
+    parameters=BalanceScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_ON_TWO_WHEELS, CAME_APART, PROPPED, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, scenario: scenario.duration_s + 1.0,
+)

@@ -1,0 +1,79 @@
+"""Two wheels on one axle: whether they are, how it turns, and what stands above it."""
+
+from typing import Final
+
+import numpy as np
+
+from buildarena_benchmark.scoring.measures.components import Mask, center_of
+from buildarena_benchmark.scoring.measures.series import Series, rotations
+from buildarena_geometry import Machine
+from buildarena_simulation import Trajectory
+
+_WHEELS: Final = 2
+_EAST: Final = np.array([1.0, 0.0, 0.0])
+_LEVEL_DEG: Final = 3.0
+"""How far an axle may be turned from east at the start: a seed turns machines by up to 2."""
+
+_PARALLEL_DEG: Final = 0.5
+_APART: Final = 0.02
+"""How far from the line through one wheel's axle the other wheel's middle may be, units."""
+
+
+def two_wheels(machine: "Machine", trajectory: "Trajectory") -> list[int] | None:
+    """The tracked blocks that are wheels, if they are two that begin on one axle, east and west.
+
+    Both turn about one line, which is level. None where they do not, there are others, or they are
+    not tracked.
+
+    Args:
+        machine: Gives the wheels.
+        trajectory: Gives where they are at the start.
+    """
+    names = [name for name, block in machine.blocks.items() if block.module.kind == "wheel"]
+    wheels = [trajectory.block_ids.index(name) for name in names if name in trajectory.block_ids]
+    if len(names) != _WHEELS or len(wheels) != _WHEELS:
+        return None
+    first, second = (_axles(trajectory, wheel)[0] for wheel in wheels)
+    apart = np.subtract(*trajectory.positions[0, wheels].astype(np.float64))
+    on_one_line = float(np.linalg.norm(apart - (apart @ first) * first)) <= _APART
+    is_axle = on_one_line and _between(first, second) <= _PARALLEL_DEG
+    return wheels if is_axle and _between(first, _EAST) <= _LEVEL_DEG else None
+
+
+def axle_turn_deg(trajectory: "Trajectory", wheels: list[int]) -> Series:
+    """Greatest angle of some wheels' axles with the line from west to east, (T,), degrees."""
+    axles = np.array([_axles(trajectory, wheel) for wheel in wheels])
+    return np.asarray(_between(axles, _EAST).max(axis=0))
+
+
+def height_over_wheels(
+    machine: "Machine", trajectory: "Trajectory", members: Mask, wheels: list[int]
+) -> Series:
+    """How much higher the centre of some blocks' mass is than the middle of wheels, (T,), units.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        members: (T, N) which of the tracked blocks.
+        wheels: The tracked blocks that are the wheels.
+    """
+    middle = trajectory.positions[:, wheels, 2].astype(np.float64).mean(axis=1)
+    return np.asarray(center_of(machine, trajectory, members)[:, 2] - middle)
+
+
+def lean_deg(machine: "Machine", trajectory: "Trajectory", block: int) -> Series:
+    """Angle from the vertical of what was a block's upward axis as built, (T,), degrees."""
+    built = machine.blocks[trajectory.block_ids[block]].world_from_block.rotation
+    up = np.array(built).T @ np.array([0.0, 0.0, 1.0])
+    cosine = (rotations(trajectory.quaternions[:, block]) @ up)[:, 2]
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+
+def _axles(trajectory: "Trajectory", wheel: int) -> Series:
+    """Direction of a wheel's axle, (T, 3), world frame."""
+    return rotations(trajectory.quaternions[:, wheel])[:, :, 2]
+
+
+def _between(axles: Series, line: Series) -> Series:
+    """Angle between lines, degrees, whichever way they point."""
+    return np.asarray(np.degrees(np.arccos(np.clip(np.abs(axles @ line), 0.0, 1.0))))

@@ -1,0 +1,186 @@
+"""Machines that programs control: a car with two sides, a craft of four fans, a mast on an axle."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_benchmark.experts.programs import listed, program_text, quoted
+from buildarena_benchmark.tasks.control.walker import walker
+
+_LENGTH, _TRACK = 3, 2
+_ARM: Final = 2
+_MAST: Final = 3
+_FOOT, _TOES, _POST, _REACH = 5, 4, 4, 4
+_GRAVITY: Final = 32.81
+_FAN_PUSH: Final = 3.25
+"""What a fan pushes, in masses that it would hold up."""
+_WOOD_MASS, _FAN_MASS = 0.3, 0.5
+
+
+def gate_finder(seed: int) -> Design:
+    """A short, wide car that turns by driving its sides apart, towards the next gate."""
+    return _car("gates", keen=f"{1.0 + 0.02 * (seed % 5):g}")
+
+
+def line_follower(seed: int) -> Design:
+    """The same car; three ground sensors before it see the line."""
+    return _car(
+        "line",
+        leads=True,
+        speed=f"{0.7 + 0.01 * (seed % 5):g}",
+        keen="0.4",
+        near="0.4",
+        learns="0.04",
+    )
+
+
+def sparing_lander(seed: int) -> Design:
+    """The same craft, which falls fast and brakes late: it has little fuel."""
+    return _craft("sparing", keen=1.4 + 0.02 * (seed % 5))
+
+
+def keeper(seed: int) -> Design:
+    """The same craft; what pushes it off its place for long it learns to lean against."""
+    return _craft("place", keen=3.0 + 0.05 * (seed % 5))
+
+
+def balancer(seed: int) -> Design:
+    """A tall mast on an axle of two wheels, which run after its top: what is tall falls slowly."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("middle of the axle")
+    sides = {}
+    for name, way in (("right", EAST), ("left", WEST)):
+        sides[name] = draft.wheel(draft.row(middle, way, _TRACK)[-1], way)
+    top = middle
+    for _ in range(_MAST):
+        top = draft.attach(top, UP, "Log")
+    return Design(
+        overall="A mast on two powered wheels that stands because they run after its top.",
+        parts={
+            "cart": PartDesign(
+                description=f"An axle with two wheels, and {_MAST} logs above each other on it",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            __package__, "balance", **quoted(sides), keen=f"{0.44 + 0.01 * (seed % 5):g}"
+        ),
+    )
+
+
+def placer(seed: int) -> Design:
+    """An arm with shoulder and elbow above a wide foot, whose gripper two pistons lower."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("under the post")
+    for way in (NORTH, SOUTH):
+        end = draft.row(middle, way, _FOOT)[-1]
+        for side in (EAST, WEST):
+            draft.row(end, side, _TOES)
+    shoulder = draft.attach(draft.row(middle, UP, _POST)[-1], UP, "Steering Block")
+    elbow = draft.attach(draft.row(shoulder, NORTH, _REACH)[-1], UP, "Steering Block")
+    upper = draft.attach(draft.row(elbow, NORTH, _REACH)[-1], DOWN, "Piston")
+    lower = draft.attach(upper, DOWN, "Piston")
+    gripper = draft.attach(lower, DOWN, "Grabber")
+    named = {"shoulder": shoulder, "elbow": elbow, "upper": upper, "lower": lower}
+    return Design(
+        overall="An arm with shoulder and elbow, above a foot; two pistons lower its gripper.",
+        parts={
+            "arm": PartDesign(
+                description=f"A foot like an H, a post of {_POST}, two arms of {_REACH}, a gripper",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            __package__,
+            "placing",
+            **quoted(named | {"gripper": gripper}),
+            arm=f"{_REACH}",
+            forearm=f"{_REACH}",
+            looks=f"{1 + 0.04 * (seed % 5):g}",
+            down="1.37",
+            keen="4",
+        ),
+    )
+
+
+def _car(program: str, *, leads: bool = False, **figures: str) -> Design:
+    """A car of two sides, and the program that drives it.
+
+    Args:
+        program: Name of the program.
+        leads: Whether the starting block is in front, and not in the middle.
+        figures: What its places are filled with.
+    """
+    draft = Draft(modules="workshop")
+    start = draft.start("front of the spine" if leads else "middle of the spine")
+    front = start if leads else draft.row(start, NORTH, _LENGTH // 2)[-1]
+    back = draft.row(start, SOUTH, _LENGTH - 1 if leads else _LENGTH // 2)[-1]
+    sides: dict[str, list[str]] = {"left": [], "right": []}
+    for base in (front, back):
+        for way, name in ((EAST, "right"), (WEST, "left")):
+            sides[name].append(draft.wheel(draft.row(base, way, _TRACK)[-1], way))
+    return Design(
+        overall="A car on four powered wheels that steers by driving its sides apart.",
+        parts={
+            "car": PartDesign(
+                description="A spine of 3 blocks, two cross members with two wheels each",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            __package__,
+            program,
+            left=listed(sides["left"]),
+            right=listed(sides["right"]),
+            **figures,
+        ),
+    )
+
+
+def _craft(program: str, *, keen: float) -> Design:
+    """A cross with a fan at the end of each arm, and the program that flies it."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("middle of the cross")
+    fans = {}
+    for name, way in (("north", NORTH), ("east", EAST), ("south", SOUTH), ("west", WEST)):
+        fans[name] = draft.attach(draft.row(middle, way, _ARM)[-1], UP, "Flying Block")
+    # Turned about a level axis: two fans, two arms of wood, and a little for what has a size.
+    inertia = 2 * _FAN_MASS * _ARM**2 + 2 * _WOOD_MASS * sum(k * k for k in range(1, _ARM + 1)) + 1
+    return Design(
+        overall="A cross with a fan at the end of each arm, which flies by how they differ.",
+        parts={
+            "craft": PartDesign(
+                description=f"Four arms of {_ARM} blocks, a fan on each end that pushes up",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(__package__, "flying", **quoted(fans), **_figures(draft, inertia))
+        + program_text(__package__, program, keen=f"{keen:g}"),
+    )
+
+
+def _figures(draft: Draft, inertia: float) -> Mapping[str, str]:
+    return {
+        "arm": f"{_ARM}",
+        "mass": f"{float(draft.machine.mass):g}",
+        "inertia": f"{inertia:g}",
+        "push": f"{_FAN_PUSH * _GRAVITY:g}",
+        "gravity": f"{_GRAVITY:g}",
+    }
+
+
+DESIGNS: Final[Designs] = {
+    "landing-2": sparing_lander,
+    "slalom-2": gate_finder,
+    "hover-4": keeper,
+    "balance-2": balancer,
+    "walk-1": walker,
+    "place-2": placer,
+    "line-1": line_follower,
+}

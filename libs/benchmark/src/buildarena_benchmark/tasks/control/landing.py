@@ -1,0 +1,159 @@
+"""Landing: how near to a mark a machine that is released in the air comes down and stays."""
+
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.carrying import stands
+from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.measures.marks import (
+    MarkName,
+    center_of_mark,
+    lacking_mark,
+    moving_mark,
+)
+from buildarena_benchmark.scoring.measures.series import starting_block, tilt_deg
+from buildarena_benchmark.scoring.measures.touching_down import first_touch, speeds_before
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.scenario import ReleasedPlacement
+
+_RESTS: Final = 5
+"""Samples over which it is judged whether a machine is at rest."""
+
+
+class LandingScoring(Document):
+    """How gently a machine lands, and how near to a mark.
+
+    Attributes:
+        mark: Name of the mark in the scenario.
+        max_sink: At its first touch the machine must be falling more slowly, units/s.
+        max_slide: And moving more slowly sideways, units/s.
+        hold_s: From its first touch on it must be whole and upright so long, seconds.
+        max_tilt_deg: Of the starting block against how it stood at the start, degrees.
+        max_speed: At the end of that it must be slower, units/s.
+        max_distance: And nearer to the mark, as seen from above, units.
+    """
+
+    name: Literal["landing"]
+    mark: MarkName = "goal"
+    max_sink: Threshold = 2.0
+    max_slide: Threshold = 1.0
+    hold_s: Annotated[float, Field(ge=1, le=60)] = 3.0
+    max_tilt_deg: Annotated[float, Field(gt=0, le=180)] = 20.0
+    max_speed: Threshold = 0.1
+    max_distance: Threshold = 3.0
+
+
+def infeasible(scoring: LandingScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if not isinstance(scenario.placement, ReleasedPlacement):
+        return "a landing is judged, but scenario.placement.kind is not released"
+    if scoring.hold_s >= scenario.duration_s:
+        return f"hold_s {scoring.hold_s:g} is longer than the trial"
+    return lacking_mark(scoring.mark, scenario) or moving_mark(scenario) or undriven(scenario)
+
+
+def judge(
+    scoring: LandingScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is 1 / (1 + the distance from the mark at which the machine rests), or 0.
+
+    It lands where anything of it first touches ground or terrain: slowly enough downwards and
+    sideways, by the speed of everything that is joined to the starting block. From then on it has
+    some seconds to come to rest, in which it stays whole and upright; at their end the ground
+    bears it. Where the starting block is then, as seen from above, is how far from the mark it is.
+
+    Args:
+        scoring: Thresholds, and the mark.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `came_apart`: it would have passed, but lost parts. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    start = starting_block(machine, trajectory)
+    path = trajectory.positions[:, start].astype(np.float64)
+    touch = first_touch(machine, trajectory, joined)
+    end = len(path) if touch is None else touch + round(scoring.hold_s * SAMPLE_RATE_HZ)
+    if touch is None or end >= len(path):
+        return Verdict(success=False, indicator=0.0, metrics={"landed": touch is not None})
+    sink, slide = speeds_before(machine, trajectory, joined, touch)
+    tilt = float(tilt_deg(trajectory, start)[touch : end + 1].max())
+    last = path[end] - path[end - _RESTS]
+    speed = float(np.linalg.norm(last)) * SAMPLE_RATE_HZ / _RESTS
+    away = float(np.linalg.norm(path[end, :2] - center_of_mark(scoring.mark, scenario)[:2]))
+    landed = (
+        sink < scoring.max_sink
+        and slide < scoring.max_slide
+        and tilt < scoring.max_tilt_deg
+        and speed < scoring.max_speed
+        and bool(stands(machine, trajectory, joined)[end])
+        and away < scoring.max_distance
+    )
+    whole = bool(joined[: end + 1].all())
+    metrics: dict[str, Metric] = {
+        "landed": True,
+        "landing_s": rounded(trajectory.time_s[touch]),
+        "sink_at_landing": rounded(sink),
+        "slide_at_landing": rounded(slide),
+        "max_tilt": rounded(tilt),
+        "distance_to_mark": rounded(away),
+        "broken_joints": len(trajectory.breaks),
+    }
+    success = landed and whole
+    return Verdict(
+        success=success,
+        indicator=rounded(1.0 / (1.0 + away)) if success else 0.0,
+        metrics=metrics,
+        flags=(CAME_APART,) if landed and not whole else (),
+        deciding=Deciding(samples=end + 1, members=joined, cargo=False),
+    )
+
+
+def explain(scoring: LandingScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if "distance_to_mark" not in told:
+        return "It did not land and stay for long enough within the trial."
+    figures = (
+        ("sank at {:.2f} units/s", "sink_at_landing", scoring.max_sink),
+        ("slid at {:.2f} units/s", "slide_at_landing", scoring.max_slide),
+        ("leaned by {:.0f}°", "max_tilt", scoring.max_tilt_deg),
+        ("landed {:.1f} from the mark", "distance_to_mark", scoring.max_distance),
+    )
+    for words, name, most in figures:
+        if told[name] > most:
+            return f"It {words.format(told[name])}; at most {most:g} is allowed."
+    landed = f"It landed {told['distance_to_mark']:.2f} from the mark"
+    return f"{landed}." if found.success else f"{landed}, but did not come to rest on the ground."
+
+
+SCORER: Final = Scorer(
+    parameters=LandingScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(CAME_APART, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 1.0,
+)

@@ -1,0 +1,197 @@
+"""Line: how much of a closed line a vehicle follows, and how fast."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Annotated, Final, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from buildarena_benchmark.fields import Count, Document, Threshold
+from buildarena_benchmark.scoring.measures.components import Mask, center_of, joined_to_start
+from buildarena_benchmark.scoring.measures.rolling import explained_distances
+from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.measures.vehicles import has_wheels, wheels_of
+from buildarena_benchmark.scoring.scorer import (
+    FORCES_NOT_MEASURED,
+    NOT_DRIVEN,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.line import Line
+
+_ASTRAY: Final = -1
+
+
+class LineScoring(Document):
+    """How much of a line a vehicle follows.
+
+    Attributes:
+        max_distance: Farthest from the line that counts as on it, units.
+        stretches: Into how many of equal length the line is divided.
+        min_stretches: Fewest of a trial that passes.
+        all_stretches: With so many the line is followed, and the measure ends.
+    """
+
+    name: Literal["line"]
+    max_distance: Threshold = 1.0
+    stretches: Annotated[int, Field(ge=3, le=100)] = 12
+    min_stretches: Count = 6
+    all_stretches: Annotated[int, Field(ge=1, le=100)] = 11
+
+    @model_validator(mode="after")
+    def _are_in_order(self) -> Self:
+        if not self.min_stretches <= self.all_stretches <= self.stretches:
+            raise ValueError("min_stretches <= all_stretches <= stretches does not hold")
+        return self
+
+
+class _Pass(NamedTuple):
+    """A stretch from its beginning to its end: its number, and the samples of both."""
+
+    stretch: int
+    first: int
+    last: int
+
+
+def infeasible(scoring: LineScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.line is None:
+        return "a line is followed, but scenario.line is missing"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: LineScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the length of the line that was followed per time, units/s.
+
+    A stretch of the line is followed once the centre of the machine's mass and the middle of its
+    wheels have both gone along it, from its beginning to its end without leaving it, driven by
+    wheels, with all of them, and along no later stretch before. The time is that of the trial, or
+    until nearly all stretches have been followed, which ends the measure.
+
+    Args:
+        scoring: Thresholds.
+        scenario: Gives the line.
+        machine: Gives the wheels.
+        trajectory: The trial.
+
+    Flags:
+        `not_driven`: stretches enough, but not by wheels. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    assert scenario.line is not None  # noqa: S101 - `infeasible` looked
+    joined = joined_to_start(machine, trajectory)
+    wheels = wheels_of(machine, trajectory)
+    whole = has_wheels(joined, wheels)
+    paths = [center_of(machine, trajectory, joined)]
+    if len(wheels):
+        paths.append(trajectory.positions[:, wheels].astype(np.float64).mean(axis=1))
+    passes = [_passes(scoring, scenario.line, path, whole) for path in paths]
+    driven = [
+        [each for each in of if _is_driven(machine, trajectory, joined, path, each)]
+        for of, path in zip(passes, paths, strict=True)
+    ]
+    ends = _followed(driven)[: scoring.all_stretches]
+    count = len(ends)
+    anyhow = len(_followed(passes))
+    is_all = count == scoring.all_stretches
+    time_s = float(trajectory.time_s[ends[-1]]) if is_all else scenario.duration_s
+    length = count * scenario.line.length / scoring.stretches
+    metrics: dict[str, Metric] = {
+        "stretches": count,
+        "length": rounded(length),
+        "share": rounded(count / scoring.stretches),
+        "all_followed_s": rounded(time_s) if is_all else None,
+        "wheels_lost": not bool(whole[-1]),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=count >= scoring.min_stretches,
+        indicator=rounded(length / time_s),
+        metrics=metrics,
+        flags=(NOT_DRIVEN,) if anyhow >= scoring.min_stretches > count else (),
+        deciding=Deciding(
+            samples=ends[-1] + 1 if is_all else len(whole), members=joined, cargo=False
+        ),
+    )
+
+
+def _passes(scoring: LineScoring, line: "Line", path: Series, whole: Mask) -> list[_Pass]:
+    """Each time that a path, with all wheels, goes along a stretch from beginning to end."""
+    ways, apart = line.nearest(path)
+    stretch = np.floor(ways * scoring.stretches / line.length).astype(int) % scoring.stretches
+    stretch[(apart > scoring.max_distance) | ~whole] = _ASTRAY
+    runs = _runs(stretch)
+    passes = []
+    for before, run, after in zip([None, *runs[:-1]], runs, runs[1:], strict=False):
+        number = run.stretch
+        if number == _ASTRAY:
+            continue
+        # At the start a machine stands on the first stretch.
+        begins = before.stretch == (number - 1) % scoring.stretches if before else number == 0
+        if begins and after.stretch == (number + 1) % scoring.stretches:
+            passes.append(_Pass(number, run.first, after.first))
+    return passes
+
+
+def _runs(stretch: NDArray[np.int_]) -> list[_Pass]:
+    """Samples in a row on one stretch, first and last included."""
+    rows = groupby(range(len(stretch)), key=lambda sample: int(stretch[sample]))
+    return [_Pass(number, (of := list(samples))[0], of[-1]) for number, samples in rows]
+
+
+def _is_driven(
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, path: Series, each: _Pass
+) -> bool:
+    """Whether wheels explain the way along a stretch at each of its samples."""
+    explained = explained_distances(machine, trajectory, joined, path, since=each.first)
+    moved = np.linalg.norm(path[:, :2] - path[each.first, :2], axis=1)
+    during = slice(each.first, each.last + 1)
+    return bool((moved[during] <= explained[during]).all())
+
+
+def _followed(passes: Sequence[Sequence[_Pass]]) -> list[int]:
+    """Samples at which stretches were followed by all of some paths, in order."""
+    each = [_in_order(of) for of in passes]
+    common = set.intersection(*(set(samples) for samples in each))
+    return sorted(max(samples[stretch] for samples in each) for stretch in common)
+
+
+def _in_order(passes: Sequence[_Pass]) -> Mapping[int, int]:
+    """The last sample of each stretch that counts: it comes after no later one."""
+    samples: dict[int, int] = {}
+    for each in passes:
+        if each.stretch > max(samples, default=-1):
+            samples[each.stretch] = each.last
+    return samples
+
+
+def explain(scoring: LineScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if told.get("all_followed_s") is not None:
+        return f"It followed the whole line in {told['all_followed_s']:.1f} s."
+    done = f"It followed {told.get('stretches', 0)} of {scoring.stretches} stretches in order"
+    return f"{done}." if found.success else f"{done}; {scoring.min_stretches} are asked."
+
+
+SCORER: Final = Scorer(
+    parameters=LineScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+)

@@ -1,0 +1,113 @@
+"""Station: how much of a time a machine in the air keeps to a mark."""
+
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document
+from buildarena_benchmark.scoring.measures.carrying import is_airborne
+from buildarena_benchmark.scoring.measures.components import center_of, joined_to_start
+from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
+from buildarena_benchmark.scoring.measures.marks import MarkName, lacking_mark, path_of_mark
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+
+
+class StationScoring(Document):
+    """How long a machine is near a mark in the air.
+
+    Attributes:
+        mark: Name of the mark in the scenario.
+        radius: How near, units.
+        from_s: When the time begins that counts; it lasts to the end of the trial, seconds.
+        min_share: Least share of that time, of a trial that passes.
+    """
+
+    name: Literal["station"]
+    mark: MarkName = "goal"
+    radius: Annotated[float, Field(gt=0, le=100)] = 1.5
+    from_s: Annotated[float, Field(ge=0, le=600)] = 5.0
+    min_share: Annotated[float, Field(gt=0, le=1)] = 0.7
+
+
+def infeasible(scoring: StationScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scoring.from_s >= scenario.duration_s:
+        return f"from_s {scoring.from_s:g} is not within the trial"
+    return lacking_mark(scoring.mark, scenario) or undriven(scenario)
+
+
+def judge(
+    scoring: StationScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the mean nearness: 1 at the mark, 0 at the radius and beyond.
+
+    Where the mark moves, it is where the mark is then. It is measured from the centre of the
+    mass of all that is joined to the starting block, and a moment counts only while none of
+    that touches ground or terrain.
+
+    Args:
+        scoring: Thresholds, and the mark.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_airborne`: it was near long enough, but touched something. `forces_not_measured`:
+        cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    places = path_of_mark(scoring.mark, scenario, trajectory.time_s.tolist())
+    away = center_of(machine, trajectory, joined) - places
+    distance = np.linalg.norm(away, axis=1)
+    near = distance < scoring.radius
+    flies = is_airborne(machine, trajectory, joined)
+    counts = trajectory.time_s >= scoring.from_s
+    share = float((near & flies)[counts].mean())
+    nearness = np.clip(1.0 - distance / scoring.radius, 0.0, None) * flies
+    success = share >= scoring.min_share
+    anyhow = float(near[counts].mean()) >= scoring.min_share
+    metrics: dict[str, Metric] = {
+        "share_near": rounded(share),
+        "mean_distance": rounded(distance[counts].mean()),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=success,
+        indicator=rounded(nearness[counts].mean()),
+        metrics=metrics,
+        flags=(NOT_AIRBORNE,) if anyhow and not success else (),
+        deciding=Deciding(samples=len(distance), members=joined, cargo=False),
+    )
+
+
+def explain(scoring: StationScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    share = found.metrics.get("share_near", 0.0)
+    near = f"It was within {scoring.radius:g} of the place for {share:.0%} of the time"
+    return f"{near}." if found.success else f"{near}; {scoring.min_share:.0%} is asked."
+
+
+SCORER: Final = Scorer(
+    parameters=StationScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_AIRBORNE, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 1.0,
+)

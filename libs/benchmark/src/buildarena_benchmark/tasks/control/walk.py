@@ -1,0 +1,166 @@
+"""Walk: how far a machine walks, on feet that are carried through the air in turn."""
+
+from functools import partial
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.measures.series import Series, lasts, starting_block
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_benchmark.tasks.control.balancing import lean_deg
+from buildarena_benchmark.tasks.control.walking import links_of, touching, walked
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.scenario import GroundPlacement
+
+NOT_WALKED: Final = Flag(
+    name="not_walked",
+    meaning="The starting block got far enough, but the machine did not walk there: its feet were "
+    "not carried in turn, part of it stayed behind, it left its way or turned over.",
+)
+_EAST, _NORTH = 0, 1
+
+
+class WalkScoring(Document):
+    """How far a machine walks north.
+
+    Attributes:
+        min_distance: How far it must walk, units.
+        lane: How far the starting block may get from the line that it walks along, units.
+        max_tilt_deg: Of the starting block against how it was built, degrees.
+        max_part_tilt_deg: Of every other part, degrees.
+    """
+
+    name: Literal["walk"]
+    min_distance: Threshold = 8.0
+    lane: Threshold = 1.5
+    max_tilt_deg: Annotated[float, Field(gt=0, lt=90)] = 45.0
+    max_part_tilt_deg: Annotated[float, Field(gt=0, lt=180)] = 120.0
+
+
+def infeasible(scoring: WalkScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if not isinstance(scenario.placement, GroundPlacement):
+        return "a walk is judged, but the machine is not put on the ground"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: WalkScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is how far it walks north, units.
+
+    What is joined by anything but a joint that moves is a link, and a link that touches ground or
+    terrain is a foot. How far the machine walks is the least of how far the starting block came,
+    how far its hindmost point did, and how far each foot was carried through the air by another
+    that stood. So what slides, rolls, jumps or stretches does not walk.
+
+    It walks until something comes off, the starting block or another part is tilted too far, or
+    the starting block is too far from the line.
+
+    Args:
+        scoring: The way and thresholds.
+        scenario: Gives the terrain.
+        machine: Gives the joints.
+        trajectory: The trial.
+
+    Flags:
+        `came_apart`: it would have passed, but lost parts. `not_walked`: the starting block got far
+        enough, but not so. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined, start = joined_to_start(machine, trajectory), starting_block(machine, trajectory)
+    whole = joined.all(axis=1)
+    path = trajectory.positions[:, start, :2].astype(np.float64)
+    upright = _upright(scoring, machine, trajectory, start)
+    links = links_of(machine, trajectory)
+    touches = touching(scenario, machine, trajectory, links)
+
+    on_feet = walked(machine, trajectory, links, touches, axis=_NORTH, since=0)
+    along = partial(_walk, path, length=scoring.min_distance)
+    distance, success, end = along(on_feet, upright & whole, lane=scoring.lane)
+    _, with_losses, _ = along(on_feet, upright, lane=scoring.lane)
+    came = path[:, _NORTH] - path[0, _NORTH]
+    _, anyhow, _ = along(came, np.ones_like(whole), lane=np.inf)
+    metrics: dict[str, Metric] = {
+        "feet": int(touches.any(axis=0).sum()),
+        "steps": _steps(touches[: end + 1]),
+        "broken_joints": len(trajectory.breaks),
+    }
+    flags = {
+        CAME_APART: with_losses and not success,
+        NOT_WALKED: anyhow and not with_losses,
+    }
+    return Verdict(
+        success=success,
+        indicator=rounded(distance),
+        metrics=metrics,
+        flags=raised(flags),
+        deciding=Deciding(samples=end + 1, members=joined, cargo=False),
+    )
+
+
+def _walk(
+    path: Series, gone: Series, holds: NDArray[np.bool_], *, lane: float, length: float
+) -> tuple[float, bool, int]:
+    """How far it gets, whether far enough, and the sample up to which that was looked at.
+
+    Args:
+        path: (T, 2) of the starting block.
+        gone: (T,) how far it got north.
+        holds: (T,) whether it may go on.
+        lane: How far it may get from its line, units.
+        length: How far is enough, units.
+    """
+    end = lasts(holds & (np.abs(path[:, _EAST]) <= lane))
+    farthest = float(gone[: end + 1].max())
+    return farthest, farthest >= length, end
+
+
+def _upright(
+    scoring: WalkScoring, machine: "Machine", trajectory: "Trajectory", start: int
+) -> NDArray[np.bool_]:
+    """When neither the starting block nor another part is tilted too far, (T,)."""
+    tilts = [lean_deg(machine, trajectory, block) for block in range(len(trajectory.block_ids))]
+    parts = np.max(tilts, axis=0) < scoring.max_part_tilt_deg
+    return np.asarray(parts & (tilts[start] < scoring.max_tilt_deg))
+
+
+def _steps(touches: NDArray[np.bool_]) -> int:
+    """How often a foot was set down."""
+    return int((touches[1:] & ~touches[:-1]).sum())
+
+
+def explain(scoring: WalkScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    steps = found.metrics.get("steps", 0)
+    went = f"It walked {found.indicator:.1f} in {steps} steps"
+    return f"{went}." if found.success else f"{went}; {scoring.min_distance:g} is asked."
+
+
+SCORER: Final = Scorer(
+    parameters=WalkScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(CAME_APART, NOT_WALKED, FORCES_NOT_MEASURED),
+)

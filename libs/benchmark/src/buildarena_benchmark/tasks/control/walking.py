@@ -1,0 +1,186 @@
+"""Feet: what of a machine touches ground and terrain, and how far it is carried through the air."""
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.scoring.measures.components import Mask
+from buildarena_benchmark.scoring.measures.outline import extents
+from buildarena_benchmark.scoring.measures.series import Series, rotations, starting_block
+from buildarena_geometry import Block, Machine
+from buildarena_geometry.modules.joints import MOVING_JOINTS
+from buildarena_geometry.modules.solids import Ball, Cylinder, Solid
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.scenario import TerrainBox
+from buildarena_simulation.terrain import shape_of
+
+TOUCHES: Final = 0.05
+"""What is no higher above ground or terrain touches it, units: engines let bodies sink in by 0.02,
+and a tilted face is looked at every half unit."""
+
+_APART: Final = 0.5
+"""Greatest distance of the points of a body that are looked at, units."""
+
+_ROUND: Final = 12
+
+
+def links_of(machine: "Machine", trajectory: "Trajectory") -> NDArray[np.intp]:
+    """Which link each tracked block belongs to, (N,), numbered from 0.
+
+    A link is what is joined by other joints than those that move, and by rigid connectors.
+
+    Args:
+        machine: Gives joints and connectors.
+        trajectory: Names the tracked blocks.
+    """
+    link = {block: block for block in machine.blocks}
+
+    def root(block: str) -> str:
+        while link[block] != block:
+            block = link[block]
+        return block
+
+    for base, part in _rigid(machine):
+        link[root(part)] = root(base)
+    roots = [root(block) for block in trajectory.block_ids]
+    return np.unique(roots, return_inverse=True)[1]
+
+
+def touching(
+    scenario: "Scenario", machine: "Machine", trajectory: "Trajectory", links: NDArray[np.intp]
+) -> Mask:
+    """Which links touch ground or terrain, (T, L): some point of theirs is within `TOUCHES`.
+
+    Told by where their bodies are, since forces are only known of the machine as a whole. What is
+    looked at are the corners of each body, and points of its surface at most 0.5 apart.
+
+    Args:
+        scenario: Gives the terrain.
+        machine: Gives the blocks' bodies.
+        trajectory: The trial.
+        links: (N,) as `links_of` says.
+    """
+    low, _ = extents(machine, trajectory, axis=2)
+    tops = [0.0, *(_top(box) for box in scenario.terrain)]
+    touches = np.zeros((len(low), int(links.max()) + 1), dtype=bool)
+    for column, name in enumerate(trajectory.block_ids):
+        near = np.flatnonzero(low[:, column] <= max(tops) + TOUCHES)
+        if near.size:
+            points = _points(machine.blocks[name], trajectory, column, near)
+            heights = np.stack([points[..., 2], *_over(scenario.terrain, points)]).min(axis=0)
+            touches[near, links[column]] |= heights.min(axis=1) <= TOUCHES
+    return touches
+
+
+def stepped(trajectory: "Trajectory", links: NDArray[np.intp], touches: Mask, axis: int) -> Series:
+    """How far each link is carried along an axis through the air by another that stands, (T, L).
+
+    From one sample to the next a link counts that touches at neither of them, while some other
+    touches at both: by how much farther it moves than that other, of several the one that moves
+    least. So who slides carries nothing. A link is where the mean of its blocks is.
+
+    Args:
+        trajectory: The trial.
+        links: (N,) as `links_of` says.
+        touches: (T, L) as `touching` says.
+        axis: 0 east, 1 north.
+    """
+    places = trajectory.positions[:, :, axis].astype(np.float64)
+    members = np.eye(touches.shape[1])[links]
+    moves = np.diff(places @ (members / members.sum(axis=0)), axis=0)
+    stands = touches[1:] & touches[:-1]
+    hangs = ~touches[1:] & ~touches[:-1]
+    least = np.where(stands, np.abs(moves), np.inf).argmin(axis=1)
+    base = np.take_along_axis(moves, least[:, None], axis=1)
+    carried = np.where(hangs & stands.any(axis=1, keepdims=True), moves - base, 0.0)
+    return np.asarray(np.vstack([np.zeros(touches.shape[1]), carried]))
+
+
+def walked(
+    machine: "Machine",
+    trajectory: "Trajectory",
+    links: NDArray[np.intp],
+    touches: Mask,
+    *,
+    axis: int,
+    since: int,
+) -> Series:
+    """How far a machine has walked along an axis since a sample, (T - since,), units.
+
+    The least of how far the starting block came, how far its hindmost point did, and how far each
+    foot was carried: each link that has touched anything until then.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        links: (N,) as `links_of` says.
+        touches: (T, L) as `touching` says.
+        axis: 0 east, 1 north.
+        since: The sample.
+    """
+    start = trajectory.positions[since:, starting_block(machine, trajectory), axis]
+    low, _ = extents(machine, trajectory, axis=axis)
+    rear = low[since:].min(axis=1)
+    carried = np.cumsum(stepped(trajectory, links, touches, axis), axis=0)[since:]
+    is_foot = np.maximum.accumulate(touches, axis=0)[since:]
+    feet = np.where(is_foot, carried - carried[0], np.inf).min(axis=1)
+    return np.asarray(np.minimum(np.minimum(start - start[0], rear - rear[0]), feet))
+
+
+def _rigid(machine: "Machine") -> Iterator[tuple[str, str]]:
+    for joint in machine.joints:
+        physics = machine.blocks[joint.part].module.physics
+        if joint.holds and physics is not None and physics.joint_type not in MOVING_JOINTS:
+            yield joint.base, joint.part
+    for link in machine.connectors.values():
+        if link.module.link == "rigid":
+            yield link.start[0], link.end[0]
+
+
+def _points(
+    block: "Block", trajectory: "Trajectory", column: int, samples: NDArray[np.intp]
+) -> Series:
+    """Points of a block's body at some samples, (S, P, 3), world frame, units."""
+    own = np.concatenate([_surface(solid) for solid in block.module.body])
+    turns = rotations(trajectory.quaternions[samples, column])
+    places = trajectory.positions[samples, column].astype(np.float64)
+    shown = own - np.array(block.module.center)
+    return np.asarray(np.einsum("sij,pj->spi", turns, shown) + places[:, None])
+
+
+def _surface(solid: "Solid") -> Series:
+    """Points of a solid, (P, 3), block frame, units."""
+    if isinstance(solid, Ball):
+        ways = np.array([way for way in product((-1, 0, 1), repeat=3) if any(way)], dtype=float)
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        return np.asarray(np.array(solid.center) + solid.radius * ways)
+    if isinstance(solid, Cylinder):
+        pose, turn = solid.block_from_axis, np.arange(_ROUND) * 2 * np.pi / _ROUND
+        ring = np.stack([np.cos(turn), np.sin(turn)], axis=1) * solid.radius
+        along = _ticks(-solid.length / 2, solid.length / 2)
+        own = np.array([(x, y, z) for z in along for x, y in ring])
+        return np.asarray(own @ np.array(pose.rotation).T + np.array(pose.position))
+    ticks = [_ticks(low, high) for low, high in zip(solid.lowest, solid.highest, strict=True)]
+    return np.array(list(product(*ticks)))
+
+
+def _ticks(low: float, high: float) -> Series:
+    return np.linspace(low, high, int(np.ceil((high - low) / _APART)) + 1)
+
+
+def _over(terrain: tuple["TerrainBox", ...], points: Series) -> Iterator[Series]:
+    """How high points are above each box's top, infinite where they are beside or below it."""
+    for box in terrain:
+        shape = shape_of(box)
+        own = (points - shape.center) @ shape.rotation
+        beside = (np.abs(own[..., :2]) > shape.half_extents[:2]).any(axis=-1)
+        below = own[..., 2] < -shape.half_extents[2]
+        yield np.where(beside | below, np.inf, own[..., 2] - shape.half_extents[2])
+
+
+def _top(box: "TerrainBox") -> float:
+    shape = shape_of(box)
+    return float(shape.center[2] + np.abs(shape.rotation[2]) @ shape.half_extents)

@@ -1,0 +1,1 @@
+"""Courses: a ball to deliver, a track to drive, a cargo to fetch."""

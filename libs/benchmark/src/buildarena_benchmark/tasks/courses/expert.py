@@ -1,0 +1,174 @@
+"""Vehicles that keep a ball between two prongs and push it."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.drafting import (
+    DOWN,
+    EAST,
+    NORTH,
+    SOUTH,
+    UP,
+    WEST,
+    Draft,
+)
+
+_PRONG = 2
+"""Length of a prong, blocks: longer ones strike a ramp that bends upwards."""
+_BEGINS_S = (0.4, 0.48, 0.56, 0.64, 0.72)
+"""When it drives off, by seed, seconds."""
+_SAMPLE_S = 0.04
+_LEFT, _RIGHT, _AHEAD, _BACK = "LeftArrow", "RightArrow", "UpArrow", "DownArrow"
+Press = tuple[float, str, float]
+"""Time, key and duration, seconds."""
+_TRACK = (
+    (0.4, _AHEAD, 19.0),
+    (1.72, _RIGHT, 0.32),
+    (3.24, _LEFT, 0.24),
+    (4.04, _LEFT, 0.48),
+    (5.76, _RIGHT, 0.48),
+)
+"""When the car that bends presses which key and for how long, seconds; found by search."""
+_OVER_THE_TOP = (*((0.16 * k, 0.08) for k in range(12)), (1.92, 3.76))
+"""When the crane turns and for how long, seconds: at half its pace to begin with, so that the arm
+keeps up with its drive and does not catch up by a jerk."""
+
+
+def courier(seed: int) -> Design:
+    """A car of four wheels with a fork in front, as wide as the ball and a little more."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("between the axles")
+    front = draft.row(middle, NORTH, 2)[-1]
+    back = draft.row(middle, SOUTH, 2)[-1]
+    wheels = []
+    for base, is_front in ((front, True), (back, False)):
+        for side in (EAST, WEST):
+            end = draft.row(base, side, 2)[-1]
+            wheels.append(draft.wheel(end, side))
+            if is_front:
+                draft.row(end, NORTH, _PRONG)
+    return Design(
+        overall="A car that pushes the ball ahead, between two prongs.",
+        parts={
+            "courier": PartDesign(
+                description="A spine of 5, two cross members of 5, four wheels, two prongs of 2",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "All wheels drive north until the trial ends.",
+            "control_config": [
+                {"block": wheel, "action": "spinning_forward", "keys": ["UpArrow"]}
+                for wheel in wheels
+            ],
+            "control_sequence": [
+                {"time": _BEGINS_S[seed % len(_BEGINS_S)], "key": "UpArrow", "hold_for": 19.0}
+            ],
+        },
+    )
+
+
+def track_follower(seed: int) -> Design:
+    """A car that bends, steered through two bends."""
+    return _bending_car(_TRACK, begin=2 * _SAMPLE_S * (seed % 4), plan="Right, straight on, left.")
+
+
+def _bending_car(presses: Sequence[Press], *, begin: float, plan: str) -> Design:
+    """A car as narrow as its wheels that bends in its middle, pressed `begin` seconds later."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("behind the joint")
+    joint = draft.attach(middle, NORTH, "Steering Hinge")
+    draft.turn_axis(joint, 0, UP)
+    front, back = draft.attach(joint, NORTH), draft.row(middle, SOUTH, 2)[-1]
+    wheels = [draft.wheel(base, side) for base in (front, back) for side in (EAST, WEST)]
+    config = [
+        {"block": joint, "action": "turn_left", "keys": [_LEFT]},
+        {"block": joint, "action": "turn_right", "keys": [_RIGHT]},
+    ]
+    for wheel in wheels:
+        config += [
+            {"block": wheel, "action": "spinning_forward", "keys": [_AHEAD]},
+            {"block": wheel, "action": "spinning_backward", "keys": [_BACK]},
+        ]
+    return Design(
+        overall="A narrow car on four wheels that bends in its middle.",
+        parts={
+            "car": PartDesign(
+                description="Two axles of two wheels each, and a steering hinge between them",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": plan,
+            "control_config": config,
+            "control_sequence": [
+                {"time": round(begin + time, 2), "key": key, "hold_for": hold}
+                for time, key, hold in presses
+            ],
+        },
+    )
+
+
+def well_crane(seed: int) -> Design:
+    """A high arm with a counterweight; its long hand goes down a well, and over the top with it."""
+    begin = 0.6 + 0.1 * (seed % 5)
+    draft = Draft(modules="workshop")
+    middle = draft.start("under the post")
+    for side in (EAST, WEST):
+        end = draft.row(middle, side, 4)[-1]
+        for way, count in ((NORTH, 4), (SOUTH, 3)):
+            draft.row(end, way, count)
+    post = draft.row(middle, UP, 7)
+    for base, side in (("5", EAST), ("16", WEST)):
+        draft.connect(post[-1], base, side, UP)
+    shoulder = draft.attach(post[-1], NORTH, "Steering Block")
+    root = draft.attach(shoulder, NORTH)
+    arm = draft.row(root, WEST, 8)
+    draft.connect(root, arm[4], UP)
+    for near in draft.row(root, EAST, 5)[2:]:
+        for way in (NORTH, SOUTH, UP, DOWN):
+            draft.attach(near, way, "Log", note="counterweight")
+    # A block further out than the arm is wide: what hangs there passes it at the top.
+    hand = draft.attach(draft.attach(arm[-1], NORTH), NORTH, "Swivel")
+    link = draft.row(hand, DOWN, 2)[-1]
+    # The hand gives way where it touches the ground of the well.
+    gripper = draft.attach(draft.attach(link, DOWN, "Suspension"), DOWN, "Grabber")
+    return Design(
+        overall="An arm on a high post that turns over the top, with a long hand that hangs.",
+        parts={
+            "crane": PartDesign(
+                description="A wide foot, a post of 7, an arm of 8 with a counterweight, a gripper",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "Down the well, half a turn over the top, let go, and lift the hand.",
+            "control_config": [
+                {"block": shoulder, "action": "turn_left", "keys": ["LeftArrow"]},
+                {"block": shoulder, "action": "turn_right", "keys": ["RightArrow"]},
+                {"block": gripper, "action": "release", "keys": ["Alpha1"]},
+            ],
+            "control_sequence": [
+                {"time": begin, "key": "RightArrow", "hold_for": 0.38},
+                *(
+                    {"time": round(begin + 2.0 + at, 2), "key": "LeftArrow", "hold_for": hold_for}
+                    for at, hold_for in _OVER_THE_TOP
+                ),
+                {"time": begin + 16.0, "key": "Alpha1", "hold_for": 0.2},
+                {"time": begin + 17.0, "key": "RightArrow", "hold_for": 0.5},
+            ],
+        },
+    )
+
+
+DESIGNS: Final[Designs] = {
+    "deliver-2": courier,
+    "drive-4": track_follower,
+    "fetch-1": well_crane,
+}

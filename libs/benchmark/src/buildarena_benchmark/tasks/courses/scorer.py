@@ -1,0 +1,166 @@
+"""Delivery: a ball that lies on the road is brought over a line, pushed or carried."""
+
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Coordinate, Document, Threshold
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.gates import ahead_of, crossings
+from buildarena_benchmark.scoring.measures.marks import MarkName
+from buildarena_benchmark.scoring.measures.series import Series
+from buildarena_benchmark.scoring.measures.thrown import distances_to_parts
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Flag,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.scenario import Gate
+
+LET_GO: Final = Flag(
+    name="let_go",
+    meaning="The ball got over the line, but the machine was not at it on its way: it was thrown, "
+    "kicked or let roll.",
+)
+
+
+class DeliverScoring(Document):
+    """How soon a ball is brought over a line.
+
+    Attributes:
+        line: Name of the gate that is the line.
+        min_height: Least height of the ball's underside when it crosses, units; None for any.
+        max_gap: Farther from every joined part the machine is not at the ball, units.
+        loose_s: For so long after the machine was at it the ball counts as being in its hands,
+            seconds: what is pushed hops.
+        max_loose: How far the ball may move in all while it is in nobody's hands, units.
+    """
+
+    name: Literal["deliver"]
+    line: MarkName = "line"
+    min_height: Coordinate | None = None
+    max_gap: Threshold = 0.3
+    loose_s: Annotated[float, Field(gt=0, le=10)] = 0.4
+    max_loose: Threshold = 1.5
+
+
+def infeasible(scoring: DeliverScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    cargo, gates = scenario.cargo, [gate.name for gate in scenario.gates]
+    if scoring.line not in gates:
+        return f"there is no gate {scoring.line!r}: there are {', '.join(gates) or 'none'}"
+    if cargo is None or cargo.at is None or cargo.shape != "ball":
+        return "a ball is delivered from its place: scenario.cargo needs shape: ball, and at"
+    if _to_go(_gate(scoring, scenario), np.array(cargo.at[:2])) <= 0.0:
+        return f"the ball already lies beyond the gate {scoring.line!r}"
+    if scenario.pushes or scenario.gusts is not None:
+        return "gusts and pushes would deliver as well: a delivery is judged without them"
+    if scenario.tracked_blocks != "all":
+        return "whether a machine is at its ball is known only if all blocks are tracked"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: DeliverScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the share of the way to the line, plus the share of time left beyond it.
+
+    The way counts while the ball is in the machine's hands: a part that is joined to the starting
+    block is at it, or was a moment ago. A ball that moves far by itself earns no more.
+
+    Args:
+        scoring: Thresholds, and the line.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `let_go`: it got over the line by itself. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=True)
+    if lacking is not None:
+        return lacking
+    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
+    assert trajectory.cargo_size is not None  # noqa: S101 - there is a cargo
+    gate, radius = _gate(scoring, scenario), trajectory.cargo_size[0] / 2
+    path = trajectory.cargo_position.astype(np.float64)
+    joined = joined_to_start(machine, trajectory)
+    gaps = np.where(joined, distances_to_parts(machine, trajectory, path) - radius, np.inf)
+    held = _lately(gaps.min(axis=1) <= scoring.max_gap, round(scoring.loose_s * SAMPLE_RATE_HZ))
+    steps = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
+    loose = np.cumsum(np.where(held, 0.0, steps))
+    counts = loose <= scoring.max_loose
+    lowest = -np.inf if scoring.min_height is None else scoring.min_height
+    high = path[:, 2] - radius >= lowest
+    over = [sample for sample in crossings(path, gate) if high[sample]]
+    done = next((sample for sample in over if held[sample] and counts[sample]), None)
+    whole = _to_go(gate, path[0, :2])
+    left = np.array([_to_go(gate, place) for place in path[:, :2]])
+    way = np.where(held & counts, 1.0 - left / whole, 0.0)
+    share = 1.0 if done is not None else min(max(float(way.max()), 0.0), 1.0)
+    time_left = 0.0 if done is None else 1.0 - trajectory.time_s[done] / scenario.duration_s
+    return Verdict(
+        success=done is not None,
+        indicator=rounded(share + time_left),
+        metrics={
+            "delivered_s": None if done is None else rounded(trajectory.time_s[done]),
+            "way": rounded(share),
+            "loose_way": rounded(float(loose[-1 if done is None else done])),
+            "touched": bool(held.any()),
+            "broken_joints": len(trajectory.breaks),
+        },
+        flags=raised({LET_GO: done is None and bool(over)}),
+        deciding=Deciding(
+            samples=len(path) if done is None else done + 1, members=joined, cargo=True
+        ),
+    )
+
+
+def _gate(scoring: DeliverScoring, scenario: Scenario) -> "Gate":
+    return next(gate for gate in scenario.gates if gate.name == scoring.line)
+
+
+def _to_go(gate: "Gate", place: Series) -> float:
+    """How far a place lies before a gate's line, units."""
+    return float((np.array(gate.center) - place) @ ahead_of(gate))
+
+
+def _lately(holds: Mask, samples: int) -> Mask:
+    """At which samples something held then, or at one of so many before, (T,)."""
+    sums = np.concatenate([[0], np.cumsum(holds)])
+    first = np.maximum(np.arange(len(holds)) - samples, 0)
+    return np.asarray(sums[1:] > sums[first])
+
+
+def explain(scoring: DeliverScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if not told.get("touched"):
+        return "The machine never touched the ball."
+    if told["delivered_s"] is not None and found.success:
+        return f"The ball was delivered after {told['delivered_s']:.1f} s."
+    way = f"The ball went {told['way']:.0%} of the way in the machine's hands"
+    if told["loose_way"] > scoring.max_loose:
+        return f"{way}; {told['loose_way']:.1f} of it went by itself."
+    return f"{way}."
+
+
+SCORER: Final = Scorer(
+    parameters=DeliverScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(LET_GO, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 2.0,
+)

@@ -1,0 +1,121 @@
+"""Apex: how near to a stated height a cargo's highest point is."""
+
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.carrying import is_airborne
+from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.measures.flight import NOT_AIRBORNE
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+
+
+class ApexScoring(Document):
+    """How near to a stated rise a cargo comes, at its highest point.
+
+    Attributes:
+        rise: How far above its place the cargo's highest point is to be, units.
+        reach: A highest point that is as far off is worth nothing, units.
+        max_off: Farthest off that the highest point of a trial that passes may be, units.
+    """
+
+    name: Literal["apex"]
+    rise: Annotated[float, Field(gt=0, le=1e4)]
+    reach: Annotated[float, Field(gt=0, le=1e4)] = 10.0
+    max_off: Threshold = 2.0
+
+
+def infeasible(scoring: ApexScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None or scenario.cargo.at is None:
+        return "the cargo rises from its place, but scenario.cargo has none: give cargo.at"
+    if scoring.max_off >= scoring.reach:
+        return f"max_off {scoring.max_off:g} is no less than reach {scoring.reach:g}"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: ApexScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is 1 where the cargo's highest point has the stated rise, evenly less around.
+
+    It counts if the machine is whole until then, and flies at that moment: over the last half
+    second nothing of it touches ground or terrain. So it is flown up, not put up by a tower, a
+    lever or a crane. Who falls down afterwards may break.
+
+    Args:
+        scoring: Rise and thresholds.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_airborne`: it would have passed, but the machine touches the ground. `came_apart`: it
+        would have passed, but parts came off. `forces_not_measured`: cannot be judged.
+    """
+    del scenario
+    lacking = unmeasured(trajectory, cargo=True)
+    if lacking is not None:
+        return lacking
+    assert trajectory.cargo_position is not None  # noqa: S101 - it was looked at
+    height = trajectory.cargo_position[:, 2].astype(np.float64)
+    top = int(np.nanargmax(height)) if np.isfinite(height).any() else 0
+    rise = float(height[top] - height[0])
+    joined = joined_to_start(machine, trajectory)
+    whole = bool(joined[: top + 1].all())
+    flies = bool(is_airborne(machine, trajectory, joined)[top])
+    off = abs(rise - scoring.rise)
+    near = off <= scoring.max_off
+    counts = whole and flies
+    worth = max(1.0 - off / scoring.reach, 0.0) if counts else 0.0
+    metrics: dict[str, Metric] = {
+        "rise": rounded(rise),
+        "top_s": rounded(trajectory.time_s[top]),
+        "broken_joints": len(trajectory.breaks),
+    }
+    flags = {NOT_AIRBORNE: near and not flies, CAME_APART: near and not whole}
+    return Verdict(
+        success=near and counts,
+        indicator=rounded(worth),
+        metrics=metrics,
+        flags=raised(flags),
+        deciding=Deciding(samples=top + 1, members=joined, cargo=True),
+    )
+
+
+def explain(scoring: ApexScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    rise = found.metrics.get("rise")
+    if rise is None:
+        return "The cargo was not carried up."
+    off = abs(rise - scoring.rise)
+    return (
+        f"The cargo rose by {rise:.2f}: {off:.2f} off {scoring.rise:g}, and {scoring.max_off:g} "
+        "is allowed."
+    )
+
+
+SCORER: Final = Scorer(
+    parameters=ApexScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_AIRBORNE, CAME_APART, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, _scenario: 1.0,
+)

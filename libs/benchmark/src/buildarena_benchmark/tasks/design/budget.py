@@ -1,0 +1,104 @@
+"""Budget: how light a bridge is that carries the stated load to the end."""
+
+from collections.abc import Callable
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring import support
+from buildarena_benchmark.scoring.scorer import START_TOO_HIGH, Finding, Scorer, Verdict, rounded
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+
+
+class BudgetScoring(Document):
+    """How little mass carries the scenario's cargo over a gap.
+
+    Attributes:
+        fall_height: The cargo has fallen when its centre is below it, units.
+        max_start_height: Its start height may not exceed it, units.
+    """
+
+    name: Literal["budget"]
+    fall_height: Threshold = 4.0
+    max_start_height: Threshold = 20.0
+
+
+def infeasible(scoring: BudgetScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    cargo = scenario.cargo
+    if cargo is not None and cargo.ramp_start_s + cargo.ramp_s >= scenario.duration_s:
+        return f"the cargo weighs its {cargo.final_mass:g} only when the trial has ended"
+    return support.infeasible(_as_support(scoring, scenario), scenario)
+
+
+def judge(
+    scoring: BudgetScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the stated load over the machine's mass, where that load is carried.
+
+    The stated load is the cargo's final mass. The trial succeeds if a bridge carries it to the end
+    of the trial, as `support` reads it up to that moment. A machine that carries less of it, or
+    not so long, has an indicator of 0, and one that could carry more has no more of it. The mass
+    is that of all blocks and connectors that were built, whatever comes off.
+
+    Args:
+        scoring: Thresholds.
+        scenario: Gives gap, terrains and the stated load.
+        machine: Gives masses.
+        trajectory: The trial; without cargo it fails.
+
+    Flags:
+        `does_not_span`: the load did not go to both terrains. `start_too_high`: the cargo started
+        above the limit. `span_not_measured`: no contact forces are known. As of `support`, whose
+        further one is left out: more load would earn nothing, so the indicator is no lower bound.
+    """
+    bridge = support.judge(_as_support(scoring, scenario), scenario, machine, trajectory)
+    success = bridge.success and support.NEVER_FELL in bridge.flags
+    stated = scenario.cargo.final_mass if scenario.cargo else 0.0
+    return Verdict(
+        success=success,
+        indicator=rounded(stated / machine.mass) if success else 0.0,
+        metrics=bridge.metrics,
+        flags=tuple(flag for flag in bridge.flags if flag is not support.NEVER_FELL),
+        deciding=bridge.deciding,
+    )
+
+
+def decision(
+    scoring: BudgetScoring, scenario: Scenario
+) -> Callable[[NDArray[np.float32] | None], bool]:
+    """Tells the sample after which nothing changes, see `Scorer`: the cargo is lost."""
+    return support.decision(_as_support(scoring, scenario), scenario)
+
+
+def _as_support(scoring: BudgetScoring, scenario: Scenario) -> support.SupportScoring:
+    cargo = scenario.cargo
+    return support.SupportScoring(
+        name="support",
+        fall_height=scoring.fall_height,
+        min_time_s=cargo.ramp_start_s + cargo.ramp_s if cargo else 0.0,
+        max_start_height=scoring.max_start_height,
+    )
+
+
+def explain(scoring: BudgetScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told, load = found.metrics, found.metrics.get("load_when_decided")
+    if load is None:
+        return "There was no cargo to carry."
+    if found.success:
+        return f"The bridge carried {load:,.0f} to the end with a mass of {told['mass']:.2f}."
+    return f"The bridge gave way at a load of {load:,.0f}, before the end: nothing is earned."
+
+
+SCORER: Final = Scorer(
+    parameters=BudgetScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(support.DOES_NOT_SPAN, START_TOO_HIGH, support.SPAN_NOT_MEASURED),
+    decision=decision,
+)

@@ -1,0 +1,1 @@
+"""Gliders, and machines that hold heights."""

@@ -1,0 +1,109 @@
+"""Glide: how far a machine that is released in the air flies, and how gently it lands."""
+
+from typing import Final, Literal
+
+import numpy as np
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.components import joined_to_start
+from buildarena_benchmark.scoring.measures.series import starting_block
+from buildarena_benchmark.scoring.measures.touching_down import first_touch, speeds_before
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.scenario import ReleasedPlacement
+
+
+class GlideScoring(Document):
+    """How far a machine that is released in the air flies, and how gently it lands.
+
+    Attributes:
+        min_range: The horizontal distance to where it lands must exceed it, units.
+        max_sink: It must be falling more slowly when it lands, units/s.
+    """
+
+    name: Literal["glide"]
+    min_range: Threshold = 80.0
+    max_sink: Threshold = 6.0
+
+
+def infeasible(scoring: GlideScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    del scoring
+    if not isinstance(scenario.placement, ReleasedPlacement):
+        return "a glider is judged, but scenario.placement.kind is not released"
+    return None
+
+
+def judge(
+    scoring: GlideScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the horizontal distance flown over the height of release, 0 of a failure.
+
+    The flight ends when anything of the machine touches ground or terrain. The distance is the
+    starting block's; the speed at landing is that of everything that is still joined to it.
+
+    Args:
+        scoring: Thresholds.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `forces_not_measured`: cannot be judged.
+    """
+    placement = scenario.placement
+    assert isinstance(placement, ReleasedPlacement)  # noqa: S101 - the task was checked for it
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    touch = first_touch(machine, trajectory, joined)
+    landed = touch is not None
+    last = len(path) - 1 if touch is None else touch
+    flown = float(np.linalg.norm(path[last, :2] - path[0, :2]))
+    sink, _ = speeds_before(machine, trajectory, joined, last)
+    metrics: dict[str, Metric] = {
+        "range": rounded(flown),
+        "landed": landed,
+        "landing_s": rounded(trajectory.time_s[last]) if landed else None,
+        "sink_at_landing": rounded(sink),
+        "broken_joints": len(trajectory.breaks),
+    }
+    success = landed and flown > scoring.min_range and sink < scoring.max_sink
+    return Verdict(
+        success=success,
+        indicator=rounded(flown / placement.height) if success else 0.0,
+        metrics=metrics,
+        deciding=Deciding(samples=last + 1, members=joined, cargo=False),
+    )
+
+
+def explain(scoring: GlideScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if not told.get("landed"):
+        return "The glider did not come down within the trial."
+    flew = f"The glider flew {told['range']:.1f} and came down at {told['sink_at_landing']:.1f}"
+    if found.success:
+        return f"{flew} units/s."
+    return f"{flew} units/s; {scoring.min_range:g} and at most {scoring.max_sink:g} are asked."
+
+
+SCORER: Final = Scorer(
+    parameters=GlideScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(FORCES_NOT_MEASURED,),
+)

@@ -1,0 +1,1 @@
+"""Rockets: thrust over weight, height, and a payload."""

@@ -1,0 +1,131 @@
+"""Rockets: water cannons that spray down, each heated by a torch below its outlet."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.drafting import (
+    DOWN,
+    EAST,
+    NORTH,
+    SIDES,
+    SOUTH,
+    UP,
+    WEST,
+    Action,
+    Direction,
+    Draft,
+    replay_actions,
+)
+
+PAIRS: tuple[tuple[Direction, ...], ...] = (SIDES, (EAST, WEST), (NORTH, SOUTH))
+"""On which sides the cannons sit, by seed: opposite ones, so that the thrust is balanced."""
+CANNONS = "cannons round the starting block, spraying down, each with a torch two blocks below"
+
+
+def engine(seed: int) -> Design:
+    """A rocket engine for itself."""
+    sides = PAIRS[seed % len(PAIRS)]
+    return Design(
+        overall="A rocket engine: heated water cannons that push one way.",
+        parts={
+            "engine": PartDesign(
+                description=f"{len(sides)} {CANNONS}", actions=_engine(sides, load=0)
+            )
+        },
+    )
+
+
+def rocket(seed: int) -> Design:
+    """A rocket as one structure: the engine with a nose of up to three blocks."""
+    sides, load = PAIRS[seed % len(PAIRS)], seed % 4
+    return Design(
+        overall="A rocket: a heated engine under a short nose, balanced about its axis.",
+        parts={
+            "rocket": PartDesign(
+                description=f"{len(sides)} {CANNONS}; a nose of {load} blocks",
+                actions=_engine(sides, load=load),
+            )
+        },
+    )
+
+
+def framed_rocket(seed: int) -> Design:
+    """An engine under a cross-shaped frame, held together by four braces."""
+    arm = 2 + seed % 2
+    frame = Draft()
+    middle = frame.start("middle of the frame")
+    for side in SIDES:
+        frame.row(middle, side, arm)
+    engine_actions = _engine(SIDES, load=0)
+    whole = Draft({"engine": replay_actions(engine_actions), "frame": frame.machine})
+    whole.do("add_machine", machine_id="frame", init_shift=[0, 0, 2], init_rotation=[0, 0, 0])
+    whole.do("add_machine", machine_id="engine", init_shift=[0, 0, 0], init_rotation=[0, 0, 0])
+    for side in SIDES:
+        whole.connect("A_1", "B_1", side, UP)
+    return Design(
+        overall="A rocket of two sub-structures: an engine, and a frame above it on four braces.",
+        parts={
+            "engine": PartDesign(description=f"{len(SIDES)} {CANNONS}", actions=engine_actions),
+            "frame": PartDesign(
+                description=f"A flat cross with arms of {arm} blocks",
+                actions=tuple(frame.actions),
+            ),
+        },
+        assembly=tuple(whole.actions),
+    )
+
+
+def payload_rocket(seed: int) -> Design:
+    """Four engines round a gripper, each on a post of its own beside the cargo."""
+    draft = Draft(modules="workshop")
+    middle = draft.start("over the cargo")
+    gripper = draft.attach(middle, DOWN, "Grabber")
+    cannons = []
+    for side in SIDES:
+        end = draft.row(middle, side, 2)[-1]
+        cannons.append(draft.cannon(end, side, DOWN))
+        draft.torch(draft.row(end, DOWN, 2)[-1], side, UP)
+    begin = 1.9 + 0.1 * (seed % 4)
+    return Design(
+        overall="Four heated cannons round a gripper that holds the cargo between their posts.",
+        parts={
+            "rocket": PartDesign(
+                description="A cross, a post of 3 with a cannon and a torch at each end, a gripper",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "It waits until the cargo is heavy, and fires all cannons at once.",
+            "control_config": [
+                {"block": gripper, "action": "grab", "keys": ["Alpha2"]},
+                *({"block": it, "action": "hold_to_fire", "keys": ["Alpha1"]} for it in cannons),
+            ],
+            "control_sequence": [{"time": begin, "key": "Alpha1", "hold_for": 12.0}],
+        },
+    )
+
+
+def _engine(sides: Sequence[Direction], *, load: int) -> tuple[Action, ...]:
+    draft = Draft()
+    middle = draft.start("between the cannons")
+    for side in sides:
+        draft.cannon(middle, side, DOWN)
+    low = draft.row(middle, DOWN, 2)[-1]
+    for side in sides:
+        draft.torch(low, side, UP)
+    draft.row(middle, UP, load)
+    return tuple(draft.actions)
+
+
+DESIGNS: Final[Designs] = {
+    "lift-1": engine,
+    "lift-2": rocket,
+    "lift-3": framed_rocket,
+    "lift-4": payload_rocket,
+}

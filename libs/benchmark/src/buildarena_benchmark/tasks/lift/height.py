@@ -1,0 +1,161 @@
+"""Lift, levels 2 and 3: how high a rocket rises."""
+
+from typing import Final, Literal
+
+import numpy as np
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.carrying import touches_from_below
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.outline import lowest_points
+from buildarena_benchmark.scoring.measures.series import speeds, starting_block
+from buildarena_benchmark.scoring.scorer import (
+    Deciding,
+    Finding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+)
+from buildarena_benchmark.tasks.lift.thrust import thrust_to_weight
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+
+_TAKEN_OFF: Final = 1.0
+"""A rocket has taken off when its starting block is so far above its start, units."""
+
+_GROUNDED: Final = 0.1
+"""What is as low touches the ground, units: it need not be seen to press on it."""
+
+
+TWR_BELOW_ONE: Final = Flag(
+    name="twr_below_one",
+    meaning="A rocket rose although its thrust is less than its weight.",
+)
+
+
+class HeightScoring(Document):
+    """How high a rocket rises.
+
+    Attributes:
+        min_height: The indicator must exceed it, units.
+        early_s: (2,) first window, seconds, its start excluded.
+        late_s: (2,) second window.
+        min_rise: The mean height must rise by more from window to window, units.
+    """
+
+    name: Literal["height"]
+    min_height: Threshold = 30.0
+    early_s: tuple[Threshold, Threshold] = (2.0, 7.0)
+    late_s: tuple[Threshold, Threshold] = (7.0, 12.0)
+    min_rise: Threshold = 5.0
+
+
+def infeasible(scoring: HeightScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    (start, end), (later, last) = scoring.early_s, scoring.late_s
+    if scenario.control.mode == "none":
+        return "a rocket is judged, but nothing fires: scenario.control.mode must be held"
+    if not start < end <= later < last <= scenario.duration_s:
+        return "early_s and late_s must be windows within the trial, one after the other"
+    return None
+
+
+def judge(
+    scoring: HeightScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the greatest height of any block that is joined to the starting block.
+
+    The trial succeeds if it exceeds a height and the rocket still rises: the mean height of its
+    highest block must grow from one window of time to the next. What has come off counts for
+    nothing, and neither does what follows once a rocket that has taken off touches the ground.
+
+    Args:
+        scoring: Thresholds.
+        scenario: What the machine was put through.
+        machine: Gives the mass.
+        trajectory: The trial.
+
+    Flags:
+        `twr_below_one`: success although the net thrust is less than the weight.
+
+    Source: the paper, section "Evaluation"; thresholds as in the published evaluation.
+    """
+    time_s = trajectory.time_s
+    positions = trajectory.positions.astype(np.float64)
+    joined = joined_to_start(machine, trajectory)
+    start = starting_block(machine, trajectory)
+    flown = _first_flight(machine, trajectory, joined, start)
+    highest = np.where(joined, positions[:, :, 2], -np.inf).max(axis=1)[:flown]
+    early, late = (
+        highest[(time_s[:flown] > begin) & (time_s[:flown] <= end)]
+        for begin, end in (scoring.early_s, scoring.late_s)
+    )
+    rise = float(late.mean() - early.mean()) if len(early) and len(late) else 0.0
+    indicator = float(highest.max())
+    success = indicator > scoring.min_height and rise > scoring.min_rise
+    # Up to the top only: how a rocket falls apart when it comes down does not concern its rise.
+    ratio, cannons = thrust_to_weight(machine, trajectory, joined, int(highest.argmax()) + 1)
+    body = positions[:, start]
+    sideways = np.linalg.norm(body[:, :2] - body[0, :2], axis=1)
+    moving = joined[1:] & joined[:-1]
+    metrics: dict[str, Metric] = {
+        **cannons,
+        "thrust_to_weight": rounded(ratio),
+        "rise": rounded(rise),
+        "max_speed": rounded(speeds(time_s, positions).max(initial=0.0, where=moving)),
+        "lateral_deviation": rounded(sideways.mean()),
+        "landed_s": None if flown == len(time_s) else rounded(time_s[flown]),
+        "broken_joints": len(trajectory.breaks),
+    }
+    flags = (TWR_BELOW_ONE,) if success and ratio < 1.0 else ()
+    return Verdict(
+        success=success,
+        indicator=rounded(indicator),
+        metrics=metrics,
+        flags=flags,
+        deciding=Deciding(samples=len(time_s), members=joined, cargo=False),
+    )
+
+
+def _first_flight(machine: "Machine", trajectory: "Trajectory", joined: Mask, start: int) -> int:
+    """How many samples there are before a rocket that has taken off touches the ground."""
+    height = trajectory.positions[:, start, 2].astype(np.float64)
+    low = lowest_points(machine, trajectory, joined)
+    # Between two samples it may have touched and bounced: it would be below the ground by now.
+    steps = np.diff(low, prepend=low[0])
+    coming = np.concatenate([[False], (low[:-1] + np.minimum(steps[:-1], 0.0)) <= 0.0])
+    touches = (low <= _GROUNDED) | coming
+    if trajectory.bearing is not None:
+        touches |= touches_from_below(machine, trajectory, joined)
+    flies = ~touches & (height - height[0] >= _TAKEN_OFF)
+    if not flies.any():
+        return len(height)
+    landings = np.flatnonzero(touches[flies.argmax() :])
+    return int(flies.argmax() + landings[0]) if len(landings) else len(height)
+
+
+def explain(scoring: HeightScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if "rise" not in told:
+        return "The rocket did not take off."
+    (early, until), late = scoring.early_s, scoring.late_s[1]
+    if found.indicator < scoring.min_height:
+        return f"The rocket reached {found.indicator:.1f}; {scoring.min_height:g} is asked."
+    if found.success:
+        return f"The rocket reached {found.indicator:,.0f} and was still rising."
+    return (
+        f"The rocket reached {found.indicator:.1f}, but rose by {told['rise']:.1f} from {early:g}-"
+        f"{until:g} s to {until:g}-{late:g} s, and {scoring.min_rise:g} is asked."
+    )
+
+
+SCORER: Final = Scorer(
+    parameters=HeightScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(TWR_BELOW_ONE,),
+)

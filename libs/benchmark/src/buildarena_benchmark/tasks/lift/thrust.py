@@ -1,0 +1,115 @@
+"""Lift, level 1: thrust over weight."""
+
+import math
+from typing import Final, Literal
+
+import numpy as np
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start, mass_of
+from buildarena_benchmark.scoring.measures.series import gravity_of
+from buildarena_benchmark.scoring.scorer import Deciding, Finding, Metric, Scorer, Verdict, rounded
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import GRAVITY
+
+_WARM_UP_S = 1.0
+_HEATED_SHARE = 0.5
+
+
+class ThrustScoring(Document):
+    """Thrust over weight.
+
+    Attributes:
+        min_ratio: The indicator must exceed it.
+    """
+
+    name: Literal["thrust"]
+    min_ratio: Threshold = 1.0
+
+
+def infeasible(scoring: ThrustScoring, scenario: Scenario) -> str | None:
+    """Some machine can always pass."""
+    del scoring, scenario
+    return None
+
+
+def judge(
+    scoring: ThrustScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the net thrust's length over the weight.
+
+    Args:
+        scoring: Thresholds.
+        scenario: What the machine was put through.
+        machine: Gives the mass, the cannons' thrusts and directions.
+        trajectory: Gives the heated cannons, and those that stay joined.
+
+    Source: the paper, section "Evaluation", with thrusts added as vectors.
+    """
+    joined = joined_to_start(machine, trajectory)
+    count = len(trajectory.time_s)
+    ratio, metrics = thrust_to_weight(machine, trajectory, joined, count)
+    return Verdict(
+        success=ratio > scoring.min_ratio,
+        indicator=rounded(ratio),
+        metrics=metrics,
+        deciding=Deciding(samples=count, members=joined, cargo=False),
+    )
+
+
+def thrust_to_weight(
+    machine: "Machine", trajectory: "Trajectory", joined: Mask, samples: int
+) -> tuple[float, dict[str, Metric]]:
+    """Net thrust over weight, and how many of its cannons are heated and cold.
+
+    The thrusts are added as vectors, in the machine as it was built: cannons that push against
+    each other cancel. A cannon counts if it stays joined to the starting block; the weight is that
+    of everything joined to it at the start, so that nothing is gained by parts that come off. A
+    cannon counts as heated if a flame touches it for half the trial, its first second aside.
+
+    Args:
+        machine: The machine.
+        trajectory: The trial.
+        joined: As from `joined_to_start`.
+        samples: How many samples a cannon must stay joined for.
+    """
+    settled = trajectory.heated[trajectory.time_s >= _WARM_UP_S]
+    share = settled.mean(axis=0) if len(settled) else np.zeros(len(trajectory.cannon_ids))
+    stays = dict(
+        zip(trajectory.block_ids, np.atleast_1d(joined[:samples].all(axis=0)), strict=True)
+    )
+    pushes, heated = [], 0
+    for block_id, hot in zip(trajectory.cannon_ids, share >= _HEATED_SHARE, strict=True):
+        block = machine.blocks[block_id]
+        thrust, spray = block.module.thrust, block.pointing_xyz
+        if thrust is None or spray is None or not stays.get(block_id, True):
+            continue
+        heated += int(hot)
+        size = thrust.heated if hot else thrust.cold
+        pushes.append([-size * component for component in spray])
+    # Exact sums: they do not depend on the cannons' order.
+    net = [math.fsum(component) for component in zip(*pushes, strict=True)]
+    mass = mass_of(machine, trajectory, joined[0])
+    weight = mass * (gravity_of(trajectory) / GRAVITY)
+    ratio = math.hypot(*net) / weight if weight > 0 else 0.0
+    return ratio, {"heated_cannons": heated, "cold_cannons": len(pushes) - heated}
+
+
+def explain(scoring: ThrustScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    count = found.metrics.get("heated_cannons")
+    if not count:
+        return "No heated cannon pushed."
+    return (
+        f"{count} heated cannons pushed {found.indicator:.2f} times the weight; "
+        f"{scoring.min_ratio:g} is asked."
+    )
+
+
+SCORER: Final = Scorer(
+    parameters=ThrustScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+)

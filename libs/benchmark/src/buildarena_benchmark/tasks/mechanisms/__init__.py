@@ -1,0 +1,1 @@
+"""Suspensions and gears: what joints and motors make of a machine."""

@@ -1,0 +1,153 @@
+"""Arms that take hold of a cargo: one swings it over a wall, one lifts it by gears."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from typing import Final
+
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.drafting import (
+    DOWN,
+    EAST,
+    NORTH,
+    SOUTH,
+    UP,
+    WEST,
+    Draft,
+)
+
+_MOTORS = 4
+_HALF_WIDTH, _HALF_LENGTH, _TRAY = 2, 3, 2
+_LIGHT_S = 0.8
+"""When a cargo that grows heavier is still light enough for three motors, seconds."""
+
+
+def loaded_lift(seed: int) -> Design:
+    """The same machine with three of its motors: all four jerk, and a light cargo slips off."""
+    return _geared_lift(_LIGHT_S + 0.04 * (seed % 4), lasts=1.3, driven=3)
+
+
+def _geared_lift(begin: float, *, lasts: float, driven: int = _MOTORS) -> Design:
+    """A geared arm with a counterweight.
+
+    Args:
+        begin: When it begins to lift, seconds.
+        lasts: For how long it does, seconds.
+        driven: How many of its motors do.
+    """
+    named = "All four motors" if driven == _MOTORS else f"{driven} of the motors"
+    draft = Draft(modules="workshop")
+    beams, hub, post = _trestle(draft)
+    wheel = draft.attach(hub, EAST, "Cog Large Unpowered")
+    motors = [draft.attach(base, EAST, "Cog Medium Powered") for base in post]
+    root = draft.attach(wheel, EAST)
+    hand = draft.attach(draft.row(root, NORTH, 6)[-1], EAST, "Swivel")
+    draft.attach(draft.row(hand, DOWN, 3)[-1], DOWN, "Grabber")
+    # A unit longer, the weights would brush the ground while the arm rises.
+    near = draft.row(root, SOUTH, 3)[-1]
+    for way in (EAST, UP, DOWN):
+        draft.attach(near, way, "Log", note="counterweight")
+    draft.attach(draft.attach(near, SOUTH), EAST, "Log", note="counterweight")
+    _brace(draft, beams, post)
+    return Design(
+        overall="A trestle with a geared arm: four motors on one large wheel, a counterweight.",
+        parts={
+            "lift": PartDesign(
+                description="Two beams on the ground, a post of 8, an arm of 6 on a large wheel",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": f"{named} lift together, and brake when the key is let go.",
+            "control_config": [
+                {"block": motor, "action": "spinning_forward", "keys": ["UpArrow"]}
+                for motor in motors[:driven]
+            ],
+            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": lasts}],
+        },
+    )
+
+
+_Beams = dict[str, list[str]]
+
+
+def _trestle(draft: Draft) -> tuple[_Beams, str, list[str]]:
+    """Beams on both sides of the cargo, and a post with seats for a wheel and its motors.
+
+    Returns:
+        The beams by name, the block of the large wheel, and those of the motors.
+    """
+    middle = draft.start("between the beams")
+    beams = {"west": draft.row(middle, WEST, 3)}
+    foot, east = beams["west"][-1], draft.row(middle, EAST, 2)[-1]
+    beams["near"] = draft.row(foot, NORTH, 8)
+    beams["far"] = draft.row(east, NORTH, 8)
+    beams["back"] = draft.row(foot, SOUTH, 4)
+    beams["post"] = draft.row(foot, UP, 8)
+    hub = beams["post"][4]
+    ahead, behind = draft.row(hub, NORTH, 3)[-1], draft.row(hub, SOUTH, 3)[-1]
+    return beams, hub, [beams["post"][1], beams["post"][7], ahead, behind]
+
+
+def _brace(draft: Draft, beams: _Beams, post: list[str]) -> None:
+    """Braces from the motors' seats to beams and top, across the beams, and about the foot."""
+    _, top, ahead, behind = post
+    west, near = beams["west"], beams["near"]
+    draft.connect(ahead, near[5], NORTH, UP)
+    draft.connect(behind, beams["back"][3], SOUTH, UP)
+    draft.connect(top, ahead, NORTH, UP)
+    draft.connect(top, behind, SOUTH, UP)
+    for k in (7, 5, 3):
+        draft.connect(near[k], beams["far"][k], EAST, WEST)
+    draft.connect(west[0], beams["post"][0], UP, EAST)
+    draft.connect(west[0], west[2], SOUTH, DOWN)
+    draft.connect(west[1], west[2], NORTH, DOWN)
+    draft.connect(west[0], near[1], NORTH, EAST)
+
+
+def rough_rider(seed: int) -> Design:
+    """A tray on four large wheels, each on a spring leg of its own."""
+    begin = 1.0 + 0.1 * (seed % 5)
+    draft = Draft(modules="workshop")
+    middle = draft.start("under the cargo")
+    deck = {(0, 0): middle}
+    for sign, way in ((1, NORTH), (-1, SOUTH)):
+        for y, block in enumerate(draft.row(middle, way, _HALF_LENGTH), 1):
+            deck[0, sign * y] = block
+    for y in (*range(-_TRAY, _TRAY + 1), -_HALF_LENGTH, _HALF_LENGTH):
+        for sign, way in ((1, EAST), (-1, WEST)):
+            for x, block in enumerate(draft.row(deck[0, y], way, _HALF_WIDTH), 1):
+                deck[sign * x, y] = block
+    for (x, y), block in deck.items():
+        if abs(y) <= _TRAY and (abs(x) == _HALF_WIDTH or abs(y) == _TRAY):
+            draft.attach(block, UP, note="rail")
+    wheels = []
+    for y in (_HALF_LENGTH, -_HALF_LENGTH):
+        for x, side in ((_HALF_WIDTH, EAST), (-_HALF_WIDTH, WEST)):
+            leg = draft.attach(deck[x, y], DOWN, "Suspension")
+            wheels.append(draft.wheel(leg, side, "Large Wheel"))
+    return Design(
+        overall="A railed tray on four large wheels, each sprung by itself.",
+        parts={
+            "rover": PartDesign(
+                description="A tray of 5 x 5 with rails, a spring leg and a wheel at each corner",
+                actions=tuple(draft.actions),
+            )
+        },
+        control={
+            "control_design": "All wheels drive north.",
+            "control_config": [
+                {"block": wheel, "action": "spinning_forward", "keys": ["UpArrow"]}
+                for wheel in wheels
+            ],
+            "control_sequence": [{"time": begin, "key": "UpArrow", "hold_for": 8.0}],
+        },
+    )
+
+
+DESIGNS: Final[Designs] = {
+    "mechanisms-1": rough_rider,
+    "mechanisms-7": loaded_lift,
+}

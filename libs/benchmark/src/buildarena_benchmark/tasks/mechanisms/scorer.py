@@ -1,0 +1,181 @@
+"""Rough road: how far, and how gently, a cargo is driven over bumps."""
+
+from typing import Final, Literal
+
+import numpy as np
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.carrying import bears_cargo
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.rolling import driven_distances, moved_upright
+from buildarena_benchmark.scoring.measures.series import (
+    Series,
+    gravity_of,
+    rotations,
+    starting_block,
+)
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    FORCES_NOT_MEASURED,
+    NOT_CARRIED,
+    NOT_DRIVEN,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+_MOVING: Final = 0.5
+"""Slower machines count as waiting, units/s: that makes no ride gentler."""
+
+_MOVING_SAMPLES: Final = 12
+"""Speed is judged over so many samples, half a second."""
+
+_BORNE_SAMPLES: Final = 25
+"""Whether the cargo is borne is judged over a second: it may hop."""
+
+
+class RoadScoring(Document):
+    """How far, and how gently, a vehicle carries a cargo over a rough road northwards.
+
+    Attributes:
+        min_distance: The distance must exceed it, units.
+        max_rms: The root mean square of the cargo's vertical acceleration must lie below it, g.
+        max_shift: Farthest that the cargo may get from its place on the machine, units.
+        settle_s: When the cargo's place is taken, and accelerations begin to count, seconds.
+        half_width: Of the road about x = 0, units; beyond it nothing counts any more.
+        length: Of the road: farther distances count as this, units.
+    """
+
+    name: Literal["road"]
+    min_distance: Threshold = 30.0
+    max_rms: Threshold = 1.0
+    max_shift: Threshold = 1.5
+    settle_s: Threshold = 2.0
+    half_width: Threshold = 15.0
+    length: Threshold = 36.0
+
+
+def infeasible(scoring: RoadScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.cargo is None:
+        return "the cargo is judged, but scenario has no cargo"
+    if scoring.settle_s >= scenario.duration_s:
+        return f"settle_s {scoring.settle_s:g} is not within the trial"
+    if scoring.length <= scoring.min_distance:
+        return f"the road's length {scoring.length:g} does not exceed min_distance"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: RoadScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is the distance northwards over 1 + the RMS of the cargo's acceleration in g.
+
+    The distance is the starting block's, as far as wheels drove it (see `driven_distances`), on the
+    road, and while the cargo stays near its place on the machine, which bears it. The acceleration
+    is vertical, and counts while the machine moves, from when the cargo has settled until the
+    machine has got farthest, or to the road's end.
+
+    Args:
+        scoring: Thresholds.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_driven`: far enough, but not by wheels. `not_carried`: far enough, but without the
+        cargo. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=True)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+    on_road = np.logical_and.accumulate(np.abs(path[:, 0]) <= scoring.half_width)
+    ahead = np.where(on_road, np.minimum(path[:, 1] - path[0, 1], scoring.length), 0.0)
+    driven = driven_distances(machine, trajectory, joined, path)
+    reach = np.zeros_like(ahead) if driven is None else driven
+    counted = np.minimum(ahead, np.minimum(reach, moved_upright(trajectory, joined, path)))
+    keeps, shift = _keeps_cargo(scoring, machine, trajectory, path)
+    distances = np.where(keeps, counted, 0.0)
+    distance, farthest = float(distances.max(initial=0.0)), int(distances.argmax())
+    rms = _ride(scoring, trajectory, path, farthest)
+    far = distance > scoring.min_distance
+    flags = {
+        NOT_DRIVEN: ahead.max() > scoring.min_distance >= counted.max(),
+        NOT_CARRIED: counted.max() > scoring.min_distance and not far,
+    }
+    metrics: dict[str, Metric] = {
+        "distance": rounded(distance),
+        "rms_acceleration": rounded(rms),
+        "cargo_shift": rounded(shift[: farthest + 1].max(initial=0.0)),
+        "broken_joints": len(trajectory.breaks),
+    }
+    return Verdict(
+        success=far and rms < scoring.max_rms,
+        indicator=rounded(distance / (1.0 + rms)),
+        metrics=metrics,
+        flags=raised(flags),
+        deciding=Deciding(samples=len(path), members=joined, cargo=True),
+    )
+
+
+def _keeps_cargo(
+    scoring: RoadScoring, machine: "Machine", trajectory: "Trajectory", path: Series
+) -> tuple[Mask, Series]:
+    """Until when the machine has its cargo, (T,), and how far from its place, (T,) units."""
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    turns = rotations(trajectory.quaternions[:, starting_block(machine, trajectory)])
+    apart = trajectory.cargo_position.astype(np.float64) - path
+    place = np.einsum("tji,tj->ti", turns, apart)
+    settled = int(np.searchsorted(trajectory.time_s, scoring.settle_s - 1e-9))
+    settled = min(settled, len(place) - 1)
+    shift = np.linalg.norm(place - place[settled], axis=1)
+    shift[:settled] = 0.0
+    keeps = (shift <= scoring.max_shift) & bears_cargo(trajectory, samples=_BORNE_SAMPLES)
+    keeps[:settled] = True
+    return np.logical_and.accumulate(keeps), shift
+
+
+def _ride(scoring: RoadScoring, trajectory: "Trajectory", path: Series, farthest: int) -> float:
+    """RMS of the cargo's vertical acceleration on its way, g."""
+    assert trajectory.cargo_position is not None  # noqa: S101 - the caller looked
+    height = trajectory.cargo_position[:, 2].astype(np.float64)
+    pull = np.zeros(len(height))
+    pull[1:-1] = np.diff(height, 2) * SAMPLE_RATE_HZ**2 / gravity_of(trajectory)
+    before = np.maximum(np.arange(len(path)) - _MOVING_SAMPLES, 0)
+    moved = np.linalg.norm(path[:, :2] - path[before, :2], axis=1)
+    counts = (moved > _MOVING * _MOVING_SAMPLES / SAMPLE_RATE_HZ) & (
+        trajectory.time_s >= scoring.settle_s
+    )
+    counts[farthest + 1 :] = False
+    return float(np.sqrt(np.mean(pull[counts] ** 2))) if counts.any() else 0.0
+
+
+def explain(scoring: RoadScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if "distance" not in told:
+        return "No wheel was driven."
+    rode = f"The cargo rode {told['distance']:.1f} at {told['rms_acceleration']:.2f} g"
+    if found.success:
+        return f"{rode}."
+    return f"{rode}; {scoring.min_distance:g} at most {scoring.max_rms:g} g is asked."
+
+
+SCORER: Final = Scorer(
+    parameters=RoadScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_DRIVEN, NOT_CARRIED, FORCES_NOT_MEASURED),
+    ceiling=lambda scoring, _scenario: scoring.length,
+)

@@ -1,0 +1,1 @@
+"""Flights round a small planet."""

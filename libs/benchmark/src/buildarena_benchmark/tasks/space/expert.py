@@ -1,0 +1,52 @@
+"""Machines that fly round a planet: four pairs of nozzles round a starting block."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from typing import Final
+
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, UP, WEST, Draft
+from buildarena_benchmark.experts.programs import program_text, quoted
+
+_GRAVITY: Final = 32.81
+_NOZZLE_PUSH: Final = 0.767
+"""What a nozzle pushes, in masses that it would hold up."""
+
+
+def returner(seed: int) -> Design:
+    """The same craft, which flies higher and more slowly, and brakes above where it started."""
+    return _craft("returning", speed=f"{110 + 2 * (seed % 5)}")
+
+
+def _craft(program: str, *, speed: str) -> Design:
+    draft = Draft(modules="all")
+    middle = draft.start("middle of the craft")
+    nozzles = {}
+    for name, way in (("north", NORTH), ("east", EAST), ("south", SOUTH), ("west", WEST)):
+        nozzles[name] = draft.attach(middle, way, "Steering Thruster")
+        draft.turn_axis(nozzles[name], 1, UP)
+    return Design(
+        overall="A starting block with nozzles on each side, which flies by how they differ.",
+        parts={
+            "craft": PartDesign(
+                description="Four Steering Thrusters on the sides of the starting block",
+                actions=tuple(draft.actions),
+            )
+        },
+        program=program_text(
+            __package__,
+            "orbiting",
+            **quoted(nozzles),
+            push=f"{4 * _NOZZLE_PUSH * _GRAVITY:g}",
+            mass=f"{float(draft.machine.mass):g}",
+        )
+        + program_text(__package__, program, speed=speed),
+    )
+
+
+DESIGNS: Final[Designs] = {
+    "orbit-2": returner,
+}

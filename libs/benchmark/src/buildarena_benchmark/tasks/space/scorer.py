@@ -1,0 +1,244 @@
+"""Orbit: how fast a machine flies round a planet, and how near to its start it comes down again."""
+
+import math
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.carrying import from_below
+from buildarena_benchmark.scoring.measures.components import (
+    Mask,
+    joined_to_start,
+    masses_of_blocks,
+)
+from buildarena_benchmark.scoring.measures.series import Series, starting_block
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_benchmark.tasks.space.orbits import swept
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+_NEAR: Final = 2.0
+"""A machine comes down once a block's centre is so near the ground, units: a large tank's half."""
+
+_BORNE: Final = 0.5
+"""Smallest share of its weight without fuel that the ground bears of a machine that has landed."""
+
+_RESTS: Final = 5
+"""Samples over which it is judged whether a machine is at rest."""
+
+
+class Return(Document):
+    """How a machine must come down.
+
+    Attributes:
+        max_speed: It must be slower from when it is near the ground on, units/s.
+        hold_s: How long after that it is judged, seconds.
+        rest_speed: At the end of that it must be slower, units/s.
+        max_distance: And no farther from where it started, along the ground, units.
+    """
+
+    max_speed: Threshold = 6.0
+    hold_s: Annotated[float, Field(ge=1, le=60)] = 4.0
+    rest_speed: Threshold = 0.2
+    max_distance: Threshold = 30.0
+
+
+class OrbitScoring(Document):
+    """How often a machine flies round a planet.
+
+    Attributes:
+        cycles: So many times.
+        least_height: The way round counts from when its starting block is so high for the first
+            time until it is lower, units above the ground.
+        landing: How it must come down after that; None where it need not.
+    """
+
+    name: Literal["orbit"]
+    cycles: Annotated[float, Field(gt=0, le=100)] = 3.0
+    least_height: Threshold = 20.0
+    landing: Return | None = None
+
+
+def infeasible(scoring: OrbitScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if scenario.planet is None:
+        return "an orbit is judged, but there is no scenario.planet"
+    if scoring.landing is not None and scoring.landing.hold_s >= scenario.duration_s:
+        return f"landing.hold_s {scoring.landing.hold_s:g} is longer than the trial"
+    return undriven(scenario)
+
+
+def judge(
+    scoring: OrbitScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is cycles a minute, from the start until all are flown, or until it lands.
+
+    The starting block's way round the planet's centre counts, about the axis about which it turns
+    most, from when it has risen to the least height for the first time until it is lower again.
+    Where the machine must come back, time runs until it lands. A trial that fails has 0.
+
+    Args:
+        scoring: Thresholds.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `came_apart`: it would have passed, but lost parts while it landed. `forces_not_measured`:
+        cannot be judged.
+    """
+    planet = scenario.planet
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None or planet is None:
+        return lacking or Verdict(success=False, indicator=0.0)
+    start = starting_block(machine, trajectory)
+    joined = joined_to_start(machine, trajectory)
+    center = np.array([0.0, 0.0, -planet.radius])
+    arms = trajectory.positions.astype(np.float64) - center
+    heights = np.linalg.norm(arms, axis=2) - planet.radius
+    first, last = _flight(heights[:, start], scoring.least_height)
+    angle = swept(arms[first:last, start], np.zeros(3))
+    rounds = np.abs(angle) / (2.0 * math.pi)
+    done = np.flatnonzero(rounds >= scoring.cycles)
+    metrics: dict[str, Metric] = {
+        "cycles": rounded(rounds.max(initial=0.0)),
+        "greatest_height": rounded(heights[:, start].max()),
+        "least_height": rounded(heights[first:last, start].min(initial=np.inf))
+        if first < last
+        else None,
+        "broken_joints": len(trajectory.breaks),
+    }
+    if not len(done):
+        return Verdict(success=False, indicator=0.0, metrics=metrics)
+    passed = first + int(done[0])
+    lasted_s = float(trajectory.time_s[passed])
+    metrics["completed_s"] = rounded(lasted_s)
+    if scoring.landing is None:
+        return Verdict(
+            success=True,
+            indicator=rounded(60.0 * scoring.cycles / lasted_s),
+            metrics=metrics,
+            deciding=Deciding(samples=passed + 1, members=joined, cargo=False),
+        )
+    around = (planet.radius, arms, heights)
+    verdict = _landed(scoring.landing, machine, trajectory, around, (joined, start, passed))
+    return Verdict(
+        success=verdict.success,
+        indicator=rounded(scoring.cycles * verdict.indicator),
+        metrics={**metrics, **verdict.metrics},
+        flags=verdict.flags,
+        deciding=verdict.deciding,
+    )
+
+
+def _flight(height: Series, least: float) -> tuple[int, int]:
+    """The first sample at which a block is as high as it must be, and the next at which not."""
+    high = height >= least
+    if not high.any():
+        return 0, 0
+    first = int(high.argmax())
+    low = np.flatnonzero(~high[first:])
+    return first, first + int(low[0]) if len(low) else len(height)
+
+
+def _landed(
+    rules: Return,
+    machine: "Machine",
+    trajectory: "Trajectory",
+    around: tuple[float, Series, Series],
+    flight: tuple[Mask, int, int],
+) -> Verdict:
+    """How a machine came down after its flight; the indicator is flights a minute.
+
+    Args:
+        rules: How it must.
+        machine: The machine.
+        trajectory: The trial.
+        around: The planet's radius; of the blocks, from its centre (T, N, 3), and their heights
+            (T, N), units.
+        flight: What is joined to the starting block (T, N), its index, and the sample from which
+            on the machine may land.
+    """
+    joined, start, passed = flight
+    radius, arms, heights = around
+    low = np.where(joined, heights, np.inf).min(axis=1)
+    down = np.flatnonzero(low[passed:] < _NEAR)
+    end = (
+        len(low) if not len(down) else passed + int(down[0]) + round(rules.hold_s * SAMPLE_RATE_HZ)
+    )
+    if end >= len(low):
+        return Verdict(success=False, indicator=0.0, metrics={"landed": bool(len(down))})
+    touch = passed + int(down[0])
+    steps = np.linalg.norm(np.diff(arms[touch - 1 : end + 1, start], axis=0), axis=1)
+    fastest = float(steps.max()) * SAMPLE_RATE_HZ
+    last = arms[end, start] - arms[end - _RESTS, start]
+    speed = float(np.linalg.norm(last)) * SAMPLE_RATE_HZ / _RESTS
+    cosine = arms[end, start] @ arms[0, start]
+    cosine /= np.linalg.norm(arms[end, start]) * np.linalg.norm(arms[0, start])
+    away = radius * float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    dry = float((_dry_masses(machine, trajectory) * joined[end]).sum())
+    landed = (
+        fastest < rules.max_speed
+        and speed < rules.rest_speed
+        and away < rules.max_distance
+        and float(from_below(trajectory)[end]) > _BORNE * dry
+    )
+    whole = bool((joined[end] == joined[touch]).all())
+    success = landed and whole
+    return Verdict(
+        success=success,
+        indicator=60.0 / float(trajectory.time_s[touch]) if success else 0.0,
+        metrics={
+            "landed": True,
+            "landing_s": rounded(trajectory.time_s[touch]),
+            "speed_at_landing": rounded(fastest),
+            "distance_to_start": rounded(away),
+        },
+        flags=(CAME_APART,) if landed and not whole else (),
+        deciding=Deciding(samples=end + 1, members=joined, cargo=False),
+    )
+
+
+def _dry_masses(machine: "Machine", trajectory: "Trajectory") -> Series:
+    """Mass of each tracked block without fuel, (N,), mass units."""
+    modules = [machine.blocks[block].module for block in trajectory.block_ids]
+    fuel = np.array([module.tank.mass if module.tank else 0.0 for module in modules])
+    return np.asarray(masses_of_blocks(machine, trajectory) - fuel)
+
+
+def explain(scoring: OrbitScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if told.get("cycles", 0.0) < scoring.cycles:
+        return f"It flew {told.get('cycles', 0.0):.2f} rounds; {scoring.cycles:g} are asked."
+    if found.success:
+        return f"It flew {scoring.cycles:g} rounds in {told['completed_s']:.1f} s and landed."
+    if not told.get("landed"):
+        return "It flew round, but did not come down."
+    return (
+        f"It flew round and came down at {told['speed_at_landing']:.1f} units/s, "
+        f"{told['distance_to_start']:.1f} from its start."
+    )
+
+
+SCORER: Final = Scorer(
+    parameters=OrbitScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(CAME_APART, FORCES_NOT_MEASURED),
+)

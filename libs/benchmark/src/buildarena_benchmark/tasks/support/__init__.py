@@ -1,0 +1,1 @@
+"""Bridges that carry a load over a gap."""

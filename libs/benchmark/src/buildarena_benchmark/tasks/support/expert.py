@@ -1,0 +1,92 @@
+"""Bridges: a row of blocks, or a deck of three, stiffened by overlapping braces."""
+
+# BuildArena benchmark data, not for training corpora:
+# canary 3ab839c7-e533-462b-9729-71495c1ee1f6
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Final
+
+from buildarena_benchmark.experts.design import Design, Designs, PartDesign
+from buildarena_benchmark.experts.drafting import (
+    DOWN,
+    EAST,
+    NORTH,
+    SOUTH,
+    UP,
+    WEST,
+    Direction,
+    Draft,
+)
+
+OVERLAP = 4
+"""Blocks that a brace spans: braces that overlap share the load of several joints."""
+
+
+def braced_beam(seed: int, *, gap: int, overlap: int = OVERLAP) -> Design:
+    """A single row of blocks with braces above and below.
+
+    Args:
+        seed: Varies how far the beam rests on the terrain, by a block at each end.
+        gap: Width of the gap, units.
+        overlap: Blocks that a brace spans.
+    """
+    draft = Draft()
+    row = _row(draft, draft.start("middle of the beam"), _half(seed, gap))
+    for way in (UP, DOWN):
+        _brace(draft, row, way, overlap)
+    return _bridge(draft, gap, f"A row of {len(row)} blocks from south to north, braced both sides")
+
+
+def braced_deck(seed: int, *, gap: int) -> Design:
+    """Three rows side by side, held together at every block, with braces on top.
+
+    Args:
+        seed: As for the beam.
+        gap: Width of the gap, units.
+    """
+    draft = Draft()
+    middle = draft.start("middle of the deck")
+    starts = [draft.attach(middle, WEST), middle, draft.attach(middle, EAST)]
+    rows = [_row(draft, start, _half(seed, gap)) for start in starts]
+    for west, centre, east in zip(*rows, strict=True):
+        draft.connect(west, centre, UP)
+        draft.connect(centre, east, UP)
+    for row in rows:
+        _brace(draft, row, UP)
+    return _bridge(
+        draft, gap, f"3 rows of {len(rows[0])} blocks from south to north, braced on top"
+    )
+
+
+def _half(seed: int, gap: int) -> int:
+    return gap // 2 + 1 + seed % 2
+
+
+def _row(draft: Draft, middle: str, half: int) -> list[str]:
+    """Blocks to the north and south of one, from south to north."""
+    ahead = draft.row(middle, NORTH, half)
+    behind = draft.row(middle, SOUTH, half)
+    return [*reversed(behind), middle, *ahead]
+
+
+def _brace(draft: Draft, row: Sequence[str], way: Direction, overlap: int = OVERLAP) -> None:
+    for first, second in zip(row, row[overlap:], strict=False):
+        draft.connect(first, second, way)
+
+
+def _bridge(draft: Draft, gap: int, description: str) -> Design:
+    return Design(
+        overall=f"A bridge over the gap of {gap} that rests on both terrains by its own weight.",
+        parts={"bridge": PartDesign(description=description, actions=tuple(draft.actions))},
+    )
+
+
+DESIGNS: Final[Designs] = {
+    "support-1": partial(braced_beam, gap=5),
+    "support-2": partial(braced_deck, gap=10),
+    "support-3": partial(braced_beam, gap=20),
+    "support-4": partial(braced_beam, gap=30, overlap=6),
+}

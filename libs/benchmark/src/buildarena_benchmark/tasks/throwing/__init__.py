@@ -1,0 +1,1 @@
+"""Machines that throw a boulder: far, or through rings."""

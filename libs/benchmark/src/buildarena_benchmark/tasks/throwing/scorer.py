@@ -1,0 +1,391 @@
+"""Throwing: how far, or how well through rings a boulder flies."""
+
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.marks import (
+    MarkName,
+    center_of_mark,
+    lacking_mark,
+    moving_mark,
+    radius_of_mark,
+)
+from buildarena_benchmark.scoring.measures.outline import reaches
+from buildarena_benchmark.scoring.measures.series import Series, starting_block, tilt_deg
+from buildarena_benchmark.scoring.measures.thrown import (
+    TOUCH,
+    Flight,
+    flight_of,
+    gap_to_world,
+    gaps_to_parts,
+    loose_ball,
+    radius_of,
+)
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    BASE_MOVED,
+    CAME_APART,
+    FORCES_NOT_MEASURED,
+    START_TOO_HIGH,
+    Deciding,
+    Finding,
+    Flag,
+    Metric,
+    Scorer,
+    Verdict,
+    raised,
+    rounded,
+    undriven,
+)
+from buildarena_benchmark.tasks.throwing.works import most_work
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.scenario import GroundPlacement
+
+_NEAR: Final = 0.3
+"""While it is borne, the boulder may lift off the machine by so much: it rolls and settles."""
+
+_INSIDE: Final = 0.1
+"""Farther than this it may not begin inside a part, units: engines drive apart what overlaps."""
+
+_SLACK: Final = 0.5
+"""Height to which its own weight may be lifted by what no work explains, units."""
+
+_LEAST_HEIGHT: Final = 3.0
+"""What the published score asks a boulder to rise above, units."""
+
+NOT_BORNE: Final = Flag(
+    name="not_borne",
+    meaning="The boulder flew far enough, but no machine that is joined to the starting block "
+    "bore it for long enough before.",
+)
+CROSSED_LINE: Final = Flag(
+    name="crossed_line",
+    meaning="A part of the machine reached beyond the line before the boulder came down.",
+)
+THRUST_USED: Final = Flag(
+    name="thrust_used", meaning="The machine has a part that pushes or lifts by itself."
+)
+NOT_FREE: Final = Flag(
+    name="not_free",
+    meaning="The boulder touched something on its way, or flew as no free ball does.",
+)
+UNEXPLAINED: Final = Flag(
+    name="unexplained",
+    meaning="The boulder had more energy than springs, drives and falling parts can have given it, "
+    "or started inside a part.",
+)
+
+
+class ThrowScoring(Document):
+    """How far, or how well through rings, a boulder flies.
+
+    Attributes:
+        line: Name of the gate that is the line.
+        min_distance: Least distance beyond the line at which the boulder may come down, units.
+        rings: Names of the marks that are rings, in order: they face the line and stand; what flies
+            through one passes nearer to its middle than its radius less the boulder's.
+        borne_s: How long the machine must bear it before it flies, seconds.
+        max_base_shift: Until the boulder flies the starting block must stay nearer to where it was,
+            units. What the recoil does to the machine afterwards throws nothing.
+        max_tilt_deg: Until then the starting block must lean by less, degrees.
+        max_start_height: The boulder's centre must start lower, units: its own fall is no throw.
+        max_error: Largest share of its way by which its flight may stray from a free one.
+        max_unexplained: Largest share by which its energy may exceed the work done.
+    """
+
+    name: Literal["throw"]
+    line: MarkName = "line"
+    min_distance: Threshold = 10.0
+    rings: Annotated[tuple[MarkName, ...], Field(max_length=8, exclude_if=lambda v: not v)] = ()
+    borne_s: Annotated[float, Field(gt=0, le=60)] = 1.0
+    max_base_shift: Threshold = 3.0
+    max_tilt_deg: Annotated[float, Field(gt=0, le=180)] = 30.0
+    max_start_height: Threshold = 5.0
+    max_error: Annotated[float, Field(gt=0, le=1)] = 0.03
+    max_unexplained: Annotated[float, Field(ge=0, le=1)] = 0.05
+
+
+def infeasible(scoring: ThrowScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    gates = [gate.name for gate in scenario.gates]
+    if scoring.line not in gates:
+        return f"there is no gate {scoring.line!r}: there are {', '.join(gates) or 'none'}"
+    for name in scoring.rings:
+        lacking = lacking_mark(name, scenario) or moving_mark(scenario)
+        if lacking is not None:
+            return lacking
+    on_ground = isinstance(scenario.placement, GroundPlacement)
+    reasons = {
+        "a throw is from the ground, but scenario.placement.kind is not ground": not on_ground,
+        "gusts and pushes would throw as well: a throw is judged without them": scenario.pushes
+        or scenario.gusts is not None,
+        "what a machine did to its boulder is known only if all blocks are tracked": (
+            scenario.tracked_blocks != "all"
+        ),
+        f"borne_s {scoring.borne_s:g} is longer than the trial": (
+            scoring.borne_s >= scenario.duration_s
+        ),
+    }
+    return next((reason for reason, holds in reasons.items() if holds), undriven(scenario))
+
+
+def ceiling(scoring: ThrowScoring, scenario: Scenario) -> float | None:
+    """See `Scorer`: a throw may go any distance, but pass a ring no nearer than its middle."""
+    del scenario
+    return 2.0 * len(scoring.rings) or None
+
+
+def judge(
+    scoring: ThrowScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is how far a boulder flies, or how well it passes rings.
+
+    A ring that it passes untouched is worth 1, and up to 1 more the nearer to its middle.
+
+    The boulder is the first loose ball of the machine. What counts is where it first touches
+    ground or terrain, if the machine bore and threw it: 0 otherwise.
+
+    Args:
+        scoring: Thresholds, the line, and the rings.
+        scenario: What the machine was put through.
+        machine: The machine.
+        trajectory: The trial.
+
+    Flags:
+        `not_borne`: no machine that is joined to the starting block bore it before it flew.
+        `crossed_line`: a part was beyond the line. `thrust_used`: a part pushes or lifts.
+        `not_free`: it touched something on its way, or flew as no free ball does. `base_moved`:
+        the starting block did not stay before. `came_apart`: a joint broke before it flew.
+        `unexplained`: it has more energy than springs, drives and falling parts can have given.
+        `start_too_high`: it started high up. `forces_not_measured`: cannot be judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    ball = loose_ball(machine, trajectory)
+    if ball is None:
+        return Verdict(success=False, indicator=0.0, metrics={"flew": False})
+    gaps = gaps_to_parts(machine, trajectory, ball)
+    flight = flight_of(scenario, machine, trajectory, ball, gaps)
+    if flight is None:
+        return Verdict(success=False, indicator=0.0, metrics={"flew": False})
+    throw = _Throw(
+        scoring=scoring,
+        scenario=scenario,
+        machine=machine,
+        trajectory=trajectory,
+        ball=ball,
+        gaps=gaps,
+        joined=joined_to_start(machine, trajectory),
+        flight=flight,
+    )
+    faults = throw.faults()
+    distance = throw.distance()
+    rings = [throw.nearness(name) for name in scoring.rings]
+    far = distance >= scoring.min_distance and all(near > 0.0 for near in rings)
+    counts = not any(faults.values())
+    worth = max(distance, 0.0)
+    if rings:
+        worth = sum(1.0 + near for near in rings if near > 0.0)
+    members = throw.joined.copy()
+    members[:, ball] = True
+    return Verdict(
+        success=far and counts,
+        indicator=rounded(worth) if counts else 0.0,
+        metrics=throw.metrics(),
+        flags=raised({flag: far and fault for flag, fault in faults.items()}),
+        deciding=Deciding(samples=flight.landed + 1, members=members, cargo=False),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Throw:
+    """A trial in which the boulder flew.
+
+    Attributes:
+        scoring: As in `judge`.
+        scenario: As in `judge`.
+        machine: As in `judge`.
+        trajectory: As in `judge`.
+        ball: Index of the boulder among the tracked blocks.
+        gaps: (T, N) from its surface to each of them, units.
+        joined: (T, N) which are joined to the starting block.
+        flight: How it flew.
+    """
+
+    scoring: ThrowScoring
+    scenario: Scenario
+    machine: "Machine"
+    trajectory: "Trajectory"
+    ball: int
+    gaps: Series
+    joined: Mask
+    flight: Flight
+
+    def faults(self) -> dict[Flag, bool]:
+        """What makes the throw count for nothing."""
+        scoring, trajectory = self.scoring, self.trajectory
+        shift, lean = self._base()
+        flies_s = trajectory.time_s[self.flight.released + 1]
+        high = float(trajectory.positions[0, self.ball, 2]) >= scoring.max_start_height
+        modules = [block.module for block in self.machine.blocks.values()]
+        return {
+            NOT_BORNE: not self._is_borne(),
+            CROSSED_LINE: self._front() > 0.0,
+            THRUST_USED: any(each.thrust or each.greatest_push or each.wing for each in modules),
+            NOT_FREE: self.flight.error > scoring.max_error,
+            BASE_MOVED: shift >= scoring.max_base_shift or lean >= scoring.max_tilt_deg,
+            CAME_APART: any(event.time_s <= flies_s for event in trajectory.breaks),
+            UNEXPLAINED: self._is_unexplained(),
+            START_TOO_HIGH: high,
+        }
+
+    def metrics(self) -> dict[str, Metric]:
+        """What else is told of it."""
+        gravity = self.scenario.gravity
+        return {
+            "flew": True,
+            "distance": rounded(self.distance()),
+            "rings": self._passed(),
+            "parabola": rounded(self._parabola()),
+            "release_s": rounded(self.trajectory.time_s[self.flight.released]),
+            "release_speed": rounded(float(np.linalg.norm(self.flight.velocity))),
+            "flight_error": rounded(self.flight.error),
+            "energy": rounded(self._energy() / gravity),
+            "work": rounded(self._work() / gravity),
+            "base_shift": rounded(self._base()[0]),
+            "broken_joints": len(self.trajectory.breaks),
+        }
+
+    def distance(self) -> float:
+        """How far beyond the line it comes down, units."""
+        middle, ahead = self._line()
+        return float((self.flight.end[:2] - middle) @ ahead)
+
+    def nearness(self, ring: str) -> float:
+        """How near to a ring's middle it passes: 1 at that, 0 and less where it does not pass."""
+        middle, (_, ahead) = center_of_mark(ring, self.scenario), self._line()
+        room = radius_of_mark(ring, self.scenario) - radius_of(
+            self.machine, self.trajectory, self.ball
+        )
+        flown = slice(self.flight.released + 1, self.flight.landed)
+        path = self.trajectory.positions[flown, self.ball].astype(np.float64)
+        along = (path[:, :2] - middle[:2]) @ ahead
+        (before,) = np.nonzero((along[:-1] < 0.0) & (along[1:] >= 0.0))
+        if not len(before):
+            return 0.0
+        first = int(before[0])
+        share = -along[first] / (along[first + 1] - along[first])
+        at = path[first] + share * (path[first + 1] - path[first])
+        return 1.0 - float(np.linalg.norm(at - middle)) / room
+
+    def _parabola(self) -> float:
+        """BesiegeField's score: the distance from its start, times 1 + how far it rose.
+
+        It is 0 where the boulder never rose above a height of 3, or comes down nearer to the
+        starting block than a quarter of that distance. Source: its public release.
+        """
+        path = self.trajectory.positions[: self.flight.landed + 1, self.ball].astype(np.float64)
+        start = starting_block(self.machine, self.trajectory)
+        block = self.trajectory.positions[self.flight.landed, start].astype(np.float64)
+        distance = float(np.linalg.norm(self.flight.end[:2] - path[0, :2]))
+        apart = float(np.linalg.norm(self.flight.end - block))
+        if path[:, 2].max() < _LEAST_HEIGHT or apart < distance / 4:
+            return 0.0
+        return distance * (1.0 + float(path[:, 2].max() - path[0, 2]))
+
+    def _passed(self) -> int | None:
+        """How many rings it passes; None without rings."""
+        rings = self.scoring.rings
+        return sum(self.nearness(name) > 0.0 for name in rings) if rings else None
+
+    def _line(self) -> tuple[Series, Series]:
+        """The line's middle (2,), and the direction (2,) in which it is crossed."""
+        gate = next(gate for gate in self.scenario.gates if gate.name == self.scoring.line)
+        heading = np.radians(gate.heading_deg)
+        return np.array(gate.center), np.array([np.sin(heading), np.cos(heading)])
+
+    def _front(self) -> float:
+        """How far beyond the line any other part ever is until the boulder comes down, units."""
+        middle, ahead = self._line()
+        _, high = reaches(self.machine, self.trajectory, np.array([*ahead, 0.0]))
+        others = np.delete(high[: self.flight.landed + 1], self.ball, axis=1)
+        return float(others.max() - middle @ ahead)
+
+    def _base(self) -> tuple[float, float]:
+        """How far the starting block shifts, units, and leans, degrees, until the boulder flies."""
+        start, until = starting_block(self.machine, self.trajectory), self.flight.released + 2
+        path = self.trajectory.positions[:until, start].astype(np.float64)
+        lean = tilt_deg(self.trajectory, start)[:until]
+        return float(np.linalg.norm(path - path[0], axis=1).max()), float(lean.max())
+
+    def _mass(self) -> float:
+        return self.machine.blocks[self.trajectory.block_ids[self.ball]].module.mass
+
+    def _energy(self) -> float:
+        """What the boulder was given until it flew, mass·unit²/s²; its own fall is no gift."""
+        rise = float(self.flight.start[2]) - float(self.trajectory.positions[0, self.ball, 2])
+        motion = float(self.flight.velocity @ self.flight.velocity) / 2
+        return self._mass() * (motion + self.scenario.gravity * max(rise, 0.0))
+
+    def _work(self) -> float:
+        """What the machine can have given it, mass·unit²/s²."""
+        until = self.flight.released + 1
+        return most_work(self.scenario, self.machine, self.trajectory, self.ball, until)
+
+    def _is_unexplained(self) -> bool:
+        spare = _SLACK * self.scenario.gravity * self._mass()
+        most = (1.0 + self.scoring.max_unexplained) * self._work() + spare
+        return self._energy() > most or bool(self.gaps[0].min() < -_INSIDE)
+
+    def _is_borne(self) -> bool:
+        """Whether joined parts alone bore it, off the ground, for long enough."""
+        count = round(self.scoring.borne_s * SAMPLE_RATE_HZ)
+        if self.flight.released < count:
+            return False
+        window = slice(self.flight.released - count, self.flight.released + 1)
+        gaps, joined = self.gaps[window], self.joined[window]
+        center = self.trajectory.positions[window, self.ball].astype(np.float64)
+        near = np.where(joined, gaps, np.inf).min(axis=1) <= _NEAR
+        strange = np.where(joined, np.inf, gaps).min(axis=1) <= TOUCH
+        radius = radius_of(self.machine, self.trajectory, self.ball)
+        lifted = gap_to_world(self.scenario, center, radius) > TOUCH
+        return bool((near & lifted & ~strange).all())
+
+
+def explain(scoring: ThrowScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told = found.metrics
+    if not told.get("flew"):
+        return str(told.get("stayed") or "The boulder did not fly.")
+    if scoring.rings and not found.success and told["distance"] >= scoring.min_distance:
+        return f"The boulder passed {told['rings']} of {len(scoring.rings)} rings."
+    flew = f"The boulder came down {told['distance']:.1f} beyond the line"
+    return f"{flew}." if found.success else f"{flew}; {scoring.min_distance:g} is asked."
+
+
+SCORER: Final = Scorer(
+    parameters=ThrowScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(
+        NOT_BORNE,
+        CROSSED_LINE,
+        THRUST_USED,
+        NOT_FREE,
+        BASE_MOVED,
+        CAME_APART,
+        UNEXPLAINED,
+        START_TOO_HIGH,
+        FORCES_NOT_MEASURED,
+    ),
+    ceiling=ceiling,
+)

@@ -1,0 +1,1 @@
+"""Vehicles that carry cargo to a point, and back."""

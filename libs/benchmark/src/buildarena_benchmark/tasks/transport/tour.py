@@ -1,0 +1,172 @@
+"""Tour: how near to several marks, one after the other, a vehicle stops, and how soon."""
+
+from collections.abc import Callable
+from typing import Annotated, Final, Literal
+
+import numpy as np
+from pydantic import Field
+
+from buildarena_benchmark.fields import Document, Threshold
+from buildarena_benchmark.scoring.measures.components import Mask, joined_to_start
+from buildarena_benchmark.scoring.measures.marks import moving_mark
+from buildarena_benchmark.scoring.measures.rolling import explained_distances
+from buildarena_benchmark.scoring.measures.series import Series, starting_block
+from buildarena_benchmark.scoring.measures.unmeasured import unmeasured
+from buildarena_benchmark.scoring.scorer import (
+    FORCES_NOT_MEASURED,
+    NOT_DRIVEN,
+    Deciding,
+    Finding,
+    Metric,
+    Scorer,
+    Verdict,
+    rounded,
+    undriven,
+)
+from buildarena_geometry import Machine
+from buildarena_simulation import Scenario, Trajectory
+from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+
+class TourScoring(Document):
+    """How near to the scenario's marks, in their order, a vehicle stops.
+
+    Attributes:
+        reach: How near to a mark a stop must be to be one at it, units.
+        max_distance: Farthest from its mark that a stop of a trial that passes may be, units.
+        stop_s: How long a stop lasts, seconds.
+        max_speed: Slower than that is a stop, units/s.
+    """
+
+    name: Literal["tour"]
+    reach: Annotated[float, Field(gt=0, le=1000)] = 2.0
+    max_distance: Threshold = 1.0
+    stop_s: Annotated[float, Field(gt=0, le=600)] = 0.4
+    max_speed: Threshold = 0.25
+
+
+def infeasible(scoring: TourScoring, scenario: Scenario) -> str | None:
+    """Why no machine can pass; see `Scorer`."""
+    if not scenario.marks:
+        return "a vehicle goes from mark to mark, but scenario.marks has none"
+    if scoring.stop_s * len(scenario.marks) >= scenario.duration_s:
+        return f"stops of {scoring.stop_s:g} s at every mark are longer than the trial"
+    return moving_mark(scenario) or undriven(scenario)
+
+
+def judge(
+    scoring: TourScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
+) -> Verdict:
+    """The indicator is how near to its marks the vehicle stopped, and the share of time left.
+
+    The starting block is to stop at each mark in order. Each first stop within reach is worth 1 at
+    the mark itself and evenly less down to 0 at the reach; marks after one that was missed are
+    worth nothing. Once it has stopped at the last, the share of the time that is left then is
+    added. It counts where wheels drove it from the stop before, as `explained_distances` says.
+
+    Args:
+        scoring: Thresholds.
+        scenario: Gives the marks.
+        machine: Gives the wheels.
+        trajectory: The trial.
+
+    Flags:
+        `not_driven`: it would have passed, but not by wheels. `forces_not_measured`: cannot be
+        judged.
+    """
+    lacking = unmeasured(trajectory, cargo=False)
+    if lacking is not None:
+        return lacking
+    joined = joined_to_start(machine, trajectory)
+    path = trajectory.positions[:, starting_block(machine, trajectory)].astype(np.float64)
+
+    def driven(since: int) -> Mask:
+        gone = np.linalg.norm(path[:, :2] - path[since, :2], axis=1)
+        explained = explained_distances(machine, trajectory, joined, path, since=since)
+        return np.asarray(gone <= explained)
+
+    stops = _stops(scoring, scenario, path, driven)
+    anyhow = _stops(scoring, scenario, path, lambda _: np.ones(len(path), dtype=bool))
+    apart = _distances(scenario, path, stops)
+    passes = _passes(scoring, scenario, apart)
+    complete = len(stops) == len(scenario.marks)
+    last_s = float(trajectory.time_s[stops[-1]]) if stops else None
+    left = 1.0 - last_s / scenario.duration_s if complete and last_s is not None else 0.0
+    metrics: dict[str, Metric] = {
+        "stops": len(stops),
+        "last_stop_s": None if last_s is None else rounded(last_s),
+        "mean_distance_to_mark": rounded(float(np.mean(apart))) if apart else None,
+        "largest_distance_to_mark": rounded(max(apart)) if apart else None,
+        "broken_joints": len(trajectory.breaks),
+    }
+    would = _passes(scoring, scenario, _distances(scenario, path, anyhow))
+    return Verdict(
+        success=passes,
+        indicator=rounded(sum(1.0 - each / scoring.reach for each in apart) + left),
+        metrics=metrics,
+        flags=(NOT_DRIVEN,) if would and not passes else (),
+        deciding=Deciding(samples=len(path), members=joined, cargo=False),
+    )
+
+
+def _stops(
+    scoring: TourScoring, scenario: Scenario, path: Series, counts: "Callable[[int], Mask]"
+) -> list[int]:
+    """The sample at which each mark's first stop has lasted long enough, until one is missed.
+
+    Args:
+        scoring: Thresholds.
+        scenario: Gives the marks.
+        path: (T, 3) units.
+        counts: At which samples (T,) the vehicle counts as driven, since a sample.
+    """
+    count = round(scoring.stop_s * SAMPLE_RATE_HZ)
+    steps = np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1) * SAMPLE_RATE_HZ
+    slow = np.concatenate([[0], np.cumsum(steps < scoring.max_speed)])
+    stands = np.zeros(len(path), dtype=bool)
+    stands[count:] = slow[count:] - slow[:-count] == count
+    samples: list[int] = []
+    since = 0
+    for mark in scenario.marks:
+        near = np.linalg.norm(path[:, :2] - np.array(mark.center[:2]), axis=1) <= scoring.reach
+        there = np.flatnonzero(near & stands & counts(since))
+        there = there[there > since]
+        if not len(there):
+            break
+        since = int(there[0])
+        samples.append(since)
+    return samples
+
+
+def _distances(scenario: Scenario, path: Series, stops: list[int]) -> list[float]:
+    """How far from its mark each stop is, horizontally, units."""
+    return [
+        float(np.linalg.norm(path[stop, :2] - np.array(mark.center[:2])))
+        for mark, stop in zip(scenario.marks, stops, strict=False)
+    ]
+
+
+def _passes(scoring: TourScoring, scenario: Scenario, apart: list[float]) -> bool:
+    """Whether it stopped at all marks, and near enough to each."""
+    return len(apart) == len(scenario.marks) and max(apart) <= scoring.max_distance
+
+
+def explain(scoring: TourScoring, scenario: Scenario, found: Finding) -> str:
+    """Return what happened; see `Scorer`."""
+    told, count = found.metrics, len(scenario.marks)
+    stops = told.get("stops", 0)
+    if found.success:
+        return (
+            f"It made all {count} stops, the farthest {told['largest_distance_to_mark']:.2f} away."
+        )
+    return f"It made {stops} of {count} stops within {scoring.max_distance:g} of their marks."
+
+
+SCORER: Final = Scorer(
+    parameters=TourScoring,
+    judge=judge,
+    explain=explain,
+    infeasible=infeasible,
+    flags=(NOT_DRIVEN, FORCES_NOT_MEASURED),
+    ceiling=lambda _scoring, scenario: len(scenario.marks) + 1.0,
+)
