@@ -6,12 +6,15 @@ import argparse
 import sys
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from buildarena_backend.errors import StartupError
-from buildarena_backend.process.context import Context
 from buildarena_backend.settings import Settings, load_settings
 from buildarena_backend.trials.installed_simulators import announced, installed_simulators
 from buildarena_geometry import __version__ as geometry_version
+
+if TYPE_CHECKING:
+    from buildarena_backend.process.context import Context
 
 
 def main() -> None:
