@@ -97,17 +97,6 @@ def test_a_block_inside_another_overlaps_it(tmp_path):
     assert assembly.act("add_machine", inside).reason == RefusalClass.OVERLAP
 
 
-def test_a_users_file_may_use_the_old_names_of_fields(tmp_path):
-    physics = {**WOOD["physics"], "seat": "hinge"}
-    del physics["joint_type"]
-    servo = {"kind": "speed", "rate": 9, "force": 2, "forward": "turn", "idle": "free"}
-    old = edit(physics=physics, joint={"drive": servo}, actions=["turn"], tether={"length": 2})
-    module = load_catalogue(module_file(tmp_path, old))["Crate"]
-    assert module.physics.joint_type == "hinge"
-    assert module.joint.drive.default_mode == "free"
-    assert module.rope_mount.length == 2
-
-
 def edit(**fields):
     return {**copy.deepcopy(CRATE), **fields}
 
@@ -155,6 +144,8 @@ SENSELESS = [
     (other(CANNON, pointing=None, landmarks=[]), "thrust: expected no thrust: it acts along"),
     (other(BRACE, physics=WOOD["physics"]), "physics: expected no physics: a connector is not"),
     (other(CARGO, thrust=CANNON["thrust"]), "action: expected one of "),
+    (edit(strut={"bending_stiffness": 1}), "strut: expected no strut: a spring and a strut are"),
+    (other(BRACE, link="rope", strut={"bending_stiffness": 1}), "no strut: its link is rope"),
     (edit(link="rope"), "link: expected no link: a block is not a connector"),
     (edit(physics=WHEEL["physics"]), "the joint type axle needs either a motor or a joint"),
 ]
@@ -304,7 +295,7 @@ def test_the_forces_of_the_further_types_fit_the_schema_and_say_where_they_are_f
     told = [
         (name, field) for name, one in FURTHER.items() for field in FORCE_FIELDS if field in one
     ]
-    assert len(told) == 22
+    assert len(told) == 23
     for name, field in told:
         origin = FURTHER[name][field]["origin"]
         assert any(word in origin for word in ("known", "community", "chosen"))

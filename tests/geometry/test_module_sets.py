@@ -37,7 +37,7 @@ def own(tmp_path, **fields):
 def test_sets_hold_each_other():
     basic, workshop, everything = (set(module_set(name)) for name in MODULE_SETS)
     assert basic - {"Ballast"} < workshop < everything
-    assert (len(basic), len(workshop), len(everything)) == (8, 41, 86)
+    assert (len(basic), len(workshop), len(everything)) == (8, 41, 87)
 
 
 def test_a_builder_gets_no_cargo_and_only_what_is_simulated():
@@ -49,7 +49,7 @@ def test_a_builder_gets_no_cargo_and_only_what_is_simulated():
     named = {name for name in left_out if module_set("all")[name].simulated}
     assert named == {name for name, module in module_set("all").items() if module.by_name}
     space = {name for name in named if module_set("all")[name].categories == ("space-flight",)}
-    assert named - space == {"Boulder", "Bomb Holder"}
+    assert named - space == {"Boulder", "Bomb Holder", "Strut"}
     assert len(space) == 11
     assert named <= set(simulated_modules())
 
@@ -264,15 +264,16 @@ SHEETS = {
     "Sqr Balloon": ("lift 2.7 per unit", "less 0.9 per unit/s", "to 5.4", "by 2 units/s"),
     "Balloon": ("a rope of 2.5", "lift 0.92"),
     "Spring": ("pulls 10 per unit", "damper 0.1", "to 0.4 of", "by 2 built", "gives way at 1000"),
+    "Strut": ("mass 0.5 for each unit of length", "pressed by 9603 / length² it buckles"),
     "Decoupler": ("an impulse of 5",),
     "Grabber": ("within 0.2", "a force of 200 or a moment of 100"),
 }
 
 
 def test_a_sheet_has_the_figures_of_its_module_in_one_line(subtests):
-    for name in WORKSHOP:
+    for name in (*WORKSHOP, "Strut"):
         with subtests.test(name=name):
-            text = data_sheet(WORKSHOP[name], WORKSHOP.start.physics)
+            text = data_sheet(module_set("all")[name], WORKSHOP.start.physics)
             assert "\n" not in text
             assert [told for told in SHEETS.get(name, ()) if told not in text] == []
 

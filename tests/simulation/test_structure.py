@@ -9,15 +9,22 @@ from hypothesis import strategies as st
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, car, deck
 
-from buildarena_benchmark.experts.drafting import EAST, NORTH, UP, WEST
+from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, UP, WEST
 from buildarena_geometry import Machine
-from buildarena_simulation.constants import JointKind
+from buildarena_simulation.constants import GRAVITY, JointKind
 from buildarena_simulation.engines.base import CargoBox, CargoPose, World
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.resting import FaceFinder
 from buildarena_simulation.scenario import gap_terrain
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
-from buildarena_simulation.structure.contacts import CARGO, WORLD, ContactForces, EvenSharing
+from buildarena_simulation.structure.contacts import (
+    CARGO,
+    WORLD,
+    ContactForces,
+    EvenSharing,
+    PointForces,
+)
+from buildarena_simulation.structure.loads import LoadModel
 from buildarena_simulation.structure.model import JOINT_KINDS, Structure
 from buildarena_simulation.structure.motion import Motion, at_rest
 
@@ -85,6 +92,37 @@ def test_mass_and_inertia_are_those_of_the_blocks_and_brace_halves() -> None:
     distances = [0, 1, 2, 3, 1, 2, 3]
     expected = sum(m * (1 / 6 + d**2) for m, d in zip(masses, distances, strict=True))
     assert across == pytest.approx(expected)
+
+
+def test_a_strut_weighs_and_buckles_by_its_length(subtests) -> None:
+    for length in (1, 3, 5, 8):
+        with subtests.test(length=length):
+            draft = KeyedDraft(modules="all")
+            foot = draft.start()
+            *between, head = draft.row(foot, UP, length + 1)
+            draft.connect(foot, head, UP, DOWN, connector="Strut")
+            for block in between:
+                draft.do("remove_block", block_id=block)
+            assert draft.machine.mass == pytest.approx(0.25 + 0.3 + 0.5 * length)
+            structure = structure_of(draft.machine)
+            assert structure.masses.sum() == pytest.approx(draft.machine.mass)
+            # Source: Euler's column with both ends free to turn.
+            most = min(600.0, math.pi**2 * 973.0 / length**2)
+            assert _strut_bears(structure, pressed=100.0) == pytest.approx(100.0 / most)
+            assert _strut_bears(structure, pressed=-100.0) == pytest.approx(100.0 / 600.0)
+
+
+def _strut_bears(structure: Structure, *, pressed: float) -> float:
+    """Share of its strength that a strut upright between two blocks bears."""
+    clusters = _clusters(structure)
+    motion = at_rest(clusters, np.zeros(3), np.eye(3))
+    forces = PointForces(
+        block=np.array([0, 1]),
+        point=structure.centers_of_mass,
+        force=pressed * GRAVITY * np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]),
+    )
+    weightless = LoadModel(structure, clusters, motion, gravity=0.0)
+    return float(weightless.evaluate(forces, motion, elapsed_s=1.0, seen_s=1e3).ratio[0])
 
 
 vectors = st.tuples(*[st.floats(-5, 5)] * 3).map(np.array)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -44,6 +45,11 @@ class Block:
     bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     structure: str = ""
     note: str = ""
+
+    @property
+    def mass(self) -> float:
+        """Mass units."""
+        return self.module.mass
 
     @property
     def center(self) -> NDArray[np.float64]:
@@ -145,6 +151,12 @@ class Connector:
     bindings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     structure: str = ""
     note: str = ""
+
+    @property
+    def mass(self) -> float:
+        """Mass units."""
+        length = math.dist(self.start_xyz, self.end_xyz) if self.module.strut else 0.0
+        return self.module.mass * max(length, 1.0)
 
     @property
     def ends(self) -> tuple[str, str]:

@@ -92,7 +92,7 @@ class MachineState:
     @property
     def mass(self) -> float:
         """Mass of all blocks and connectors, mass units."""
-        return math.fsum(part.module.mass for part in self.parts)
+        return math.fsum(part.mass for part in self.parts)
 
     @property
     def cost(self) -> int:
@@ -110,7 +110,7 @@ class MachineState:
             raise ValueError("an empty machine has no center of mass")
         points = [block.center for block in self.blocks.values()]
         points += [(link.start_point + link.end_point) / 2 for link in self.connectors.values()]
-        masses = [part.module.mass for part in self.parts]
+        masses = [part.mass for part in self.parts]
         center: NDArray[np.float64] = np.average(np.array(points), axis=0, weights=masses)
         return center
 

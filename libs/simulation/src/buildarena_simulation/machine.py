@@ -63,9 +63,10 @@ def structure_of(machine: "Machine") -> Structure:
             Link(
                 **_span(connector, index),
                 kind=JointKind.BRACE,
-                mass=connector.module.mass,
+                mass=connector.mass,
                 share=share,
                 faces=(connector.start, connector.end),
+                strut=connector.module.strut,
             )
         )
     between: dict[frozenset[FaceRef], list[Connector]] = {}

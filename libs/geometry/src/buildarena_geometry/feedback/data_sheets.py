@@ -128,6 +128,9 @@ def _forces(module: Module) -> Iterator[str]:
         yield _altitude(module.altitude)
     if module.spring is not None:
         yield _spring(module.spring)
+    if module.strut is not None:
+        yield f"mass {plain(module.mass)} for each unit of length, at least for one"
+        yield f"pressed by {math.pi**2 * module.strut.bending_stiffness:.0f} / length² it buckles"
     if module.decouple is not None:
         yield f"lets go with an impulse of {plain(module.decouple.impulse)} mass·units/s each way"
     yield from _in_space(module)

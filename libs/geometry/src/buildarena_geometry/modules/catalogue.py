@@ -40,7 +40,6 @@ _ACTIONS = (
     *("spring.contract", "decouple.action", "grip.grab", "grip.release", "push.reverse"),
     *("flywheel.left", "flywheel.right"),
 )
-_OLD_FIELDS = {"seat": "joint_type", "idle": "default_mode", "tether": "rope_mount"}
 
 
 class FaceEntry(Form, frozen=True, kw_only=True):
@@ -190,7 +189,7 @@ def _parse_yaml(text: str, file: Path) -> object:
 def _module(content: object, where: str, usual_of: Mapping[str, Module]) -> Module:
     name = content.get("name") if isinstance(content, dict) else None
     where = f"{where} ({name:.60})" if isinstance(name, str) else where
-    entry = read(_renamed(content), ModuleEntry, where=where, error=CatalogueError)
+    entry = read(content, ModuleEntry, where=where, error=CatalogueError)
     usual = usual_of.get(entry.kind)
     try:
         _check_entry(entry)
@@ -199,17 +198,6 @@ def _module(content: object, where: str, usual_of: Mapping[str, Module]) -> Modu
     except MisfitError as misfit:
         raise CatalogueError(f"{where}{misfit}") from None
     return module
-
-
-def _renamed(content: object) -> object:
-    """An entry whose fields have their present names; older files call three of them otherwise."""
-    if not isinstance(content, dict):
-        return content
-    entry = {_OLD_FIELDS.get(name, name): value for name, value in content.items()}
-    for name in ("physics", "joint", "drive"):
-        if isinstance(entry.get(name), dict):
-            entry[name] = _renamed(entry[name])
-    return entry
 
 
 def _made(entry: ModuleEntry, usual: Module | None) -> Module:

@@ -145,6 +145,21 @@ class Spring(Form, frozen=True, kw_only=True):
     origin: str = ""
 
 
+class Strut(Form, frozen=True, kw_only=True):
+    """What a rigid connector's length does to it: it weighs more, and buckles (Euler's column).
+
+    It has its module's mass for each unit of its length, and for the first unit if it is shorter.
+    Pressed together by more than π² · bending_stiffness / length², it gives way.
+
+    Attributes:
+        bending_stiffness: Young's modulus times the section's second moment, mass·g·unit².
+        origin: where the figure comes from.
+    """
+
+    bending_stiffness: Positive
+    origin: str = ""
+
+
 class Decoupling(Form, frozen=True, kw_only=True):
     """What lets go of the face that a block sits on, once, and pushes the two apart.
 
@@ -248,6 +263,7 @@ class Forces(Form, frozen=True, kw_only=True):
         altitude: that of a balloon that holds its height.
         rope_mount: the rope it hangs on.
         spring: a connector's.
+        strut: what a rigid connector's length does to it; None for one that is always the same.
         decouple: what lets go.
         grip: what holds.
         tank: its fuel.
@@ -261,6 +277,7 @@ class Forces(Form, frozen=True, kw_only=True):
     altitude: Altitude | None = None
     rope_mount: RopeMount | None = None
     spring: Spring | None = None
+    strut: Strut | None = None
     decouple: Decoupling | None = None
     grip: Grip | None = None
     tank: Tank | None = None
@@ -292,12 +309,14 @@ def check_forces(forces: Forces, *, kind: str, mass: float, link: str | None) ->
     """
     for name in FORCE_FIELDS:
         force = getattr(forces, name)
-        if force is not None and (kind == "connector") != (name == "spring"):
-            only = "a connector has no force but a spring's, and only connectors have a spring"
+        if force is not None and (kind == "connector") != (name in ("spring", "strut")):
+            only = "a spring and a strut are connectors, and connectors have no other force"
             refuse(name, f"no {name}: {only}", force)
     if (forces.spring is not None) != (link == "spring"):
         expected = "a spring with the link spring, and none with another link"
         refuse("spring", expected, forces.spring)
+    if forces.strut is not None and link not in ("rigid", None):
+        refuse("strut", f"no strut: its link is {link}", forces.strut)
     wing, altitude, brake = forces.wing, forces.altitude, forces.brake
     if forces.tank is not None and forces.tank.mass >= mass:
         refuse("tank.mass", f"less than the block's mass of {mass:g}", forces.tank.mass)

@@ -1,5 +1,6 @@
 """From parts and joints to the arrays of a `Structure`: masses, members, far joints."""
 
+import math
 from collections import Counter
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
@@ -7,7 +8,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from buildarena_geometry.modules.forces import Spring
+from buildarena_geometry.modules.forces import Spring, Strut
 from buildarena_geometry.modules.module import Sphere
 from buildarena_simulation.constants import GRAVITY, JOINT_STRENGTH, ROPE_STRENGTH, JointKind
 from buildarena_simulation.structure.joints import joints_of
@@ -51,6 +52,7 @@ class Link:
         share: Its share of one connector's stiffness: connectors that leave a face the same way
             are together no stiffer than one.
         faces: What identifies the faces at its start and end; None for joints of attachments.
+        strut: How it buckles; None if it does not.
     """
 
     name: str
@@ -62,6 +64,7 @@ class Link:
     mass: float = 0.0
     share: float = 1.0
     faces: tuple[Hashable, Hashable] | None = None
+    strut: Strut | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -267,9 +270,18 @@ def _members(parts: Sequence[Part], links: Sequence[Link]) -> Members:
         frame=np.array(frames).reshape(-1, 3, 3),
         stiffness=np.array(stiffness).reshape(-1, 6),
         limits=np.array([(s.force, s.moment) for s in strengths]).reshape(-1, 2),
+        buckling=np.array([_buckling(link) for link in links]),
         share=np.array([link.share for link in links]),
         ends=_shared_faces(links),
     )
+
+
+def _buckling(link: Link) -> float:
+    """Pressing force at which a link buckles, mass·g. Source: Euler's column, ends free to turn."""
+    if link.strut is None:
+        return math.inf
+    length = max(float(np.linalg.norm(link.end - link.start)), _FLUSH_TOLERANCE)
+    return link.share * math.pi**2 * link.strut.bending_stiffness / length**2
 
 
 def _shared_faces(links: Sequence[Link]) -> IntArray:

@@ -69,6 +69,7 @@ class LoadModel:
         self._weights = structure.masses * (gravity / GRAVITY)
         self.wind: FloatArray = np.zeros(3)
         self._limits = (structure.members.share[:, None] * structure.members.limits).T.copy()
+        self._buckles = bool(np.isfinite(structure.members.buckling).any())
         self._stiffness = StiffnessModel(structure)
         self._wrenches = np.zeros((len(structure), 6))
         self.holds: BoolArray = np.ones(len(structure.members), dtype=bool)
@@ -153,6 +154,9 @@ class LoadModel:
         norms = np.sqrt(np.add.reduce((members * members).reshape(-1, 2, 3), axis=2))
         force[inside], moment[inside] = norms[:, 0], norms[:, 1]
         ratio = np.maximum(force / self._limits[0], moment / self._limits[1])
+        if self._buckles:
+            pressed = -members[:, 0] / self._structure.members.buckling[inside]
+            ratio[inside] = np.maximum(ratio[inside], pressed)
         self._add_shared_faces(members, ratio)
         return JointLoads(force=force, moment=moment, ratio=ratio)
 

@@ -156,6 +156,7 @@ class Members:
         frame: (M, 3, 3) machine_from_member; the first column is the member's axis.
         stiffness: (M, 6) of its six springs (axial, two shears, torsion, two bendings).
         limits: (M, 2) force and moment at which it breaks alone, mass·g and mass·g·unit.
+        buckling: (M,) pressing force at which it buckles, mass·g; infinite where it does not.
         share: (M,) share of its limits that is left to it by connectors beside it.
         ends: (S, 3) ends of connectors at faces that several connectors use: the member, the sign
             of its force on that end (-1 at its first block), and the face's number. Together they
@@ -170,6 +171,7 @@ class Members:
     frame: FloatArray
     stiffness: FloatArray
     limits: FloatArray
+    buckling: FloatArray
     share: FloatArray
     ends: IntArray
 
