@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from support.machines.families import beam, car, deck
 from support.machines.rigs import Rig
-from support.machines.trials import trial
+from support.machines.trials import gap_terrain, trial
 from support.marks import nightly
 
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, UP
@@ -23,7 +23,7 @@ from buildarena_simulation.constants import (
 )
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.rollout import simulate_structure
-from buildarena_simulation.scenario import Control, ReleasedPlacement, SpanPlacement, gap_terrain
+from buildarena_simulation.scenario import Control, ReleasedPlacement, SpanPlacement
 from buildarena_simulation.structure.contacts import ContactForces
 
 KINDS = {

@@ -7,12 +7,14 @@ from benchmarks.agreement import compared
 from support.machines.drafts import KeyedDraft
 from support.machines.random_machines import TASKS
 from support.machines.references import load_machine
-from support.machines.trials import trial
+from support.machines.trials import gap_terrain, trial
 from support.marks import nightly
 
 from buildarena_benchmark.experts.drafting import NORTH, SOUTH, UP
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
+from buildarena_simulation.scenario import SpanPlacement
+from buildarena_benchmark.experts.drafting import NORTH, SOUTH, UP
 from buildarena_simulation.scenario import SpanPlacement, gap_terrain
 
 

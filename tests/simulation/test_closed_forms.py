@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, car
+from support.machines.trials import gap_terrain
 
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SIDES, SOUTH, UP, WEST
 from buildarena_geometry import Machine, load_catalogue
@@ -15,7 +16,6 @@ from buildarena_simulation.scenario import (
     Cargo,
     SpanPlacement,
     TerrainBox,
-    gap_terrain,
 )
 
 BLOCK = load_catalogue()["Small Wooden Block"].physics

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.machines.drafts import KeyedDraft
 from support.machines.families import beam, car, deck
+from support.machines.trials import gap_terrain
 
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, UP, WEST
 from buildarena_geometry import Machine
@@ -15,7 +16,6 @@ from buildarena_simulation.constants import GRAVITY, JointKind
 from buildarena_simulation.engines.base import CargoBox, CargoPose, World
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.resting import FaceFinder
-from buildarena_simulation.scenario import gap_terrain
 from buildarena_simulation.structure.clusters import Clusters, find_clusters
 from buildarena_simulation.structure.contacts import (
     CARGO,

@@ -6,6 +6,7 @@ from typing import Any
 from buildarena_benchmark import Score, Task, score
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import Trajectory, simulate
+from buildarena_simulation.scenario import TerrainBox
 
 
 def press(key: str, time: float, hold_for: float = 0.1) -> KeyPress:
@@ -22,3 +23,11 @@ def trial(task: Task, machine: Machine, engine: str, **changes: Any) -> tuple[Sc
     scenario = task.scenario.model_copy(update=changes)
     trajectory = simulate(machine, scenario, engine)
     return score(task, machine, trajectory), trajectory
+
+
+def gap_terrain(gap: float, height: float = 5.0) -> tuple[TerrainBox, ...]:
+    """The southern and the northern terrain of Support's tasks, their edges a gap apart."""
+    return tuple(
+        TerrainBox(center=(0.0, side * (gap / 2 + 10.0), height / 2), size=(30.0, 20.0, height))
+        for side in (-1.0, 1.0)
+    )

@@ -64,14 +64,9 @@ class Line(BaseModel):
         """All the way round, units."""
         return _measured(self)[2]
 
-    @property
-    def greatest_curvature(self) -> float:
-        """Where it bends most, 1/units."""
-        return _measured(self)[3]
-
     def points(self, count: int) -> NDArray[np.float64]:
         """Points at even distances along the line, the first at (0, 0), (count, 2), units."""
-        path, ways, length, _ = _measured(self)
+        path, ways, length = _measured(self)
         at = np.arange(count) * length / count
         return np.column_stack([np.interp(at, ways, path[:, axis]) for axis in (0, 1)])
 
@@ -85,7 +80,7 @@ class Line(BaseModel):
             The way along the line to its nearest point, (T,), from 0 on and below the length, and
             the level distance from there, (T,), units.
         """
-        path, ways, _, _ = _measured(self)
+        path, ways, _ = _measured(self)
         own = np.atleast_2d(places)[:, :2].astype(np.float64)
         # About the centre the angle tells where to begin: only what is near it can be nearest.
         nodes = path[:: _FINE // _NODES]
@@ -102,16 +97,14 @@ _NODES: Final = 200
 
 
 @lru_cache(maxsize=_REMEMBERED)
-def _measured(line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64], float, float]:
-    """Points of a line, (F, 2), the way to each, (F + 1,) units, its length and curvature."""
+def _measured(line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Points of a line, (F, 2), the way to each, (F + 1,) units, and its length."""
     angle = np.arange(_FINE + 1) * 2 * np.pi / _FINE
-    away, slope, bend = np.ones(_FINE + 1), np.zeros(_FINE + 1), np.zeros(_FINE + 1)
+    away, slope = np.ones(_FINE + 1), np.zeros(_FINE + 1)
     for k, (c, s) in enumerate(line.bends, start=_FIRST_BEND):
         even, odd = np.cos(k * angle), np.sin(k * angle)
         away += c * even + s * odd
         slope += k * (s * even - c * odd)
-        bend -= k * k * (c * even + s * odd)
-    curvature = (away**2 + 2 * slope**2 - away * bend) / (away**2 + slope**2) ** 1.5 / line.radius
     around = line.radius * away[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     # What is the way at the start becomes north.
     turn = np.pi / 2 - np.arctan2(away[0], slope[0])
@@ -121,4 +114,4 @@ def _measured(line: Line) -> tuple[NDArray[np.float64], NDArray[np.float64], flo
         path[:, 0] *= -1
     steps = np.linalg.norm(np.diff(path, axis=0), axis=1)
     ways = np.concatenate([[0.0], np.cumsum(steps)])
-    return path, ways, float(ways[-1]), float(np.abs(curvature).max())
+    return path, ways, float(ways[-1])

@@ -2,8 +2,10 @@
 
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
-from typing import Final
+from contextlib import AbstractContextManager, closing, contextmanager
+from functools import cache
+from importlib import import_module
+from typing import Any, Final
 from weakref import finalize
 
 from buildarena_simulation.clearance import require_clear_start
@@ -33,7 +35,6 @@ from buildarena_simulation.scenario import Control, Scenario
 from buildarena_simulation.structure.force_field import field_of
 from buildarena_simulation.structure.model import Structure
 from buildarena_simulation.structure.planet import Surroundings
-from buildarena_simulation.threads import single_threaded
 from buildarena_simulation.trajectory import Trajectory
 from buildarena_simulation.trial import Decision, Trial
 
@@ -255,3 +256,21 @@ def _check_start(start: Start, scenario: Scenario, seed: int | None) -> None:
     if (start.cargo is None) != (scenario.cargo is None):
         lacking = "start" if start.cargo is None else "scenario"
         raise ValueError(f"the {lacking} has no cargo, and the other one has")
+
+
+def single_threaded() -> AbstractContextManager[object]:
+    """While it is entered, NumPy's and SciPy's BLAS use one thread in this process.
+
+    Sums over several threads depend on how many cores a machine has.
+    """
+    limits: AbstractContextManager[object] = _threads().limit(limits=1, user_api="blas")
+    return limits
+
+
+@cache
+def _threads() -> Any:
+    """The process's pools of threads; looking for them takes longer than a tick of a trial."""
+    import_module("scipy.sparse.linalg")  # brings a BLAS of its own, to be limited as well
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()

@@ -374,26 +374,3 @@ class Scenario(_Document):
     def sample_count(self) -> int:
         """Number of recorded instants, the start included."""
         return round(self.duration_s * SAMPLE_RATE_HZ) + 1
-
-
-def gap_terrain(
-    gap: float, *, height: float = 5.0, width: float = 30.0, length: float = 20.0
-) -> tuple[TerrainBox, ...]:
-    """Two fixed terrains that leave a gap along north-south, their tops at `height`.
-
-    Args:
-        gap: Distance of the two edges, which lie at y = ±gap / 2, units.
-        height: Height of both tops, units.
-        width: Extent of each terrain along east-west, units.
-        length: Extent of each terrain along north-south, units.
-
-    Returns:
-        The southern and the northern box.
-
-    Source: the paper, task details of Support.
-    """
-    offset = gap / 2 + length / 2
-    return tuple(
-        TerrainBox(center=(0.0, side * offset, height / 2), size=(width, length, height))
-        for side in (-1.0, 1.0)
-    )

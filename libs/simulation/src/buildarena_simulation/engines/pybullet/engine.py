@@ -23,10 +23,12 @@ from buildarena_simulation.engines.base import (
 )
 from buildarena_simulation.engines.pybullet.bodies import (
     RESIDUAL,
+    follow_friction,
     free_of_damping,
     friction_of,
     limit_spin,
     load_body,
+    mixed_clusters,
     pose_of,
     push_cargo,
     put_cargo,
@@ -41,7 +43,6 @@ from buildarena_simulation.engines.pybullet.external_forces import (
     drag_forces,
     thrust_forces,
 )
-from buildarena_simulation.engines.pybullet.friction import follow_friction, mixed_clusters
 from buildarena_simulation.engines.pybullet.grips import BulletGrips
 from buildarena_simulation.engines.pybullet.hinges import HingedComponent, hinge_frames
 from buildarena_simulation.engines.pybullet.joints import articulated
@@ -204,13 +205,15 @@ class PyBulletEngine:
             time_step_s=self.time_step_s,
             mass=self._mass + self._cargo_mass,
         )
-        velocity = self._free_velocities()
+        velocity, roped = self._free_velocities(), bool(self._rope_alive.any())
         changes = changes_of(self._targets, targets)
         for step, (row, change) in enumerate(zip(targets, changes, strict=True)):
             if len(row) and (step == 0 or change != 0.0):
                 for component in self._components:
                     component.follow(row, self._client)
             self._apply_forces(external_forces, [*drags, *self._own_forces(step)])
+            if roped:
+                self._pull_ropes()
             self._slipping.push(step, change)
             if step + 1 == len(targets):
                 impacts.before_last(*self._step_contacts())
@@ -324,8 +327,6 @@ class PyBulletEngine:
         for c, (force, torque) in drags:
             pybullet.applyExternalForce(*address[c], force, _ORIGIN, frame, number)
             pybullet.applyExternalTorque(*address[c], torque, frame, number)
-        if self._rope_alive.any():
-            self._pull_ropes()
 
     def _own_forces(self, step: int) -> list[tuple[int, Force]]:
         field = self._world.field
