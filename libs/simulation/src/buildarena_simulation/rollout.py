@@ -32,9 +32,8 @@ from buildarena_simulation.placement import Start, start_digest, start_of
 from buildarena_simulation.planning import Keys
 from buildarena_simulation.processor import warn_if_late
 from buildarena_simulation.scenario import Control, Scenario
-from buildarena_simulation.structure.force_field import field_of
+from buildarena_simulation.structure.force_field import Surroundings, field_of
 from buildarena_simulation.structure.model import Structure
-from buildarena_simulation.structure.planet import Surroundings
 from buildarena_simulation.trajectory import Trajectory
 from buildarena_simulation.trial import Decision, Trial
 
