@@ -169,8 +169,9 @@ def built_with(module: Module) -> Machine:
 def test_every_type_comes_back_as_it_was(subtests) -> None:
     for name in [*BLOCKS, *CONNECTORS]:
         with subtests.test(name=name):
-            machine = built_with(ALL[name])
-            imported = read_machine_file(plain_machine_file(machine, name="m"))
+            # The game has no braces that weigh by their length: a Strut is one of its braces.
+            machine = built_with(ALL["Brace" if name == "Strut" else name])
+            imported = read_machine_file(plain_machine_file(built_with(ALL[name]), name="m"))
             assert imported.not_understood == ()
             assert_alike(contents(imported.machine), contents(machine))
             assert Machine.from_document(imported.machine.to_document()) == imported.machine
