@@ -71,7 +71,12 @@ def documents() -> list[Path]:
 
 def test_statements_and_solutions_have_the_canary_and_no_model_reads_it() -> None:
     tasks = ROOT / "libs/benchmark/src/buildarena_benchmark/tasks"
-    sources = [*tasks.glob("*/*.yaml"), *tasks.glob("*/expert.py"), *tasks.glob("*/*.lua"), *tasks.glob("*/README.md")]
+    sources = [
+        *tasks.glob("*/*.yaml"),
+        *tasks.glob("*/expert.py"),
+        *tasks.glob("*/*.lua"),
+        *tasks.glob("*/README.md"),
+    ]
     assert len(sources) > len(builtin_tasks())
     assert not [file.name for file in sources if NUMBER not in file.read_text(encoding="utf-8")]
     assert NUMBER in drive_machines.written()

@@ -34,7 +34,7 @@ PATH = re.compile(
 MAKEFILES = "\n".join(f.read_text() for f in [ROOT / "Makefile", *ROOT.glob("mk/*.mk")])
 TARGETS = set(re.findall(r"^([a-z0-9-]+):", MAKEFILES, re.MULTILINE))
 VARIABLE = re.compile(r"\bBUILDARENA_([A-Z0-9]+(?:_[A-Z0-9]+)*)\b(?!_)")
-WITHOUT_SETTINGS = {"URL", "KEY", "BLAS_KERNELS", "PARENT_PID", "CHROMIUM"}
+WITHOUT_SETTINGS = {"CATEGORIES", "URL", "KEY", "BLAS_KERNELS", "PARENT_PID", "CHROMIUM"}
 """Read before, or without, a process' settings."""
 
 

@@ -14,8 +14,6 @@ from buildarena_benchmark.experts.drafting import NORTH, SOUTH, UP
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
 from buildarena_simulation.scenario import SpanPlacement
-from buildarena_benchmark.experts.drafting import NORTH, SOUTH, UP
-from buildarena_simulation.scenario import SpanPlacement, gap_terrain
 
 
 @pytest.mark.ci

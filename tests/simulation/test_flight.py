@@ -16,8 +16,6 @@ from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.machine import structure_of
 from buildarena_simulation.scenario import Control, ReleasedPlacement
 from buildarena_simulation.structure.own_forces import wings_of
-from buildarena_benchmark.experts.drafting import DOWN, EAST, UP, WEST, Direction
-from buildarena_simulation.structure.aerodynamics import wings_of
 
 WORKSHOP = module_set("workshop")
 DRIVEN = Control(mode="agent")

@@ -172,7 +172,7 @@ def _mass_of(machine: Machine, letters: Sequence[str]) -> float:
     of = {block.id: block.structure for block in machine.blocks.values()}
     masses = [b.module.mass for b in machine.blocks.values() if b.structure in letters]
     masses += [
-        link.module.mass
+        link.mass
         for link in machine.connectors.values()
         if {of[link.start[0]], of[link.end[0]]} & set(letters)
     ]

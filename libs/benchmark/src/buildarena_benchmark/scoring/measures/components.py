@@ -77,7 +77,7 @@ def mass_of(machine: "Machine", trajectory: "Trajectory", members: Mask) -> floa
     lost = {i for i, member in zip(trajectory.block_ids, members, strict=True) if not member}
     blocks = [block.module.mass for block in machine.blocks.values() if block.id not in lost]
     halves = [
-        link.module.mass / 2
+        link.mass / 2
         for link in machine.connectors.values()
         for end in (link.start[0], link.end[0])
         if end not in lost
@@ -107,7 +107,7 @@ def masses_of_blocks(machine: "Machine", trajectory: "Trajectory") -> NDArray[np
     for link in machine.connectors.values():
         for end in (link.start[0], link.end[0]):
             if end in index:
-                masses[index[end]] += link.module.mass / 2
+                masses[index[end]] += link.mass / 2
     return masses
 
 
