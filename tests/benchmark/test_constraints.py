@@ -9,6 +9,9 @@ from buildarena_benchmark import Task, broken_constraint, load_task
 from buildarena_geometry import Machine
 
 
+WOOD = ("base_block", "face", "new_block")
+
+
 def task_with(tasks: dict[str, Task], **constraints: object) -> Task:
     document = dict(tasks["support-1"].as_document()) | {"constraints": constraints}
     return load_task(yaml.safe_dump(document))
@@ -109,3 +112,35 @@ def test_a_block_that_was_shifted_off_its_place_is_unjoined(tasks) -> None:
         assert broken[1].startswith("block 4 (Small Wooden Block) is not joined to the start")
     assert connect(machine, "4", "C", "3", "C").ok
     assert broken_constraint(tasks["support-1"], machine) is None
+
+
+def test_key_presses_are_bounded_and_no_two_connectors_are_one(tasks) -> None:
+    task = tasks["transport-1"]
+    for times, hold_s, told in (
+        (2_001, 0.1, "2,001 key presses, at most 2,000"),
+        (1, 1e308, "ends after 600 s"),
+        (1, 1.0, "is nothing but"),
+    ):
+        machine = Machine()
+        assert machine.act("start", {}).ok
+        for _ in range(times):
+            press = {"time": 0.0, "key": "UpArrow", "hold_for": hold_s}
+            assert machine.act("add_control_sequence", press).ok
+        if hold_s != 1.0:
+            assert machine.act(
+                "attach_block_to", dict(zip(WOOD, ("1", "A", BLOCK), strict=True))
+            ).ok
+        assert told in broken_constraint(task, machine)[1]
+    twice = row(4)
+    for pair in (("1", "4"), ("4", "1")):
+        assert connect(twice, pair[0], "C", pair[1], "C", connector="Brace").ok
+    assert "joins the same faces" in broken_constraint(tasks["support-1"], twice)[1]
+
+
+def test_more_than_the_most_of_a_module_is_refused(tasks) -> None:
+    task = task_with(tasks, max_modules={"Brace": 1})
+    machine = row(5)
+    assert connect(machine, "1", "C", "4", "C", connector="Brace").ok
+    assert broken_constraint(task, machine) is None
+    assert connect(machine, "1", "D", "4", "D", connector="Brace").ok
+    assert "2 of Brace, the task allows 1" in broken_constraint(task, machine)[1]

@@ -67,7 +67,9 @@ LIGHT = ("with ballast", "braced beam", "hanging post", "three pieces")
 def test_a_light_bridge_is_worth_its_load_over_its_mass(engine, tasks, name) -> None:
     expert = name == "expert"
     machine = (
-        drafted(expert_designs()["budget-1"](0), []) if expert else stored(f"light bridge {name}")
+        drafted(expert_designs()["budget-1"](0), [], modules="all")
+        if expert
+        else stored(f"light bridge {name}")
     )
     result, _ = trial(tasks["budget-1"], machine, engine)
     assert (result.success, result.flags) == (True, ())

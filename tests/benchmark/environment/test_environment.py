@@ -121,7 +121,7 @@ def test_shaping_follows_the_machine_and_pays_nothing_for_going_in_circles() -> 
     environment = Environment("support-1", rewards=ALL)
     assert environment.reward == 0.0
     begun = environment.step("start").reward
-    assert begun == pytest.approx(0.1 + 0.1 / 7)
+    assert begun == pytest.approx(0.1 + 0.1 / 9)
     grown = environment.step("attach_block_to", WOOD).reward
     assert grown > begun
     for _ in range(3):

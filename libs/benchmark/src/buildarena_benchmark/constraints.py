@@ -19,6 +19,8 @@ from buildarena_simulation.machine import structure_of
 from buildarena_simulation.structure.model import JOINT_KINDS
 
 _MAX_NAMED = 10
+_MAX_PRESSES: Final = 2_000
+_MAX_PRESS_S: Final = 600.0
 
 Broken = tuple[str, str]
 """A broken constraint: class and sentence."""
@@ -93,6 +95,33 @@ def _wrong_modules(task: Task, machine: Machine) -> str | None:
     for name, least in constraints.min_modules.items():
         if used[name] < least:
             return f"the machine has {used[name]} of {name}, the task asks for {least} or more"
+    for name, most in constraints.max_modules.items():
+        if used[name] > most:
+            return f"the machine has {used[name]} of {name}, the task allows {most}"
+    return None
+
+
+def _wrong_presses(task: Task, machine: Machine) -> str | None:
+    """Whether there are too many key presses, or one that ends after any trial."""
+    del task  # every task allows as many
+    presses = machine.control_sequence
+    if len(presses) > _MAX_PRESSES:
+        return f"the machine has {len(presses):,} key presses, at most {_MAX_PRESSES:,} are played"
+    for number, press in enumerate(presses):
+        if not press.time_s + press.hold_for_s <= _MAX_PRESS_S:
+            return f"key press {number} ends after {_MAX_PRESS_S:g} s, when every trial is over"
+    return None
+
+
+def _doubled(task: Task, machine: Machine) -> str | None:
+    """Whether two connectors of one module join the same two faces: they bear as one."""
+    del task  # no task allows it
+    seen: dict[tuple[object, ...], str] = {}
+    for link in machine.connectors.values():
+        ends = (link.module.name, frozenset({link.start, link.end}))
+        if ends in seen:
+            return f"{link.module.name} {link.id} joins the same faces as {seen[ends]}"
+        seen[ends] = link.id
     return None
 
 
@@ -246,6 +275,8 @@ _CHECKS: Final[tuple[Check, ...]] = (
     _only_started,
     _violated(_crowded),
     _violated(_wrong_modules),
+    _violated(_wrong_presses),
+    _violated(_doubled),
     _violated(_wrong_structures),
     _loose,
     _violated(_wrong_frame),

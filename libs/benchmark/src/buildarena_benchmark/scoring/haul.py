@@ -48,6 +48,10 @@ _SHARE: Final = 0.5
 """Smallest share of a weight that is borne: what is lifted by a swing presses less for a while."""
 
 
+_DRIVEN: Final = 0.8
+"""Smallest share of a lift by gears during which a motor is told to turn."""
+
+
 class HaulScoring(Document):
     """How heavy a cargo is raised.
 
@@ -158,6 +162,12 @@ def _is_geared(
     presses = motor_presses(machine, presses_of(machine, trajectory))
     first_s = min((press.time_s for played in presses.values() for press in played), default=np.inf)
     if trajectory.time_s[begin] < first_s:
+        return False
+    time_s = trajectory.time_s[begin:end]
+    turning = np.zeros(len(time_s), dtype=bool)
+    for press in (press for played in presses.values() for press in played):
+        turning |= (time_s >= press.time_s) & (time_s < press.time_s + press.hold_for_s)
+    if turning.mean() < _DRIVEN:
         return False
     turn = gear_turn_deg(machine, trajectory, presses, first=begin, last=end)
     return (turn or 0.0) >= scoring.min_gear_turn_deg

@@ -34,9 +34,6 @@ from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 
-_NEAREST: Final = 0.1
-"""Nearer to the mark usually counts no more, units: the cargo's place is drawn as finely."""
-
 _BORNE_SAMPLES: Final = 5
 """Whether the cargo is borne is judged over a fifth of a second: a throw shows."""
 
@@ -61,7 +58,6 @@ class PlaceScoring(Document):
         max_base_shift: The starting block must stay nearer to where it was, units.
         max_loose: Farthest that the cargo may move, in all, while the machine does not bear it,
             units.
-        nearest: Nearer to the mark counts no more, units.
         must_rest: Whether the indicator counts only for a cargo that is at rest at the end, and
             that the machine has let go.
     """
@@ -75,9 +71,6 @@ class PlaceScoring(Document):
     max_speed: Threshold = 0.1
     max_base_shift: Threshold = 0.5
     max_loose: Threshold = 1.5
-    nearest: Annotated[float, Field(gt=0, le=1, exclude_if=lambda value: value == _NEAREST)] = (
-        _NEAREST
-    )
     must_rest: Annotated[bool, Field(exclude_if=lambda value: not value)] = False
 
 
@@ -99,7 +92,7 @@ def infeasible(scoring: PlaceScoring, scenario: Scenario) -> str | None:
 def judge(
     scoring: PlaceScoring, scenario: Scenario, machine: "Machine", trajectory: "Trajectory"
 ) -> Verdict:
-    """The indicator is one over the distance from the mark at which the cargo comes to rest.
+    """The indicator is 1 / (1 + d) where the cargo comes to rest d from the mark.
 
     It counts for a cargo that the machine carried over what is between: whose underside was high
     enough halfway, and that moved little while the machine did not bear it. A cargo that was
@@ -151,7 +144,7 @@ def judge(
     counts = carried and stays and whole
     return Verdict(
         success=lies and counts,
-        indicator=rounded(1.0 / max(apart, scoring.nearest))
+        indicator=rounded(1.0 / (1.0 + apart))
         if counts and (rests or not scoring.must_rest)
         else 0.0,
         metrics=metrics,
@@ -222,5 +215,5 @@ SCORER: Final = Scorer(
     explain=explain,
     infeasible=infeasible,
     flags=(NOT_CARRIED, BASE_MOVED, CAME_APART, FORCES_NOT_MEASURED),
-    ceiling=lambda scoring, _scenario: 1.0 / scoring.nearest,
+    ceiling=lambda _scoring, _scenario: 1.0,
 )

@@ -105,6 +105,7 @@ class Constraints(Document):
             set.
         module_list: Whether builders are told all modules they may use, or look them up by tools.
         min_modules: Fewest blocks or connectors of a module, by its name.
+        max_modules: Most blocks or connectors of a module, by its name.
         min_wheels: Fewest powered wheels; shown to builders, judged by the scorer.
         frame: What the frame of a rocket must be, held by nothing but connectors; None where the
             task asks for none.
@@ -125,6 +126,10 @@ class Constraints(Document):
         BeforeValidator(lambda value: _FORMER_LISTS.get(value, value)),
     ] = "inline"
     min_modules: dict[ModuleName, Annotated[int, Field(ge=1, le=1000)]] = Field(default={})
+    max_modules: Annotated[
+        dict[ModuleName, Annotated[int, Field(ge=0, le=1000)]],
+        Field(exclude_if=lambda value: not value),
+    ] = Field(default={})
     min_wheels: Count = 0
     frame: Annotated[FrameConstraint | None, Field(exclude_if=lambda value: value is None)] = None
 

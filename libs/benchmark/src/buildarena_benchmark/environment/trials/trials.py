@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_benchmark import Score, Task, broken_constraint, failed_score, score
-from buildarena_benchmark.flags import is_disqualified, meaning
-from buildarena_benchmark.scores import simulate_task
+from buildarena_benchmark.flags import is_disqualified
+from buildarena_benchmark.scores import explain, simulate_task
 from buildarena_benchmark.scoring.measures.series import rotations
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE, MachineNotSimulable, Trajectory
@@ -155,7 +155,8 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
     indicator = task.indicator
     succeeded = score.success and not is_disqualified(score.flags)
     parts = [
-        "It succeeded." if succeeded else f"It did not succeed. Criterion: {_criterion(task)}.",
+        "It succeeded." if succeeded else "It did not succeed.",
+        explain(task, score),
         f"{indicator.name.capitalize()}: {score.indicator:.2f}{indicator.suffix}.",
     ]
     known = [
@@ -164,20 +165,8 @@ def score_text(task: Task, score: Score, trajectory: Trajectory | None = None) -
     if known:
         parts.append("Measured: " + ", ".join(known) + ".")
     if score.flags:
-        flags = (f"{flag} ({meaning(flag)})" if meaning(flag) else flag for flag in score.flags)
-        parts.append("Flags: " + ", ".join(flags) + ".")
+        parts.append(f"Flags: {', '.join(score.flags)}.")
     return " ".join([*parts, *_happened(trajectory)])
-
-
-def _criterion(task: Task) -> str:
-    """The thresholds that the task's file gives its scorer."""
-    asked = task.scoring.model_dump(mode="json").items()
-    thresholds = [
-        f"{name.replace('_', ' ')} {value:g}"
-        for name, value in asked
-        if isinstance(value, int | float) and not isinstance(value, bool) and value
-    ]
-    return ", ".join(thresholds) or "as the task says"
 
 
 def _happened(trajectory: Trajectory | None) -> Iterator[str]:

@@ -15,6 +15,8 @@ from buildarena_simulation.terrain import shape_of
 
 TOUCH: Final = 0.12
 """A ball this near to something touches it: bodies are a little smaller to engines, units."""
+HELD: Final = 0.2
+"""A ball this near to a part is held by it, units: on a gripper's seat there is a gap of 0.146."""
 
 _FEWEST: Final = 3
 """So many samples in the air are a flight: its velocity is that between the first two."""
@@ -102,7 +104,7 @@ def flight_of(
     radius = radius_of(machine, trajectory, ball)
     down = np.flatnonzero(gap_to_world(scenario, path, radius) <= TOUCH)
     landed = int(down[0]) if len(down) else 0
-    touched = np.flatnonzero(gaps.min(axis=1)[:landed] <= TOUCH)
+    touched = np.flatnonzero(gaps.min(axis=1)[:landed] <= HELD)
     if not len(touched) or landed - int(touched[-1]) - 1 < _FEWEST:
         return None
     released = int(touched[-1])

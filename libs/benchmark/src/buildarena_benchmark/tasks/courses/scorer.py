@@ -41,7 +41,8 @@ class DeliverScoring(Document):
     Attributes:
         line: Name of the gate that is the line.
         min_height: Least height of the ball's underside when it crosses, units; None for any.
-        max_gap: Farther from every joined part the machine is not at the ball, units.
+        max_relative_speed: Threshold = 2.0
+    max_gap: Farther from every joined part the machine is not at the ball, units.
         loose_s: For so long after the machine was at it the ball counts as being in its hands,
             seconds: what is pushed hops.
         max_loose: How far the ball may move in all while it is in nobody's hands, units.
@@ -50,6 +51,7 @@ class DeliverScoring(Document):
     name: Literal["deliver"]
     line: MarkName = "line"
     min_height: Coordinate | None = None
+    max_relative_speed: Threshold = 2.0
     max_gap: Threshold = 0.3
     loose_s: Annotated[float, Field(gt=0, le=10)] = 0.4
     max_loose: Threshold = 1.5
@@ -97,7 +99,11 @@ def judge(
     path = trajectory.cargo_position.astype(np.float64)
     joined = joined_to_start(machine, trajectory)
     gaps = np.where(joined, distances_to_parts(machine, trajectory, path) - radius, np.inf)
-    held = _lately(gaps.min(axis=1) <= scoring.max_gap, round(scoring.loose_s * SAMPLE_RATE_HZ))
+    near = gaps <= scoring.max_gap
+    parts = trajectory.positions.astype(np.float64)
+    apart = np.diff(parts - path[:, None], axis=0, prepend=(parts - path[:, None])[:1])
+    along = np.linalg.norm(apart, axis=2) * SAMPLE_RATE_HZ <= scoring.max_relative_speed
+    held = _lately((near & along).any(axis=1), round(scoring.loose_s * SAMPLE_RATE_HZ))
     steps = np.linalg.norm(np.diff(path, axis=0, prepend=path[:1]), axis=1)
     loose = np.cumsum(np.where(held, 0.0, steps))
     counts = loose <= scoring.max_loose

@@ -18,7 +18,7 @@ from buildarena_benchmark.families.cars import KEY, Wheel, drawn_car
 from buildarena_benchmark.families.unknowns import Unknowns
 
 _OVERLAP: Final = 4
-"""Blocks that a brace spans."""
+"""Blocks that a strut spans."""
 FAN: Final = "Flying Block"
 KEYS: Final = ("Alpha1", "Alpha2", "Alpha3", "Alpha4")
 """Of the fans one, two and three blocks from the middle, and of the others."""
@@ -43,19 +43,19 @@ ELSEWHERE = "DownArrow"
 
 
 def light_beam(seed: int, *, gap: int) -> Design:
-    """A single row of blocks with braces above and below where the moment is greatest.
+    """A single row of blocks with two struts above and two below, about its middle.
 
     Args:
         seed: Varies how far the beam rests on the terrain, by a block at each end.
         gap: Width of the gap, units.
     """
-    draft = Draft()
+    draft = Draft(modules="all")
     middle, half = draft.start("middle of the beam"), gap // 2 + seed % 2
     ahead = draft.row(middle, NORTH, half)
     row = [*reversed(draft.row(middle, SOUTH, half)), middle, *ahead]
     for way in (UP, DOWN):
-        for first in (half - _OVERLAP, half - _OVERLAP // 2, half):
-            draft.connect(row[first], row[first + _OVERLAP], way)
+        for first in (half - _OVERLAP, half):
+            draft.connect(row[first], row[first + _OVERLAP], way, connector="Strut")
     description = f"A row of {len(row)} blocks from south to north, braced near its middle"
     return Design(
         overall=f"A bridge over the gap of {gap} that rests on both terrains by its own weight.",

@@ -226,7 +226,7 @@ def explain(scoring: OrbitScoring, scenario: Scenario, found: Finding) -> str:
     if told.get("cycles", 0.0) < scoring.cycles:
         return f"It flew {told.get('cycles', 0.0):.2f} rounds; {scoring.cycles:g} are asked."
     if found.success:
-        return f"It flew {scoring.cycles:g} rounds in {told['completed_s']:.1f} s and landed."
+        return f"It flew round in {told['completed_s']:.1f} s and landed near its start."
     if not told.get("landed"):
         return "It flew round, but did not come down."
     return (

@@ -18,6 +18,7 @@ from buildarena_benchmark.scoring.measures.marks import (
 from buildarena_benchmark.scoring.measures.outline import reaches
 from buildarena_benchmark.scoring.measures.series import Series, starting_block, tilt_deg
 from buildarena_benchmark.scoring.measures.thrown import (
+    HELD,
     TOUCH,
     Flight,
     flight_of,
@@ -175,7 +176,8 @@ def judge(
     gaps = gaps_to_parts(machine, trajectory, ball)
     flight = flight_of(scenario, machine, trajectory, ball, gaps)
     if flight is None:
-        return Verdict(success=False, indicator=0.0, metrics={"flew": False})
+        touched = bool((gaps.min(axis=1) <= HELD).any())
+        return Verdict(success=False, indicator=0.0, metrics={"flew": False, "touched": touched})
     throw = _Throw(
         scoring=scoring,
         scenario=scenario,
@@ -364,8 +366,10 @@ def explain(scoring: ThrowScoring, scenario: Scenario, found: Finding) -> str:
     """Return what happened; see `Scorer`."""
     told = found.metrics
     if not told.get("flew"):
-        return str(told.get("stayed") or "The boulder did not fly.")
-    if scoring.rings and not found.success and told["distance"] >= scoring.min_distance:
+        if not told.get("touched"):
+            return "No part that is joined to the machine touched the boulder: nothing threw it."
+        return "The boulder did not fly: it stayed on the machine or fell to the ground at once."
+    if scoring.rings and (found.success or told["distance"] >= scoring.min_distance):
         return f"The boulder passed {told['rings']} of {len(scoring.rings)} rings."
     flew = f"The boulder came down {told['distance']:.1f} beyond the line"
     return f"{flew}." if found.success else f"{flew}; {scoring.min_distance:g} is asked."

@@ -1,0 +1,83 @@
+"""A category is a folder: one that is added is known and played, and nothing else names it."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from buildarena_benchmark import builtin_tasks
+from buildarena_benchmark.categories import categories
+from buildarena_benchmark.experts import expert_designs
+
+PLAY = """
+import json
+from buildarena_benchmark import builtin_tasks, references
+from buildarena_benchmark.environment import Environment
+from buildarena_benchmark.environment.expert_calls import calls_of
+from buildarena_benchmark.scoring.registry import known_scorers
+
+environment = Environment("ropeway-1", simulator="mujoco")
+for call in calls_of("ropeway-1", 0):
+    assert environment.step(call["tool"], call["arguments"], machine=call["machine"]).ok
+trial = environment.submit().trial
+print(json.dumps([list(builtin_tasks())[0], references()["ropeway-1"], "span" in known_scorers(),
+                  trial.score.success, trial.score.indicator]))
+"""
+
+
+def test_each_category_has_its_tasks_experts_and_references() -> None:
+    names = [task.category for task in builtin_tasks().values()]
+    assert list(dict.fromkeys(names)) == [category.name for category in categories()]
+    assert set(expert_designs()) == set(builtin_tasks())
+    for category in categories():
+        assert (category.folder / "README.md").is_file()
+        own = {name for name, task in builtin_tasks().items() if task.category == category.name}
+        assert set(category.references) == own
+        assert set(category.paper) <= own
+
+
+@pytest.fixture
+def ropeway(tmp_path: Path) -> Path:
+    """Bridges under another name, with a scorer of their own."""
+    (support,) = (category.folder for category in categories() if category.name == "support")
+    folder = Path(shutil.copytree(support, tmp_path / "ropeway"))
+    for file in folder.glob("support-*.yaml"):
+        file.unlink()
+    task = (support / "support-1.yaml").read_text("utf-8")
+    for old, new in (
+        ("name: support-1", "name: ropeway-1"),
+        ("category: support", "category: ropeway"),
+        ("  name: support\n", "  name: span\n"),
+    ):
+        task = task.replace(old, new)
+    (folder / "ropeway-1.yaml").write_text(task, "utf-8")
+    (folder / "category.yaml").write_text(
+        "title: Ropeways\norder: 0\nreferences: {ropeway-1: 7.5}\n", "utf-8"
+    )
+    expert = (folder / "expert.py").read_text("utf-8").replace('"support-', '"ropeway-')
+    (folder / "expert.py").write_text(expert, "utf-8")
+    (folder / "scorer.py").write_text(
+        "from dataclasses import replace\n"
+        "from typing import Literal\n"
+        "from buildarena_benchmark.scoring import support\n"
+        "class SpanScoring(support.SupportScoring):\n"
+        '    name: Literal["span"]\n'
+        "SCORER = replace(support.SCORER, parameters=SpanScoring)\n",
+        "utf-8",
+    )
+    return folder
+
+
+def test_a_folder_that_is_added_is_a_category(ropeway) -> None:
+    variables = {**os.environ, "BUILDARENA_CATEGORIES": str(ropeway)}
+    done = subprocess.run(
+        [sys.executable, "-c", PLAY], env=variables, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    first, reference, scores, success, indicator = json.loads(done.stdout)
+    assert (first, reference, scores, success) == ("ropeway-1", 7.5, True, True)
+    assert indicator > 1000
