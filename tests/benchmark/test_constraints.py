@@ -9,9 +9,6 @@ from buildarena_benchmark import Task, broken_constraint, load_task
 from buildarena_geometry import Machine
 
 
-WOOD = ("base_block", "face", "new_block")
-
-
 def task_with(tasks: dict[str, Task], **constraints: object) -> Task:
     document = dict(tasks["support-1"].as_document()) | {"constraints": constraints}
     return load_task(yaml.safe_dump(document))
@@ -115,22 +112,17 @@ def test_a_block_that_was_shifted_off_its_place_is_unjoined(tasks) -> None:
 
 
 def test_key_presses_are_bounded_and_no_two_connectors_are_one(tasks) -> None:
-    task = tasks["transport-1"]
     for times, hold_s, told in (
         (2_001, 0.1, "2,001 key presses, at most 2,000"),
-        (1, 1e308, "ends after 600 s"),
-        (1, 1.0, "is nothing but"),
+        (1, 1e5, "ends after 600 s"),
     ):
-        machine = Machine()
-        assert machine.act("start", {}).ok
+        machine = built(("1", "A", "Powered Wheel"))
+        key = {"block_id": "2", "action": "spinning_forward", "new_key": "UpArrow"}
+        assert machine.act("change_control_key", key).ok
         for _ in range(times):
             press = {"time": 0.0, "key": "UpArrow", "hold_for": hold_s}
             assert machine.act("add_control_sequence", press).ok
-        if hold_s != 1.0:
-            assert machine.act(
-                "attach_block_to", dict(zip(WOOD, ("1", "A", BLOCK), strict=True))
-            ).ok
-        assert told in broken_constraint(task, machine)[1]
+        assert told in broken_constraint(tasks["transport-1"], machine)[1]
     twice = row(4)
     for pair in (("1", "4"), ("4", "1")):
         assert connect(twice, pair[0], "C", pair[1], "C", connector="Brace").ok

@@ -17,9 +17,9 @@ from buildarena_benchmark.environment import Environment
 from buildarena_benchmark.environment import briefing as words_around
 from buildarena_benchmark.environment.briefing import briefing_digest
 from buildarena_benchmark.environment.trials.trials import score_text
-from buildarena_benchmark.scores import explain
 from buildarena_benchmark.environment.trials.world import world_text
 from buildarena_benchmark.flags import meaning
+from buildarena_benchmark.scores import explain
 from buildarena_geometry import LOOKUP, module_set, modules_named, tool_definitions
 from buildarena_geometry.feedback.words import plain
 from buildarena_simulation import constants
