@@ -82,7 +82,8 @@ def module_text(contract: Mapping[str, Any]) -> str:
         name: {"description": description, "properties": _parameters(contract["paths"][path])}
         for name, (path, description) in FILTERS.items()
     }
-    classes = [_class(name, schema) for name, schema in sorted(documents.items())]
+    enums_first = sorted(documents, key=lambda name: ("enum" not in documents[name], name))
+    classes = [_class(name, documents[name]) for name in enums_first]
     return "\n\n\n".join([HEAD.rstrip(), *classes]) + "\n"
 
 
@@ -95,6 +96,8 @@ def _parameters(operations: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _class(name: str, schema: Mapping[str, Any]) -> str:
+    if "enum" in schema:
+        return f"{name} = {_type(schema)}"
     about = schema.get("description", "").partition("Attributes:")[0] or name
     lines = [f"class {name}(TypedDict):", f"    {_text(about)}", ""]
     for key, field in schema["properties"].items():

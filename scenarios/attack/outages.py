@@ -103,7 +103,7 @@ def flushed_broker(arena: Arena) -> Tried:
         120,
         "all jobs end",
     )
-    jobs = arena.innocent.get(f"/v1/jobs?sweep={sweep}&limit=50")["jobs"]
+    jobs = arena.innocent.get(f"/v1/jobs?sweep={sweep}&limit=50")["data"]
     requests = [job["usage"]["requests"] for job in jobs]
     found.require(len(set(requests)) == 1, f"sessions asked {Counter(requests)} times")
     found.refused = f"30 jobs done within {time.monotonic() - started:.0f} s, none run twice"

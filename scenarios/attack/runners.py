@@ -43,10 +43,13 @@ def forged_trials(arena: Arena) -> Tried:
     for job in brought:
         wait_until(lambda: _verified(arena, job), 300, f"{job} is verified")
         jobs[job] = arena.operator.get(f"/v1/jobs/{job}")
-    audits = Counter(str(job["audit"]) for job in jobs.values())
+    audits = Counter(str(job["verification_status"]) for job in jobs.values())
     for id_, job in jobs.items():
         honest = brought[id_] == "the truth"
-        found.require((job["audit"] == "verified") == honest, f"{brought[id_]}: {job['audit']}")
+        found.require(
+            (job["verification_status"] == "verified") == honest,
+            f"{brought[id_]}: {job['verification_status']}",
+        )
     counted = _counted(arena) - before
     found.require(counted == audits["verified"], f"the board counts {counted} more")
     keys = arena.operator.get("/v1/keys")
@@ -77,7 +80,7 @@ def noisy_runner(arena: Arena) -> Tried:
     found.require(set(answers) <= {200, 413, 422, 429}, f"answers {answers}")
     found.require(not large_taken, f"{large_taken} of 2 MB were taken")
     found.require(after < HEALTH_S, f"health takes {after:.1f} s")
-    workers = arena.operator.get("/v1/workers?limit=200")["workers"]
+    workers = arena.operator.get("/v1/workers?limit=200")["data"]
     names = sum(worker["id"].startswith("runner@") for worker in workers)
     found.require(names <= 128 + 10, f"{names} names are in the register")
     found.refused = (
@@ -186,7 +189,7 @@ def _verified(arena: Arena, job: str) -> bool:
         open_ones = connection.exec_driver_sql(
             "SELECT count(*) FROM verifications WHERE job_id = %s AND state <> 'done'", (job,)
         ).scalar_one()
-    return open_ones == 0 and bool(arena.operator.get(f"/v1/jobs/{job}")["audit"])
+    return open_ones == 0 and bool(arena.operator.get(f"/v1/jobs/{job}")["verification_status"])
 
 
 def _health(arena: Arena) -> float:

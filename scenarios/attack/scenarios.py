@@ -60,7 +60,7 @@ def other_tenants(arena: Arena) -> Tried:
     owner.post(f"/v1/sweeps/{sweep}/pause")
     session = owner.post("/v1/sessions", SESSION)["id"]
     owner.ask("POST", "/v1/tasks", content=EXAMPLE, headers=YAML)
-    job = arena.operator.get(f"/v1/jobs?sweep={sweep}")["jobs"][0]["id"]
+    job = arena.operator.get(f"/v1/jobs?sweep={sweep}")["data"][0]["id"]
     tries: list[tuple[str, str, dict[str, Any]]] = [
         *(
             ("POST", f"/v1/sweeps/{sweep}/{verb}", {})
@@ -87,9 +87,9 @@ def other_tenants(arena: Arena) -> Tried:
     owner.post(f"/v1/sweeps/{sweep}/resume")
     for verb in ("pause", "resume", "retry", "cancel"):
         thief.post(f"/v1/sweeps/{shared}/{verb}")
-    jobs = arena.operator.get(f"/v1/jobs?sweep={sweep}")["jobs"]
+    jobs = arena.operator.get(f"/v1/jobs?sweep={sweep}")["data"]
     found.require(all(job["outcome"] != "cancelled" for job in jobs), "a shared job was cancelled")
-    found.require({job["owner"] for job in jobs} == {owner.id}, "a shared job changed hands")
+    found.require({job["key_id"] for job in jobs} == {owner.id}, "a shared job changed hands")
     owner.post(f"/v1/sweeps/{sweep}/cancel")
     return found
 
@@ -103,7 +103,7 @@ def hanging_provider(arena: Arena) -> Tried:
     sweep = thief.post("/v1/sweeps", payload)["id"]
 
     def running() -> int:
-        return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["jobs"])
+        return len(arena.operator.get(f"/v1/jobs?sweep={sweep}&state=running&limit=100")["data"])
 
     wait_until(lambda: running() >= MANY, 60, f"{MANY} sessions run")
     provider = arena.provider

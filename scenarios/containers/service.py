@@ -86,7 +86,7 @@ class Service:
             time.sleep(0.5)
 
     def jobs(self, sweep: str) -> list[dict[str, Any]]:
-        return list(self.get("/v1/jobs", sweep=sweep, limit=200)["jobs"])
+        return list(self.get("/v1/jobs", sweep=sweep, limit=200)["data"])
 
     def outcomes(self, sweep: str) -> Counter[str]:
         return Counter(str(job["outcome"]) for job in self.jobs(sweep))

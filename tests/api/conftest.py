@@ -38,7 +38,7 @@ def submit_job(api: TestClient) -> Callable[..., str]:
     def submit(task: str = "support-1", model: str = "builtin/expert", **more: Any) -> str:
         body = {"task": task, "model": model, "simulator": "mujoco", **more}
         answer = api.post("/v1/jobs", json=body)
-        assert answer.status_code == 202, answer.text
+        assert answer.status_code == 201, answer.text
         return str(answer.json()["id"])
 
     return submit

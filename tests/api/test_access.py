@@ -28,7 +28,7 @@ def test_without_a_good_key_only_health_and_the_contract_answer(guarded) -> None
             assert answer.status_code == 401, (path, secret)
             assert answer.headers["www-authenticate"] == "Bearer"
             assert answer.headers["content-type"] == "application/problem+json"
-    assert operator(guarded).get("/v1/keys") == []
+    assert operator(guarded).get("/v1/keys")["data"] == []
 
 
 def test_expired_and_revoked_keys_are_refused_and_say_so(guarded, context) -> None:
@@ -55,22 +55,26 @@ def test_each_scope_allows_its_part_and_is_told(guarded, api, sweep) -> None:
 
     for scopes, statuses in (
         (["read"], [200, 403, 403, 403]),
-        (["read", "submit"], [200, 202, 403, 403]),
-        (["admin"], [200, 202, 200, 201]),
+        (["read", "submit"], [200, 201, 403, 403]),
+        (["read", "submit", "admin"], [200, 201, 200, 201]),
     ):
         who = new_tenant(guarded, "ada", *scopes)
         assert tried(who) == statuses
-        told = {"key": who.id, "scope": scopes[-1], "keys_required": True}
+        told = {"key_id": who.id, "scopes": scopes, "keys_required": True}
         assert who.get("/v1/caller") == told
     answer = api.get("/v1/caller")
-    assert answer.json() == {"key": None, "scope": "admin", "keys_required": False}
+    assert answer.json() == {
+        "key_id": None,
+        "scopes": ["read", "submit", "admin"],
+        "keys_required": False,
+    }
     assert answer.headers["cache-control"] == "no-store"
 
 
 def test_nobody_changes_what_another_submitted(guarded, sweep) -> None:
     mine, other = (new_tenant(guarded, name, "read", "submit") for name in ("mine", "other"))
     id_ = mine.post("/v1/sweeps", sweep)["id"]
-    job = mine.get("/v1/jobs")["jobs"][0]["id"]
+    job = mine.get("/v1/jobs")["data"][0]["id"]
     session = mine.post("/v1/sessions", {"task": "support-1", "agent": "me"})["id"]
     call = {"tool": "start", "arguments": {}}
     budget = f"/v1/sweeps/{id_}/budget"

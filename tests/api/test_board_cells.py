@@ -226,33 +226,6 @@ def test_boards_equal_boards_made_from_every_job(context, process, seed) -> None
         disturb(context, rng, step + 1)
 
 
-def test_a_period_takes_apart_what_ended_alike(context, process) -> None:
-    """One tally of forty trials, of which each period has some, with counts of any size."""
-    rng = random.Random(3)
-    alike = random_job(rng, 0) | {
-        "task": "lift-1",
-        "task_version": builtin_tasks()["lift-1"].version,
-        "model_config": {"provider": "made-up", "decoding": {}},
-        "track": TRACKS[0],
-        "outcome": "success",
-        "success": True,
-        "flags": [],
-    }
-    own = ("id", "seed", "finished_at", *(n for n in alike if n.endswith("_tokens")))
-    made = []
-    for number in range(40):
-        other = random_job(rng, number)
-        counts = {"requests": 2**40 + number, "actions": 2**40 + number, "refused_actions": number}
-        refusals = {f"class {rng.randrange(3)}": rng.randrange(1, 2**40)}
-        made.append(alike | {name: other[name] for name in own} | counts | {"refusals": refusals})
-    execute(context, insert(jobs), made)
-    api = process()
-    for since, until in ((0, 450), (100, 700), (400, 450), (500, 1000), (900, 700)):
-        times = {"since": since, "until": until}
-        params = BOARD | {name: START + timedelta(hours=at) for name, at in times.items()}
-        assert asked(api, params) == expected(context, params), params
-
-
 @pytest.fixture
 def filled(context) -> None:
     rng = random.Random(7)

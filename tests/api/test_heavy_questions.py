@@ -32,9 +32,9 @@ BOARDS = (
 def test_a_page_has_at_most_200_rows(api, submissions) -> None:
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=201))
     page = api.get("/v1/jobs?limit=200").json()
-    assert len(page["jobs"]) == 200
+    assert len(page["data"]) == 200
     rest = api.get("/v1/jobs", params={"limit": 200, "cursor": page["next_cursor"]}).json()
-    assert len(rest["jobs"]) == 1
+    assert len(rest["data"]) == 1
     for path in ("/v1/jobs", "/v1/leaderboard/changes", "/v1/workers"):
         answer = api.get(f"{path}?limit=201")
         assert answer.status_code == 422
@@ -187,7 +187,7 @@ def test_one_too_many_is_refused_by_whose_places_are_taken() -> None:
         await work.until(1)
         with pytest.raises(ProblemError, match="you have 1 questions going on") as raised:
             await work.ask("a")
-        assert (raised.value.status, raised.value.headers) == (429, {"Retry-After": "2"})
+        assert (raised.value.code.status, raised.value.headers) == (429, {"Retry-After": "2"})
         for task in waiting:
             task.cancel()
         streams = Work(each=1, total=2, waiting=0)
@@ -196,7 +196,7 @@ def test_one_too_many_is_refused_by_whose_places_are_taken() -> None:
         for who, status in (("a", 429), ("c", 503)):
             with pytest.raises(ProblemError) as raised:
                 await streams.ask(who)
-            assert raised.value.status == status
+            assert raised.value.code.status == status
         streams.end_one()
         await open_ones[0]
         open_ones[0] = asyncio.create_task(streams.ask("c"))

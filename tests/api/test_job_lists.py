@@ -22,7 +22,7 @@ def jobs(api, context, open_session) -> list[dict]:
         "models": ["builtin/idle", "builtin/random"],
         "seeds": [0, 1, 2],
     }
-    assert api.post("/v1/sweeps", json=spec).status_code == 202
+    assert api.post("/v1/sweeps", json=spec).status_code == 201
     for number in range(8):
         lease = claim(context)
         usage = Usage(requests=1, cost_usd=[0, 1, 1, 2][number % 4])
@@ -31,7 +31,7 @@ def jobs(api, context, open_session) -> list[dict]:
         score = {"detail": f"number {number} of 100%_sure"} | (score if number < 3 else {})
         finish(context, lease, indicator=[0.1, 0.1, 7.5, -2.0][number % 4], **score)
     open_session(task="lift-1", seed=5)
-    return api.get("/v1/jobs", params={"limit": 200}).json()["jobs"]
+    return api.get("/v1/jobs", params={"limit": 200}).json()["data"]
 
 
 def pages(api, limit: int, **params: object) -> list[dict]:
@@ -42,11 +42,11 @@ def pages(api, limit: int, **params: object) -> list[dict]:
         answer = api.get("/v1/jobs", params=given)
         assert answer.status_code == 200, answer.text
         page = answer.json()
-        found += page["jobs"]
+        found += page["data"]
         cursor = page["next_cursor"]
         if cursor is None:
             return found
-        assert len(page["jobs"]) == limit
+        assert len(page["data"]) == limit
 
 
 def ids(found: list[dict]) -> list[str]:
@@ -85,10 +85,10 @@ def test_filters_find_what_they_say_and_go_together(api, jobs, monkeypatch) -> N
     def indicators(**params: object) -> list[float]:
         return sorted(job["indicator"] for job in pages(api, 3, sort="indicator", **params))
 
-    assert indicators(indicator_min=0.1) == [0.1] * 4 + [7.5] * 2
-    assert indicators(indicator_max=0.1) == [-2.0] * 2 + [0.1] * 4
-    assert indicators(indicator_min=0.1, indicator_max=0.1) == [0.1] * 4
-    assert indicators(indicator_min=1, indicator_max=0) == []
+    assert indicators(min_indicator=0.1) == [0.1] * 4 + [7.5] * 2
+    assert indicators(max_indicator=0.1) == [-2.0] * 2 + [0.1] * 4
+    assert indicators(min_indicator=0.1, max_indicator=0.1) == [0.1] * 4
+    assert indicators(min_indicator=1, max_indicator=0) == []
     (row, *_) = api.get("/v1/leaderboard").json()["tasks"][0]["rows"]
     for params, wanted in (
         ({"category": "support"}, lambda job: job["task"] == "support-1"),
@@ -99,7 +99,7 @@ def test_filters_find_what_they_say_and_go_together(api, jobs, monkeypatch) -> N
         ({"outcome": "success"}, lambda job: job["outcome"] == "success"),
         ({"configuration": row["configuration"]}, lambda job: job["model"] == row["model"]),
         (
-            {"task": "lift-1", "text": "idle", "state": "done", "indicator_min": 0},
+            {"task": "lift-1", "text": "idle", "state": "done", "min_indicator": 0},
             lambda job: (
                 (job["task"], job["model"], job["state"]) == ("lift-1", "builtin/idle", "done")
                 and job["indicator"] >= 0
@@ -154,7 +154,7 @@ def test_values_that_no_job_can_have_are_refused_with_the_choices(api, jobs) -> 
         assert choices <= set(error["choices"])
         assert repr(bad) in error["message"]
     for name, bad in (
-        *(("indicator_min", bad) for bad in ("nan", "inf", "-inf", "x", "")),
+        *(("min_indicator", bad) for bad in ("nan", "inf", "-inf", "x", "")),
         *(("text", bad) for bad in ("", "x" * 101)),
         *(("id_prefix", bad) for bad in ("job", "job_%", "job_G", "", "job_ ", "x" * 50)),
     ):
@@ -195,26 +195,26 @@ def test_jobs_and_sweeps_are_found_by_the_beginnings_of_their_ids(api, jobs) -> 
     known = sorted(ids(jobs))
     for length in (4, 5, 6, 12, 24):
         prefix = known[3][:length]
-        found = api.get("/v1/jobs", params={"id_prefix": prefix}).json()["jobs"]
+        found = api.get("/v1/jobs", params={"id_prefix": prefix}).json()["data"]
         assert sorted(ids(found)) == [id_ for id_ in known if id_.startswith(prefix)]
-    (sweep,) = ids(api.get("/v1/sweeps").json()["sweeps"])
+    (sweep,) = ids(api.get("/v1/sweeps").json()["data"])
     for prefix, count in ((sweep[:20], 1), ("sweep_0000000000000", 0)):
-        page = api.get("/v1/sweeps", params={"id_prefix": prefix}).json()["sweeps"]
+        page = api.get("/v1/sweeps", params={"id_prefix": prefix}).json()["data"]
         assert ids(page) == [sweep] * count
 
 
 def test_all_files_of_a_job_are_listed_and_given(api, context, submit_job) -> None:
     job = submit_job()
-    assert api.get("/v1/jobs?reason=lost_worker").json()["jobs"] == [], "while no job has any"
+    assert api.get("/v1/jobs?reason=lost_worker").json()["data"] == [], "while no job has any"
     path = f"/v1/jobs/{job}/artifacts"
-    assert api.get(path).json() == []
+    assert api.get(path).json()["data"] == []
     assert api.get(f"{path}/machine").status_code == 404
     attach(context, job, {"machine": b"{}", "notes": b"[]"})
-    files = api.get(path).json()
+    files = api.get(path).json()["data"]
     assert [file["name"] for file in files] == ["machine", "notes"]
     for file in files:
         answer = api.get(f"{path}/{file['name']}")
         assert answer.headers["content-type"] == file["media_type"]
-        assert answer.headers["etag"] == f'"{file["hash"]}"'
-        assert hashlib.sha256(answer.content).hexdigest() == file["hash"]
+        assert answer.headers["etag"] == f'"{file["sha256"]}"'
+        assert hashlib.sha256(answer.content).hexdigest() == file["sha256"]
         assert len(answer.content) == file["size"]

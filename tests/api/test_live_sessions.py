@@ -129,7 +129,7 @@ def test_the_transcript_of_a_session_under_way_is_the_one_it_will_have(
     assert live.content == kept
     work(context)
     assert api.get(path).content == kept
-    assert "turns, " in api.get(path, params={"style": "markdown"}).text
+    assert "turns, " in api.get(path, params={"format": "markdown"}).text
 
 
 @pytest.mark.ci
@@ -189,7 +189,7 @@ def test_an_agents_calls_are_turns_and_are_found(api, context, open_session, act
     assert [one["index"] for one in shown] == [0, 1]
     assert shown[1] == json.loads(json.dumps(turn))
     words = turn["actions"][0]["feedback"].split()[:9]
-    assert (job, 1) in {(m["job"], m["turn"]) for m in found(api, f'"{" ".join(words)}"')}
+    assert (job, 1) in {(m["job_id"], m["turn"]) for m in found(api, f'"{" ".join(words)}"')}
 
 
 @pytest.fixture
@@ -209,7 +209,7 @@ def sweep_of_talkers(api, context) -> str:
 def found(api, words: str, **more: object) -> list[dict]:
     answer = api.get("/v1/transcripts", params={"text": words, **more})
     assert answer.status_code == 200, answer.text
-    return answer.json()["matches"]
+    return answer.json()["data"]
 
 
 def marked(match: dict) -> list[str]:
@@ -221,7 +221,7 @@ def test_words_are_found_in_all_their_forms_with_their_turns(api, sweep_of_talke
     assert {turn: match["where"] for turn, match in both.items()} == {0: "reply", 1: "reply"}
     assert "".join(piece["text"] for piece in both[1]["excerpt"]) == SAID
     assert marked(both[1]) == ["wheels"]
-    transcript = api.get(f"/v1/jobs/{both[1]['job']}/transcript").json()
+    transcript = api.get(f"/v1/jobs/{both[1]['job_id']}/transcript").json()
     assert transcript["turns"][1]["text"] == SAID
     assert (both[0]["outcome"], both[0]["task"]) == ("success", "support-1")
     assert "naïve 🚗" in "".join(piece["text"] for piece in both[0]["excerpt"])
@@ -247,25 +247,26 @@ def test_words_are_found_in_all_their_forms_with_their_turns(api, sweep_of_talke
 
 
 def test_what_roles_were_told_is_kept_and_found_once_a_job(api, sweep_of_talkers) -> None:
-    (match,) = found(api, "gearbox", of="prompts")
+    (match,) = found(api, "gearbox", search_in="prompts")
     assert (match["turn"], match["where"], marked(match)) == (0, "prompt", ["gearboxes"])
-    assert found(api, '"lift weights"', of="prompts") == []
+    assert found(api, '"lift weights"', search_in="prompts") == []
     assert found(api, "gearbox")[0]["where"] == "reply"
-    both = found(api, "bridge or gearbox", of="prompts", sweep=sweep_of_talkers)
-    assert len({match["job"] for match in both}) == 2
-    assert found(api, "gearbox", of="prompts", task="lift-1") == []
-    kept = api.get(f"/v1/jobs/{match['job']}/prompts").json()["prompts"]
+    both = found(api, "bridge or gearbox", search_in="prompts", sweep=sweep_of_talkers)
+    assert len({match["job_id"] for match in both}) == 2
+    assert found(api, "gearbox", search_in="prompts", task="lift-1") == []
+    kept = api.get(f"/v1/jobs/{match['job_id']}/prompts").json()["data"]
     again = {"turn": 2, "system": None, "user": ["Draw the gearbox again."]}
     assert kept == [{"turn": 0, **TOLD}, again]
 
 
-def test_of_very_many_turns_some_are_searched_and_it_says_so(
+def test_of_very_many_turns_some_are_searched_page_by_page(
     api, context, lease, monkeypatch
 ) -> None:
     for index in range(6):
         take(context, lease, index, said=f"The beam, part {index}.")
     assert [match["turn"] for match in found(api, "beam")] == list(range(6))
     some = api.get("/v1/transcripts?text=beam&limit=4").json()
-    assert (len(some["matches"]), some["complete"]) == (4, False)
+    rest = found(api, "beam", limit=4, cursor=some["next_cursor"])
+    assert [match["turn"] for match in some["data"] + rest] == list(range(6))
     monkeypatch.setattr(transcript_search, "MAX_MATCHES", 3)
-    assert api.get("/v1/transcripts?text=beam").json()["complete"] is False
+    assert len(found(api, "beam")) == 3

@@ -108,7 +108,7 @@ def test_hostile_files_are_refused_in_words(api) -> None:
 def test_a_machine_is_tried_on_no_leaderboard(api, context) -> None:
     answer = attempt(api, written())
     job = answer.json()
-    assert (answer.status_code, job["state"], job["stage"]) == (202, "queued", "simulate")
+    assert (answer.status_code, job["state"], job["stage"]) == (201, "queued", "simulate")
     assert job["model"].startswith("file/")
     assert api.get(f"/v1/jobs/{job['id']}/machine").status_code == 200
     assert api.get(f"/v1/jobs/{job['id']}/scene").json()["machine"] is not None
@@ -148,9 +148,9 @@ def test_trials_under_way_are_bounded_for_each_key(tenants, context, monkeypatch
     mine, other = tenants
     # An equal one takes no place, and one that is opened again takes one.
     first, *rest = (brought(mine, seed) for seed in (0, 1, 0))
-    assert [first.status_code, *(answer.status_code for answer in rest)] == [202, 202, 200]
+    assert [first.status_code, *(answer.status_code for answer in rest)] == [201, 201, 200]
     mine.post(f"/v1/jobs/{first.json()['id']}/cancel", status=200)
-    assert brought(mine, 2).status_code == 202
+    assert brought(mine, 2).status_code == 201
     assert brought(mine, 0).status_code == 429
     assert mine.get(f"/v1/jobs/{first.json()['id']}")["outcome"] == "cancelled"
     # So does one that errored and is tried again.
@@ -158,7 +158,7 @@ def test_trials_under_way_are_bounded_for_each_key(tenants, context, monkeypatch
     lease = context.store.leases.claim("simulate.mujoco", owner="w", only=[other.id])
     assert lease.job.id == job
     context.store.leases.give_up(lease, "no reason", reason="simulator_fault")
-    assert [brought(other, seed).status_code for seed in (8, 9)] == [202, 202]
+    assert [brought(other, seed).status_code for seed in (8, 9)] == [201, 201]
     other.post(f"/v1/jobs/{job}/retry", status=429)
     assert other.get(f"/v1/jobs/{job}")["outcome"] == "errored"
 
@@ -260,7 +260,7 @@ def test_a_process_that_is_killed_or_takes_too_long_loses_nothing(
         trying = threads.submit(attempt, api, written())
         wait_until(shared_checker()._lock.locked, 10, "the file is asked about")
         process.kill()
-        assert trying.result().status_code == 202
+        assert trying.result().status_code == 201
     second = psutil.Process(shared_checker()._process.pid)
     assert second.pid != process.pid
     assert attempt(api, written()).status_code == 200

@@ -37,7 +37,7 @@ def test_an_agent_builds_and_submits(api, context, session, act) -> None:
     assert len(api.get(f"/v1/jobs/{session}/transcript").json()["turns"]) == 3
     context.queues.settle()
     assert context.queues.waiting("simulate.mujoco") == 1
-    page = api.get(f"/v1/jobs/{session}/transcript", params={"style": "markdown"}).text
+    page = api.get(f"/v1/jobs/{session}/transcript", params={"format": "markdown"}).text
     assert page.startswith("# support-1 by agent/me, seed 1")
     assert "3 actions, 33.3% of them refused (1 face_occupied)." in page
     late = api.post(f"/v1/sessions/{session}/calls", json={"tool": "reset", "arguments": {}})
@@ -93,7 +93,7 @@ def test_an_equal_wish_is_the_same_session(api, context, session, act, open_sess
     act(session, "start", START)
     again = api.post("/v1/sessions", json=OPEN)
     assert (again.status_code, again.json()["id"], again.json()["calls"]) == (200, session, 1)
-    assert again.headers["Location"] == f"/v1/jobs/{session}"
+    assert again.headers["Location"] == f"/v1/sessions/{session}"
     assert len(context.store.jobs.page(limit=9)) == 1
     changes = ({"seed": 2}, {"agent": "x"}, {"task": "support-2"}, {"simulator": "pybullet"})
     assert len({session, *(open_session(**change) for change in changes)}) == 5
@@ -179,7 +179,7 @@ def test_what_a_submission_would_try_can_be_had_and_tried_before(api, session, a
     modules = [block["module"] for block in document["blocks"]]
     assert modules == ["Starting Block", "Small Wooden Block"]
     tried = api.post("/v1/machines/trials?task=support-1", content=json.dumps(document))
-    assert tried.status_code == 202
+    assert tried.status_code == 201
     assert act(session, "attach_block_to", {**ATTACH, "face": "B"})["ok"]
 
 

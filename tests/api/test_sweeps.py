@@ -28,24 +28,24 @@ def submitted(api, sweep) -> str:
 
 
 def states(api, sweep_id: str) -> list[str]:
-    found = api.get("/v1/jobs", params={"sweep": sweep_id}).json()["jobs"]
+    found = api.get("/v1/jobs", params={"sweep": sweep_id}).json()["data"]
     return sorted(job["outcome"] or job["state"] for job in found)
 
 
 def test_a_job_and_a_sweep_are_accepted_and_found_again(api, sweep) -> None:
     answer = api.post("/v1/jobs", json=JOB)
-    assert answer.status_code == 202
+    assert answer.status_code == 201
     job = api.get(answer.headers["location"]).json()
     assert {name: job[name] for name in JOB} == JOB
     assert (job["state"], job["stage"], job["outcome"]) == ("queued", "construct", None)
     assert job["attempts"] == []
     assert api.post("/v1/jobs", json=JOB).json()["id"] == job["id"]
     answer = api.post("/v1/sweeps", json=sweep)
-    assert (answer.status_code, answer.json()["jobs"]) == (202, 2)
+    assert (answer.status_code, answer.json()["jobs"]) == (201, 2)
     shown = api.get(answer.headers["location"]).json()
     assert (shown["state"], shown["progress"]["total"]) == ("active", 2)
     assert shown["progress"]["stages"] == {"construct queued": 2}
-    jobs = api.get("/v1/jobs", params={"sweep": shown["id"]}).json()["jobs"]
+    jobs = api.get("/v1/jobs", params={"sweep": shown["id"]}).json()["data"]
     assert {job["seed"] for job in jobs} == {0, 1}
 
 
@@ -71,8 +71,8 @@ def test_a_bad_submission_is_refused_whole_and_names_its_field(api, sweep) -> No
     for field, bad in (("task", "x"), ("model", "x"), ("seed", -1)):
         errors = api.post("/v1/jobs", json={**JOB, field: bad}).json()["errors"]
         assert [error["field"] for error in errors] == [field]
-    assert api.get("/v1/jobs").json()["jobs"] == []
-    assert api.get("/v1/sweeps").json()["sweeps"] == []
+    assert api.get("/v1/jobs").json()["data"] == []
+    assert api.get("/v1/sweeps").json()["data"] == []
 
 
 def test_a_submission_with_a_key_is_done_once(api, sweep) -> None:
@@ -83,11 +83,11 @@ def test_a_submission_with_a_key_is_done_once(api, sweep) -> None:
 
     with ThreadPoolExecutor(8) as threads:
         answers = [*threads.map(submit, range(8)), submit(0)]
-    assert {answer.status_code for answer in answers} == {202}
+    assert sorted(answer.status_code for answer in answers) == [200] * 8 + [201]
     assert len({answer.json()["id"] for answer in answers}) == 1
-    assert len(api.get("/v1/sweeps").json()["sweeps"]) == 1
+    assert len(api.get("/v1/sweeps").json()["data"]) == 1
     assert submit(0, seeds=[9]).status_code == 409
-    assert len(api.get("/v1/jobs").json()["jobs"]) == 2
+    assert len(api.get("/v1/jobs").json()["data"]) == 2
 
 
 @pytest.mark.usefixtures("submitted")
@@ -96,7 +96,7 @@ def test_a_job_is_cancelled_once_and_only_errored_ones_are_retried(api, context)
     path = f"/v1/jobs/{lease.job.id}"
     assert api.post(f"{path}/retry").status_code == 409
     context.store.leases.give_up(lease, "gone", reason="lost_worker")
-    errored = api.get("/v1/jobs", params={"outcome": "errored"}).json()["jobs"]
+    errored = api.get("/v1/jobs", params={"outcome": "errored"}).json()["data"]
     assert [(job["id"], job["reason"]) for job in errored] == [(lease.job.id, "lost_worker")]
     assert api.post(f"{path}/retry").json()["state"] == "queued"
     assert api.post(f"{path}/cancel").json()["outcome"] == "cancelled"
@@ -125,10 +125,12 @@ def test_an_estimate_stores_nothing(api, sweep) -> None:
     estimate = api.post("/v1/sweeps/estimate", json=payload).json()
     assert estimate["jobs"] == 8
     free, paid = estimate["models"]
-    assert (free["cost_usd"], free["requests"]) == (0.0, 0.0)
+    assert (free["usage"]["cost_usd"], free["usage"]["requests"]) == (0.0, 0)
     # gpt-4o at 2.5 and 10 dollars per million tokens, support-1's means of the paper.
-    assert paid["cost_usd"] == pytest.approx(4 * (629911.1 * 2.5 + 27311.1 * 10) / 1e6, rel=1e-3)
-    assert api.get("/v1/sweeps").json()["sweeps"] == []
+    assert paid["usage"]["cost_usd"] == pytest.approx(
+        4 * (629911.1 * 2.5 + 27311.1 * 10) / 1e6, rel=1e-3
+    )
+    assert api.get("/v1/sweeps").json()["data"] == []
     # Two models on one task are one claim.
     power = estimate["power"]
     assert (power["trials"], power["trials_for_ten_points"]) == (4, 388)
@@ -158,7 +160,7 @@ def test_events_come_as_they_happen_and_from_where_one_left_off(context, submitt
         rest = threads.submit(read_events, stream, 2, **{"Last-Event-ID": str(first[-1][0])})
         lease = claim(context)
         context.store.leases.hand_back(lease)
-        assert [(kind, data["job"]) for _, kind, data in rest.result()] == [
+        assert [(kind, data["job_id"]) for _, kind, data in rest.result()] == [
             ("running", lease.job.id),
             ("queued", lease.job.id),
         ]
@@ -171,7 +173,7 @@ def test_whoever_has_read_the_jobs_hears_only_what_happened_since(api, context, 
     execute(context, "UPDATE events SET at = at - interval '6 seconds'")
     seen = api.get(f"/v1/sweeps/{submitted}").json()["last_event"]
     assert seen == events[-1].id
-    assert api.get("/v1/sweeps").json()["sweeps"][0]["last_event"] == seen
+    assert api.get("/v1/sweeps").json()["data"][0]["last_event"] == seen
     finish(context, claim(context))
     assert api.get(f"/v1/sweeps/{submitted}").json()["last_event"] == seen
     since = context.store.events.after(seen, sweep_id=submitted)
@@ -179,7 +181,7 @@ def test_whoever_has_read_the_jobs_hears_only_what_happened_since(api, context, 
 
 
 def test_troubles_of_a_sweep_are_counted_by_what_they_are(api, context, submitted) -> None:
-    assert api.get(f"/v1/sweeps/{submitted}/troubles").json() == []
+    assert api.get(f"/v1/sweeps/{submitted}/troubles").json()["data"] == []
     other = api.post("/v1/jobs", json=JOB).json()["id"]
     fault = (AttemptResult.FAULT, "provider answered 503")
     lost = (AttemptResult.LOST, None)
@@ -190,7 +192,7 @@ def test_troubles_of_a_sweep_are_counted_by_what_they_are(api, context, submitte
                 lease, to=JobState.QUEUED, connection=connection, result=result, note=note
             )
         api.post(f"/v1/jobs/{other}/cancel")
-    found = api.get(f"/v1/sweeps/{submitted}/troubles").json()
+    found = api.get(f"/v1/sweeps/{submitted}/troubles").json()["data"]
     counted = {(one["result"], one["detail"]): one["attempts"] for one in found}
     assert counted == {("fault", "provider answered 503"): 2, ("lost", None): 1}
     assert all(one["jobs"] <= one["attempts"] and one["model"] == "builtin/idle" for one in found)
@@ -217,33 +219,33 @@ def ahead(api, sweep: str) -> dict:
 
 def test_costs_go_by_the_same_model_on_the_same_task_first(api, context, large) -> None:
     assert ahead(api, large) == {
-        "jobs_left": 40,
+        "remaining_jobs": 40,
         "jobs_per_minute": None,
-        "ends_at": None,
-        "cost_usd_left": 0,
-        "cost_usd_total": 0,
-        "budget_usd_short": 0,
+        "finish_at": None,
+        "remaining_cost_usd": 0,
+        "total_cost_usd": 0,
+        "lacking_budget_usd": 0,
         "unknown_models": ["builtin/expert", "builtin/random"],
     }
     end(context, "builtin/expert", "support-1", 4, "0.50")
     end(context, "builtin/expert", "lift-1", 1, "1.50")
     # 6 at 0.50 and 9 at 1.50.
     first = ahead(api, large)
-    assert (first["cost_usd_left"], first["unknown_models"]) == (16.5, ["builtin/random"])
+    assert (first["remaining_cost_usd"], first["unknown_models"]) == (16.5, ["builtin/random"])
     # On a task of which nothing ended, the mean over the others.
     end(context, "builtin/random", "lift-1", 2, "0.10")
     second = ahead(api, large)
-    assert second["cost_usd_left"] == pytest.approx(16.5 + 18 * 0.1)
+    assert second["remaining_cost_usd"] == pytest.approx(16.5 + 18 * 0.1)
     assert second["unknown_models"] == []
     # A job that has cost something costs only the rest.
     spent = "UPDATE jobs SET cost_usd = 0.25 WHERE id = (SELECT id FROM jobs WHERE "
     spent += "state = 'queued' AND model = 'builtin/expert' AND task = 'lift-1' LIMIT 1)"
     execute(context, spent)
-    assert ahead(api, large)["cost_usd_left"] == pytest.approx(16.5 + 18 * 0.1 - 0.25)
-    assert ahead(api, large)["budget_usd_short"] == pytest.approx(18.05 - 10)
+    assert ahead(api, large)["remaining_cost_usd"] == pytest.approx(16.5 + 18 * 0.1 - 0.25)
+    assert ahead(api, large)["lacking_budget_usd"] == pytest.approx(18.05 - 10)
     for budget, short in (({"max_cost_usd": 100}, 0), ({"max_requests": 100}, None)):
         api.put(f"/v1/sweeps/{large}/budget", json=budget)
-        assert ahead(api, large)["budget_usd_short"] == short
+        assert ahead(api, large)["lacking_budget_usd"] == short
 
 
 def test_the_rate_is_over_time_that_passes_and_the_end_follows_from_it(api, context, large) -> None:
@@ -254,10 +256,10 @@ def test_the_rate_is_over_time_that_passes_and_the_end_follows_from_it(api, cont
     context.store.leases.give_up(claim(context), "no key", reason="missing_key")
     seen = ahead(api, large)
     assert seen["jobs_per_minute"] == pytest.approx(0.5, rel=0.02), "faults tell nothing"
-    end_at = datetime.fromisoformat(seen["ends_at"])
+    end_at = datetime.fromisoformat(seen["finish_at"])
     assert abs(end_at - datetime.now(UTC) - timedelta(minutes=68)) < timedelta(minutes=2)
     api.post(f"/v1/sweeps/{large}/pause")
     assert ahead(api, large)["jobs_per_minute"] is None
     # What ended before it was resumed says nothing of what comes.
     api.post(f"/v1/sweeps/{large}/resume")
-    assert ahead(api, large)["ends_at"] is None
+    assert ahead(api, large)["finish_at"] is None

@@ -31,7 +31,7 @@ def sweep_of(who: Tenant, **more: Any) -> str:
 
 
 def the_job(who: Tenant) -> dict[str, Any]:
-    (job,) = who.get("/v1/jobs")["jobs"]
+    (job,) = who.get("/v1/jobs")["data"]
     return job
 
 
@@ -51,8 +51,8 @@ def run_until(context: Context, state: str) -> None:
 
 
 def spent(who: Tenant, guarded: TestClient) -> int:
-    (key,) = [key for key in operator(guarded).get("/v1/keys") if key["id"] == who.id]
-    return key["budget"]["spent_requests"]
+    (key,) = [key for key in operator(guarded).get("/v1/keys")["data"] if key["id"] == who.id]
+    return key["budget"]["used_requests"]
 
 
 def budget(who: Tenant, guarded: TestClient, requests: int) -> None:
@@ -73,7 +73,7 @@ def test_anothers_limits_never_become_my_result(a, b, context) -> None:
     assert a.get(f"/v1/jobs/{mine['id']}")["outcome"] == "construction_failed"
     (task,) = a.get("/v1/leaderboard")["tasks"]
     rows = {row["decoding"].get("limits", {}).get("max_requests"): row for row in task["rows"]}
-    assert {limit: row["trials"] for limit, row in rows.items()} == {None: 1, 1: 1}
+    assert {limit: row["counted"] for limit, row in rows.items()} == {None: 1, 1: 1}
     # The same limits are the same job, however they are spelled.
     ids = {mine["id"], tight["id"]}
     for name, one, spelled in (
@@ -98,9 +98,9 @@ def test_a_command_hands_jobs_over_to_an_active_sweep_of_another_key(
 ) -> None:
     mine, theirs = sweep_of(a), sweep_of(b)
     run_until(context, state)
-    assert (the_job(a)["owner"], payer_of(context)) == (a.id, mine)
+    assert (the_job(a)["key_id"], payer_of(context)) == (a.id, mine)
     a.post(f"/v1/sweeps/{mine}/{command}")
-    assert the_job(b)["owner"] == b.id
+    assert the_job(b)["key_id"] == b.id
     assert state == "errored" or (the_job(b)["state"], payer_of(context)) == (state, theirs)
 
 
@@ -114,7 +114,7 @@ def test_a_paused_sweep_wants_its_jobs_and_lets_them_wait(a, b, context, state) 
     assert the_job(a)["state"] == state
     a.post(f"/v1/sweeps/{mine}/cancel")
     job = the_job(b)
-    assert (job["state"], job["owner"], payer_of(context)) == ("on_hold", b.id, theirs)
+    assert (job["state"], job["key_id"], payer_of(context)) == ("on_hold", b.id, theirs)
     b.post(f"/v1/sweeps/{theirs}/resume")
     assert the_job(b)["state"] == "queued"
     work(context)
@@ -136,8 +136,8 @@ def test_a_sweep_that_ran_out_of_budget_wants_its_jobs(a, b, context) -> None:
     assert b.get(f"/v1/sweeps/{theirs}")["state"] == "budget_exhausted"
     mine = sweep_of(a, models=["builtin/expert"])
     a.post(f"/v1/sweeps/{mine}/cancel")
-    left = b.get(f"/v1/jobs?sweep={theirs}&model=builtin/expert")["jobs"]
-    assert [(job["state"], job["owner"]) for job in left] == [("on_hold", b.id)]
+    left = b.get(f"/v1/jobs?sweep={theirs}&model=builtin/expert")["data"]
+    assert [(job["state"], job["key_id"]) for job in left] == [("on_hold", b.id)]
 
 
 def test_nobody_pays_after_cancelling(a, b, guarded, context) -> None:
@@ -149,7 +149,7 @@ def test_nobody_pays_after_cancelling(a, b, guarded, context) -> None:
     assert the_job(b)["outcome"] == "construction_failed"
     assert spent(a, guarded) == 0
     assert spent(b, guarded) == the_job(b)["usage"]["requests"] > 0
-    assert b.get(f"/v1/sweeps/{mine}")["budget"]["spent_requests"] == 0
+    assert b.get(f"/v1/sweeps/{mine}")["budget"]["used_requests"] == 0
     assert theirs == payer_of(context)
 
 
@@ -179,7 +179,7 @@ def test_a_keys_budget_stop_leaves_the_jobs_that_another_key_wants(a, b, guarded
     for seed in seeds:
         b.post("/v1/jobs", {**JOB, "seed": seed})
     work(context)
-    assert {job["state"] for job in b.get("/v1/jobs")["jobs"]} == {"done"}
+    assert {job["state"] for job in b.get("/v1/jobs")["data"]} == {"done"}
     assert spent(a, guarded) <= 1
 
 
@@ -233,7 +233,7 @@ def test_a_job_that_another_key_asked_for_singly_goes_on(a, b, context) -> None:
     mine = sweep_of(a)
     b.post("/v1/jobs", JOB)
     a.post(f"/v1/sweeps/{mine}/cancel")
-    assert (the_job(b)["state"], the_job(b)["owner"]) == ("queued", b.id)
+    assert (the_job(b)["state"], the_job(b)["key_id"]) == ("queued", b.id)
     assert payer_of(context) is None
 
 
@@ -241,14 +241,14 @@ def test_cancelling_a_shared_job_only_ends_ones_own_wish(a, b) -> None:
     mine, theirs = sweep_of(a), sweep_of(b)
     job = the_job(a)["id"]
     # B takes back its payload, A's stays; so what A cancels later ends.
-    assert b.post(f"/v1/jobs/{job}/cancel")["owner"] == a.id
+    assert b.post(f"/v1/jobs/{job}/cancel")["key_id"] == a.id
     assert the_job(a)["state"] == "queued"
     b.post("/v1/sweeps", SWEEP)
-    assert a.post(f"/v1/jobs/{job}/cancel")["owner"] == b.id
+    assert a.post(f"/v1/jobs/{job}/cancel")["key_id"] == b.id
     assert the_job(b)["state"] == "queued"
     # A took its payload back: B's cancel does not bring it back to A.
     assert b.post(f"/v1/jobs/{job}/cancel")["outcome"] == "cancelled"
-    assert {mine, theirs} <= {sweep["id"] for sweep in a.get("/v1/sweeps")["sweeps"]}
+    assert {mine, theirs} <= {sweep["id"] for sweep in a.get("/v1/sweeps")["data"]}
 
 
 def test_who_neither_owns_nor_wants_a_job_may_not_cancel_it_but_an_admin(

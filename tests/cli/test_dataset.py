@@ -149,7 +149,7 @@ def test_the_calls_of_the_messages_build_the_machine(url, context, tmp_path):
     ]
 
     expert = found["builtin/expert", "support-1"]
-    prompts = httpx.get(f"{url}/v1/jobs/{expert['job_id']}/prompts").json()["prompts"]
+    prompts = httpx.get(f"{url}/v1/jobs/{expert['job_id']}/prompts").json()["data"]
     told = [text for p in prompts for text in ([p["system"]] if p["system"] else []) + p["user"]]
     read = [m["content"] for m in expert["messages"] if m["role"] in ("system", "user")]
     assert read == told

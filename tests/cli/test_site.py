@@ -106,7 +106,7 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
     assert files_of(site) == wanted
     assert sum(name.endswith(".arrow") for name in wanted) == 1
     for sweep in sweeps:
-        found = httpx.get(f"{url}/v1/jobs", params={"sweep": sweep}).json()["jobs"]
+        found = httpx.get(f"{url}/v1/jobs", params={"sweep": sweep}).json()["data"]
         assert [rows["jobs"][place] for place in rows["sweeps"][sweep]] == found
     assert len(rows["jobs"]) == 3
     told = {name: read(site, whole["answers"][f"/v1/{name}"]) for name in ("tasks", "models")}

@@ -68,7 +68,7 @@ def test_a_coroutine_that_suspends_is_refused_without_an_event_loop() -> None:
 def test_types_have_the_keys_of_the_contract_and_change_with_it() -> None:
     documents = CONTRACT["components"]["schemas"]
     typed = {name for name in documents if inspect.isclass(getattr(schemas, name, None))}
-    assert {"JobDetail", "SweepView", "Board", "ToolOutcome"} <= typed
+    assert {"JobDetail", "Sweep", "Board", "ToolOutcome"} <= typed
     for name in typed:
         hints = get_type_hints(getattr(schemas, name), include_extras=True)
         required = {key for key, hint in hints.items() if get_origin(hint) is not NotRequired}

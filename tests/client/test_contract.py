@@ -32,13 +32,13 @@ SAYS = ("lift-1 builtin/expert 1.0", "transcripts", "success_low", "construction
 
 def test_the_catalogue(client) -> None:
     assert client.health()["checks"]
-    assert client.caller()["scope"] == "admin"
+    assert client.caller()["scopes"][-1] == "admin"
     assert {task["name"] for task in client.tasks()} == builtin_tasks().keys()
     task = client.task("lift-1")
     assert client.task("lift-1", version=task["version"]) == task
     assert "builtin/idle" in [model["name"] for model in client.models()]
     assert client.module_model(client.modules()[0]["name"]).startswith(b"glTF")
-    assert client.versions()["error"] == 0.05
+    assert client.versions()["family_wise_error_rate"] == 0.05
     assert list(client.workers()) == []
 
 
@@ -85,9 +85,9 @@ def test_the_leaderboard_and_what_stands_beside_it(client, service) -> None:
     assert client.manifest(task=["lift-1"], model=["builtin/idle"])
     assert b"builtin/idle" in client.export_leaderboard("csv")
     page = client.changes(limit=2)
-    assert len(page["changes"]) == 2
+    assert len(page["data"]) == 2
     older = client.changes(before=page["next_before"])["changes"]
-    assert older[0]["id"] < page["changes"][-1]["id"]
+    assert older[0]["id"] < page["data"][-1]["id"]
     asked = client.verify_leaderboard("builtin/expert", sample=1)
     assert asked["scored"] == 3
     assert client.verification(asked["verifications"][0])["id"] == asked["verifications"][0]
@@ -143,7 +143,7 @@ def test_a_sweep_is_paused_resumed_cancelled_and_retried(client, make) -> None:
     assert client.wait_for_sweep(sweep)["state"] == "paused"
     assert client.resume_sweep(sweep, budget={"max_requests": 5})["state"] == "active"
     assert client.set_sweep_budget(sweep, {"max_requests": 7})["budget"]["max_requests"] == 7
-    assert client.sweep_forecast(sweep)["jobs_left"] == 1
+    assert client.sweep_forecast(sweep)["remaining_jobs"] == 1
     assert client.job_summary(sweep=sweep)["jobs"] == 1
     assert client.search_transcripts("nobody said this", sweep=sweep)["matches"] == []
     job = next(iter(client.jobs(sweep=sweep)))["id"]
@@ -229,7 +229,7 @@ def test_what_is_not_there_or_not_allowed(make, service) -> None:
             ask(NOBODY)
     made = admin.post("/v1/keys", {"name": f"reads-{make.kind}", "scopes": ["read"]})
     reader = make(service.locked, made["secret"])
-    assert reader.caller()["scope"] == "read"
+    assert reader.caller()["scopes"] == ["read"]
     with pytest.raises(ForbiddenError, match="needs the scope 'submit'"):
         reader.submit_job("lift-1", "builtin/idle")
     for key in (None, "unknown"):
@@ -240,14 +240,14 @@ def test_what_is_not_there_or_not_allowed(make, service) -> None:
 def test_the_key_and_the_url_may_stand_in_the_environment(make, service, monkeypatch, tmp_path):
     monkeypatch.setenv("BUILDARENA_URL", service.locked + "/")
     monkeypatch.setenv("BUILDARENA_KEY", ADMIN)
-    assert make().caller()["scope"] == "admin"
+    assert make().caller()["scopes"][-1] == "admin"
     file = tmp_path / "key"
     file.write_text(f"{ADMIN}\n")
     monkeypatch.setenv("BUILDARENA_KEY_FILE", str(file))
     with pytest.raises(BadArgumentError, match="are both set"):
         make()
     monkeypatch.delenv("BUILDARENA_KEY")
-    assert make().caller()["scope"] == "admin"
+    assert make().caller()["scopes"][-1] == "admin"
 
 
 def ran(program: str, url: str) -> subprocess.CompletedProcess[str]:

@@ -127,7 +127,7 @@ def test_an_agent_can_submit_again_when_the_store_works(context, folder) -> None
         assert refused.status_code == 503
         assert refused.headers["Retry-After"]
         mend_store(folder)
-        assert api.post(f"/v1/sessions/{session}/submit").status_code == 202
+        assert api.post(f"/v1/sessions/{session}/submit").status_code == 200
 
 
 def test_a_trajectory_of_an_older_schema_is_verified_as_it_is(

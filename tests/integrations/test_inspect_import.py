@@ -47,7 +47,7 @@ def bring(url: str, *words: object, key: str = "") -> tuple[int, list[str]]:
 
 
 def jobs_of(client: httpx.Client) -> dict[str, dict]:
-    return {job["task"]: job for job in client.get("/v1/jobs").json()["jobs"]}
+    return {job["task"]: job for job in client.get("/v1/jobs").json()["data"]}
 
 
 def test_a_log_becomes_jobs_that_the_service_simulates_and_scores_itself(logs, context) -> None:

@@ -194,7 +194,7 @@ def test_no_lease_is_renewed_forever(context, caller) -> None:
 def test_runners_are_workers_like_others(url, caller) -> None:
     caller.ask("POST", "/heartbeat", json=caller.about(versions={"engine": "mujoco"}, pid=7))
     admin = as_admin(url)
-    (listed,) = admin.ask("GET", "/../workers").json()["workers"]
+    (listed,) = admin.ask("GET", "/../workers").json()["data"]
     assert (listed["queues"], listed["pid"], listed["alive"]) == (["simulate.mujoco"], 7, True)
     assert listed["id"].startswith("runner@key_")
 
@@ -204,7 +204,7 @@ def test_runners_are_workers_like_others(url, caller) -> None:
 
     wait_until(is_served, 20, "health was told")
     caller.ask("POST", "/goodbye", json=caller.about())
-    assert admin.ask("GET", "/../workers").json()["workers"] == []
+    assert admin.ask("GET", "/../workers").json()["data"] == []
 
 
 def misses(context, caller: Caller, how: str) -> None:

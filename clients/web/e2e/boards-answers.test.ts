@@ -29,10 +29,10 @@ describe("failures", () => {
     await page.goto(`${URL_OF_SERVICE}/jobs`);
     await summary.getByRole("link", { name: /^success/ }).click();
     await page.waitForURL(/outcome=success/);
-    const wanted = await ask<Schemas["JobPage"]>("/v1/jobs?outcome=success&sort=indicator&order=desc&state=done");
+    const wanted = await ask<Schemas["JobList"]>("/v1/jobs?outcome=success&sort=indicator&order=desc&state=done");
     await page.getByRole("button", { name: "Indicator" }).click();
     await page.waitForURL(/sort=indicator/);
-    const first = wanted.jobs[0]?.id.slice(0, 12) ?? "none";
+    const first = wanted.data[0]?.id.slice(0, 12) ?? "none";
     await expect.poll(() => page.locator("tbody tr").first().textContent()).toContain(first);
     await page.getByRole("button", { name: "More filters" }).click();
     await page.getByLabel("Contains").fill("said by nobody");
@@ -55,12 +55,14 @@ describe("failures", () => {
   });
 
   it("have what roles were told, which their turns say when they are asked", async () => {
-    const { matches } = await ask<Schemas["TranscriptMatchesView"]>("/v1/transcripts?text=drawing&of=prompts");
-    const id = matches[0]?.job ?? "";
+    const { data: matches } = await ask<Schemas["TranscriptMatchList"]>(
+      "/v1/transcripts?text=drawing&search_in=prompts",
+    );
+    const id = matches[0]?.job_id ?? "";
     const { page, context } = await opened(`/jobs/${id}?turn=${matches[0]?.turn ?? ""}`);
     const told = page.locator("article[data-chosen] details.told");
     await told.waitFor();
-    const [first] = (await ask<Schemas["PromptsView"]>(`/v1/jobs/${id}/prompts`)).prompts;
+    const [first] = (await ask<Schemas["PromptList"]>(`/v1/jobs/${id}/prompts`)).data;
     expect(await told.locator("pre").first().isVisible()).toBe(false);
     await told.locator("summary").click();
     expect(await told.locator("pre").allTextContents()).toEqual([first?.system, ...(first?.user ?? [])]);
@@ -106,7 +108,7 @@ it("the method is a click away from the board, with the versions in use", async 
   const { page, context } = await opened("/");
   await page.getByRole("link", { name: "Method", exact: true }).click();
   await page.getByRole("heading", { name: "What is not claimed" }).waitFor();
-  const used = await ask<Schemas["VersionsView"]>("/v1/versions");
+  const used = await ask<Schemas["Versions"]>("/v1/versions");
   const shown = await textsOf(page, 'table[aria-label="Versions in use"]');
   const simulators = used.simulators.map(({ name, version }) => [`Simulator ${name}`, version]);
   expect(shown.map((cells) => cells.at(-1))).toEqual([

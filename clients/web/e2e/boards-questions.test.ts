@@ -58,7 +58,7 @@ it("why did this model fail at that task? In two clicks", async () => {
 });
 
 it("look at this moment of the trial! In one click", async () => {
-  const { jobs } = await ask<Schemas["JobPage"]>("/v1/jobs?model=builtin/expert&outcome=success&limit=1");
+  const { data: jobs } = await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/expert&outcome=success&limit=1");
   const path = `/jobs/${jobs[0]?.id ?? ""}?view=trial`;
   const { page, context, click, clicks } = await asked(path);
   await page.getByRole("slider").first().press("End");

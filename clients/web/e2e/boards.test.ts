@@ -56,7 +56,7 @@ describe("every figure of the board", () => {
         percent(row.success_rate_mean, 1),
         dollars(row.cost_usd_mean),
         count(row.output_tokens_mean),
-        count(row.trials),
+        count(row.counted),
       ]);
     });
   });
@@ -88,7 +88,7 @@ describe("every figure of the board", () => {
         expect(rank?.replace(" tied", "")).toBe(String(row.rank ?? "–"));
         expect(place).toBe(places(row.rank_low, row.rank_high));
         expect(success).toBe(
-          `${percent(row.success_rate)} (${row.successes} of ${row.trials})${percent(row.success_low)} to ${percent(row.success_high)}`,
+          `${percent(row.success_rate)} (${row.successes} of ${row.counted})${percent(row.success_low)} to ${percent(row.success_high)}`,
         );
         expect(indicator).toBe(`${row.indicator_mean === null ? "" : atLeast}${number(row.indicator_mean)}${spread}`);
         expect(score?.startsWith(number(row.score, 2))).toBe(true);
@@ -96,7 +96,7 @@ describe("every figure of the board", () => {
         expect([parts, cost, refused]).toEqual([
           count(row.parts_mean),
           dollars(row.cost_per_success_usd),
-          percent(row.invalid_action_rate),
+          percent(row.refused_action_rate),
         ]);
       });
     }
@@ -169,7 +169,7 @@ describe("sweeps", () => {
   });
 
   it("are submitted once, however often the button is clicked", async () => {
-    const before = (await ask<Schemas["SweepPage"]>("/v1/sweeps?limit=100")).sweeps.length;
+    const before = (await ask<Schemas["SweepList"]>("/v1/sweeps?limit=100")).data.length;
     const { page, context } = await opened("/sweeps/new");
     await page
       .getByRole("textbox", { name: "Simulator" })
@@ -184,7 +184,7 @@ describe("sweeps", () => {
       found.click();
     });
     await page.waitForURL(/\/sweeps\/sweep_/);
-    const after = (await ask<Schemas["SweepPage"]>("/v1/sweeps?limit=100")).sweeps;
+    const after = (await ask<Schemas["SweepList"]>("/v1/sweeps?limit=100")).data;
     expect(after.length).toBe(before + 1);
     expect(after[0]?.spec.simulator).toBe("pybullet");
     await context.close();
@@ -218,19 +218,19 @@ describe("sweeps", () => {
     page.on("request", (request) => {
       if (request.url().includes("order=asc")) reads.push(request.url());
     });
-    const jobs = await ask<Schemas["JobPage"]>(`/v1/jobs?sweep=${id}`);
-    await ask(`/v1/jobs/${jobs.jobs[0]?.id ?? ""}/cancel`, {});
+    const jobs = await ask<Schemas["JobList"]>(`/v1/jobs?sweep=${id}`);
+    await ask(`/v1/jobs/${jobs.data[0]?.id ?? ""}/cancel`, {});
     await expect.poll(() => page.getByText("cancelled: 1").count(), { timeout: 10_000 }).toBe(1);
     expect(reads).toEqual([]);
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Resume" }).waitFor();
-    expect((await ask<Schemas["SweepView"]>(`/v1/sweeps/${id}`)).state).toBe("paused");
+    expect((await ask<Schemas["Sweep"]>(`/v1/sweeps/${id}`)).state).toBe("paused");
     await page.getByText(/^1 on hold before/).waitFor();
     await page.getByRole("button", { name: "Budget…" }).click();
     await page.getByLabel("US dollars").fill("12.5");
     await page.getByRole("button", { name: "Set the budget" }).click();
     await page.getByText("of $12.50").waitFor();
-    const raised = await ask<Schemas["SweepView"]>(`/v1/sweeps/${id}`);
+    const raised = await ask<Schemas["Sweep"]>(`/v1/sweeps/${id}`);
     expect([raised.state, raised.budget?.max_cost_usd, raised.budget?.max_requests]).toEqual(["paused", 12.5, null]);
     await page.getByRole("button", { name: "Cancel…" }).click();
     await page.getByRole("button", { name: "Cancel the sweep" }).click();

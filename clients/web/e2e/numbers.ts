@@ -22,7 +22,7 @@ export async function numbersOf(track: string, ask: Ask): Promise<Numbers[]> {
   const on = `track=${encodeURIComponent(track)}`;
   const board = await ask<Schemas["Board"]>(`/v1/leaderboard?${on}`);
   const task = await ask<Schemas["Board"]>(`/v1/leaderboard?${on}&task=${TASK}`);
-  const { jobs } = await ask<Schemas["JobPage"]>(`/v1/jobs?${on}&model=${MODEL}&task=${TASK}&outcome=success`);
+  const { data: jobs } = await ask<Schemas["JobList"]>(`/v1/jobs?${on}&model=${MODEL}&task=${TASK}&outcome=success`);
   const [done] = jobs;
   if (done === undefined) throw new Error(`no job of ${MODEL} succeeded on ${track}`);
   const job = await ask<Schemas["JobDetail"]>(`/v1/jobs/${done.id}`);
@@ -37,7 +37,7 @@ export async function numbersOf(track: string, ask: Ask): Promise<Numbers[]> {
         number(row.mean_rank, 2),
         number(row.score_mean, 2),
         percent(row.success_rate_mean, 1),
-        count(row.trials),
+        count(row.counted),
       ]),
     },
     {
@@ -60,7 +60,7 @@ export async function numbersOf(track: string, ask: Ask): Promise<Numbers[]> {
         percent(own?.success_rate_mean, 1),
         dollars(own?.cost_usd_mean),
         count(own?.output_tokens_mean),
-        count(own?.trials),
+        count(own?.counted),
         ...rows
           .filter((row) => row.model === MODEL)
           .flatMap((row) => [

@@ -22,10 +22,10 @@ const ids = { sweep: "", second: "", job: "", other: "", session: "" };
 
 beforeAll(async () => {
   browser = await launched();
-  const { jobs } = await ask<Schemas["JobPage"]>("/v1/jobs?model=builtin/expert&outcome=success");
+  const { data: jobs } = await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/expert&outcome=success");
   ids.job = jobs[0]?.id ?? "";
-  ids.other = (await ask<Schemas["JobPage"]>("/v1/jobs?model=builtin/idle")).jobs[0]?.id ?? "";
-  ids.sweep = (await ask<Schemas["SweepPage"]>("/v1/sweeps")).sweeps[0]?.id ?? "";
+  ids.other = (await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/idle")).data[0]?.id ?? "";
+  ids.sweep = (await ask<Schemas["SweepList"]>("/v1/sweeps")).data[0]?.id ?? "";
   // Another track: the same models in another workflow.
   const again = { tasks: ["support-1"], models: ["builtin/expert", "builtin/idle"], seeds: [0], simulator: "mujoco" };
   const sent = { ...again, name: "second track", workflow: "builder" };
@@ -75,11 +75,11 @@ describe.each(PAGES)("the page: %s", (name, path) => {
 
 it("ten numbers of a page are the service's on two tracks", async () => {
   const ended = async (): Promise<boolean> => {
-    const { progress } = await ask<Schemas["SweepView"]>(`/v1/sweeps/${ids.second}`);
+    const { progress } = await ask<Schemas["Sweep"]>(`/v1/sweeps/${ids.second}`);
     return progress.done === progress.total;
   };
   await expect.poll(ended, { timeout: 45_000, interval: 500 }).toBe(true);
-  const { jobs } = await ask<Schemas["JobPage"]>("/v1/jobs?model=builtin/expert&outcome=success");
+  const { data: jobs } = await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/expert&outcome=success");
   const tracks = [...new Set(jobs.map((job) => job.track))];
   expect(tracks.length).toBeGreaterThanOrEqual(2);
   const context = await browser.newContext({ viewport: { width: 1280, height: 900 } });

@@ -12,8 +12,8 @@ async function json(path: string): Promise<Record<string, { id: string }[]>> {
 
 beforeAll(async () => {
   browser = await launched();
-  sweep = (await json("/v1/sweeps")).sweeps?.[0]?.id ?? "";
-  built = (await json("/v1/jobs?model=builtin/expert&outcome=success")).jobs?.[0]?.id ?? "";
+  sweep = (await json("/v1/sweeps")).data?.[0]?.id ?? "";
+  built = (await json("/v1/jobs?model=builtin/expert&outcome=success")).data?.[0]?.id ?? "";
 });
 afterAll(() => browser.close());
 

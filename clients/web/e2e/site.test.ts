@@ -8,7 +8,7 @@ import { ALL_LOOKS, expectNoSeriousFault, launched, URL_OF_SERVICE } from "./bro
 import { expectNumbers, numbersOf } from "./numbers";
 
 type Board = components["schemas"]["Board"];
-type JobPage = components["schemas"]["JobPage"];
+type JobPage = components["schemas"]["JobList"];
 
 /** Published sites under a sub-path of a file server: one with every job whole, one with the best alone. */
 const [WHOLE = "", BEST = ""] = (process.env.BUILDARENA_WEB_SITES ?? "").split(",");
@@ -120,7 +120,7 @@ describe.skipIf(WHOLE === "")("a published site", () => {
         number(row.mean_rank, 2),
         number(row.score_mean, 2),
         percent(row.success_rate_mean, 1),
-        count(row.trials),
+        count(row.counted),
       ]);
     });
     expect(shown).toHaveLength(board.overall.length);
@@ -232,8 +232,8 @@ describe.skipIf(WHOLE === "")("a published site", () => {
       { state: "running" },
       { text: "SUPPORT" },
       { text: "unreadable" },
-      { indicator_min: "1" },
-      { indicator_max: "0" },
+      { min_indicator: "1" },
+      { max_indicator: "0" },
       { id_prefix: one?.id.slice(0, 8) ?? "" },
       { configuration: one?.configuration ?? "" },
       { task_version: one?.task_version ?? "" },
@@ -247,17 +247,17 @@ describe.skipIf(WHOLE === "")("a published site", () => {
         const words = new URLSearchParams(query);
         const wanted = await asked<JobPage>(`/v1/jobs?limit=200&${words.toString()}`);
         const found = listed(rows, new URLSearchParams([...words, ["limit", "200"]]));
-        expect(found.jobs, words.toString()).toEqual(wanted.jobs);
+        expect(found.data, words.toString()).toEqual(wanted.data);
       }
     }
     const pages: string[] = [];
     for (let cursor: string | null = "0"; cursor !== null;) {
       const page: JobPage = listed(rows, new URLSearchParams({ limit: "4", cursor, sort: "indicator" }));
-      pages.push(...page.jobs.map((job) => job.id));
+      pages.push(...page.data.map((job) => job.id));
       cursor = page.next_cursor;
     }
     expect(pages).toEqual(
-      listed(rows, new URLSearchParams({ limit: "1000", sort: "indicator" })).jobs.map((job) => job.id),
+      listed(rows, new URLSearchParams({ limit: "1000", sort: "indicator" })).data.map((job) => job.id),
     );
   });
 });

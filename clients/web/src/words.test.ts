@@ -44,7 +44,7 @@ describe("problems", () => {
 
   it("in a stream are skipped", () => {
     expect(readEvent("3", "done", "{")).toBeNull();
-    expect(readEvent("3", "done", '{"job":"j","at":"t"}')).toMatchObject({ id: 3, kind: "done", job: "j" });
+    expect(readEvent("3", "done", '{"job_id":"j","at":"t"}')).toMatchObject({ id: 3, kind: "done", job_id: "j" });
   });
 });
 

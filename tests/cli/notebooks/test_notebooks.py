@@ -109,7 +109,7 @@ def test_a_service_is_read_in_the_notebook_and_in_frames(tmp_path, url):
 
 
 def test_a_job_s_machine_and_trial_are_those_that_are_kept(url):
-    jobs = {job["model"]: job for job in httpx.get(f"{url}/v1/jobs").json()["jobs"]}
+    jobs = {job["model"]: job for job in httpx.get(f"{url}/v1/jobs").json()["data"]}
     good, empty = jobs["builtin/expert"], jobs["builtin/idle"]
     machine, trial = ba.job_machine(good["id"]), ba.job_trial(good["id"], url)
     assert machine.to_document() == httpx.get(f"{url}/v1/jobs/{good['id']}/machine").json()

@@ -132,7 +132,7 @@ def finished(client: httpx.Client, sweep_id: str, within_s: float = 180) -> dict
 
 def results(client: httpx.Client, sweep_id: str) -> list[dict[str, Any]]:
     """Everything that must be equal between two runs of one sweep."""
-    jobs = client.get("/v1/jobs", params={"sweep": sweep_id, "limit": 200}).json()["jobs"]
+    jobs = client.get("/v1/jobs", params={"sweep": sweep_id, "limit": 200}).json()["data"]
     found = []
     for job in sorted(jobs, key=lambda job: job["id"]):
         detail = client.get(f"/v1/jobs/{job['id']}").json()

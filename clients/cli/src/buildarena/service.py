@@ -30,7 +30,7 @@ def leaderboard(
             BUILDARENA_KEY or BUILDARENA_KEY_FILE.
         overall: Whether there is a row for each model over all tasks instead.
         kind: ``pandas`` or ``polars``.
-        filters: Which jobs count: ``track``, ``task``, ``level``, ``model``, ``sweep``, …
+        filters: Which jobs count: ``track``, ``task``, ``model``, ``sweep``, …
 
     Raises:
         ClientError: The service does not answer, or refuses; or the library is not installed.
@@ -105,8 +105,8 @@ def job_trial(job_id: str, url: str | None = None) -> Trial:
             score=Score(
                 success=bool(job["success"]),
                 indicator=job["indicator"] or 0.0,
-                metrics=job["metrics"] or {},
-                flags=tuple(job["flags"] or ()),
+                metrics=job["metrics"],
+                flags=tuple(job["flags"]),
             ),
             trajectory=read_trajectory(client.artifact(job_id, name)),
         )

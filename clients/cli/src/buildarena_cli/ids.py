@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.suggestions import did_you_mean
@@ -16,8 +16,6 @@ DIGITS: Final = 20
 EXAMPLE: Final = "0a1b2c3d4e5f60718293"
 KINDS: Final = ("job", "sweep", "key")
 MAX_CANDIDATES: Final = 10
-LISTED: Final = {"job": "jobs", "sweep": "sweeps"}
-"""Kinds that the API lists by ``id_prefix``; of keys it lists all."""
 
 
 def whole_id(client: Client, kind: str, word: str) -> str:
@@ -74,9 +72,8 @@ def checked_prefix(kind: str, word: str) -> str:
 def candidates(client: Client, kind: str, prefix: str) -> list[str]:
     """Ids that begin with a prefix: all up to MAX_CANDIDATES, one more when there are more."""
     limit = MAX_CANDIDATES + 1
-    if kind in LISTED:
-        name = LISTED[kind]
-        entries: list[Any] = client.get(f"/v1/{name}", id_prefix=prefix, limit=limit)[name]
+    if kind == "key":  # which are few
+        entries = client.every("/v1/keys")
     else:
-        entries = client.get(f"/v1/{kind}s")
+        entries = client.get(f"/v1/{kind}s", id_prefix=prefix, limit=limit)["data"]
     return [entry["id"] for entry in entries if entry["id"].startswith(prefix)][:limit]

@@ -168,7 +168,7 @@ def _act(client: Client, tool: str, arguments: dict[str, Any]) -> types.CallTool
 
 def _manage(client: Client, tool: str, arguments: Arguments) -> types.CallToolResult:
     if tool == "list_tasks":
-        tasks = client.get("/v1/tasks")
+        tasks = client.tasks()
         return _result("\n".join(f"{task['name']}: {task['title']}" for task in tasks))
     if tool == "open_session":
         opened = client.post("/v1/sessions", arguments)

@@ -53,14 +53,17 @@ class RefusedError(ClientError):
 
     Attributes:
         status: The HTTP status.
+        code: What went wrong, for programs; empty if the answer has none.
         detail: What went wrong, in one sentence.
         errors: What is wrong with the request: ``field``, ``message``, ``line`` and ``choices`` of
             each mistake.
     """
 
-    def __init__(self, status: int, detail: str, errors: Sequence[Mapping[str, Any]] = ()) -> None:
+    def __init__(
+        self, status: int, detail: str, errors: Sequence[Mapping[str, Any]] = (), *, code: str = ""
+    ) -> None:
         super().__init__("\n".join(map(described, errors)) or detail)
-        self.status = status
+        self.status, self.code = status, code
         self.detail = detail
         self.errors = [dict(error) for error in errors]
 

@@ -21,16 +21,16 @@ class Event(TypedDict):
     Attributes:
         id: Grows; a stream that begins after it continues behind it.
         kind: What happened.
-        job: The job it happened to, if it is about one.
-        sweep: The sweep it is about, if it is about one.
+        job_id: The job it happened to, if it is about one.
+        sweep_id: The sweep it is about, if it is about one.
         at: When.
         data: What else there is to say, by kind.
     """
 
     id: int
     kind: str
-    job: str | None
-    sweep: str | None
+    job_id: str | None
+    sweep_id: str | None
     at: str
     data: dict[str, Any]
 
@@ -43,9 +43,14 @@ def event_of(message: ServerSentEvent) -> Event:
     """
     try:
         data = json.loads(message.data)
-        job, sweep, at = (data.pop(name, None) for name in ("job", "sweep", "at"))
+        job_id, sweep_id, at = (data.pop(name, None) for name in ("job_id", "sweep_id", "at"))
         return Event(
-            id=int(message.id), kind=message.event, job=job, sweep=sweep, at=str(at), data=data
+            id=int(message.id),
+            kind=message.event,
+            job_id=job_id,
+            sweep_id=sweep_id,
+            at=str(at),
+            data=data,
         )
     except (ValueError, AttributeError, TypeError) as error:
         raise no_events() from error

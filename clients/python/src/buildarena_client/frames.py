@@ -53,7 +53,7 @@ Columns = dict[str, tuple[type, bool]]
 texts, dict for documents with columns of their own, object for JSON."""
 
 
-def jobs_frame(jobs: Iterable[schemas.JobView], *, kind: Kind = "pandas") -> Any:
+def jobs_frame(jobs: Iterable[schemas.Job], *, kind: Kind = "pandas") -> Any:
     """A row for each job.
 
     Args:
@@ -63,17 +63,17 @@ def jobs_frame(jobs: Iterable[schemas.JobView], *, kind: Kind = "pandas") -> Any
     Raises:
         MissingLibraryError: It is not installed.
     """
-    return _made(jobs, _columns(schemas.JobView), kind)
+    return _made(jobs, _columns(schemas.Job), kind)
 
 
-def sweeps_frame(sweeps: Iterable[schemas.SweepView], *, kind: Kind = "pandas") -> Any:
+def sweeps_frame(sweeps: Iterable[schemas.Sweep], *, kind: Kind = "pandas") -> Any:
     """A row for each sweep, as ``Client.sweeps`` gives them; else as ``jobs_frame``."""
-    return _made(sweeps, _columns(schemas.SweepView), kind)
+    return _made(sweeps, _columns(schemas.Sweep), kind)
 
 
-def results_frame(results: Iterable[schemas.Result], *, kind: Kind = "pandas") -> Any:
+def results_frame(results: Iterable[schemas.JobResult], *, kind: Kind = "pandas") -> Any:
     """A row for each result, as ``Client.sweep_results`` gives them; else as ``jobs_frame``."""
-    return _made(results, _columns(schemas.Result), kind)
+    return _made(results, _columns(schemas.JobResult), kind)
 
 
 def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind = "pandas") -> Any:
@@ -85,14 +85,14 @@ def leaderboard_frame(board: schemas.Board, *, overall: bool = False, kind: Kind
         kind: As in ``jobs_frame``.
     """
     if overall:
-        return _made(board.get("overall", []), _columns(schemas.OverallView), kind)
+        return _made(board.get("overall", []), _columns(schemas.OverallRow), kind)
     rows = [
         {**{name: task[name] for name in TASK_COLUMNS}, **row}
         for task in board["tasks"]
         for row in task["rows"]
     ]
     of_task = {name: _columns(schemas.TaskBoard)[name] for name in TASK_COLUMNS}
-    return _made(rows, of_task | _columns(schemas.Row), kind)
+    return _made(rows, of_task | _columns(schemas.BoardRow), kind)
 
 
 def _made(rows: Iterable[Mapping[str, Any]], columns: Columns, kind: Kind) -> Any:

@@ -233,15 +233,17 @@ class _BlockingStream(httpx2.AsyncByteStream):
 def _failure(answer: httpx2.Response, key: str | None) -> ClientError:
     """What a problem says, without the key, which a server may repeat."""
     detail, errors = f"HTTP {answer.status_code} from {answer.url}", list[dict[str, Any]]()
+    code = ""
     text = answer.text.replace(json.dumps(key)[1:-1], HIDDEN) if key else answer.text
     with contextlib.suppress(ValueError, KeyError, TypeError, AttributeError, RecursionError):
         problem = json.loads(text)
         errors = [_issue(error) for error in problem["errors"]]
+        code = str(problem.get("code", ""))
         detail = str(problem["detail"])
     if answer.status_code == HTTPStatus.SERVICE_UNAVAILABLE:
         return UnavailableError(detail)
     kind = kind_of(answer.status_code)
-    return kind(answer.status_code, detail, [] if kind is KeyRefusedError else errors)
+    return kind(answer.status_code, detail, [] if kind is KeyRefusedError else errors, code=code)
 
 
 def _issue(error: dict[str, Any]) -> dict[str, Any]:

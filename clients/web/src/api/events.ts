@@ -6,7 +6,7 @@ import { BASE, isSite } from "./site";
 export interface ServiceEvent {
   id: number;
   kind: string;
-  job: string | null;
+  job_id: string | null;
   at: string;
   data: Record<string, unknown>;
 }
@@ -23,7 +23,7 @@ export function readEvent(id: string | undefined, kind: string | undefined, text
     return {
       id: Number(id ?? 0),
       kind: kind ?? "message",
-      job: typeof data.job === "string" ? data.job : null,
+      job_id: typeof data.job_id === "string" ? data.job_id : null,
       at: typeof data.at === "string" ? data.at : "",
       data,
     };

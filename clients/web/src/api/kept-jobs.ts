@@ -1,12 +1,12 @@
 import type { components } from "./contract";
 
-type JobView = components["schemas"]["JobView"];
-type JobPage = components["schemas"]["JobPage"];
-type JobSummary = components["schemas"]["JobSummaryView"];
+type Job = components["schemas"]["Job"];
+type JobPage = components["schemas"]["JobList"];
+type JobSummary = components["schemas"]["JobSummary"];
 
 /** The rows of a site's jobs, and which of them are kept with everything they made. */
 export interface Rows {
-  jobs: JobView[];
+  jobs: Job[];
   kept: string[];
   /** By sweep, the places of its jobs among all. */
   sweeps: Record<string, number[]>;
@@ -14,7 +14,7 @@ export interface Rows {
 
 type Value = string | number | null;
 
-const EQUAL: Readonly<Record<string, (job: JobView) => Value>> = {
+const EQUAL: Readonly<Record<string, (job: Job) => Value>> = {
   task: (job) => job.task,
   task_version: (job) => job.task_version,
   model: (job) => job.model,
@@ -25,7 +25,7 @@ const EQUAL: Readonly<Record<string, (job: JobView) => Value>> = {
   reason: (job) => job.reason,
 };
 
-const SORTED: Readonly<Record<string, (job: JobView) => Value>> = {
+const SORTED: Readonly<Record<string, (job: Job) => Value>> = {
   created: (job) => job.created_at,
   finished: (job) => job.finished_at,
   indicator: (job) => job.indicator,
@@ -51,7 +51,7 @@ function compare(a: Value, b: Value, by: string): number {
   return (a ?? 0) < (b ?? 0) ? -1 : 1;
 }
 
-function holds(job: JobView, words: URLSearchParams, categories: Categories): boolean {
+function holds(job: Job, words: URLSearchParams, categories: Categories): boolean {
   for (const [name, read] of Object.entries(EQUAL)) {
     const wanted = words.get(name);
     if (wanted !== null && read(job) !== wanted) return false;
@@ -60,7 +60,7 @@ function holds(job: JobView, words: URLSearchParams, categories: Categories): bo
   if (flag !== null && !(job.flags ?? []).includes(flag)) return false;
   const wanted = words.getAll("category");
   if (wanted.length > 0 && !wanted.some((name) => categories.get(name)?.has(job.task))) return false;
-  const [least, most] = [words.get("indicator_min"), words.get("indicator_max")];
+  const [least, most] = [words.get("min_indicator"), words.get("max_indicator")];
   if (least !== null && (job.indicator === null || job.indicator < Number(least))) return false;
   if (most !== null && (job.indicator === null || job.indicator > Number(most))) return false;
   if (prefix !== null && !job.id.startsWith(prefix)) return false;
@@ -72,7 +72,7 @@ function holds(job: JobView, words: URLSearchParams, categories: Categories): bo
 
 const NONE: Categories = new Map();
 
-function chosen(rows: Rows, words: URLSearchParams, categories: Categories): JobView[] {
+function chosen(rows: Rows, words: URLSearchParams, categories: Categories): Job[] {
   const sweep = words.get("sweep");
   const all = sweep === null ? rows.jobs : (rows.sweeps[sweep] ?? []).flatMap((place) => rows.jobs[place] ?? []);
   return all.filter((job) => holds(job, words, categories));
@@ -100,7 +100,7 @@ export function summed(rows: Rows, words: URLSearchParams, categories: Categorie
 /** A page of jobs, filtered and sorted as the service does it; a cursor is the place where it begins. */
 export function listed(rows: Rows, words: URLSearchParams, categories: Categories = NONE): JobPage {
   const by = words.get("sort") ?? "created";
-  const value = SORTED[by] ?? ((job: JobView) => job.created_at);
+  const value = SORTED[by] ?? ((job: Job) => job.created_at);
   const sign = words.get("order") === "asc" ? 1 : -1;
   const found = chosen(rows, words, categories).sort((a, b) => {
     const [one, other] = [value(a), value(b)];
@@ -111,5 +111,5 @@ export function listed(rows: Rows, words: URLSearchParams, categories: Categorie
   });
   const begin = Number(words.get("cursor") ?? 0);
   const end = begin + Number(words.get("limit") ?? 100);
-  return { jobs: found.slice(begin, end), next_cursor: end < found.length ? String(end) : null };
+  return { data: found.slice(begin, end), next_cursor: end < found.length ? String(end) : null };
 }

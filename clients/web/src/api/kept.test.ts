@@ -40,7 +40,7 @@ describe("listed", () => {
   } as unknown as Rows;
   const ids = (words: string): string =>
     listed(rows, new URLSearchParams(words))
-      .jobs.map((one) => one.id)
+      .data.map((one) => one.id)
       .join("");
 
   it("counts, bounds and sorts as the service does", () => {
@@ -53,7 +53,7 @@ describe("listed", () => {
       ],
     } as unknown as Rows;
     const ids = (words: string): string[] =>
-      listed(more, new URLSearchParams(words), new Map([["k", new Set(["u"])]])).jobs.map((one) => one.id);
+      listed(more, new URLSearchParams(words), new Map([["k", new Set(["u"])]])).data.map((one) => one.id);
     expect(ids("category=k")).toEqual(["b"]);
     expect(ids("sort=cost&order=asc").at(-1)).toBe("c");
     const counted = summed(more, new URLSearchParams(""));
@@ -77,8 +77,8 @@ describe("listed", () => {
     expect(ids("sweep=nobody")).toBe("");
     expect(ids("flag=odd")).toBe("c");
     expect(ids("text=fell")).toBe("c");
-    expect(ids("indicator_min=2")).toBe("c");
-    expect(ids("indicator_max=1")).toBe("da");
+    expect(ids("min_indicator=2")).toBe("c");
+    expect(ids("max_indicator=1")).toBe("da");
     expect(ids("id_prefix=a")).toBe("a");
   });
 
@@ -86,6 +86,6 @@ describe("listed", () => {
     const first = listed(rows, new URLSearchParams("limit=3"));
     expect(first.next_cursor).toBe("3");
     const last = listed(rows, new URLSearchParams("limit=3&cursor=3"));
-    expect([last.jobs.map((one) => one.id), last.next_cursor]).toEqual([["a"], null]);
+    expect([last.data.map((one) => one.id), last.next_cursor]).toEqual([["a"], null]);
   });
 });

@@ -4,7 +4,7 @@ import { SITE, type Site } from "./site";
 
 const JOB = /^\/v1\/jobs\/([^/]+)/;
 /** Nobody may change anything here, so no page offers it. */
-const READER = { key: null, scope: "read", keys_required: false };
+const READER = { key_id: null, scopes: ["read"], keys_required: false };
 /** Statuses of what a site does not hold, or can't do. */
 export const NOT_KEPT: ReadonlySet<number> = new Set([405, 410]);
 const WORDS: Readonly<Record<string, string>> = {
@@ -48,7 +48,7 @@ function once<Data>(name: string, cache: RequestCache = "default"): Promise<Data
 export const readSite = (): Promise<Site> => once<Site>(SITE ?? "", "no-cache");
 
 function problem(status: number, title: string, detail: string): Response {
-  return Response.json({ type: "about:blank", status, title, detail, errors: [] }, { status });
+  return Response.json({ type: "about:blank", status, code: "path_not_found", title, detail, errors: [] }, { status });
 }
 
 function found(name: string | null | undefined, why: string): Promise<Response> | Response {
@@ -75,7 +75,7 @@ const LISTS: Readonly<Record<string, typeof listed | typeof summed>> = {
 
 async function categoriesOf(site: Site): Promise<Categories> {
   const name = site.answers["/v1/tasks"];
-  const tasks = name == null ? [] : await once<{ name: string; category: string }[]>(name);
+  const tasks = name == null ? [] : (await once<{ data: { name: string; category: string }[] }>(name)).data;
   const found = new Map<string, Set<string>>();
   for (const task of tasks) found.set(task.category, (found.get(task.category) ?? new Set()).add(task.name));
   return found;

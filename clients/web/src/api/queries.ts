@@ -7,19 +7,31 @@ import { every, isSite } from "./site";
 
 export type Board = Schema<"Board">;
 export type Figures = Schema<"Figures">;
-export type Caller = Schema<"CallerView">;
-export type Trouble = Schema<"TroubleView">;
-export type Row = Schema<"Row">;
+export type Caller = Schema<"Caller">;
+export type Trouble = Schema<"Trouble">;
+export type Row = Schema<"BoardRow">;
 export type TaskBoard = Schema<"TaskBoard">;
-export type OverallView = Schema<"OverallView">;
-export type SweepView = Schema<"SweepView">;
-export type Forecast = Schema<"ForecastView">;
-export type JobSummary = Schema<"JobSummaryView">;
-export type JobView = Schema<"JobView">;
+export type OverallRow = Schema<"OverallRow">;
+export type Sweep = Schema<"Sweep">;
+export type Forecast = Schema<"Forecast">;
+export type JobSummary = Schema<"JobSummary">;
+export type Job = Schema<"Job">;
 export type JobDetail = Schema<"JobDetail">;
-export type TaskView = Schema<"TaskView">;
+export type Task = Schema<"Task">;
 export type TaskDetail = Schema<"TaskDetail">;
-export type JobFilters = NonNullable<paths["/v1/jobs"]["get"]["parameters"]["query"]>;
+type JobQuery = NonNullable<paths["/v1/jobs"]["get"]["parameters"]["query"]>;
+/** Pages narrow lists down by one value of each kind, and by several categories. */
+export type JobFilters = {
+  [Name in keyof JobQuery]: Name extends "category"
+    ? JobQuery[Name]
+    : NonNullable<JobQuery[Name]> extends (infer One)[]
+      ? One
+      : JobQuery[Name];
+};
+export const asQuery = (filters: JobFilters): JobQuery => filters as JobQuery;
+
+/** The rows of a list that one page holds. */
+const rowsOf = async <Row>(asked: Promise<{ data: Row[] }>): Promise<Row[]> => (await asked).data;
 
 const LIVE_MS = 5_000;
 
@@ -93,7 +105,7 @@ export const sweepTroubles = (id: string) =>
   queryOptions({
     queryKey: ["sweep-troubles", id],
     refetchInterval: every(2 * LIVE_MS),
-    queryFn: () => taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } })),
+    queryFn: () => rowsOf(taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } }))),
   });
 
 /** Jobs that faults ended: they are in no average until they are retried. */
@@ -103,7 +115,9 @@ export const deadLetters = (id: string) =>
     refetchInterval: every(3 * LIVE_MS),
     queryFn: () =>
       taken(
-        client.GET("/v1/jobs", { params: { query: { sweep: id, outcome: "errored", sort: "finished", limit: 100 } } }),
+        client.GET("/v1/jobs", {
+          params: { query: { sweep: [id], outcome: ["errored"], sort: "finished", limit: 100 } },
+        }),
       ),
   });
 
@@ -111,7 +125,7 @@ export const deadLetters = (id: string) =>
 export const jobSummary = (filters: JobFilters) =>
   queryOptions({
     queryKey: ["job-summary", filters],
-    queryFn: () => taken(client.GET("/v1/jobs/summary", { params: { query: filters } })),
+    queryFn: () => taken(client.GET("/v1/jobs/summary", { params: { query: asQuery(filters) } })),
     placeholderData: keepPreviousData,
     refetchInterval: every(2 * LIVE_MS),
   });
@@ -120,14 +134,14 @@ export const jobSummary = (filters: JobFilters) =>
 export const PAGE = 200;
 
 export const jobPage = (filters: JobFilters) =>
-  taken(client.GET("/v1/jobs", { params: { query: { ...filters, limit: PAGE } } }));
+  taken(client.GET("/v1/jobs", { params: { query: { ...asQuery(filters), limit: PAGE } } }));
 
 /** Jobs page after page, as they are asked for. */
-export async function* jobPages(filters: JobFilters): AsyncGenerator<readonly JobView[]> {
+export async function* jobPages(filters: JobFilters): AsyncGenerator<readonly Job[]> {
   let cursor: string | undefined;
   do {
     const page = await jobPage({ ...filters, cursor });
-    yield page.jobs;
+    yield page.data;
     cursor = page.next_cursor ?? undefined;
   } while (cursor !== undefined);
 }
@@ -141,33 +155,33 @@ export const job = (id: string) =>
 export const jobFiles = (id: string) =>
   queryOptions({
     queryKey: ["job-files", id],
-    queryFn: () => taken(client.GET("/v1/jobs/{job_id}/artifacts", { params: { path: { job_id: id } } })),
+    queryFn: () => rowsOf(taken(client.GET("/v1/jobs/{job_id}/artifacts", { params: { path: { job_id: id } } }))),
   });
 
 export const tasks = () =>
   queryOptions({
     queryKey: ["tasks"],
     staleTime: 60_000,
-    queryFn: () => taken(client.GET("/v1/tasks", {})),
+    queryFn: () => rowsOf(taken(client.GET("/v1/tasks", {}))),
   });
 
 export const task = (name: string, version?: string) =>
   queryOptions({
     queryKey: ["task", name, version ?? ""],
     staleTime: 60_000,
-    queryFn: () => taken(client.GET("/v1/tasks/{name}", { params: { path: { name }, query: { version } } })),
+    queryFn: () => taken(client.GET("/v1/tasks/{task}", { params: { path: { task: name }, query: { version } } })),
   });
 
 export const models = () =>
   queryOptions({
     queryKey: ["models"],
     staleTime: 60_000,
-    queryFn: () => taken(client.GET("/v1/models", {})),
+    queryFn: () => rowsOf(taken(client.GET("/v1/models", {}))),
   });
 
 export const simulators = () =>
   queryOptions({
     queryKey: ["simulators"],
     staleTime: 60_000,
-    queryFn: () => taken(client.GET("/v1/simulators", {})),
+    queryFn: () => rowsOf(taken(client.GET("/v1/simulators", {}))),
   });

@@ -63,8 +63,8 @@ export default function MethodPage() {
                 </>
                 <>
                   Each pair of models has a permutation test on each task, and one over all tasks. All claims of a board
-                  are one family, adjusted together (Holm): at most {percent(used.error)} of boards make any false
-                  claim.
+                  are one family, adjusted together (Holm): at most {percent(used.family_wise_error_rate)} of boards
+                  make any false claim.
                 </>
                 <>
                   A model’s <b>rank</b> is one more than the number of models that are better beyond chance. Models that
@@ -78,7 +78,7 @@ export default function MethodPage() {
               <Points>
                 <>
                   Of a success rate: the exact interval of Clopper and Pearson, which covers at least{" "}
-                  {percent(1 - used.error)} at every rate.
+                  {percent(1 - used.family_wise_error_rate)} at every rate.
                 </>
                 <>
                   Of a mean indicator: the successes’ share and their mean, each with its own interval, combined. Below{" "}

@@ -3,12 +3,12 @@ import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useCallback } from "react";
 import { bytesOf } from "../api/client";
-import type { JobView } from "../api/queries";
+import type { Job } from "../api/queries";
 import { number, words } from "../format";
 import { OutcomeBadge } from "./Outcome";
 
 /** Machines by their pictures; each leads to its job. */
-export function Gallery({ jobs, unit, by }: { jobs: readonly JobView[]; unit?: string; by: "model" | "task" }) {
+export function Gallery({ jobs, unit, by }: { jobs: readonly Job[]; unit?: string; by: "model" | "task" }) {
   return (
     <SimpleGrid cols={{ base: 1, xs: 2, md: 4 }}>
       {jobs.map((job) => (

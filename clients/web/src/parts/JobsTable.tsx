@@ -2,7 +2,7 @@ import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
 import { useVirtualizer } from "@tanstack/react-virtual";
 import { memo, useRef, useState } from "react";
-import type { JobView } from "../api/queries";
+import type { Job } from "../api/queries";
 import { dollars, duration, number, secondsBetween, words } from "../format";
 import { Ago } from "./Ago";
 import { OutcomeBadge } from "./Outcome";
@@ -12,7 +12,7 @@ import { sortedRows, type Sorting, type Values } from "./sorting";
 const ROW_PX = 41;
 const HEIGHT_PX = 620;
 
-const VALUES: Values<JobView> = {
+const VALUES: Values<Job> = {
   task: (job) => job.task,
   model: (job) => job.model,
   seed: (job) => job.seed,
@@ -23,7 +23,7 @@ const VALUES: Values<JobView> = {
 };
 
 interface Listed {
-  jobs: readonly JobView[];
+  jobs: readonly Job[];
   onEnd?: () => void;
   /** How the service sorted them, where it does; rows that are all here are sorted here. */
   sorting?: Sorting | null;
@@ -101,7 +101,7 @@ export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Liste
 }
 
 /** Drawn again only when its job changes: a list that lives has many that do not. */
-const JobRow = memo(function JobRow({ job, index }: { job: JobView; index: number }) {
+const JobRow = memo(function JobRow({ job, index }: { job: Job; index: number }) {
   return (
     <Table.Tr style={{ height: ROW_PX }} aria-rowindex={index + 2}>
       <Table.Td>

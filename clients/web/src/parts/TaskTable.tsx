@@ -17,7 +17,7 @@ const VALUES: Values<Row> = {
   best: (row) => row.indicator_best,
   parts: (row) => row.parts_mean,
   cost: (row) => row.cost_per_success_usd,
-  refused: (row) => row.invalid_action_rate,
+  refused: (row) => row.refused_action_rate,
 };
 
 /** All models on one task, the best first. */
@@ -87,7 +87,7 @@ function Proof({ row }: { row: Row }) {
 }
 
 function TaskRow({ row, tied, several }: { row: Row; tied: boolean; several: boolean }) {
-  const success = `${successes(row.successes)} of ${row.trials}`;
+  const success = `${successes(row.successes)} of ${row.counted}`;
   return (
     <Table.Tr>
       <Table.Td>
@@ -150,7 +150,7 @@ function TaskRow({ row, tied, several }: { row: Row; tied: boolean; several: boo
       </Table.Td>
       <Table.Td className="figures">{count(row.parts_mean)}</Table.Td>
       <Table.Td className="figures">{dollars(row.cost_per_success_usd)}</Table.Td>
-      <Table.Td className="figures">{percent(row.invalid_action_rate)}</Table.Td>
+      <Table.Td className="figures">{percent(row.refused_action_rate)}</Table.Td>
     </Table.Tr>
   );
 }

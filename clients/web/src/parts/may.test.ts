@@ -2,7 +2,12 @@ import { expect, it } from "vitest";
 import type { Caller } from "../api/queries";
 import { has, mayChange } from "./may";
 
-const as = (scope: Caller["scope"], key: string | null = "key_1"): Caller => ({ scope, key, keys_required: true });
+const SCOPES: Caller["scopes"] = ["read", "submit", "admin"];
+const as = (scope: Caller["scopes"][number], key_id: string | null = "key_1"): Caller => ({
+  scopes: SCOPES.slice(0, SCOPES.indexOf(scope) + 1),
+  key_id,
+  keys_required: true,
+});
 
 it("each scope includes those before it, and nobody has none", () => {
   expect(has(as("submit"), "read")).toBe(true);

@@ -3,8 +3,8 @@ import type { Schema } from "../api/client";
 import { learnShapes, moduleShape, type Solid, type Vector } from "./modules";
 
 export type MachineScene = Schema<"MachineScene">;
-export type PlacedView = Schema<"PlacedView">;
-export type PartView = Schema<"PartView">;
+export type PlacedView = Schema<"PlacedPart">;
+export type PartView = Schema<"Part">;
 
 export interface Part {
   id: string;

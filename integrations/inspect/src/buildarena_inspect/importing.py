@@ -176,7 +176,7 @@ def _brought_before(wanted: dict[str, Any], service: Client) -> str | None:
     cursor: dict[str, str] = {}
     while True:
         page = service.get("/v1/jobs", task=wanted["task"], model=model, limit="200", **cursor)
-        for job in page["jobs"]:
+        for job in page["data"]:
             if job["seed"] == wanted["seed"] and f"/{wanted['simulator']}-" in job["track"]:
                 return str(job["id"])
         if page["next_cursor"] is None:

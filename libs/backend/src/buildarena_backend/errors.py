@@ -129,6 +129,10 @@ class NameTakenError(StoreError):
         super().__init__(f"the {kind} name {name!r} {whose}: choose another name")
 
 
+class RequestReusedError(StoreError):
+    """A request has the name of an earlier one that asked for something else."""
+
+
 class TooManyFilesError(StoreError):
     """An owner has as many trials of files under way as one may have."""
 

@@ -77,12 +77,17 @@ class Stage(StrEnum):
 
 
 class SweepState(StrEnum):
-    """What a sweep's owner, or its budget, wants of it. A cancelled sweep stays cancelled."""
+    """What a sweep's owner, or its budget, wants of it. A cancelled sweep stays cancelled.
+
+    Attributes:
+        DONE: It is active, and every job has ended; shown, never stored.
+    """
 
     ACTIVE = "active"
     PAUSED = "paused"
     BUDGET_EXHAUSTED = "budget_exhausted"
     CANCELLED = "cancelled"
+    DONE = "done"
 
 
 class AttemptResult(StrEnum):
@@ -162,6 +167,7 @@ SWEEP_TRANSITIONS: Final[Mapping[SweepState, frozenset[SweepState]]] = MappingPr
         SweepState.PAUSED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
         SweepState.BUDGET_EXHAUSTED: frozenset({SweepState.ACTIVE, SweepState.CANCELLED}),
         SweepState.CANCELLED: frozenset(),
+        SweepState.DONE: frozenset(),
     }
 )
 """Which states may follow a sweep's state."""

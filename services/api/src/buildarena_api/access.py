@@ -23,9 +23,10 @@ from starlette.types import Scope
 
 from buildarena_api.dependencies import Services, services_of
 from buildarena_api.http.bodies import Admit
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ProblemError, database_problem
-from buildarena_api.http.rate_limits import RateLimits
+from buildarena_api.http.rate_limits import Count, RateLimits
 from buildarena_backend.settings import Settings
 
 SCOPES = ("read", "submit", "admin")
@@ -79,9 +80,9 @@ class Caller:
             ProblemError: 403, when it may not.
         """
         if self.scope == RUNNER:
-            raise ProblemError(403, f"this needs the scope {scope!r}; a runner key leases trials")
+            raise _lacking(scope, "a runner key leases trials")
         if SCOPES.index(self.scope) < SCOPES.index(scope):
-            raise ProblemError(403, f"this needs the scope {scope!r}; the key has {self.scope!r}")
+            raise _lacking(scope, f"the key has {self.scope!r}")
 
     def require_owner(self, owner: str | None, what: str) -> None:
         """Checks that something is the caller's own.
@@ -94,7 +95,8 @@ class Caller:
             ProblemError: 403, when it is somebody else's.
         """
         if not self.is_admin and owner != self.key_id:
-            raise ProblemError(403, f"{what} was submitted with another key; only an admin may")
+            detail = f"{what} was submitted with another key; only an admin may"
+            raise ProblemError(ErrorCode.NOT_OWNER, detail)
 
 
 def check_binding(settings: Settings) -> None:
@@ -130,6 +132,20 @@ async def caller_of(
     return caller
 
 
+async def admin_of(
+    request: Request,
+    given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
+) -> Caller:
+    """As `caller_of`, for what only admins may ask.
+
+    Raises:
+        ProblemError: As of `caller_of`.
+    """
+    caller = await _admitted(request, given)
+    caller.require("admin")
+    return caller
+
+
 async def runner_of(
     request: Request,
     given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
@@ -141,7 +157,7 @@ async def runner_of(
     """
     caller = await _admitted(request, given)
     if caller.runner is None:
-        raise ProblemError(403, f"this needs the scope 'runner'; the key has {caller.scope!r}")
+        raise _lacking(RUNNER, f"the key has {caller.scope!r}")
     return caller
 
 
@@ -151,7 +167,8 @@ async def _admitted(request: Request, given: HTTPAuthorizationCredentials | None
     caller = _reader_of_metrics(request, services.context.settings, given)
     caller = caller or await _identified(services, request.scope, given)
     request.state.caller = caller
-    await _count(services.rate_limits, _name(caller, request.scope))
+    count = await _count(services.rate_limits, _name(caller, request.scope))
+    request.state.rate = count.headers()
     return caller
 
 
@@ -241,37 +258,35 @@ CallerDep = Annotated[Caller, Depends(caller_of)]
 RunnerDep = Annotated[Caller, Depends(runner_of)]
 
 
-async def admin_only(caller: CallerDep) -> None:
-    """Lets admins pass only."""
-    caller.require("admin")
-
-
-async def _count(limits: RateLimits, who: str) -> None:
-    wait_s = await limits.hit(who)
-    if wait_s is not None:
+async def _count(limits: RateLimits, who: str) -> Count:
+    count = await limits.hit(who)
+    if not count.passes:
         raise ProblemError(
-            429,
-            f"more than {limits.spelled} requests; wait {wait_s} s",
-            headers={"Retry-After": str(wait_s)},
+            ErrorCode.RATE_LIMITED,
+            f"more than {limits.spelled} requests; wait {count.reset_s} s",
+            headers={"Retry-After": str(count.reset_s), **count.headers()},
         )
+    return count
 
 
 async def _identify(services: Services, given: HTTPAuthorizationCredentials | None) -> Caller:
     settings = services.context.settings
     if given is None:
         if settings.require_keys:
-            raise _unauthorized("an API key is needed: send `Authorization: Bearer KEY`")
+            detail = "an API key is needed: send `Authorization: Bearer KEY`"
+            raise _unauthorized(ErrorCode.KEY_REQUIRED, detail)
         return Caller(key_id=None, scope="admin", runner=RunnerRights())
     secret = given.credentials
     if _is_operators(secret, settings):
         return Caller(key_id=None, scope="admin")
     found = await services.key_checks.check(secret)
     if found is None:
-        raise _unauthorized("unknown API key")
+        raise _unauthorized(ErrorCode.KEY_UNKNOWN, "unknown API key")
     if found.refusal is not None:
         cause = found.key.suspended_for if found.refusal == "suspended" else None
         refuted = f": {cause} refuted a trial of its runners" if cause else ""
-        raise _unauthorized(f"API key {found.key.id} is {found.refusal}{refuted}")
+        detail = f"API key {found.key.id} is {found.refusal}{refuted}"
+        raise _unauthorized(ErrorCode.KEY_REFUSED, detail)
     key = found.key
     if RUNNER in key.scopes:
         rights = RunnerRights(simulators=key.simulators or (), job_owners=key.job_owners)
@@ -299,5 +314,9 @@ def _is_operators(secret: str, settings: Settings) -> bool:
     return sum(hmac.compare_digest(given, key.encode()) for key in settings.admin_keys) > 0
 
 
-def _unauthorized(detail: str) -> ProblemError:
-    return ProblemError(401, detail, headers={"WWW-Authenticate": "Bearer"})
+def _unauthorized(code: ErrorCode, detail: str) -> ProblemError:
+    return ProblemError(code, detail, headers={"WWW-Authenticate": "Bearer"})
+
+
+def _lacking(scope: str, but: str) -> ProblemError:
+    return ProblemError(ErrorCode.SCOPE_MISSING, f"this needs the scope {scope!r}; {but}")

@@ -12,7 +12,7 @@ from fastapi.routing import APIRoute
 from fastapi_offline import FastAPIOffline
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from buildarena_api.access import admission, caller_of, known_sender, limited
+from buildarena_api.access import admin_of, admission, caller_of, known_sender, limited
 from buildarena_api.dashboard.files import read_pages
 from buildarena_api.dashboard.serving import Dashboard, is_page
 from buildarena_api.dependencies import Services
@@ -24,14 +24,16 @@ from buildarena_api.http.locality import LocalOnlyMiddleware
 from buildarena_api.http.log import RequestLog
 from buildarena_api.http.methods import MethodMiddleware
 from buildarena_api.http.metrics import ServiceMetrics
+from buildarena_api.http.openapi import describe
 from buildarena_api.http.outer_address import (
     BasePathMiddleware,
     ForwardedHostMiddleware,
     RootPathMiddleware,
 )
+from buildarena_api.http.pages import known_parameters
 from buildarena_api.http.parts import Parts
 from buildarena_api.http.places import OpenRequests, usual_places
-from buildarena_api.http.problems import add_problem_handlers, problem_responses
+from buildarena_api.http.problems import add_problem_handlers
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
@@ -190,15 +192,15 @@ def _services(context: Context, registry: ModelRegistry, watching: Context) -> S
 
 
 def _add_routes(app: FastAPI) -> None:
-    app.include_router(health.router)
+    known = Depends(known_parameters)
+    app.include_router(health.router, dependencies=[known])
     for route in ROUTES:
-        own = [limited("heavy")] if route in HEAVY else [limited()] if route in ORDINARY else []
-        app.include_router(
-            route.router,
-            dependencies=[Depends(caller_of), *own],
-            responses=problem_responses(401, 403, 429),
-        )
-    app.include_router(runner.router, responses=problem_responses(401, 403, 429))
+        who = admin_of if route is keys else caller_of
+        own = [limited("heavy")] if route in HEAVY else []
+        own = [limited(caller=who)] if route in ORDINARY else own
+        app.include_router(route.router, dependencies=[Depends(who), known, *own])
+    app.include_router(runner.router, dependencies=[known])
+    describe(app)
 
 
 def all_routes() -> list[APIRoute]:

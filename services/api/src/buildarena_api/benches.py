@@ -5,8 +5,8 @@ from __future__ import annotations
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.replays.views import (
+    KeyPress,
     PartView,
-    PressView,
     Vector,
     block_view,
     connector_view,
@@ -27,7 +27,7 @@ class FaceView(BaseModel):
     )
 
 
-class BenchPartView(PartView):
+class WorkbenchPart(PartView):
     """A part of a machine under construction."""
 
     sits_on: tuple[str, str] | None = Field(
@@ -49,12 +49,12 @@ class SubStructureView(BaseModel):
     source: str = Field(description="The machine that it is a copy of")
 
 
-class BenchMachineView(BaseModel):
+class WorkbenchMachine(BaseModel):
     """A machine under construction."""
 
     name: str
-    parts: list[BenchPartView]
-    control_sequence: list[PressView]
+    parts: list[WorkbenchPart]
+    control_sequence: list[KeyPress]
     controller: str = Field(description="The program that acts in place of it, Lua; empty for none")
     sub_structures: list[SubStructureView] = Field(description="Of an assembly")
     available: list[str] = Field(description="Machines that an assembly can be put together from")
@@ -62,20 +62,20 @@ class BenchMachineView(BaseModel):
     detached: list[str] = Field(description="Blocks without a path to the starting block")
 
 
-def machine_view(name: str, machine: Machine) -> BenchMachineView:
+def machine_view(name: str, machine: Machine) -> WorkbenchMachine:
     """A machine under construction.
 
     Args:
         name: Its name on the workbench.
         machine: The machine.
     """
-    return BenchMachineView(
+    return WorkbenchMachine(
         name=name,
         parts=[
             *(_block(block, machine) for block in machine.blocks.values()),
             *(_connector(link) for link in machine.connectors.values()),
         ],
-        control_sequence=[PressView.model_validate(one) for one in machine.control_sequence],
+        control_sequence=[KeyPress.model_validate(one) for one in machine.control_sequence],
         controller=machine.controller,
         sub_structures=[
             SubStructureView.model_validate(one) for one in machine.sub_structures.values()
@@ -86,8 +86,8 @@ def machine_view(name: str, machine: Machine) -> BenchMachineView:
     )
 
 
-def _block(block: Block, machine: Machine) -> BenchPartView:
-    return BenchPartView(
+def _block(block: Block, machine: Machine) -> WorkbenchPart:
+    return WorkbenchPart(
         **block_view(block).model_dump(),
         sits_on=block.mount,
         ends=[],
@@ -97,8 +97,8 @@ def _block(block: Block, machine: Machine) -> BenchPartView:
     )
 
 
-def _connector(link: Connector) -> BenchPartView:
-    return BenchPartView(
+def _connector(link: Connector) -> WorkbenchPart:
+    return WorkbenchPart(
         **connector_view(link).model_dump(),
         sits_on=None,
         ends=[link.start, link.end],

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Annotated
 
 from fastapi import Depends, Query
 
 from buildarena_api.dependencies import ServicesDep, Track
-from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.problems import unknown
 from buildarena_api.leaderboard.cache import Question
-from buildarena_benchmark import ValidationIssue, builtin_tasks, paper_tasks
+from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_benchmark.leaderboard import BoardQuery
 
 MAX_SWEEPS = 50
@@ -25,7 +24,7 @@ class Selection:
     Attributes:
         track: The track.
         tracks: All that could have been asked for.
-        query: Which tasks, models and times.
+        query: Which tasks and models.
         question: The same with the track and the sweeps.
     """
 
@@ -40,7 +39,6 @@ def select_board(
     *,
     track: Annotated[Track | None, Query(description="Default: the first with ended jobs")] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
-    level: Annotated[list[int] | None, Query(description="Only tasks of these levels")] = None,
     category: Annotated[
         list[str] | None,
         Query(
@@ -54,13 +52,11 @@ def select_board(
         list[str] | None,
         Query(max_length=MAX_SWEEPS, description="Only jobs of these sweeps, and their tracks"),
     ] = None,
-    since: Annotated[datetime | None, Query(description="Only jobs ended then or later")] = None,
-    until: Annotated[datetime | None, Query(description="Only jobs ended before")] = None,
 ) -> Selection:
     """What the parameters ask for.
 
     Raises:
-        ProblemError: A track, task, level or category is unknown, or a time has no zone.
+        ProblemError: A track, task or category is unknown.
         NotFoundError: A sweep is unknown.
     """
     context, boards = services.context, services.boards
@@ -73,30 +69,21 @@ def select_board(
     for name in task or ():
         if name not in tasks:
             raise unknown("task", name, sorted(tasks))
-    levels = sorted({entry.level for entry in tasks.values()})
-    for number in level or ():
-        if number not in levels:
-            raise unknown("level", str(number), [str(known) for known in levels])
     categories = sorted({entry.category for entry in tasks.values()})
     for name in category or ():
         if name not in categories:
             raise unknown("category", name, categories)
-    require_zones(since=since, until=until)
     chosen = None
-    if task or level or category:
+    if task or category:
         chosen = frozenset(
             name
             for name, entry in tasks.items()
-            if (not task or name in task)
-            and (not level or entry.level in level)
-            and (not category or entry.category in category)
+            if (not task or name in task) and (not category or entry.category in category)
         )
     query = BoardQuery(
         tasks=chosen,
         # Invented names are not told from each other: their empty boards are one.
         models=boards.known_models(model) if model else None,
-        since=since,
-        until=until,
         overall=_ranked_over(task, category),
     )
     track = track or (tracks[0] if tracks else None)
@@ -122,31 +109,4 @@ def _ranked_over(task: list[str] | None, category: list[str] | None) -> frozense
     return frozenset(paper_tasks())
 
 
-def require_zones(**times: datetime | None) -> None:
-    """Refuses times that leave open when they are.
-
-    Args:
-        times: By the name that requests give them.
-
-    Raises:
-        ProblemError: One has no zone.
-    """
-    for field, time in times.items():
-        if time is not None and time.tzinfo is None:
-            message = f"{time.isoformat()} has no time zone"
-            raise ProblemError(
-                422, f"{field}: {message}", errors=[ValidationIssue(path=field, message=message)]
-            )
-
-
 SelectionDep = Annotated[Selection, Depends(select_board)]
-
-
-def unknown(field: str, value: str, choices: list[str]) -> ProblemError:
-    """The problem of a name that nobody has."""
-    message = f"there is no {field} {value!r}"
-    return ProblemError(
-        422,
-        f"{field}: {message}",
-        errors=[ValidationIssue(path=field, message=message, choices=tuple(choices))],
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated
 
 from fastapi import Depends, Query, Request
 from pydantic import AfterValidator
@@ -85,8 +85,6 @@ def _plus(track: str) -> str:
     return track.replace(" ", "+")
 
 
-MAX_ROWS: Final = 200
-"""Of one page of a list."""
 # In a URL a plus is a space to those who read it, and no track has one.
 Track = Annotated[str, AfterValidator(_plus)]
 IdPrefix = Annotated[

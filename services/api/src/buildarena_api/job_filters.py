@@ -7,48 +7,42 @@ from typing import Annotated
 
 from fastapi import Depends, Query
 
-from buildarena_api.board_filters import unknown
 from buildarena_api.dependencies import ContextDep, IdPrefix, Track
-from buildarena_api.http.problems import ProblemError
-from buildarena_api.schemas import AnyJobState, AnyOutcome
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import invalid, unknown
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.process.context import Context
-from buildarena_benchmark import ValidationIssue
+from buildarena_backend.states import JobState, Outcome
 from buildarena_benchmark.scoring.registry import known_flags
+
+Words = Annotated[list[str] | None, Query(max_length=100)]
 
 
 def job_filter(
     context: ContextDep,
     *,
-    sweep: Annotated[str | None, Query(description="Only this sweep's jobs")] = None,
-    task: Annotated[str | None, Query()] = None,
-    category: Annotated[
-        list[str] | None, Query(description="Only jobs on tasks of these categories")
-    ] = None,
-    model: Annotated[str | None, Query()] = None,
-    track: Annotated[Track | None, Query()] = None,
-    task_version: Annotated[str | None, Query()] = None,
+    sweep: Annotated[Words, Query(description="Only jobs of one of these sweeps")] = None,
+    task: Words = None,
+    category: Annotated[Words, Query(description="Only on tasks of these categories")] = None,
+    model: Words = None,
+    track: Annotated[list[Track] | None, Query()] = None,
+    task_version: Words = None,
     configuration: Annotated[
-        str | None, Query(description="Of the model: hash of its decoding and limits too")
+        Words, Query(description="Of the model: hash of its decoding and limits too")
     ] = None,
-    state: Annotated[AnyJobState | None, Query()] = None,
-    outcome: Annotated[AnyOutcome | None, Query()] = None,
-    reason: Annotated[str | None, Query(description="Class of the failure")] = None,
-    flag: Annotated[str | None, Query(description="Only jobs with this flag")] = None,
-    indicator_min: Annotated[
-        float | None, Query(allow_inf_nan=False, description="Only with at least this indicator")
-    ] = None,
-    indicator_max: Annotated[
-        float | None, Query(allow_inf_nan=False, description="Only with at most this indicator")
-    ] = None,
+    state: Annotated[list[JobState] | None, Query()] = None,
+    outcome: Annotated[list[Outcome] | None, Query()] = None,
+    reason: Annotated[Words, Query(description="Class of the failure")] = None,
+    flag: Annotated[Words, Query(description="Only jobs with one of these flags")] = None,
+    min_indicator: Annotated[float | None, Query(allow_inf_nan=False)] = None,
+    max_indicator: Annotated[float | None, Query(allow_inf_nan=False)] = None,
     text: Annotated[
         str | None,
         Query(
             min_length=1,
             max_length=100,
-            description="Only jobs in whose id, task, model, reason or detail it stands, in any "
-            "case",
+            description="Only with this text in id, task, model, reason or detail, in any case",
         ),
     ] = None,
     id_prefix: IdPrefix = None,
@@ -57,17 +51,17 @@ def job_filter(
 
     Raises:
         ProblemError: A category is unknown.
-        NotFoundError: The sweep is unknown.
+        NotFoundError: A sweep is unknown.
     """
-    if sweep is not None:
-        context.store.sweeps.get(sweep)
+    for sweep_id in sweep or ():
+        context.store.sweeps.get(sweep_id)
     return JobFilter(
-        sweep_id=sweep,
+        sweep_ids=sweep,
         tasks=None if category is None else _tasks_of(context, category),
-        flag=flag,
+        flags=flag,
         id_prefix=id_prefix,
-        indicator_min=indicator_min,
-        indicator_max=indicator_max,
+        indicator_min=min_indicator,
+        indicator_max=max_indicator,
         text=text,
         equals={
             "task": task,
@@ -101,9 +95,9 @@ def require_known(context: Context, registry: ModelRegistry, wanted: JobFilter) 
     Raises:
         ProblemError: One is; it lists the choices.
     """
-    given = {name: wanted.equals.get(name) for name in ("task", "model", "track", "reason")}
-    for name, value in {**given, "flag": wanted.flag}.items():
-        if value is not None:
+    given = {name: wanted.values(name) for name in ("task", "model", "track", "reason")}
+    for name, values in {**given, "flag": wanted.flags}.items():
+        for value in values or ():
             _require_known(context, registry, name, str(value))
 
 
@@ -125,5 +119,4 @@ def _require_known(context: Context, registry: ModelRegistry, name: str, value: 
     if choices:
         raise unknown(name, value, list(dict.fromkeys([*choices, *used])))
     message = f"no job has the {name} {value!r}"
-    problem = ValidationIssue(path=name, message=message, choices=tuple(used))
-    raise ProblemError(422, f"{name}: {message}", errors=[problem])
+    raise invalid(name, message, choices=used, code=ErrorCode.UNKNOWN_NAME)

@@ -14,8 +14,8 @@ from typing import Any, Final
 from fastapi import Request
 
 from buildarena_api.checking import Checker, CheckFailedError
-from buildarena_api.http.problems import ProblemError
-from buildarena_benchmark import ValidationIssue
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import ProblemError, invalid
 from buildarena_besiege import (
     ImportedMachine,
     MachineFileError,
@@ -44,7 +44,7 @@ async def uploaded(request: Request) -> bytes:
     body = await request.body()
     if len(body) > MAX_BYTES:
         detail = f"a machine's file has at most {MAX_BYTES:,} bytes, this {len(body):,}"
-        raise ProblemError(413, detail)
+        raise ProblemError(ErrorCode.TOO_LARGE, detail)
     return body
 
 
@@ -79,7 +79,7 @@ def read_uploaded(data: bytes) -> Upload:
     try:
         answer: Upload | str = shared_checker().ask(data)
     except CheckFailedError as error:
-        raise refused(f"the file is too much: {error}") from error
+        raise refused(f"the file exceeded the parser's limits: {error}") from error
     if isinstance(answer, str):
         raise refused(answer)
     return answer
@@ -118,7 +118,7 @@ def _not_storable(machine: Machine) -> str | None:
 
 def refused(message: str) -> ProblemError:
     """The answer to a file that is not a sound machine."""
-    return ProblemError(422, message, errors=[ValidationIssue(path="file", message=message)])
+    return invalid("file", message, code=ErrorCode.INVALID_FILE)
 
 
 def _json(data: bytes) -> object:

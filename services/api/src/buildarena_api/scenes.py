@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-class BodyView(BaseModel):
+class SolidView(BaseModel):
     """A solid of a module, in the block's frame, units."""
 
     shape: Literal["box", "cylinder", "sphere"]
@@ -42,7 +42,7 @@ class ModuleShape(BaseModel):
         description="Its shown centre in the block's frame: what trajectories give as its position"
     )
     pointing: Vector | None = Field(description="The way a cannon or torch points, block's frame")
-    bodies: list[BodyView]
+    bodies: list[SolidView]
     flames: list[FlameView]
 
 
@@ -55,7 +55,7 @@ class BlockPlace(BaseModel):
     quaternion: Quaternion
 
 
-class EndView(BaseModel):
+class ConnectorEnd(BaseModel):
     """An end of a connector."""
 
     block: str
@@ -71,8 +71,8 @@ class ConnectorPlace(BaseModel):
         description="What trajectories call it where it breaks", examples=["Brace 7"]
     )
     rope: bool = Field(description="Whether it pulls and never pushes")
-    start: EndView
-    end: EndView
+    start: ConnectorEnd
+    end: ConnectorEnd
 
 
 class MachineScene(BaseModel):
@@ -129,20 +129,20 @@ def _module(module: Module) -> ModuleShape:
     )
 
 
-def _bodies(module: Module) -> Iterable[BodyView]:
+def _bodies(module: Module) -> Iterable[SolidView]:
     for solid in module.body:
         if isinstance(solid, Cylinder):
             yield _cylinder(solid)
             continue
         shape: Literal["box", "sphere"] = "box" if isinstance(solid, Box) else "sphere"
         unturned = (1.0, 0.0, 0.0, 0.0)
-        yield BodyView(shape=shape, center=solid.center, quaternion=unturned, size=solid.size)
+        yield SolidView(shape=shape, center=solid.center, quaternion=unturned, size=solid.size)
 
 
-def _cylinder(solid: Cylinder) -> BodyView:
+def _cylinder(solid: Cylinder) -> SolidView:
     pose = solid.block_from_axis
     across = 2 * solid.radius
-    return BodyView(
+    return SolidView(
         shape="cylinder",
         center=pose.xyz,
         quaternion=pose.wxyz,
@@ -168,5 +168,5 @@ def _connector(link: Connector, machine: Machine) -> ConnectorPlace:
     )
 
 
-def _end(block: Block, face: str) -> EndView:
-    return EndView(block=block.id, point=block.module.face_of_label[face].center)
+def _end(block: Block, face: str) -> ConnectorEnd:
+    return ConnectorEnd(block=block.id, point=block.module.face_of_label[face].center)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from datetime import datetime
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, computed_field
 
 from buildarena_backend.accounts.budgets import Budget
 from buildarena_backend.jobs.job import Job
@@ -14,48 +14,31 @@ from buildarena_backend.states import AttemptResult, Audit, JobState, Outcome, S
 from buildarena_backend.sweeps.sweeps import SweepProgress
 from buildarena_benchmark.flags import is_censored
 
-# Spelled out, because the contract lists the values in place.
-AnyOutcome = Literal[
-    Outcome.SUCCESS,
-    Outcome.UNSUCCESSFUL,
-    Outcome.CONSTRUCTION_FAILED,
-    Outcome.LIMIT,
-    Outcome.ERRORED,
-    Outcome.CANCELLED,
-]
-AnyJobState = Literal[JobState.QUEUED, JobState.ON_HOLD, JobState.RUNNING, JobState.DONE]
-AnyStage = Literal[Stage.CONSTRUCT, Stage.SIMULATE]
-DONE: Final = "done"
-"""The state that is shown of an active sweep whose jobs have all ended."""
-AnySweepState = Literal[
-    SweepState.ACTIVE,
-    SweepState.PAUSED,
-    SweepState.BUDGET_EXHAUSTED,
-    SweepState.CANCELLED,
-    "done",
-]
-
 
 class _Answer(BaseModel):
     model_config = ConfigDict(from_attributes=True)
 
 
+EXISTED: Final[dict[int | str, dict[str, Any]]] = {
+    200: {"description": "An equal one was there; 201: it is new"}
+}
+"""What operations answer that create something, unless it exists."""
+Flags = Annotated[list[str], BeforeValidator(lambda flags: flags or [])]
+Counts = Annotated[dict[str, int], BeforeValidator(lambda counts: counts or {})]
+
+
 class UsageView(_Answer):
-    """What a job's session used; null where an external agent reports nothing."""
+    """Model requests and what they took; null where an external agent reports nothing."""
 
     requests: int | None
     input_tokens: int | None
     output_tokens: int | None
-    cached_tokens: int | None
-    reasoning_tokens: int | None
     cost_usd: float | None
 
     @staticmethod
-    def of(job: Job) -> UsageView:
-        """What is known of a job's usage."""
-        if job.usage_is_known:
-            return UsageView.model_validate(job)
-        return UsageView.model_validate(dict.fromkeys(UsageView.model_fields))
+    def of(used: Any, *, known: bool = True) -> UsageView:
+        """The usage of what has these attributes, as far as it is known."""
+        return UsageView.model_validate(used if known else dict.fromkeys(UsageView.model_fields))
 
 
 class AttemptView(_Answer):
@@ -65,8 +48,8 @@ class AttemptView(_Answer):
     stage: str
     worker: str
     started_at: datetime
-    ended_at: datetime | None
-    result: str | None = Field(description=", ".join(AttemptResult))
+    finished_at: datetime | None = Field(validation_alias="ended_at")
+    result: AttemptResult | None
     detail: str | None
 
 
@@ -80,24 +63,24 @@ class JobView(_Answer):
     configuration: str = Field(description="Hash of model, decoding and limits")
     track: str
     seed: int
-    owner: str | None = Field(description="Id of the API key that submitted it")
-    state: AnyJobState
-    stage: AnyStage
-    outcome: AnyOutcome | None = Field(description="How it ended; null until it has")
+    key_id: str | None = Field(description="Of the API key that submitted it")
+    state: JobState
+    stage: Stage
+    outcome: Outcome | None = Field(description="How it ended; null until it has")
     reason: str | None = Field(description="Class of the failure, if any")
     detail: str | None
     success: bool | None
     indicator: float | None = Field(description="The task's performance indicator")
     censored: bool = Field(description="Whether the indicator is at least what it says")
-    metrics: dict[str, Any] | None
-    flags: list[str] | None = Field(description="Remarks on the score; the board says what of")
+    metrics: dict[str, Any]
+    flags: Flags = Field(description="Remarks on the score; the board says what of")
     usage: UsageView
     actions: int
     refused_actions: int
-    refusals: dict[str, int] | None = Field(description="Refused actions by class")
+    refusals: Counts = Field(description="Refused actions by class")
     faults: int = Field(description="Infrastructure faults at the current stage")
     by_runner: bool = Field(description="Whether a runner ran one of its trials")
-    audit: Literal[Audit.REQUIRED, Audit.VERIFIED, Audit.REFUTED] | None = Field(
+    verification_status: Audit | None = Field(
         description="Of a score that was brought by a runner, or refuted: it counts once "
         "it is verified, and nowhere while a verification is required or refuted it"
     )
@@ -113,8 +96,11 @@ class JobView(_Answer):
             {
                 **{name: getattr(job, name, None) for name in JobView.model_fields},
                 "configuration": job.model_hash,
+                "key_id": job.owner,
+                "metrics": job.metrics or {},
+                "verification_status": job.audit,
                 "censored": is_censored(job.flags or ()),
-                "usage": UsageView.of(job),
+                "usage": UsageView.of(job, known=job.usage_is_known),
             }
         )
 
@@ -125,29 +111,24 @@ class JobDetail(JobView):
     manifest: dict[str, Any] | None = Field(description="Versions of what can change the score")
     attempts: list[AttemptView]
     artifacts: dict[str, str] = Field(description="SHA-256 of each artifact by name")
+    cached_tokens: int | None = Field(description="Of the input, in the provider's cache")
+    reasoning_tokens: int | None = Field(description="Of the output, hidden reasoning")
 
 
-class JobFileView(_Answer):
+class ArtifactView(_Answer):
     """An artifact of a job."""
 
     name: str = Field(examples=["trajectory-0"])
     media_type: str = Field(examples=["application/vnd.apache.parquet"])
     size: int = Field(description="Bytes")
-    hash: str = Field(description="SHA-256 of the bytes")
-
-
-class JobPage(_Answer):
-    """Some jobs, in the order that was asked for."""
-
-    jobs: list[JobView]
-    next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")
+    sha256: str = Field(description="Of the bytes", validation_alias="hash")
 
 
 class EndingView(_Answer):
     """Jobs that stand or ended alike."""
 
-    state: AnyJobState
-    outcome: AnyOutcome | None = Field(description="null while they have not ended")
+    state: JobState
+    outcome: Outcome | None = Field(description="null while they have not ended")
     reason: str | None = Field(description="Class of the failure")
     jobs: int
 
@@ -158,12 +139,6 @@ class PromptView(_Answer):
     turn: int | None = Field(description="Place in the transcript; null for a reply in no turn")
     system: str | None = Field(description="The role's system message, before its first turn")
     user: list[str] = Field(description="Further messages, in order")
-
-
-class PromptsView(_Answer):
-    """What a session told its roles."""
-
-    prompts: list[PromptView] = Field(description="In order; turns that were told nothing lack")
 
 
 class JobSummaryView(_Answer):
@@ -191,38 +166,54 @@ class ProgressView(_Answer):
         examples=[{"construct running": 2}],
     )
     outcomes: dict[str, int] = Field(description="Ended jobs by outcome", examples=[{"success": 4}])
-    requests: int
-    lost_requests: int = Field(default=0, description=LOST)
-    input_tokens: int
-    output_tokens: int
-    cost_usd: float
+    usage: UsageView
+    lost_requests: int = Field(description=LOST)
 
     @staticmethod
     def of(progress: SweepProgress) -> ProgressView:
         """The view of a sweep's progress."""
-        return ProgressView.model_validate(progress)
+        own = ("total", "done", "stages", "outcomes", "lost_requests")
+        known = {name: getattr(progress, name) for name in own}
+        return ProgressView.model_validate({**known, "usage": UsageView.of(progress)})
 
 
-class BudgetView(_Answer):
-    """What may be spent, and what was."""
+class BudgetUse(_Answer):
+    """What may be used, what was, and what is left; null: without limit."""
 
     max_cost_usd: float | None
     max_tokens: int | None
     max_requests: int | None
-    spent_cost_usd: float
-    spent_tokens: int
-    spent_requests: int
+    used_cost_usd: float = Field(validation_alias="spent_cost_usd")
+    used_tokens: int = Field(validation_alias="spent_tokens")
+    used_requests: int = Field(validation_alias="spent_requests")
     lost_cost_usd: float = Field(
-        default=0.0, description="What the lost requests cost at most, beyond what was spent"
+        description="What the lost requests cost at most, beyond what was used"
     )
-    lost_requests: int = Field(default=0, description=LOST)
+    lost_requests: int = Field(description=LOST)
+
+    @computed_field
+    def remaining_cost_usd(self) -> float | None:
+        """What is left."""
+        most = self.max_cost_usd
+        return None if most is None else max(0.0, round(most - self.used_cost_usd, 6))
+
+    @computed_field
+    def remaining_tokens(self) -> int | None:
+        """What is left."""
+        return None if self.max_tokens is None else max(0, self.max_tokens - self.used_tokens)
+
+    @computed_field
+    def remaining_requests(self) -> int | None:
+        """What is left."""
+        most = self.max_requests
+        return None if most is None else max(0, most - self.used_requests)
 
     @staticmethod
-    def of(budget: Budget | None) -> BudgetView | None:
+    def of(budget: Budget | None) -> BudgetUse | None:
         """The view of a budget, if there is one."""
         if budget is None:
             return None
-        return BudgetView.model_validate(asdict(budget) | asdict(budget.limits))
+        return BudgetUse.model_validate(asdict(budget) | asdict(budget.limits))
 
 
 class SweepView(_Answer):
@@ -230,13 +221,13 @@ class SweepView(_Answer):
 
     id: str = Field(examples=["sweep_0a1b2c3d4e5f60718293"])
     name: str
-    state: AnySweepState = Field(
+    state: SweepState = Field(
         description="budget_exhausted when a budget is used up; done when every job has ended"
     )
-    owner: str | None = Field(description="Id of the API key that submitted it")
+    key_id: str | None = Field(description="Of the API key that submitted it")
     created_at: datetime
     spec: dict[str, Any]
-    budget: BudgetView | None
+    budget: BudgetUse | None
     progress: ProgressView
     last_event: int = Field(
         description="What later requests answer holds every event up to this one: whoever has "
@@ -247,18 +238,18 @@ class SweepView(_Answer):
 class ForecastView(_Answer):
     """What is to come of a sweep, from what ran so far."""
 
-    jobs_left: int = Field(description="Jobs that have not ended")
+    remaining_jobs: int = Field(description="Jobs that have not ended")
     jobs_per_minute: float | None = Field(
         description="How fast jobs are scored, over the last hundred; null until five were, and "
         "unless the sweep is active"
     )
-    ends_at: datetime | None = Field(description="When the last one ends at that rate")
-    cost_usd_left: float = Field(
+    finish_at: datetime | None = Field(description="When the last one ends at that rate")
+    remaining_cost_usd: float = Field(
         description="What the jobs left come to cost yet, by the mean cost of the same model on "
         "the same task, or on other tasks"
     )
-    cost_usd_total: float = Field(description="The same with what was spent")
-    budget_usd_short: float | None = Field(
+    total_cost_usd: float = Field(description="The same with what was used")
+    lacking_budget_usd: float | None = Field(
         description="How many dollars the budget lacks for that; null when it has no limit in "
         "dollars, 0 when it is enough"
     )
@@ -271,12 +262,12 @@ class TroubleView(_Answer):
     """Attempts at a sweep's jobs that failed alike; faults never count as failures of a model."""
 
     model: str
-    stage: AnyStage
-    result: Literal[AttemptResult.FAULT, AttemptResult.LOST]
+    stage: Stage
+    result: AttemptResult
     detail: str | None = Field(description="A sentence for people")
     attempts: int
     jobs: int = Field(description="Of how many jobs")
-    newest: datetime = Field(description="When the last one ended")
+    last_at: datetime = Field(description="When the last one ended", validation_alias="newest")
 
 
 class SweepAccepted(_Answer):
@@ -295,10 +286,7 @@ class ModelEstimate(_Answer):
 
     model: str
     jobs: int
-    requests: float
-    input_tokens: float
-    output_tokens: float
-    cost_usd: float | None = Field(description="null when no price is known")
+    usage: UsageView = Field(description="cost_usd is null when no price is known")
 
 
 class BoardPower(_Answer):
@@ -322,10 +310,3 @@ class SweepEstimate(_Answer):
     models: list[ModelEstimate]
     cost_usd: float = Field(description="Sum over the models with a known price")
     power: BoardPower
-
-
-class SweepPage(_Answer):
-    """Some sweeps, newest first."""
-
-    sweeps: list[SweepView]
-    next_cursor: str | None

@@ -15,7 +15,11 @@ from buildarena_cli.options import DEFAULT_URL, JobId, JsonOption, UrlOption
 from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import print_json, print_table, say
 
-ENDINGS = {"application/json": ".json", "application/vnd.apache.parquet": ".parquet"}
+ENDINGS = {
+    "application/json": ".json",
+    "application/vnd.apache.parquet": ".parquet",
+    "image/png": ".png",
+}
 
 
 def job_files(
@@ -33,7 +37,9 @@ def job_files(
     """List a job's files, or fetch them into a folder and check them against their hashes."""
     client = Client(url)
     whole = whole_id(client, "job", job_id)
-    files: list[dict[str, Any]] = _chosen(client.get(at("jobs", whole, "artifacts")), names, whole)
+    files: list[dict[str, Any]] = _chosen(
+        client.every(at("jobs", whole, "artifacts")), names, whole
+    )
     if out is not None:
         for file in files:
             file["path"] = str(_fetched(client, whole, file, out))
@@ -45,7 +51,7 @@ def job_files(
     else:
         print_table(
             ("file", "type", "bytes", "sha256"),
-            [(f["name"], f["media_type"], f"{f['size']:,}", f["hash"]) for f in files],
+            [(f["name"], f["media_type"], f"{f['size']:,}", f["sha256"]) for f in files],
             numeric=("bytes",),
         )
 
@@ -75,7 +81,7 @@ def _fetched(client: Client, job_id: str, file: dict[str, Any], folder: Path) ->
     path = at("jobs", job_id, "artifacts", file["name"])
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        client.download(path, target, sha256=file["hash"])
+        client.download(path, target, sha256=file["sha256"])
     except OSError as error:
         raise CommandError(f"{target} can't be written: {error.strerror}") from error
     return target

@@ -23,15 +23,15 @@ COLUMNS = ("job", "task", "model", "seed", "state", "reason", "flags", "indicato
 
 def list_jobs(
     *,
-    sweep: Annotated[str | None, typer.Option(help="Only this sweep's.")] = None,
-    task: Annotated[str | None, typer.Option(help="Only this task's.")] = None,
-    model: Annotated[str | None, typer.Option(help="Only this model's.")] = None,
-    state: Annotated[str | None, typer.Option(help="Only in this state.")] = None,
+    sweep: Annotated[list[str] | None, typer.Option(help="Only these sweeps'.")] = None,
+    task: Annotated[list[str] | None, typer.Option(help="Only these tasks'.")] = None,
+    model: Annotated[list[str] | None, typer.Option(help="Only these models'.")] = None,
+    state: Annotated[list[str] | None, typer.Option(help="Only in these states.")] = None,
     outcome: Annotated[
-        str | None, typer.Option(help="Only this outcome; errored shows the dead letters.")
+        list[str] | None, typer.Option(help="Only these outcomes; errored shows the dead letters.")
     ] = None,
-    reason: Annotated[str | None, typer.Option(help="Only this reason of failure.")] = None,
-    flag: Annotated[str | None, typer.Option(help="Only with this flag.")] = None,
+    reason: Annotated[list[str] | None, typer.Option(help="Only these reasons of failure.")] = None,
+    flag: Annotated[list[str] | None, typer.Option(help="Only with one of these flags.")] = None,
     limit: Annotated[int, typer.Option(help="Rows at most.", min=1, max=MAX_LIMIT)] = 50,
     after: AfterOption = None,
     every: AllOption = False,
@@ -43,7 +43,7 @@ def list_jobs(
     pages = client.pages(
         "/v1/jobs",
         cursor=after,
-        sweep=None if sweep is None else whole_id(client, "sweep", sweep),
+        sweep=[whole_id(client, "sweep", word) for word in sweep or ()] or None,
         task=task,
         model=model,
         state=state,
@@ -52,20 +52,20 @@ def list_jobs(
         flag=flag,
         limit=MAX_LIMIT if every else limit,
     )
-    page = gathered(pages, "jobs", every=every)
+    page = gathered(pages, every=every)
     if as_json:
         print_json(page)
         return
-    print_table(COLUMNS, [_row(job) for job in page["jobs"]], numeric=("seed", "indicator"))
+    print_table(COLUMNS, [_row(job) for job in page["data"]], numeric=("seed", "indicator"))
     show_cursor(page)
 
 
-def gathered(pages: Any, name: str, *, every: bool) -> dict[str, Any]:
-    """One page of what is listed under a name, or all pages as one."""
+def gathered(pages: Any, *, every: bool) -> dict[str, Any]:
+    """One page of a list, or all pages as one."""
     if not every:
         first: dict[str, Any] = next(pages)
         return first
-    return {name: [entry for page in pages for entry in page[name]], "next_cursor": None}
+    return {"data": [entry for page in pages for entry in page["data"]], "next_cursor": None}
 
 
 def show_cursor(page: dict[str, Any]) -> None:
@@ -82,7 +82,7 @@ def _row(job: dict[str, Any]) -> list[str]:
         str(job["seed"]),
         job["outcome"] or f"{job['stage']} {job['state']}",
         job["reason"] or "",
-        ", ".join(job["flags"] or ()),
+        ", ".join(job["flags"]),
         number(job["indicator"], 2, at_least=job["censored"]),
         minute_of(job["created_at"]),
     ]

@@ -74,7 +74,7 @@ def _verify_model(client: Client, body: dict[str, Any], *, as_json: bool) -> int
         if not check["report"]["ok"]:
             wrong = [entry for entry in check["report"]["checks"] if not entry["ok"]]
             differences.append({"job_id": check["job_id"], "checks": wrong})
-    checked = len(accepted["verifications"]) + len(accepted["left"])
+    checked = len(accepted["verification_ids"]) + len(accepted["skipped_job_ids"])
     if as_json:
         print_json({"scored": accepted["scored"], "checked": checked, "differences": differences})
     else:
@@ -92,6 +92,6 @@ def _verify_model(client: Client, body: dict[str, Any], *, as_json: bool) -> int
 
 def _verifications(client: Client, accepted: dict[str, Any]) -> Iterator[str]:
     """Ids of all verifications; those that found no room are asked for when others have ended."""
-    yield from accepted["verifications"]
-    for job_id in accepted["left"]:
+    yield from accepted["verification_ids"]
+    for job_id in accepted["skipped_job_ids"]:
         yield client.post(at("jobs", job_id, "verify"), {})["id"]

@@ -94,9 +94,9 @@ def _change(url: str, job_id: str, verb: str, *, as_json: bool) -> None:
 
 
 def _audit(job: dict[str, Any]) -> str:
-    if job["audit"] == "verified":
+    if job["verification_status"] == "verified":
         return f"verified at {minute_of(job['verified_at'])}"
-    waits = "waits for its verification" if job["audit"] == "required" else "refuted"
+    waits = "waits for its verification" if job["verification_status"] == "required" else "refuted"
     return f"{waits}: it counts nowhere"
 
 
@@ -112,12 +112,12 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     say(f"outcome   {ended}" + (f" ({job['reason']})" if job["reason"] else ""))
     if job["detail"]:
         say(f"detail    {job['detail']}")
-    for flag in job["flags"] or ():
+    for flag in job["flags"]:
         say(f"flag      {flag}: {meaning(flag)}" if meaning(flag) else f"flag      {flag}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
     if job.get("by_runner"):
         say("trials    by a runner")
-    if job.get("audit"):
+    if job["verification_status"]:
         say(f"audit     {_audit(job)}")
     usage = job["usage"]
     say(

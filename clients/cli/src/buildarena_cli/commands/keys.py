@@ -60,7 +60,12 @@ def create_key(
 ) -> None:
     """Make a key and print its secret, which can't be read again."""
     budget = budget_of(max_cost_usd, max_tokens, max_requests)
-    body: dict[str, Any] = {"name": name, "scopes": scope, "days": days, "budget": budget}
+    body: dict[str, Any] = {
+        "name": name,
+        "scopes": scope,
+        "expires_in_days": days,
+        "budget": budget,
+    }
     # Left out where they are not asked for: services of before runner keys do not know them.
     restrictions = {"simulators": simulator, "job_owners": jobs_of}
     made = Client(url).post("/v1/keys", body | {k: v for k, v in restrictions.items() if v})
@@ -74,7 +79,7 @@ def create_key(
 @app.command("list")
 def list_keys(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """List all keys, including revoked and expired ones."""
-    keys = Client(url).get("/v1/keys")
+    keys = Client(url).every("/v1/keys")
     if as_json:
         print_json(keys)
         return
@@ -100,7 +105,9 @@ def rotate_key(
     if as_json:
         print_json(key)
         return
-    say(f"{key['id']} ({key['name']}): the secret before is good until {key['previous_until']}")
+    say(
+        f"{key['id']} ({key['name']}): the secret before is good until {key['previous_expires_at']}"
+    )
     say(f"export BUILDARENA_KEY={key['secret']}")
 
 
@@ -161,12 +168,12 @@ def spent(budget: Mapping[str, Any] | None) -> str:
     parts = []
     if budget["max_cost_usd"] is not None:
         parts.append(
-            f"${number(budget['spent_cost_usd'], 2)} of ${number(budget['max_cost_usd'], 2)}"
+            f"${number(budget['used_cost_usd'], 2)} of ${number(budget['max_cost_usd'], 2)}"
         )
     for name in ("tokens", "requests"):
         most = budget[f"max_{name}"]
         if most is not None:
-            parts.append(f"{budget[f'spent_{name}']:,} of {most:,} {name}")
+            parts.append(f"{budget[f'used_{name}']:,} of {most:,} {name}")
     return ", ".join(parts) or "no limit"
 
 

@@ -107,14 +107,14 @@ def compare(
         return
     rows = []
     for row in answer["tasks"]:
-        (won_1, won_2), (of_1, of_2) = row["successes"], row["trials"]
+        (won_1, won_2), (of_1, of_2) = row["successes"], row["counted_jobs"]
         rows.append(
             (
                 row["task"],
                 f"{won_1:g}/{of_1}",
                 f"{won_2:g}/{of_2}",
                 f"{100 * row['difference']:+.0f}",
-                f"{100 * row['low']:+.0f}..{100 * row['high']:+.0f}",
+                f"{100 * row['ci_low']:+.0f}..{100 * row['ci_high']:+.0f}",
                 str(row["success"]["pairs"]) if row["success"] else "0",
                 number(row["success_p"], 4),
                 number(row["indicator_p"], 4),

@@ -13,7 +13,7 @@ app = new_group("Look at models.")
 @app.command("list")
 def list_models(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """List the models of the registry."""
-    models = Client(url).get("/v1/models")
+    models = Client(url).models()
     if as_json:
         print_json(models)
         return

@@ -34,7 +34,7 @@ from buildarena_cli.terminal.progress import (
 )
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import BoardPower, SweepEstimate, SweepView
+    from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate
 
 app = new_group("Submit and watch sweeps.")
 
@@ -117,11 +117,11 @@ def list_sweeps(
 ) -> None:
     """List sweeps, newest first."""
     pages = Client(url).pages("/v1/sweeps", cursor=after, limit=MAX_LIMIT if every else limit)
-    page = gathered(pages, "sweeps", every=every)
+    page = gathered(pages, every=every)
     if as_json:
         print_json(page)
         return
-    rows = [_row(sweep) for sweep in page["sweeps"]]
+    rows = [_row(sweep) for sweep in page["data"]]
     print_table(LIST, rows, numeric=("ended", "jobs", "USD"))
     show_cursor(page)
 
@@ -222,7 +222,7 @@ def _row(sweep: dict[str, Any]) -> list[str]:
         f"{progress['done']:,}",
         f"{progress['total']:,}",
         ", ".join(f"{n:,} {name}" for name, n in sorted(progress["outcomes"].items())),
-        number(progress["cost_usd"], 2),
+        number(progress["usage"]["cost_usd"], 2),
         minute_of(sweep["created_at"]),
     ]
 
@@ -235,7 +235,7 @@ def _change(
     _show(client.post(path, body or {}), as_json=as_json)
 
 
-def _show(sweep: SweepView, *, as_json: bool) -> None:
+def _show(sweep: Sweep, *, as_json: bool) -> None:
     if as_json:
         print_json(sweep)
         return
@@ -244,7 +244,8 @@ def _show(sweep: SweepView, *, as_json: bool) -> None:
     say(f"{progress['done']} of {progress['total']} jobs ended")
     for name, count in {**progress["stages"], **progress["outcomes"]}.items():
         say(f"  {count:>6}  {in_plain_words(name)}")
-    say(f"{progress['requests']:,} model requests, ${progress['cost_usd']:.2f}")
+    usage = progress["usage"]
+    say(f"{usage['requests']:,} model requests, ${usage['cost_usd']:.2f}")
     if progress.get("lost_requests"):
         say(f"{progress['lost_requests']:,} more may have been paid for: their replies were lost")
     if sweep["budget"] is not None:
@@ -262,10 +263,10 @@ def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
             (
                 model["model"],
                 f"{model['jobs']:,}",
-                number(model["requests"], 0),
-                number(model["input_tokens"], 0),
-                number(model["output_tokens"], 0),
-                number(model["cost_usd"], 2),
+                number(model["usage"]["requests"], 0),
+                number(model["usage"]["input_tokens"], 0),
+                number(model["usage"]["output_tokens"], 0),
+                number(model["usage"]["cost_usd"], 2),
             )
             for model in estimate["models"]
         ],
@@ -292,7 +293,7 @@ def _by(rise: float | None) -> str:
     return "not at all" if rise is None else f"if it is {100 * rise:.0f} points more"
 
 
-def _show_limit(sweep: SweepView) -> None:
+def _show_limit(sweep: Sweep) -> None:
     if sweep["state"] == "budget_exhausted":
         say(
             f"The budget is used up: `buildarena sweep budget {sweep['id']} --max-cost-usd …` "
@@ -300,7 +301,7 @@ def _show_limit(sweep: SweepView) -> None:
         )
 
 
-def _watch(client: Client, sweep_id: str, *, as_json: bool) -> SweepView:
+def _watch(client: Client, sweep_id: str, *, as_json: bool) -> Sweep:
     if not as_json:
         watched = watch_sweep(client, sweep_id)
         _show_limit(watched)

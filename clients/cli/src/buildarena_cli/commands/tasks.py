@@ -27,7 +27,7 @@ TaskFile = Annotated[Path, typer.Argument(help="YAML file of the task.", callbac
 @app.command("list")
 def list_tasks(*, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
     """List the tasks; custom ones are marked."""
-    tasks = Client(url).get("/v1/tasks")
+    tasks = Client(url).tasks()
     if as_json:
         print_json(tasks)
         return
@@ -63,7 +63,7 @@ def show_task(
     except RefusedError as error:
         if error.status != NOT_FOUND or version is not None:
             raise
-        names = [known["name"] for known in client.get("/v1/tasks")]
+        names = [known["name"] for known in client.tasks()]
         raise CommandError(
             f"{error}; choose from {', '.join(names)}{did_you_mean(name, names)}"
         ) from error

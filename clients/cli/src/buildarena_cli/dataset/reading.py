@@ -140,7 +140,7 @@ class Reader:
             **single,
         )
         for page in pages:
-            yield from page["jobs"]
+            yield from page["data"]
 
     def _fetched(self, job_id: str) -> Fetched | None:
         """A job with its documents; None when it is under way again."""
@@ -158,7 +158,7 @@ class Reader:
             task=self._task(job["task"], job["task_version"]),
             machine=machine,
             transcript=ask(self._client, at("jobs", job_id, "transcript")),
-            prompts=() if prompts is None else json.loads(prompts)["prompts"],
+            prompts=() if prompts is None else json.loads(prompts)["data"],
         )
 
     def _task(self, name: str, version: str) -> Mapping[str, Any] | None:

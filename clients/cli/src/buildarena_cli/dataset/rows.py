@@ -61,13 +61,13 @@ def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
     track = manifest.get("track") or {}
     return {
         **{name: job[name] for name in AS_THEY_ARE},
-        **{name: job["usage"][name] for name in USAGE},
+        **{name: (job | job["usage"])[name] for name in USAGE},
         **_of_task(fetched.task),
         "job_id": job["id"],
         "decoding": compact((manifest.get("model") or {}).get("decoding") or {}),
         "workflow": track.get("workflow") or job["track"].partition("/")[0],
         "simulator": track.get("simulator"),
-        "disqualified": is_disqualified(job["flags"] or ()),
+        "disqualified": is_disqualified(job["flags"]),
         "metrics": None if job["metrics"] is None else compact(job["metrics"]),
         "messages": chat(_first_words(fetched.task, track), turns, fetched.prompts),
         "tools": tools,
@@ -78,9 +78,9 @@ def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
         ),
         "trajectory_sha256": _trajectories(job["artifacts"]),
         "versions": compact({k: v for k, v in manifest.items() if k not in NO_VERSION}),
-        "refusals": compact(job["refusals"] or {}),
+        "refusals": compact(job["refusals"]),
         "by_runner": job.get("by_runner", False),
-        "audit": job.get("audit"),
+        "audit": job["verification_status"],
         "verified": job["verified_at"] is not None if _is_unproved(job) else None,
         "finished_at": job["finished_at"] and datetime.fromisoformat(job["finished_at"]),
         "license": OURS if job["model"].startswith(BASELINE) else licence,
@@ -90,7 +90,7 @@ def _row_of(fetched: Fetched, *, tools: str, licence: str) -> dict[str, Any]:
 
 def _is_unproved(job: Mapping[str, Any]) -> bool:
     """Whether a job counts only once it was verified."""
-    return job.get("audit") is not None
+    return job["verification_status"] is not None
 
 
 def _turns(transcript: bytes) -> list[dict[str, Any]]:

@@ -37,7 +37,7 @@ class Collected:
 
     def collect(self) -> None:
         """Asks for everything."""
-        self._listed = self._client.get("/v1/tasks")
+        self._listed = self._client.tasks()
         self._boards()
         self._comparisons()
         self._tasks()
@@ -108,9 +108,7 @@ class Collected:
     def _tasks(self) -> None:
         versions = {(job["task"], job["task_version"]) for job in self._scope.jobs}
         names = {name for name, _ in versions}
-        self.answers["/v1/tasks"] = document(
-            [task for task in self._listed if task["name"] in names]
-        )
+        self.answers["/v1/tasks"] = _page([task for task in self._listed if task["name"] in names])
         for name, version in sorted({*versions, *((name, None) for name in names)}, key=str):
             path = at("tasks", name)
             content = ask(self._client, path, version=version)
@@ -120,19 +118,22 @@ class Collected:
     def _models(self) -> None:
         used = {job["model"] for job in self._scope.jobs}
         self.answers["/v1/versions"] = document(self._client.get("/v1/versions"))
-        listed = self._client.get("/v1/models")
-        self.answers["/v1/models"] = document([model for model in listed if model["name"] in used])
+        listed = self._client.models()
+        self.answers["/v1/models"] = _page([model for model in listed if model["name"] in used])
 
     def _sweeps(self) -> None:
         sweeps = list(self._scope.sweeps)
-        page = {"sweeps": sweeps, "next_cursor": None}
-        self.answers[question("/v1/sweeps", {"limit": LISTED_SWEEPS})] = document(page)
+        self.answers[question("/v1/sweeps", {"limit": LISTED_SWEEPS})] = _page(sweeps)
         for sweep in sweeps:
             self.answers[f"/v1/sweeps/{sweep['id']}"] = document(sweep)
             troubles = ask(self._client, at("sweeps", sweep["id"], "troubles"))
             self.answers[f"/v1/sweeps/{sweep['id']}/troubles"] = (
                 troubles and Answer(troubles)
             ) or None
+
+
+def _page(rows: Sequence[Any]) -> Answer:
+    return document({"data": list(rows), "next_cursor": None})
 
 
 def rows_of(scope: Scope, chosen: Sequence[Job]) -> Answer:

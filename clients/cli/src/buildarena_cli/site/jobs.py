@@ -55,10 +55,10 @@ def job_answers(client: Client, job_id: str) -> Answers:
 def _files(client: Client, job_id: str, answers: Answers) -> None:
     """The list of a job's files, and those files; trajectories are there as trials already."""
     listed = ask(client, at("jobs", job_id, "artifacts"))
-    files = [] if listed is None else json.loads(listed)
+    files = [] if listed is None else json.loads(listed)["data"]
     others = [file for file in files if ROLLOUT.fullmatch(file["name"]) is None]
     answers[f"/v1/jobs/{job_id}/artifacts"] = Answer(
-        json.dumps(others, ensure_ascii=False, separators=(",", ":")).encode()
+        json.dumps({"data": others, "next_cursor": None}, separators=(",", ":")).encode()
     )
     for file in others:
         content = ask(client, at("jobs", job_id, "artifacts", file["name"]))

@@ -74,7 +74,7 @@ def read_scope(client: Client, sweeps: Sequence[str], track: str | None) -> Scop
         rows = [
             job
             for page in client.pages("/v1/jobs", sweep=sweep, track=track, limit=PAGE)
-            for job in page["jobs"]
+            for job in page["data"]
         ]
         # Ids become names of files.
         jobs.update((checked_id("job", job["id"]), job) for job in rows)
@@ -127,7 +127,7 @@ def chosen_jobs(scope: Scope, per_cell: int | None) -> list[Job]:
         cells.setdefault(tuple(job[name] for name in names), []).append(job)
 
     def worth(job: Job) -> tuple[bool, float, int, str]:
-        failed = not job["success"] or not scope.disqualifying.isdisjoint(job["flags"] or ())
+        failed = not job["success"] or not scope.disqualifying.isdisjoint(job["flags"])
         return failed, -(job["indicator"] or 0.0), job["seed"], job["id"]
 
     return [job for cell in cells.values() for job in sorted(cell, key=worth)[:per_cell]]

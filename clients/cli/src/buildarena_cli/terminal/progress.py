@@ -11,7 +11,7 @@ from buildarena_cli.terminal.output import is_terminal, minute_of, say
 from buildarena_client.endpoints.sweeps import sweep_has_stopped
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import ForecastView, SweepView
+    from buildarena_client.schemas import Forecast, Sweep
 
 POLL_S = 0.3
 PLAIN_PAUSE_S = 1.7
@@ -37,26 +37,26 @@ def in_plain_words(state: str) -> str:
     return WORDS.get(state, state.replace("_", " "))
 
 
-def forecast_lines(forecast: ForecastView) -> list[str]:
+def forecast_lines(forecast: Forecast) -> list[str]:
     """What is to come of a sweep, as lines to print."""
     lines = []
-    rate, end = forecast["jobs_per_minute"], forecast["ends_at"]
+    rate, end = forecast["jobs_per_minute"], forecast["finish_at"]
     if rate is not None and end is not None:
         lines.append(
-            f"{forecast['jobs_left']:,} jobs left at {rate:.2g} a minute: "
+            f"{forecast['remaining_jobs']:,} jobs left at {rate:.2g} a minute: "
             f"ends about {minute_of(end)} UTC"
         )
     unknown = ", ".join(forecast["unknown_models"])
     but = f", without {unknown}, of which nothing has ended yet" if unknown else ""
-    if forecast["cost_usd_total"] or not unknown:
-        left, total = forecast["cost_usd_left"], forecast["cost_usd_total"]
+    if forecast["total_cost_usd"] or not unknown:
+        left, total = forecast["remaining_cost_usd"], forecast["total_cost_usd"]
         lines.append(f"about ${left:.2f} still to spend, ${total:.2f} in all{but}")
-    if forecast["budget_usd_short"]:
-        lines.append(f"the budget lacks about ${forecast['budget_usd_short']:.2f} for that")
+    if forecast["lacking_budget_usd"]:
+        lines.append(f"the budget lacks about ${forecast['lacking_budget_usd']:.2f} for that")
     return lines
 
 
-def watch_sweep(client: Client, sweep_id: str) -> SweepView:
+def watch_sweep(client: Client, sweep_id: str) -> Sweep:
     """Shows a sweep's progress until every job has ended: a bar on a terminal, lines elsewhere.
 
     Returns:
@@ -72,7 +72,8 @@ def watch_sweep(client: Client, sweep_id: str) -> SweepView:
         for sweep in client.watch_sweep(sweep_id, poll_s=POLL_S):
             progress = sweep["progress"]
             line = (
-                f"{progress['requests']:,} requests, ${progress['cost_usd']:.2f}  "
+                f"{progress['usage']['requests']:,} requests, "
+                f"${progress['usage']['cost_usd']:.2f}  "
                 f"{_counted(progress['outcomes'])}"
             )
             bars.update(bar, total=progress["total"], completed=progress["done"], description=line)
@@ -87,7 +88,7 @@ def watch_sweep(client: Client, sweep_id: str) -> SweepView:
     return sweep
 
 
-def exit_code(sweep: SweepView) -> int:
+def exit_code(sweep: Sweep) -> int:
     """0 when every job was scored, 3 when some errored, were cancelled, or had to stop."""
     progress = sweep["progress"]
     faults = any(progress["outcomes"].get(name) for name in FAULTS)

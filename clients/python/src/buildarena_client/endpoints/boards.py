@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncGenerator
 from typing import TYPE_CHECKING, Literal, Unpack, cast
 
-from buildarena_client.endpoints.sending import Sender
+from buildarena_client.endpoints.sending import PAGE, Sender
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
         Board,
+        BoardChange,
         BoardFilters,
-        ChangePage,
         Comparison,
         Figures,
         ManifestEntry,
@@ -44,18 +45,16 @@ class Boards(Sender):
         """What a leaderboard's figures are drawn from."""
         return cast("Figures", await self.get("/v1/leaderboard/figures", **filters))
 
-    async def changes(
-        self, *, before: int | None = None, limit: int = 100, **filters: Unpack[BoardFilters]
-    ) -> ChangePage:
+    def changes(
+        self, *, limit: int | None = 100, **filters: Unpack[BoardFilters]
+    ) -> AsyncGenerator[BoardChange, None]:
         """What entered a leaderboard, left it or was scored again, the newest first.
 
         Args:
-            before: Only older ones than this, the ``next_before`` of the page before.
             limit: Entries at most.
             filters: Which leaderboard.
         """
-        answer = await self.get("/v1/leaderboard/changes", before=before, limit=limit, **filters)
-        return cast("ChangePage", answer)
+        return self._listed("/v1/leaderboard/changes", limit, PAGE, dict(filters))
 
     async def verify_leaderboard(
         self,
@@ -84,7 +83,7 @@ class Boards(Sender):
         Args:
             filters: Which entry: name ``task`` and ``model``.
         """
-        return cast("list[ManifestEntry]", await self.get("/v1/leaderboard/manifest", **filters))
+        return await self.every("/v1/leaderboard/manifest", **filters)
 
     async def export_leaderboard(
         self, kind: Literal["csv", "parquet", "latex"], **filters: Unpack[BoardFilters]

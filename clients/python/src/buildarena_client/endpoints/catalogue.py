@@ -11,16 +11,16 @@ from buildarena_client.paths import HEALTH, at
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
-        CallerView,
+        Caller,
         Health,
-        ModelView,
-        ModuleView,
-        ScorerView,
-        SimulatorView,
+        Model,
+        Module,
+        Scorer,
+        Simulator,
+        Task,
         TaskDetail,
-        TaskView,
-        VersionsView,
-        WorkerView,
+        Versions,
+        Worker,
     )
 
 
@@ -31,13 +31,13 @@ class Catalogue(Sender):
         """How the service's parts are."""
         return cast("Health", await self.get(HEALTH))
 
-    async def caller(self) -> CallerView:
+    async def caller(self) -> Caller:
         """Whose key this is, and what it may do."""
-        return cast("CallerView", await self.get("/v1/caller"))
+        return cast("Caller", await self.get("/v1/caller"))
 
-    async def tasks(self) -> list[TaskView]:
+    async def tasks(self) -> list[Task]:
         """The tasks in their newest versions, the built-in ones first."""
-        return cast("list[TaskView]", await self.get("/v1/tasks"))
+        return await self.every("/v1/tasks")
 
     async def task(self, name: str, *, version: str | None = None) -> TaskDetail:
         """A task with its whole document; the newest version by default."""
@@ -52,13 +52,13 @@ class Catalogue(Sender):
         content = bytes(source, "utf-8") if isinstance(source, str) else source
         return cast("TaskDetail", await self.upload("/v1/tasks", content, "application/yaml"))
 
-    async def models(self) -> list[ModelView]:
+    async def models(self) -> list[Model]:
         """The models that jobs can name."""
-        return cast("list[ModelView]", await self.get("/v1/models"))
+        return await self.every("/v1/models")
 
     async def modules(
         self, *, of_set: str | None = None, task: str | None = None, version: str | None = None
-    ) -> list[ModuleView]:
+    ) -> list[Module]:
         """The kinds of parts that machines are made of: the basic ones by default.
 
         Args:
@@ -66,31 +66,28 @@ class Catalogue(Sender):
             task: Those that builders of a task may use.
             version: The task's; the newest by default.
         """
-        modules = await self.get("/v1/modules", set=of_set, task=task, version=version)
-        return cast("list[ModuleView]", modules)
+        return await self.every("/v1/modules", set=of_set, task=task, version=version)
 
-    async def versions(self) -> VersionsView:
+    async def versions(self) -> Versions:
         """The versions that results depend on, and the constants of the boards' statistics."""
-        return cast("VersionsView", await self.get("/v1/versions"))
+        return cast("Versions", await self.get("/v1/versions"))
 
-    async def simulators(self) -> list[SimulatorView]:
+    async def simulators(self) -> list[Simulator]:
         """What jobs can name as their simulator, and whether it is served at the moment."""
-        return cast("list[SimulatorView]", await self.get("/v1/simulators"))
+        return await self.every("/v1/simulators")
 
-    async def scorers(self) -> list[ScorerView]:
+    async def scorers(self) -> list[Scorer]:
         """The scorers that task files can name, with their parameters and flags."""
-        return cast("list[ScorerView]", await self.get("/v1/scorers"))
+        return await self.every("/v1/scorers")
 
-    def workers(
-        self, *, limit: int | None = None, page: int = 100
-    ) -> AsyncGenerator[WorkerView, None]:
+    def workers(self, *, limit: int | None = None, page: int = 100) -> AsyncGenerator[Worker, None]:
         """The workers that were heard of lately, the last started first.
 
         Args:
             limit: How many at most; all by default.
             page: How many are asked for at once, 1 to 500.
         """
-        return self._listed("/v1/workers", "workers", limit, page, {})
+        return self._listed("/v1/workers", limit, page, {})
 
     async def module_model(self, name: str) -> bytes:
         """The shape of a module, as GLB."""

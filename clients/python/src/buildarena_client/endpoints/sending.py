@@ -14,6 +14,8 @@ from buildarena_client.files import whole_file
 from buildarena_client.retries import RetryPolicy
 
 TIMEOUT_S: Final = 60.0
+PAGE: Final = 200
+"""Rows that are asked for at once, as many as the service gives."""
 AT_ONCE: Final = 16
 """Of one caller, the service has 96 requests open at most."""
 STREAM_TIMEOUT_S: Final = 60.0
@@ -178,15 +180,19 @@ class Sender:
                     raise
             await self._transport.pause(RESTART_POLL_S)
 
+    async def every(self, /, path: str, **params: Any) -> list[Any]:
+        """All rows of a list; parameters that are None are left out."""
+        return [row async for row in self._listed(path, None, PAGE, params)]
+
     async def _listed(
-        self, path: str, name: str, limit: int | None, page: int, params: Mapping[str, Any]
+        self, path: str, limit: int | None, page: int, params: Mapping[str, Any]
     ) -> AsyncGenerator[Any, None]:
-        """The documents that pages have under a name, page after page as they are needed."""
+        """The rows of a list, page after page as they are needed."""
         remaining = float("inf") if limit is None else limit
         if remaining <= 0:
             return
         async for answer in self.pages(path, limit=min(page, remaining), **params):
-            for listed in answer[name]:
+            for listed in answer["data"]:
                 yield listed
                 remaining -= 1
                 if remaining <= 0:

@@ -11,10 +11,9 @@ from buildarena_client.paths import at
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
-        JobView,
-        MachineCheckView,
-        SessionOpened,
-        SessionView,
+        Job,
+        MachineCheck,
+        Session,
         ToolOutcome,
     )
 
@@ -26,7 +25,7 @@ class Sessions(Sender):
 
     async def open_session(
         self, /, task: str, agent: str, *, seed: int = 0, **more: Any
-    ) -> SessionOpened:
+    ) -> Session:
         """Opens a session in which an agent of yours builds for one task.
 
         The same arguments give the same session for as long as it is open.
@@ -38,11 +37,11 @@ class Sessions(Sender):
             more: ``simulator``, and ``kind`` for a person.
         """
         body = {"task": task, "agent": agent, "seed": seed, **more}
-        return cast("SessionOpened", await self.post("/v1/sessions", body, repeatable=True))
+        return cast("Session", await self.post("/v1/sessions", body, repeatable=True))
 
-    async def session(self, session_id: str) -> SessionView:
+    async def session(self, session_id: str) -> Session:
         """A session: its machines, its tools, and how much is left."""
-        return cast("SessionView", await self.get(at("sessions", session_id)))
+        return cast("Session", await self.get(at("sessions", session_id)))
 
     async def session_machine(self, session_id: str) -> Any:
         """The document of the machine that a submission would try now."""
@@ -67,17 +66,15 @@ class Sessions(Sender):
         body = {"tool": tool, "arguments": dict(arguments or {}), "machine": machine}
         return cast("ToolOutcome", await self.post(at("sessions", session_id, "calls"), body))
 
-    async def test_session(self, session_id: str) -> JobView:
+    async def test_session(self, session_id: str) -> Job:
         """Has the machine tried as it stands, where the task has test trials. Never sent twice."""
-        return cast("JobView", await self.post(at("sessions", session_id, "tests")))
+        return cast("Job", await self.post(at("sessions", session_id, "tests")))
 
-    async def submit_session(self, session_id: str) -> JobView:
+    async def submit_session(self, session_id: str) -> Job:
         """Ends a session; the machine is simulated and scored."""
-        return cast("JobView", await self.post(at("sessions", session_id, "submit")))
+        return cast("Job", await self.post(at("sessions", session_id, "submit")))
 
-    async def check_machine(
-        self, source: Path | bytes, *, task: str | None = None
-    ) -> MachineCheckView:
+    async def check_machine(self, source: Path | bytes, *, task: str | None = None) -> MachineCheck:
         """What a machine's file is and what is wrong with it.
 
         Args:
@@ -87,11 +84,11 @@ class Sessions(Sender):
         answer = await self.upload(
             "/v1/machines/check", source, MACHINE_FILE, repeatable=True, task=task
         )
-        return cast("MachineCheckView", answer)
+        return cast("MachineCheck", answer)
 
     async def try_machine(
         self, source: Path | bytes, *, task: str, simulator: str | None = None, seed: int = 0
-    ) -> JobView:
+    ) -> Job:
         """Puts a machine from a file through a task's trial, on no leaderboard.
 
         An equal one that was tried is the answer.
@@ -106,4 +103,4 @@ class Sessions(Sender):
         answer = await self.upload(
             "/v1/machines/trials", source, MACHINE_FILE, repeatable=True, **asked
         )
-        return cast("JobView", answer)
+        return cast("Job", answer)

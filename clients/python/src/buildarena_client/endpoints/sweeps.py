@@ -7,7 +7,7 @@ from collections.abc import AsyncGenerator, Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
-from buildarena_client.endpoints.sending import POLL_S, Sender
+from buildarena_client.endpoints.sending import PAGE, POLL_S, Sender
 from buildarena_client.errors import BadArgumentError, MissingLibraryError
 from buildarena_client.event_streams import Event
 from buildarena_client.paths import at
@@ -15,16 +15,14 @@ from buildarena_client.paths import at
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
         Budget,
-        ForecastView,
-        Result,
+        Forecast,
+        JobResult,
+        Sweep,
         SweepAccepted,
         SweepEstimate,
-        SweepView,
-        TroubleView,
+        Trouble,
     )
 
-PAGE: Final = 100
-"""Sweeps that are asked for at once, as many as the service gives."""
 STOPPED: Final = ("budget_exhausted", "paused")
 """States of sweeps of which nothing more starts."""
 MAX_BYTES: Final = 2 * 1024 * 1024
@@ -35,19 +33,20 @@ class Sweeps(Sender):
     """Sweeps, from their submission to their end."""
 
     def sweeps(
-        self, *, limit: int | None = None, page: int = PAGE
-    ) -> AsyncGenerator[SweepView, None]:
+        self, /, *, limit: int | None = None, page: int = PAGE, **filters: Any
+    ) -> AsyncGenerator[Sweep, None]:
         """Sweeps, the newest first, page after page as they are needed.
 
         Args:
             limit: How many at most; all by default.
-            page: How many are asked for at once, 1 to 100.
+            page: How many are asked for at once, 1 to 200.
+            filters: ``name``, ``state`` and ``key_id``, each one or a list.
         """
-        return self._listed("/v1/sweeps", "sweeps", limit, page, {})
+        return self._listed("/v1/sweeps", limit, page, filters)
 
-    async def sweep(self, sweep_id: str) -> SweepView:
+    async def sweep(self, sweep_id: str) -> Sweep:
         """A sweep and its progress."""
-        return cast("SweepView", await self.get(at("sweeps", sweep_id)))
+        return cast("Sweep", await self.get(at("sweeps", sweep_id)))
 
     async def submit_sweep(
         self,
@@ -80,38 +79,39 @@ class Sweeps(Sender):
         answer = await self.post("/v1/sweeps/estimate", _fields(spec), repeatable=True)
         return cast("SweepEstimate", answer)
 
-    async def pause_sweep(self, sweep_id: str) -> SweepView:
+    async def pause_sweep(self, sweep_id: str) -> Sweep:
         """Puts a sweep's waiting jobs on hold; running jobs continue."""
-        return cast("SweepView", await self.post(at("sweeps", sweep_id, "pause")))
+        return cast("Sweep", await self.post(at("sweeps", sweep_id, "pause")))
 
-    async def resume_sweep(self, sweep_id: str, *, budget: Budget | None = None) -> SweepView:
+    async def resume_sweep(self, sweep_id: str, *, budget: Budget | None = None) -> Sweep:
         """Resumes a paused sweep, or one whose budget is used up, with a larger one if given."""
         body = {} if budget is None else {"budget": budget}
-        return cast("SweepView", await self.post(at("sweeps", sweep_id, "resume"), body))
+        return cast("Sweep", await self.post(at("sweeps", sweep_id, "resume"), body))
 
-    async def set_sweep_budget(self, sweep_id: str, budget: Budget) -> SweepView:
+    async def set_sweep_budget(self, sweep_id: str, budget: Budget) -> Sweep:
         """Replaces a sweep's budget; one whose budget was used up goes on."""
-        return cast("SweepView", await self.put(at("sweeps", sweep_id, "budget"), budget))
+        return cast("Sweep", await self.put(at("sweeps", sweep_id, "budget"), budget))
 
-    async def sweep_forecast(self, sweep_id: str) -> ForecastView:
+    async def sweep_forecast(self, sweep_id: str) -> Forecast:
         """When a sweep ends and what it comes to cost, from what ran so far."""
-        return cast("ForecastView", await self.get(at("sweeps", sweep_id, "forecast")))
+        return cast("Forecast", await self.get(at("sweeps", sweep_id, "forecast")))
 
-    async def cancel_sweep(self, sweep_id: str) -> SweepView:
+    async def cancel_sweep(self, sweep_id: str) -> Sweep:
         """Ends a sweep's jobs that have not ended and that nobody else wants."""
-        return cast("SweepView", await self.post(at("sweeps", sweep_id, "cancel")))
+        return cast("Sweep", await self.post(at("sweeps", sweep_id, "cancel")))
 
-    async def retry_sweep(self, sweep_id: str) -> SweepView:
+    async def retry_sweep(self, sweep_id: str) -> Sweep:
         """Queues a sweep's errored jobs again where they failed."""
-        return cast("SweepView", await self.post(at("sweeps", sweep_id, "retry")))
+        return cast("Sweep", await self.post(at("sweeps", sweep_id, "retry")))
 
-    async def sweep_results(self, sweep_id: str) -> list[Result]:
-        """The scored jobs of a sweep."""
-        return cast("list[Result]", await self.get(at("sweeps", sweep_id, "results")))
+    async def sweep_results(self, sweep_id: str) -> list[JobResult]:
+        """The ended jobs of a sweep, by task, model and seed."""
+        results = await self.every(at("sweeps", sweep_id, "results"))
+        return sorted(results, key=lambda one: (one["task"], one["model"], one["seed"]))
 
-    async def sweep_troubles(self, sweep_id: str) -> list[TroubleView]:
+    async def sweep_troubles(self, sweep_id: str) -> list[Trouble]:
         """Attempts at a sweep's jobs that faults ended, the newest kinds first."""
-        return cast("list[TroubleView]", await self.get(at("sweeps", sweep_id, "troubles")))
+        return await self.every(at("sweeps", sweep_id, "troubles"))
 
     def sweep_events(self, sweep_id: str, *, after: int = 0) -> AsyncGenerator[Event, None]:
         """What happens to a sweep and its jobs, from the beginning; waits for more.
@@ -126,7 +126,7 @@ class Sweeps(Sender):
 
     async def watch_sweep(
         self, sweep_id: str, *, poll_s: float = POLL_S
-    ) -> AsyncGenerator[SweepView, None]:
+    ) -> AsyncGenerator[Sweep, None]:
         """A sweep again and again, until nothing more will happen to it.
 
         The last one is how it ended: every job has, or all others are on hold. A service that is
@@ -137,7 +137,7 @@ class Sweeps(Sender):
             poll_s: Seconds between two looks.
         """
         while True:
-            sweep = cast("SweepView", await self.get_patiently(at("sweeps", sweep_id)))
+            sweep = cast("Sweep", await self.get_patiently(at("sweeps", sweep_id)))
             yield sweep
             if sweep_has_stopped(sweep):
                 return
@@ -147,10 +147,10 @@ class Sweeps(Sender):
         self,
         sweep_id: str,
         *,
-        progress: Callable[[SweepView], object] | None = None,
+        progress: Callable[[Sweep], object] | None = None,
         poll_s: float = POLL_S,
         timeout_s: float | None = None,
-    ) -> SweepView:
+    ) -> Sweep:
         """A sweep when nothing more will happen to it.
 
         Args:
@@ -165,10 +165,10 @@ class Sweeps(Sender):
         answer = await self._when(
             at("sweeps", sweep_id), sweep_has_stopped, timeout_s, poll_s=poll_s, progress=progress
         )
-        return cast("SweepView", answer)
+        return cast("Sweep", answer)
 
 
-def sweep_has_stopped(sweep: SweepView) -> bool:
+def sweep_has_stopped(sweep: Sweep) -> bool:
     """Whether nothing more will happen: every job has ended, or all others are on hold."""
     progress = sweep["progress"]
     moving = [name for name in progress["stages"] if not name.endswith(" on_hold")]

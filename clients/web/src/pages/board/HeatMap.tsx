@@ -106,14 +106,14 @@ function Cell({ task, entry, figure, entries }: CellOf) {
       to="/jobs"
       search={jobsBehind(row)}
       style={shade(share)}
-      title={`${entry.label} on ${task.task}: ${successes(row.successes)} of ${row.trials} succeeded, ${interval}${row.flagged > 0 ? `; ${row.flagged} flagged` : ""}`}
+      title={`${entry.label} on ${task.task}: ${successes(row.successes)} of ${row.counted} succeeded, ${interval}${row.flagged > 0 ? `; ${row.flagged} flagged` : ""}`}
     >
       <span>
         {row.censored > 0 && figure === "indicator" ? "≥ " : ""}
         {shown}
       </span>
       <small>
-        {successes(row.successes)} of {row.trials}
+        {successes(row.successes)} of {row.counted}
         {row.flagged > 0 ? ` · ${row.flagged} ⚑` : ""}
       </small>
     </Link>

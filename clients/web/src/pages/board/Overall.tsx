@@ -1,6 +1,6 @@
 import { Badge, Button, Checkbox, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
-import type { Board, OverallView } from "../../api/queries";
+import type { Board, OverallRow } from "../../api/queries";
 import { count, dollars, number, percent, places } from "../../format";
 import { Interval } from "../../parts/Interval";
 import { useState } from "react";
@@ -13,9 +13,9 @@ import { Tip } from "../../parts/Tip";
 import type { Values } from "../../parts/sorting";
 import type { BoardSearch } from "../../api/board-search";
 
-type Entry = Pick<OverallView, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
+type Entry = Pick<OverallRow, "rank" | "rank_low" | "rank_high" | "mean_rank" | "model">;
 
-const VALUES: Values<OverallView> = {
+const VALUES: Values<OverallRow> = {
   model: (row) => row.model,
   rank: (row) => row.rank,
   mean: (row) => row.mean_rank,
@@ -23,7 +23,7 @@ const VALUES: Values<OverallView> = {
   success: (row) => row.success_rate_mean,
   cost: (row) => row.cost_usd_mean,
   tokens: (row) => row.output_tokens_mean,
-  trials: (row) => row.trials,
+  trials: (row) => row.counted,
 };
 
 /** Models ranked over all tasks of the board, with the intervals of their places. */
@@ -153,7 +153,7 @@ function Place({ row, most, tied }: { row: Entry; most: number; tied: boolean })
 }
 
 interface RowOf {
-  row: OverallView;
+  row: OverallRow;
   label: string;
   most: number;
   tied: boolean;
@@ -197,7 +197,7 @@ function OverallRow({ row, label, most, tied, over, ticked, onTick }: RowOf) {
       <Table.Td className="figures">{percent(row.success_rate_mean, 1)}</Table.Td>
       <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
       <Table.Td className="figures">{count(row.output_tokens_mean)}</Table.Td>
-      <Table.Td className="figures">{count(row.trials)}</Table.Td>
+      <Table.Td className="figures">{count(row.counted)}</Table.Td>
     </Table.Tr>
   );
 }

@@ -1,4 +1,4 @@
-import type { TaskView } from "../../api/queries";
+import type { Task } from "../../api/queries";
 import type { BoardSearch } from "../../api/board-search";
 import { words } from "../../format";
 
@@ -21,7 +21,7 @@ function labelOf(category: string): string {
 }
 
 /** Everything that the tasks allow a board to be about. */
-export function scopesOf(tasks: readonly Pick<TaskView, "category">[]): Scope[] {
+export function scopesOf(tasks: readonly Pick<Task, "category">[]): Scope[] {
   const categories = [...new Set(tasks.map((task) => task.category))];
   const paper = PAPER.categories.some((name) => categories.includes(name)) ? [PAPER] : [];
   return [ALL, ...paper, ...categories.map((name) => ({ key: name, label: labelOf(name), categories: [name] }))];

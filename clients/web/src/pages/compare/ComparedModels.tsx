@@ -2,7 +2,7 @@ import { Stack, Table, Text } from "@mantine/core";
 import { queryOptions, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { client, taken, type Schema } from "../../api/client";
-import { boardQuery, jobPages, type JobView } from "../../api/queries";
+import { boardQuery, jobPages, type Job } from "../../api/queries";
 import { number, successes, words } from "../../format";
 import { OutcomeBadge } from "../../parts/Outcome";
 import { Section } from "../../parts/Section";
@@ -22,9 +22,9 @@ const comparison = (first: string, second: string, scope: Scoped) =>
       )) as Comparison,
   });
 
-async function endedJobs(model: string, task: string): Promise<JobView[]> {
+async function endedJobs(model: string, task: string): Promise<Job[]> {
   const [name, configuration = ""] = model.split("@");
-  const jobs: JobView[] = [];
+  const jobs: Job[] = [];
   for await (const page of jobPages({ model: name, task, state: "done" })) jobs.push(...page);
   return jobs.filter((job) => job.configuration.startsWith(configuration));
 }
@@ -45,10 +45,10 @@ const cases = (found: Comparison) =>
   });
 
 /** Pairs with one seed, task version and track, one a success and the other not. */
-export function differing(a: readonly JobView[], b: readonly JobView[], track: string | null): [JobView, JobView][] {
-  const key = (job: JobView): string => `${job.task} ${job.task_version} ${job.seed}`;
+export function differing(a: readonly Job[], b: readonly Job[], track: string | null): [Job, Job][] {
+  const key = (job: Job): string => `${job.task} ${job.task_version} ${job.seed}`;
   const others = new Map(b.filter((job) => job.track === track).map((job) => [key(job), job]));
-  return a.flatMap((job): [JobView, JobView][] => {
+  return a.flatMap((job): [Job, Job][] => {
     const other = others.get(key(job));
     const apart =
       other !== undefined && job.track === track && (job.outcome === "success") !== (other.outcome === "success");
@@ -92,8 +92,8 @@ function points(share: number): string {
 
 const VALUES: Values<Comparison["tasks"][number]> = {
   task: (row) => row.task,
-  first: (row) => row.successes[0] / row.trials[0],
-  second: (row) => row.successes[1] / row.trials[1],
+  first: (row) => row.successes[0] / row.counted_jobs[0],
+  second: (row) => row.successes[1] / row.counted_jobs[1],
   difference: (row) => row.difference,
   success: (row) => row.success_p,
   indicator: (row) => row.indicator_p,
@@ -136,11 +136,11 @@ function Duels({ found }: { found: Comparison }) {
               </Table.Td>
               {[0, 1].map((side) => (
                 <Table.Td key={side} className="figures">
-                  {successes(task.successes[side] ?? 0)} of {task.trials[side]}
+                  {successes(task.successes[side] ?? 0)} of {task.counted_jobs[side]}
                 </Table.Td>
               ))}
               <Table.Td className="figures">
-                {points(task.difference)} (95 %: {points(task.low)} to {points(task.high)})
+                {points(task.difference)} (95 %: {points(task.ci_low)} to {points(task.ci_high)})
               </Table.Td>
               <Table.Td>
                 <Tested test={task.success} adjusted={task.success_p} />
@@ -160,7 +160,7 @@ function Duels({ found }: { found: Comparison }) {
   );
 }
 
-function Tested({ test, adjusted }: { test: Schema<"TestView"> | null; adjusted: number | null }) {
+function Tested({ test, adjusted }: { test: Schema<"PairedTest"> | null; adjusted: number | null }) {
   if (test === null) return <Text size="sm">no shared seeds</Text>;
   return (
     <Text size="sm">

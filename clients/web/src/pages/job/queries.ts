@@ -30,7 +30,7 @@ export const prompts = (id: string) =>
   queryOptions({
     queryKey: ["job", id, "prompts"],
     staleTime: Infinity,
-    queryFn: async () => (await ifAny(jsonOf<Schema<"PromptsView">>(path(id, "prompts"))))?.prompts ?? null,
+    queryFn: async () => (await ifAny(jsonOf<Schema<"PromptList">>(path(id, "prompts"))))?.data ?? null,
   });
 
 export const replay = (id: string) =>
@@ -50,7 +50,7 @@ export const scene = (id: string, number: number) =>
     queryKey: ["job", id, "scene", number],
     staleTime: Infinity,
     queryFn: async (): Promise<Scene> => {
-      const found = await jsonOf<Schema<"SceneView">>(path(id, `scene?number=${number}`));
+      const found = await jsonOf<Schema<"Scene">>(path(id, `scene?number=${number}`));
       return { scenario: found.scenario as unknown as Scenario, machine: found.machine };
     },
   });

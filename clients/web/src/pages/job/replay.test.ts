@@ -1,7 +1,7 @@
 import { describe, expect, it } from "vitest";
 import type { PartView } from "../../scene/machine";
 import { differing } from "../compare/ComparedModels";
-import type { JobView } from "../../api/queries";
+import type { Job } from "../../api/queries";
 import { toldIn } from "./live";
 import { rolloutsOf } from "./queries";
 import { builtAt, ghostsOf, isWhole, placesOf, rangeOf, stepsOf, touchedBy, withTurns, type Replay } from "./replay";
@@ -127,13 +127,13 @@ describe("live turns", () => {
     const event = (shortened: boolean) => ({
       id: 1,
       kind: "turn",
-      job: "j",
+      job_id: "j",
       at: "",
       data: { turn: { ...turn(0), shortened } },
     });
     expect(toldIn([event(false)]).whole).toBe(true);
     expect(toldIn([event(false), event(true)]).whole).toBe(false);
-    expect(toldIn([{ id: 1, kind: "done", job: "j", at: "", data: {} }])).toEqual({ turns: [], whole: true });
+    expect(toldIn([{ id: 1, kind: "done", job_id: "j", at: "", data: {} }])).toEqual({ turns: [], whole: true });
   });
 });
 
@@ -159,7 +159,7 @@ describe("addresses", () => {
 describe("what differs", () => {
   it("is told of jobs with one seed, task version and track alone", () => {
     const job = (id: string, seed: number, outcome: string, track = "t", version = "v") =>
-      ({ id, seed, outcome, track, task: "x", task_version: version }) as JobView;
+      ({ id, seed, outcome, track, task: "x", task_version: version }) as Job;
     const first = [job("a", 0, "success"), job("b", 1, "success"), job("c", 2, "limit"), job("d", 3, "success")];
     const second = [
       job("e", 0, "limit"),

@@ -2,8 +2,8 @@ import type { Schema } from "../../api/client";
 import type { PartView, PlacedView } from "../../scene/machine";
 import type { Turn } from "./transcript";
 
-export type Replay = Schema<"ReplayView">;
-export type Step = Schema<"StepView"> & {
+export type Replay = Schema<"Replay">;
+export type Step = Schema<"Step"> & {
   /** Place of its chapter in the replay. */
   chapter: number;
 };

@@ -25,7 +25,7 @@ export interface Turn {
 }
 
 /** What a role was told before a turn. */
-export type Prompt = Schema<"PromptView">;
+export type Prompt = Schema<"Prompt">;
 
 /** The messages of a prompt, each with what it is. */
 export function messagesOf(prompt: Prompt): { kind: "system" | "user"; text: string }[] {

@@ -99,7 +99,7 @@ function Choice({ name, label, data, search, set }: ChoiceOf) {
 }
 
 function Further({ search, set, flags }: Set & { flags: readonly string[] }) {
-  const listed = useQuery(sweeps()).data?.sweeps ?? [];
+  const listed = useQuery(sweeps()).data?.data ?? [];
   const named = listed.map((sweep) => ({ value: sweep.id, label: `${sweep.name} (${sweep.id.slice(6, 12)})` }));
   const chosen = search.sweep ?? null;
   const known = chosen === null || listed.some((sweep) => sweep.id === chosen);

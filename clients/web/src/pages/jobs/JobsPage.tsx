@@ -30,7 +30,7 @@ export default function JobsPage() {
     getNextPageParam: (page) => page.next_cursor ?? undefined,
     refetchInterval: (running) => (running.state.data?.pages.length ?? 1) === 1 && every(REFRESH_MS),
   });
-  const jobs = (query.data?.pages ?? []).flatMap((page) => page.jobs);
+  const jobs = (query.data?.pages ?? []).flatMap((page) => page.data);
   const more = (): void => {
     if (query.hasNextPage && !query.isFetching) void query.fetchNextPage();
   };

@@ -36,12 +36,12 @@ export function Said() {
       </form>
       {text !== "" && (
         <Answered query={query} rows={4}>
-          {({ matches }) => (
+          {({ data: matches }) => (
             <Group gap="xs" role="status">
               {matches.length === 0 && <Text size="sm">No turn has these words.</Text>}
               {matches.map((match) => (
-                <article key={`${match.job} ${match.turn ?? ""} ${match.where}`} className="turn turn-text">
-                  <Link to="/jobs/$id" params={{ id: match.job }} search={{ turn: match.turn ?? undefined }}>
+                <article key={`${match.job_id} ${match.turn ?? ""} ${match.where}`} className="turn turn-text">
+                  <Link to="/jobs/$id" params={{ id: match.job_id }} search={{ turn: match.turn ?? undefined }}>
                     {match.task} by {match.model}, seed {match.seed}, turn {match.turn}
                   </Link>{" "}
                   {match.excerpt.map((piece, index) =>

@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
 import { client, taken } from "../../api/client";
-import { board, figures, type Board, type Figures, type OverallView } from "../../api/queries";
+import { board, figures, type Board, type Figures, type OverallRow } from "../../api/queries";
 import { count, dollars, duration, number, percent, places, secondsBetween } from "../../format";
 import { Fact } from "../../parts/Fact";
 import { DataTable } from "../../parts/DataTable";
@@ -90,7 +90,7 @@ function Profile({ board: found, name }: { board: Board; name: string }) {
   );
 }
 
-function Standing({ entry, row }: { entry: Entry; row: OverallView | undefined }) {
+function Standing({ entry, row }: { entry: Entry; row: OverallRow | undefined }) {
   if (row === undefined) return null;
   const facts: readonly [string, string][] = [
     ["Rank", row.rank === null ? "–" : String(row.rank)],
@@ -99,7 +99,7 @@ function Standing({ entry, row }: { entry: Entry; row: OverallView | undefined }
     ["Success, mean of tasks", percent(row.success_rate_mean, 1)],
     ["Dollars a job", dollars(row.cost_usd_mean)],
     ["Output tokens a job", count(row.output_tokens_mean)],
-    ["Trials", count(row.trials)],
+    ["Trials", count(row.counted)],
   ];
   return (
     <Section
@@ -135,7 +135,7 @@ function Effort({ tasks }: { tasks: Board["tasks"] }) {
       count(row.input_tokens_mean),
       count(row.output_tokens_mean),
       dollars(row.cost_usd_mean),
-      percent(row.invalid_action_rate, 1),
+      percent(row.refused_action_rate, 1),
     ]),
   );
   return (
@@ -159,10 +159,18 @@ function Best({ name, track }: { name: string; track: string | undefined }) {
       (
         await taken(
           client.GET("/v1/jobs", {
-            params: { query: { model: name, track, outcome: "success", sort: "indicator", limit: LOOKED_AT } },
+            params: {
+              query: {
+                model: [name],
+                track: track === undefined ? track : [track],
+                outcome: ["success"],
+                sort: "indicator",
+                limit: LOOKED_AT,
+              },
+            },
           }),
         )
-      ).jobs,
+      ).data,
   });
   const last = useQuery({
     queryKey: ["latency", name, track],
@@ -170,10 +178,18 @@ function Best({ name, track }: { name: string; track: string | undefined }) {
       (
         await taken(
           client.GET("/v1/jobs", {
-            params: { query: { model: name, track, state: "done", sort: "finished", limit: LOOKED_AT } },
+            params: {
+              query: {
+                model: [name],
+                track: track === undefined ? track : [track],
+                state: ["done"],
+                sort: "finished",
+                limit: LOOKED_AT,
+              },
+            },
           }),
         )
-      ).jobs,
+      ).data,
   });
   const took = (last.data ?? [])
     .flatMap((job) => secondsBetween(job.started_at, job.finished_at) ?? [])

@@ -5,14 +5,14 @@ import { IconBan, IconPlayerPause, IconPlayerPlay, IconRefresh } from "@tabler/i
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { client, taken } from "../../api/client";
 import { headline } from "../../api/problem";
-import { sweep as sweepQuery, type SweepView } from "../../api/queries";
+import { sweep as sweepQuery, type Sweep } from "../../api/queries";
 import { mayChange, useCaller } from "../../parts/may";
 import { BudgetForm } from "./BudgetForm";
 import { possible } from "./live";
 
 type Act = "pause" | "resume" | "cancel" | "retry";
 
-async function act(id: string, what: Act): Promise<SweepView> {
+async function act(id: string, what: Act): Promise<Sweep> {
   const params = { params: { path: { sweep_id: id } } };
   if (what === "pause") return taken(client.POST("/v1/sweeps/{sweep_id}/pause", params));
   if (what === "resume") return taken(client.POST("/v1/sweeps/{sweep_id}/resume", params));
@@ -21,7 +21,7 @@ async function act(id: string, what: Act): Promise<SweepView> {
 }
 
 /** What can be done with a sweep now. */
-export function Actions({ sweep }: { sweep: SweepView }) {
+export function Actions({ sweep }: { sweep: Sweep }) {
   const queries = useQueryClient();
   const [asking, question] = useDisclosure(false);
   const doing = useMutation({
@@ -35,7 +35,7 @@ export function Actions({ sweep }: { sweep: SweepView }) {
     },
   });
   const who = useCaller();
-  if (!mayChange(who, sweep.owner)) return null;
+  if (!mayChange(who, sweep.key_id)) return null;
   const can = possible(sweep.state);
   const button = (what: Act, label: string, icon: React.ReactNode, onClick: () => void) => (
     <Button

@@ -4,7 +4,7 @@ import { IconCoin } from "@tabler/icons-react";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { client, taken } from "../../api/client";
-import { sweep as sweepQuery, sweepForecast, type SweepView } from "../../api/queries";
+import { sweep as sweepQuery, sweepForecast, type Sweep } from "../../api/queries";
 import { dollars } from "../../format";
 import { ProblemNote } from "../../parts/Problem";
 
@@ -22,7 +22,7 @@ function amount(value: Amount): number | null {
   return text === "" ? null : Number(text);
 }
 
-function limitsOf({ budget }: SweepView): Limits {
+function limitsOf({ budget }: Sweep): Limits {
   return {
     max_cost_usd: budget?.max_cost_usd ?? "",
     max_tokens: budget?.max_tokens ?? "",
@@ -31,7 +31,7 @@ function limitsOf({ budget }: SweepView): Limits {
 }
 
 /** A button that opens a sweep's budget, to be raised while it runs or once it is used up. */
-export function BudgetForm({ sweep }: { sweep: SweepView }) {
+export function BudgetForm({ sweep }: { sweep: Sweep }) {
   const [opened, form] = useDisclosure(false);
   return (
     <>
@@ -50,7 +50,7 @@ export function BudgetForm({ sweep }: { sweep: SweepView }) {
   );
 }
 
-function Fields({ sweep, done }: { sweep: SweepView; done: () => void }) {
+function Fields({ sweep, done }: { sweep: Sweep; done: () => void }) {
   const queries = useQueryClient();
   const [limits, setLimits] = useState(() => limitsOf(sweep));
   const saving = useMutation({
@@ -86,7 +86,7 @@ function Fields({ sweep, done }: { sweep: SweepView; done: () => void }) {
     />
   );
   const { budget, progress } = sweep;
-  const tokens = budget?.spent_tokens ?? progress.input_tokens + progress.output_tokens;
+  const tokens = budget?.used_tokens ?? (progress.usage.input_tokens ?? 0) + (progress.usage.output_tokens ?? 0);
   return (
     <form
       onSubmit={(event) => {
@@ -98,12 +98,12 @@ function Fields({ sweep, done }: { sweep: SweepView; done: () => void }) {
         {sweep.state === "budget_exhausted" && (
           <Text size="sm">With a larger budget the sweep goes on where it stopped.</Text>
         )}
-        {field("max_cost_usd", "US dollars", dollars(budget?.spent_cost_usd ?? progress.cost_usd), false)}
+        {field("max_cost_usd", "US dollars", dollars(budget?.used_cost_usd ?? progress.usage.cost_usd), false)}
         {field("max_tokens", "Tokens, in and out", tokens.toLocaleString("en"), true)}
         {field(
           "max_requests",
           "Model requests",
-          (budget?.spent_requests ?? progress.requests).toLocaleString("en"),
+          (budget?.used_requests ?? progress.usage.requests ?? 0).toLocaleString("en"),
           true,
         )}
         {saving.error !== null && <ProblemNote error={saving.error} />}

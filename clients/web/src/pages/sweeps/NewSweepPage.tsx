@@ -192,10 +192,10 @@ function Estimate({ found, waiting }: { found: Schema<"SweepEstimate"> | undefin
                     <Table.Td>{model.model}</Table.Td>
                     <Table.Td className="figures">{count(model.jobs)}</Table.Td>
                     <Table.Td className="figures">
-                      {compact(model.input_tokens)}, {compact(model.output_tokens)}
+                      {compact(model.usage.input_tokens)}, {compact(model.usage.output_tokens)}
                     </Table.Td>
                     <Table.Td className="figures">
-                      {model.cost_usd === null ? "no price known" : dollars(model.cost_usd)}
+                      {model.usage.cost_usd === null ? "no price known" : dollars(model.usage.cost_usd)}
                     </Table.Td>
                   </Table.Tr>
                 ))}

@@ -1,7 +1,7 @@
 import { Progress, SimpleGrid, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import type { ReactNode } from "react";
-import { sweepForecast, type Forecast, type SweepView } from "../../api/queries";
+import { sweepForecast, type Forecast, type Sweep } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { compact, count, dollars, duration, moment, number, percent, stateWords } from "../../format";
 import { Fact } from "../../parts/Fact";
@@ -21,40 +21,40 @@ interface Shown {
 function rateOf(forecast: Forecast | undefined): Shown {
   const rate = forecast?.jobs_per_minute ?? null;
   if (forecast === undefined || rate === null) return { name: "Rate", value: "–", notes: [] };
-  const end = forecast.ends_at;
+  const end = forecast.finish_at;
   return {
     name: "Rate",
     value: `${number(rate)} a minute`,
     notes: [
       end !== null && (
         <time dateTime={end} title={`about ${moment(end)}`}>
-          {forecast.jobs_left < rate
+          {forecast.remaining_jobs < rate
             ? "less than a minute left"
-            : `about ${duration((60 * forecast.jobs_left) / rate)} left`}
+            : `about ${duration((60 * forecast.remaining_jobs) / rate)} left`}
         </time>
       ),
     ],
   };
 }
 
-function spentOf({ progress, budget }: SweepView, forecast: Forecast | undefined): Shown {
-  const short = forecast?.budget_usd_short ?? 0;
+function spentOf({ progress, budget }: Sweep, forecast: Forecast | undefined): Shown {
+  const short = forecast?.lacking_budget_usd ?? 0;
   const unknown = forecast?.unknown_models ?? [];
   return {
     name: "Spent",
-    value: dollars(progress.cost_usd),
+    value: dollars(progress.usage.cost_usd),
     notes: [
       budget?.max_cost_usd == null ? "no budget in dollars" : `of ${dollars(budget.max_cost_usd)}`,
-      forecast !== undefined && forecast.cost_usd_left > 0 && `about ${dollars(forecast.cost_usd_total)} in all`,
+      forecast !== undefined && forecast.remaining_cost_usd > 0 && `about ${dollars(forecast.total_cost_usd)} in all`,
       unknown.length > 0 && `no cost known yet: ${unknown.join(", ")}`,
       short > 0 && <b>the budget lacks about {dollars(short)}</b>,
     ],
-    share: shareOf(budget?.spent_cost_usd, budget?.max_cost_usd),
+    share: shareOf(budget?.used_cost_usd, budget?.max_cost_usd),
   };
 }
 
 /** Where a sweep is, how fast it goes, and what it costs and comes to cost. */
-export function SweepFacts({ sweep }: { sweep: SweepView }) {
+export function SweepFacts({ sweep }: { sweep: Sweep }) {
   const { progress, budget } = sweep;
   const open = !isSite && progress.done < progress.total;
   const asked = useQuery({ ...sweepForecast(sweep.id), enabled: open });
@@ -69,18 +69,18 @@ export function SweepFacts({ sweep }: { sweep: SweepView }) {
     spentOf(sweep, forecast),
     {
       name: "Model requests",
-      value: count(progress.requests),
+      value: count(progress.usage.requests),
       notes: [budget?.max_requests != null && `of ${count(budget.max_requests)}`],
-      share: shareOf(budget?.spent_requests, budget?.max_requests),
+      share: shareOf(budget?.used_requests, budget?.max_requests),
     },
     {
       name: "Tokens",
-      value: `${compact(progress.input_tokens)} in`,
+      value: `${compact(progress.usage.input_tokens)} in`,
       notes: [
-        `${compact(progress.output_tokens)} out`,
+        `${compact(progress.usage.output_tokens)} out`,
         budget?.max_tokens != null && `of ${compact(budget.max_tokens)} together`,
       ],
-      share: shareOf(budget?.spent_tokens, budget?.max_tokens),
+      share: shareOf(budget?.used_tokens, budget?.max_tokens),
     },
   ];
   return (

@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { getRouteApi } from "@tanstack/react-router";
 import type { StreamState } from "../../api/events";
 import { every, isSite } from "../../api/site";
-import { sweep as sweepQuery, type SweepView } from "../../api/queries";
+import { sweep as sweepQuery, type Sweep } from "../../api/queries";
 import { count } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { JobsSummary } from "../../parts/JobsSummary";
@@ -64,7 +64,7 @@ export default function SweepPage() {
   );
 }
 
-function Head({ sweep, stream }: { sweep: SweepView; stream: StreamState }) {
+function Head({ sweep, stream }: { sweep: Sweep; stream: StreamState }) {
   return (
     <Stack gap={6}>
       <Group justify="space-between" align="start">

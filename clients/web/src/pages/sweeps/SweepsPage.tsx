@@ -2,7 +2,7 @@ import { Badge, Button, Group, Progress, Stack, Table, Text, Title } from "@mant
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { useState } from "react";
-import { sweeps, type SweepView } from "../../api/queries";
+import { sweeps, type Sweep } from "../../api/queries";
 import { isSite } from "../../api/site";
 import { count, dollars, stateWords, words } from "../../format";
 import { Ago } from "../../parts/Ago";
@@ -37,15 +37,15 @@ export default function SweepsPage() {
       </Group>
       <Answered query={query}>
         {(page) =>
-          page.sweeps.length === 0 && isSite ? (
+          page.data.length === 0 && isSite ? (
             <Empty title="This site holds a track, and no sweeps" />
-          ) : page.sweeps.length === 0 ? (
+          ) : page.data.length === 0 ? (
             <Empty title="Nobody has submitted a sweep">
               <code>buildarena sweep run examples/sweeps/baselines.yaml</code> submits one.
             </Empty>
           ) : (
             <Table.ScrollContainer minWidth={720} type="native">
-              <SweepRows sweeps={page.sweeps} />
+              <SweepRows sweeps={page.data} />
               <Group mt="sm" gap="xs">
                 {cursors.length > 0 && (
                   <Button
@@ -78,16 +78,16 @@ export default function SweepsPage() {
   );
 }
 
-const VALUES: Values<SweepView> = {
+const VALUES: Values<Sweep> = {
   name: (row) => row.name,
   state: (row) => row.state,
   progress: (row) => row.progress.done / Math.max(1, row.progress.total),
   jobs: (row) => row.progress.total,
-  spent: (row) => row.progress.cost_usd,
+  spent: (row) => row.progress.usage.cost_usd,
   submitted: (row) => row.created_at,
 };
 
-function SweepRows({ sweeps: listed }: { sweeps: readonly SweepView[] }) {
+function SweepRows({ sweeps: listed }: { sweeps: readonly Sweep[] }) {
   const { rows, head } = useSorting(listed, VALUES);
   return (
     <Table highlightOnHover verticalSpacing="sm">
@@ -136,7 +136,7 @@ export function SweepState({ state }: { state: string }) {
 }
 
 /** A bar of how a sweep's jobs ended; its label says it in figures. */
-export function OutcomeBar({ sweep, size = 12 }: { sweep: SweepView; size?: number }) {
+export function OutcomeBar({ sweep, size = 12 }: { sweep: Sweep; size?: number }) {
   const { total, outcomes } = sweep.progress;
   const places = Object.keys(OUTCOME_COLOURS);
   const parts = Object.entries(outcomes).sort(([one], [another]) => places.indexOf(one) - places.indexOf(another));
@@ -155,7 +155,7 @@ export function OutcomeBar({ sweep, size = 12 }: { sweep: SweepView; size?: numb
   );
 }
 
-function SweepRow({ sweep }: { sweep: SweepView }) {
+function SweepRow({ sweep }: { sweep: Sweep }) {
   return (
     <Table.Tr>
       <Table.Td>
@@ -176,7 +176,7 @@ function SweepRow({ sweep }: { sweep: SweepView }) {
         {count(sweep.progress.done)} of {count(sweep.progress.total)}
       </Table.Td>
       <Table.Td className="figures">
-        {dollars(sweep.progress.cost_usd)}
+        {dollars(sweep.progress.usage.cost_usd)}
         {sweep.budget?.max_cost_usd != null && (
           <Text span size="xs" className="dimmed">
             {" "}

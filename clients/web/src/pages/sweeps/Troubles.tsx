@@ -4,7 +4,7 @@ import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { client, taken } from "../../api/client";
 import { headline } from "../../api/problem";
-import { deadLetters, sweepTroubles, type JobView, type SweepView, type Trouble } from "../../api/queries";
+import { deadLetters, sweepTroubles, type Job, type Sweep, type Trouble } from "../../api/queries";
 import { count, words } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { mayChange, useCaller } from "../../parts/may";
@@ -19,11 +19,11 @@ const VALUES: Values<Trouble> = {
   stage: (row) => row.stage,
   attempts: (row) => row.attempts,
   jobs: (row) => row.jobs,
-  last: (row) => row.newest,
+  last: (row) => row.last_at,
 };
 
 /** Jobs that faults ended, with their reasons: they are in no average until they are retried. */
-export function DeadLetters({ sweep }: { sweep: SweepView }) {
+export function DeadLetters({ sweep }: { sweep: Sweep }) {
   const errored = sweep.progress.outcomes.errored ?? 0;
   const found = useQuery({ ...deadLetters(sweep.id), enabled: errored > 0 });
   const queries = useQueryClient();
@@ -39,10 +39,10 @@ export function DeadLetters({ sweep }: { sweep: SweepView }) {
     },
   });
   if (errored === 0) return null;
-  const jobs = found.data?.jobs ?? [];
+  const jobs = found.data?.data ?? [];
   const reasons = new Map<string, number>();
   for (const job of jobs) reasons.set(job.reason ?? "unknown", (reasons.get(job.reason ?? "unknown") ?? 0) + 1);
-  const retriable = (job: JobView): boolean => mayChange(who, job.owner) && sweep.state !== "cancelled";
+  const retriable = (job: Job): boolean => mayChange(who, job.key_id) && sweep.state !== "cancelled";
   return (
     <Alert
       color="pink"
@@ -139,7 +139,7 @@ export function Troubles({ id }: { id: string }) {
                 <Table.Td className="figures">{count(one.attempts)}</Table.Td>
                 <Table.Td className="figures">{count(one.jobs)}</Table.Td>
                 <Table.Td>
-                  <Ago time={one.newest} />
+                  <Ago time={one.last_at} />
                 </Table.Td>
               </Table.Tr>
             ))}

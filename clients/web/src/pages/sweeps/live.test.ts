@@ -1,19 +1,19 @@
 import { describe, expect, it } from "vitest";
 import type { ServiceEvent } from "../../api/events";
-import type { JobView } from "../../api/queries";
+import type { Job } from "../../api/queries";
 import { LiveJobs, possible } from "./live";
 
-function job(id: string, change: Partial<JobView> = {}): JobView {
+function job(id: string, change: Partial<Job> = {}): Job {
   const fresh = { id, task: "lift-1", model: "m", state: "queued", stage: "construct", outcome: null };
   const times = { created_at: "2026-01-01T00:00:00Z", started_at: null, finished_at: null };
-  return { ...fresh, ...times, ...change } as JobView;
+  return { ...fresh, ...times, ...change } as Job;
 }
 
 function event(kind: string, at: string, data: Record<string, unknown> = {}, id = "a"): ServiceEvent {
-  return { id: 1, kind, job: id, at, data };
+  return { id: 1, kind, job_id: id, at, data };
 }
 
-function live(...jobs: JobView[]): LiveJobs {
+function live(...jobs: Job[]): LiveJobs {
   const found = new LiveJobs();
   found.add(jobs);
   return found;
@@ -58,7 +58,7 @@ describe("events", () => {
   it("of strangers, of sweeps and of unknown kinds change nothing", () => {
     const jobs = live(job("b"));
     const strange = [event("done", "2026-01-02T00:00:00Z"), event("paused", "2026-01-02T00:00:00Z", {}, "b")];
-    expect(jobs.apply([...strange, { ...event("done", "2026-01-02T00:00:00Z"), job: null }])).toBe(0);
+    expect(jobs.apply([...strange, { ...event("done", "2026-01-02T00:00:00Z"), job_id: null }])).toBe(0);
     expect([...jobs.moment().totals]).toEqual([["queued", 1]]);
   });
 });

@@ -1,7 +1,7 @@
 import type { ServiceEvent } from "../../api/events";
-import type { JobView, SweepView } from "../../api/queries";
+import type { Job, Sweep } from "../../api/queries";
 
-const STATES: Readonly<Record<string, JobView["state"]>> = {
+const STATES: Readonly<Record<string, Job["state"]>> = {
   queued: "queued",
   running: "running",
   on_hold: "on_hold",
@@ -9,13 +9,13 @@ const STATES: Readonly<Record<string, JobView["state"]>> = {
 };
 
 /** The last thing that is known to have happened to a job, by the service's clock. */
-function knownAt(job: JobView): number {
+function knownAt(job: Job): number {
   const times = [job.created_at, job.started_at, job.finished_at];
   return Math.max(...times.map((time) => (time === null ? 0 : Date.parse(time))));
 }
 
 /** A job after an event, or null when that says nothing new. */
-export function changed(job: JobView, event: ServiceEvent): JobView | null {
+export function changed(job: Job, event: ServiceEvent): Job | null {
   const state = STATES[event.kind];
   // A stream begins with what happened a while ago: that never takes back what was read since.
   if (state === undefined || Date.parse(event.at) < knownAt(job)) return null;
@@ -23,7 +23,7 @@ export function changed(job: JobView, event: ServiceEvent): JobView | null {
     if (job.state === "done") return null;
     const outcome = typeof event.data.outcome === "string" ? event.data.outcome : null;
     const reason = typeof event.data.reason === "string" ? event.data.reason : null;
-    return { ...job, state, outcome: outcome as JobView["outcome"], reason, finished_at: event.at };
+    return { ...job, state, outcome: outcome as Job["outcome"], reason, finished_at: event.at };
   }
   const stage = event.data.stage === "simulate" ? "simulate" : "construct";
   if (job.state === state && job.stage === stage) return null;
@@ -37,13 +37,13 @@ export interface CellCounts {
 
 /** A moment of a sweep. Its jobs and cells are those of the sweep itself: read, never changed. */
 export interface Moment {
-  jobs: readonly JobView[];
+  jobs: readonly Job[];
   cells: ReadonlyMap<string, ReadonlyMap<string, CellCounts>>;
   totals: ReadonlyMap<string, number>;
   tasks: readonly string[];
 }
 
-function standing(job: JobView): string {
+function standing(job: Job): string {
   return job.outcome ?? job.state;
 }
 
@@ -51,14 +51,14 @@ function standing(job: JobView): string {
  * The jobs of a sweep, kept true by events: each costs as much as it changes, whatever the size of the sweep.
  */
 export class LiveJobs {
-  private readonly jobs: JobView[] = [];
+  private readonly jobs: Job[] = [];
   private readonly places = new Map<string, number>();
   private readonly cells = new Map<string, Map<string, { total: number; counts: Map<string, number> }>>();
   private readonly totals = new Map<string, number>();
   private readonly tasks = new Set<string>();
 
   /** Takes in jobs as they were read; what events have said since stays. */
-  add(read: readonly JobView[]): void {
+  add(read: readonly Job[]): void {
     for (const job of read) {
       const place = this.places.get(job.id);
       const before = place === undefined ? undefined : this.jobs[place];
@@ -75,7 +75,7 @@ export class LiveJobs {
   apply(events: readonly ServiceEvent[]): number {
     let ended = 0;
     for (const event of events) {
-      const place = event.job === null ? undefined : this.places.get(event.job);
+      const place = event.job_id === null ? undefined : this.places.get(event.job_id);
       const before = place === undefined ? undefined : this.jobs[place];
       if (place === undefined || before === undefined) continue;
       const after = changed(before, event);
@@ -95,13 +95,13 @@ export class LiveJobs {
     };
   }
 
-  private replace(place: number, before: JobView, after: JobView): void {
+  private replace(place: number, before: Job, after: Job): void {
     this.count(before, -1);
     this.jobs[place] = after;
     this.count(after, 1);
   }
 
-  private count(job: JobView, by: 1 | -1): void {
+  private count(job: Job, by: 1 | -1): void {
     const name = standing(job);
     const row = this.cells.get(job.model) ?? new Map<string, { total: number; counts: Map<string, number> }>();
     this.cells.set(job.model, row);
@@ -118,7 +118,7 @@ export class LiveJobs {
 }
 
 /** What can be done with a sweep in its state. */
-export function possible(state: SweepView["state"]): readonly ("pause" | "resume" | "cancel")[] {
+export function possible(state: Sweep["state"]): readonly ("pause" | "resume" | "cancel")[] {
   if (state === "active") return ["pause", "cancel"];
   if (state === "paused" || state === "budget_exhausted") return ["resume", "cancel"];
   return [];

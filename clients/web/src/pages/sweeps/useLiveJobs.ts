@@ -2,7 +2,7 @@ import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useCallback, useEffect, useRef, useState } from "react";
 import { client, taken } from "../../api/client";
 import { useEvents, type ServiceEvent, type StreamState } from "../../api/events";
-import { jobPages, sweep as sweepQuery, sweepTroubles, type JobView } from "../../api/queries";
+import { jobPages, sweep as sweepQuery, sweepTroubles, type Job } from "../../api/queries";
 import { LiveJobs, type Moment } from "./live";
 
 /** How often the page is drawn again, and what ended is read, at most. */
@@ -16,7 +16,7 @@ export interface Live {
   error: unknown;
 }
 
-async function readPages(id: string, take: (page: readonly JobView[]) => void, live: () => boolean): Promise<number> {
+async function readPages(id: string, take: (page: readonly Job[]) => void, live: () => boolean): Promise<number> {
   const before = await taken(client.GET("/v1/sweeps/{sweep_id}", { params: { path: { sweep_id: id } } }));
   for await (const page of jobPages({ sweep: id, order: "asc" })) {
     if (!live()) return before.last_event;
@@ -28,7 +28,7 @@ async function readPages(id: string, take: (page: readonly JobView[]) => void, l
 }
 
 /** Reads the jobs of a sweep that ended last, so many of them at least. */
-async function readEnded(id: string, wanted: number, take: (page: readonly JobView[]) => void): Promise<void> {
+async function readEnded(id: string, wanted: number, take: (page: readonly Job[]) => void): Promise<void> {
   let read = 0;
   for await (const page of jobPages({ sweep: id, state: "done", sort: "finished" })) {
     take(page);

@@ -1,7 +1,8 @@
 import { Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { client, taken } from "../../api/client";
-import type { JobFilters, JobView, TaskDetail } from "../../api/queries";
+import { asQuery } from "../../api/queries";
+import type { JobFilters, Job, TaskDetail } from "../../api/queries";
 import { Gallery } from "../../parts/Gallery";
 import { Section } from "../../parts/Section";
 import { Answered } from "../../parts/States";
@@ -12,13 +13,13 @@ const LOOKED_AT = 40;
 function someJobs(filters: JobFilters) {
   return {
     queryKey: ["some-jobs", filters],
-    queryFn: async () => (await taken(client.GET("/v1/jobs", { params: { query: filters } }))).jobs,
+    queryFn: async () => (await taken(client.GET("/v1/jobs", { params: { query: asQuery(filters) } }))).data,
   };
 }
 
 /** Of jobs in an order the first of each kind: a second failure of a kind teaches less than a first of another. */
-export function oneOfEach(jobs: readonly JobView[], kind: (job: JobView) => string, most: number): JobView[] {
-  const seen = new Map<string, JobView>();
+export function oneOfEach(jobs: readonly Job[], kind: (job: Job) => string, most: number): Job[] {
+  const seen = new Map<string, Job>();
   for (const job of jobs) if (!seen.has(kind(job))) seen.set(kind(job), job);
   const rest = jobs.filter((job) => ![...seen.values()].includes(job));
   return [...seen.values(), ...rest].slice(0, most);

@@ -1,7 +1,7 @@
 import { Badge, Card, Group, SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { tasks, type TaskView } from "../../api/queries";
+import { tasks, type Task } from "../../api/queries";
 import { measured, words } from "../../format";
 import { Answered } from "../../parts/States";
 import { goalOf } from "./goal";
@@ -34,7 +34,7 @@ export default function TasksPage() {
   );
 }
 
-function TaskCard({ task }: { task: TaskView }) {
+function TaskCard({ task }: { task: Task }) {
   return (
     <Card withBorder padding="md">
       <Group justify="space-between" mb={4} wrap="nowrap">

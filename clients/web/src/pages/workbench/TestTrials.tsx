@@ -17,8 +17,8 @@ export function TestTrials({ view }: { view: SessionView }) {
     mutationFn: () => taken(client.POST("/v1/sessions/{session_id}/tests", { params: { path: { session_id: id } } })),
     onSuccess: () => queries.invalidateQueries({ queryKey: sessionQuery(id).queryKey }),
   });
-  if (view.most_tests === 0) return null;
-  const left = view.most_tests - view.tests.length;
+  if (view.max_tests === 0) return null;
+  const left = view.max_tests - view.tests.length;
   return (
     <Stack gap="xs" aria-label="Test trials" role="region">
       <Group gap="sm">
@@ -34,7 +34,7 @@ export function TestTrials({ view }: { view: SessionView }) {
           Test trial
         </Button>
         <Text size="sm" className="dimmed">
-          {left} of {view.most_tests} test trials left; they count for nothing.
+          {left} of {view.max_tests} test trials left; they count for nothing.
         </Text>
       </Group>
       {testing.isError && <ProblemNote error={testing.error} />}

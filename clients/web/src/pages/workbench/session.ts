@@ -2,15 +2,15 @@ import { queryOptions, useMutation, useQuery, useQueryClient } from "@tanstack/r
 import { useMemo, useState } from "react";
 import { after, inverseOf, NO_HISTORY, redone, undone, type Done, type History } from "./history";
 import { bytesOf, client, jsonOf, sentFile, taken, type Schema } from "../../api/client";
-import type { JobView } from "../../api/queries";
+import type { Job } from "../../api/queries";
 
-export type SessionView = Schema<"SessionView">;
-export type Bench = Schema<"BenchMachineView">;
-export type BenchPart = Schema<"BenchPartView">;
-export type Face = Schema<"FaceView">;
-export type Tool = Schema<"ToolView">;
+export type SessionView = Schema<"Session">;
+export type Bench = Schema<"WorkbenchMachine">;
+export type BenchPart = Schema<"WorkbenchPart">;
+export type Face = Schema<"Face">;
+export type Tool = Schema<"Tool">;
 export type Outcome = Schema<"ToolOutcome">;
-export type ModuleView = Schema<"ModuleView">;
+export type ModuleView = Schema<"Module">;
 
 export const MAIN = "main";
 export const ASSEMBLY = "assembly";
@@ -22,9 +22,9 @@ export const session = (id: string) =>
   });
 
 /** A trial of the machine as it stands, in the task's exact world and on no leaderboard; the session goes on. */
-export async function triedAsItStands({ job }: SessionView, simulator: string): Promise<JobView> {
+export async function triedAsItStands({ job }: SessionView, simulator: string): Promise<Job> {
   const machine = await bytesOf(`/v1/sessions/${job.id}/machine`);
-  return sentFile<JobView>("/v1/machines/trials", { task: job.task, simulator }, machine);
+  return sentFile<Job>("/v1/machines/trials", { task: job.task, simulator }, machine);
 }
 
 /** The modules that a task offers. */
@@ -32,7 +32,10 @@ export const modules = (task: string, version: string) =>
   queryOptions({
     queryKey: ["modules", task, version],
     staleTime: Infinity,
-    queryFn: () => jsonOf<ModuleView[]>(`/v1/modules?${new URLSearchParams({ task, version }).toString()}`),
+    queryFn: async () => {
+      const asked = new URLSearchParams({ task, version }).toString();
+      return (await jsonOf<Schema<"ModuleList">>(`/v1/modules?${asked}`)).data;
+    },
   });
 
 const EMPTY: Bench = {

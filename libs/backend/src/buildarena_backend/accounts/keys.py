@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any
 
-from sqlalchemy import any_, func, insert, or_, select, update
+from sqlalchemy import any_, func, or_, select, update
+from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
 from buildarena_backend.database.account_tables import api_keys
@@ -87,7 +88,8 @@ class ApiKeys:
         ttl: timedelta | None = None,
         simulators: Sequence[str] | None = None,
         job_owners: Sequence[str] | None = None,
-    ) -> tuple[ApiKey, str]:
+        key_id: str | None = None,
+    ) -> tuple[ApiKey, str | None]:
         """Makes a key.
 
         Args:
@@ -96,15 +98,16 @@ class ApiKeys:
             ttl: How long it is valid; None for no limit.
             simulators: Of a runner key, the simulators whose jobs may be leased.
             job_owners: Of a runner key, the keys whose jobs may be leased; None for everybody's.
+            key_id: Its id, if it was decided; one that is there already stays as it is.
 
         Returns:
-            The key, and its secret, which can't be read again.
+            The key, and its secret, which can't be read again; None if the key was there.
         """
-        secret = new_secret()
+        secret, key_id = new_secret(), key_id or new_id("key")
         statement = (
             insert(api_keys)
             .values(
-                id=new_id("key"),
+                id=key_id,
                 name=name,
                 secret_hash=secret_hash(secret),
                 scopes=list(scopes),
@@ -112,11 +115,12 @@ class ApiKeys:
                 job_owners=None if job_owners is None else list(job_owners),
                 expires_at=None if ttl is None else events.now + ttl,
             )
+            .on_conflict_do_nothing(index_elements=["id"])
             .returning(*_COLUMNS)
         )
         with self._database.transaction() as connection:
-            row = connection.execute(statement).one()
-        return value_of(ApiKey, row), secret
+            row = connection.execute(statement).first()
+        return (self.get(key_id), None) if row is None else (value_of(ApiKey, row), secret)
 
     def check(self, secret: str) -> KeyCheck | None:
         """The key that has this secret, and whether it is still valid; None when nobody has it."""

@@ -56,23 +56,6 @@ class SessionClosedError(PipelineError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OpenedSession:
-    """An open session.
-
-    Attributes:
-        job: Its job.
-        task: What is to be built.
-        briefing: What its agent must know to play.
-        reopened: Whether it was open already.
-    """
-
-    job: Job
-    task: Task
-    briefing: str
-    reopened: bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SessionState:
     """A session as it stands.
 
@@ -85,6 +68,8 @@ class SessionState:
         tests: Its test trials, those under way included.
         most_tests: Test trials that it may have.
         programs: Whether it may set a controller.
+        statement: What is to be built.
+        briefing: What its agent must know to play, the statement included.
     """
 
     job: Job
@@ -95,6 +80,8 @@ class SessionState:
     tests: Sequence[TriedOnce]
     most_tests: int
     programs: bool
+    statement: str
+    briefing: str
 
 
 class ExternalSessions:
@@ -121,7 +108,7 @@ class ExternalSessions:
         force: bool = False,
         data_sheets: bool = True,
         worlds: int | None = None,
-    ) -> OpenedSession:
+    ) -> tuple[SessionState, bool]:
         """Opens a session for one task, which belongs to the key that opened it.
 
         A session that is open already is given again to its owner: the first answer may be lost.
@@ -136,6 +123,9 @@ class ExternalSessions:
             force: Play under another key's name, as an admin may.
             data_sheets: Whether it is told the numbers of modules and world.
             worlds: In how many varied worlds its machine is scored; None for the service's default.
+
+        Returns:
+            The session, and whether it is new.
 
         Raises:
             SubmissionError: Something is unknown, or the agent's session of this seed is over or
@@ -176,12 +166,7 @@ class ExternalSessions:
                         f"{kind} {agent!r} has played seed {seed} of {task}: take another seed"
                     )
                     raise SubmissionError([ValidationIssue(path="seed", message=message)])
-        return OpenedSession(
-            job=self._context.store.jobs.get(job_id),
-            task=chosen,
-            briefing=briefing(chosen, data_sheets=data_sheets, worlds=worlds_of(track.as_config())),
-            reopened=reopened,
-        )
+        return self.view(job_id), not reopened
 
     def call(self, job_id: str, *, machine: str, tool: str, arguments: Any) -> ExternalCall:
         """Carries out one tool call and keeps it.
@@ -218,19 +203,14 @@ class ExternalSessions:
         Raises:
             UnknownIdError: There is no such session.
         """
-        try:
-            job = self._context.store.jobs.get(job_id)
-        except UnknownIdError as error:
-            raise UnknownIdError("session", job_id) from error
-        if job.track_config.get("workflow") != EXTERNAL_WORKFLOW:
-            raise UnknownIdError("session", job_id)
+        job = self.job(job_id)
         with self._context.store.database.transaction() as connection:
             calls = self._context.store.external_calls.read(job_id, connection=connection)
         with self._lock:
             bench = self._benches.pop((job_id, len(calls)), None)
         if bench is None:
             bench = self._rebuilt(calls, job)
-        task = self._task(job)
+        task, plain = self._task(job), self._context.tasks.exact(job.task, job.task_version)
         # A call in between works on a workbench of its own, so this one stays as it is.
         machines = {name: machine.copy() for name, machine in bench.machines.items()}
         state = SessionState(
@@ -242,6 +222,14 @@ class ExternalSessions:
             tests=trials_of(self._context, job_id, task) if task and task.tests else (),
             most_tests=task.tests if task else 0,
             programs=task is not None and task.takes_programs,
+            statement=plain.statement if plain else "",
+            briefing=briefing(
+                plain,
+                data_sheets=has_data_sheets(job.track_config),
+                worlds=worlds_of(job.track_config),
+            )
+            if plain
+            else "",
         )
         self._keep_bench(job_id, len(calls), bench)
         return state
@@ -287,13 +275,24 @@ class ExternalSessions:
             context.queues.wake(queue)
         return context.store.jobs.get(job_id)
 
+    def job(self, session_id: str) -> Job:
+        """The job of a session.
+
+        Raises:
+            UnknownIdError: There is no such job, or none that an agent builds for.
+        """
+        try:
+            job = self._context.store.jobs.get(session_id)
+        except UnknownIdError as error:
+            raise UnknownIdError("session", session_id) from error
+        if job.track_config.get("workflow") != EXTERNAL_WORKFLOW:
+            raise UnknownIdError("session", session_id)
+        return job
+
     def _open_lease(self, job_id: str, connection: Any) -> Lease:
         lease = self._context.store.external_calls.lease(job_id, connection=connection)
-        if lease is None:
-            try:
-                job = self._context.store.jobs.get(job_id)
-            except UnknownIdError as error:
-                raise UnknownIdError("session", job_id) from error
+        if lease is None or lease.job.track_config.get("workflow") != EXTERNAL_WORKFLOW:
+            job = self.job(job_id)
             state = job.outcome or f"{job.stage} {job.state}"
             if job.outcome is None and job.queue.startswith("simulate."):
                 state += ": its machine is being tried"

@@ -92,18 +92,24 @@ class Boards:
         with self._database.statement() as connection:
             return connection.execute(query).first() is not None
 
-    def of_sweep(self, sweep_id: str) -> list[tuple[EndedJob, list[Round]]]:
-        """A sweep's ended jobs with their rounds, in a fixed order."""
+    def of_sweep(
+        self, sweep_id: str, *, after: str = "", limit: int | None = None
+    ) -> list[tuple[EndedJob, list[Round]]]:
+        """A sweep's ended jobs with their rounds, in the order of their ids.
+
+        Args:
+            sweep_id: The sweep.
+            after: Only jobs with greater ids.
+            limit: How many at most; all by default.
+        """
         members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == sweep_id)
-        query = (
-            select(*TRIAL_COLUMNS)
-            .where(jobs.c.state == JobState.DONE, jobs.c.id.in_(members))
-            .order_by(jobs.c.task, jobs.c.model, jobs.c.seed, jobs.c.id)
-        )
+        ended = jobs.c.state == JobState.DONE, jobs.c.id.in_(members), jobs.c.id > after
+        query = select(*TRIAL_COLUMNS).where(*ended).order_by(jobs.c.id).limit(limit)
+        wanted = select(jobs.c.id).where(*ended).order_by(jobs.c.id).limit(limit)
         simulated = (
             select(rollouts)
             .where(
-                rollouts.c.job_id.in_(members),
+                rollouts.c.job_id.in_(wanted),
                 rollouts.c.finished_at.is_not(None),
                 rollouts.c.seed.is_(None),
             )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
-from datetime import datetime
 from typing import Any, Final, NamedTuple
 
 from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
@@ -38,8 +37,6 @@ class TrialFilter:
         models: Their models.
         cells: Their cells.
         sweeps: Ids of sweeps: jobs of any of these.
-        since: Only jobs that ended then or later.
-        until: Only jobs that ended before.
     """
 
     track: str | None = None
@@ -47,8 +44,6 @@ class TrialFilter:
     models: Collection[str] | None = None
     cells: Collection[CellId] | None = None
     sweeps: Collection[str] | None = None
-    since: datetime | None = None
-    until: datetime | None = None
 
     def within(self, cells: Collection[CellId]) -> TrialFilter:
         """The same, of some cells alone."""
@@ -71,10 +66,6 @@ class TrialFilter:
                     sweep_jobs.c.sweep_id == func.any(bound_texts(sorted(self.sweeps))),
                 )
             )
-        if self.since is not None:
-            found.append(jobs.c.finished_at >= self.since)
-        if self.until is not None:
-            found.append(jobs.c.finished_at < self.until)
         return found
 
 

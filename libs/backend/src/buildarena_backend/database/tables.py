@@ -158,7 +158,6 @@ sweeps = Table(
     Column("spec", JSONB, nullable=False),
     Column("state", Text, nullable=False),
     Column("owner", Text),
-    Column("request_key", Text, unique=True),
     Column("request_hash", Text),
     Column("jobs_hash", Text, index=True),
     time_column("created_at", now=True),

@@ -35,24 +35,29 @@ class JobFilter:
     """Which jobs are meant; None means any.
 
     Attributes:
-        sweep_id: Only this sweep's jobs.
-        tasks: Only jobs on these tasks.
-        flag: Only jobs with this flag.
+        sweep_ids: Only jobs of one of these sweeps.
+        tasks: Only jobs on these tasks, beside what ``equals`` says of tasks.
+        flags: Only jobs with one of these flags.
         id_prefix: Only jobs whose id begins like this.
         indicator_min: Only jobs with this indicator or a greater one.
         indicator_max: Only jobs with this indicator or a smaller one.
         text: Only jobs in whose id, task, model, reason or detail it stands, in any case.
-        equals: Column values to match.
+        equals: Values to match by column: one of them, of a list.
     """
 
-    sweep_id: str | None = None
+    sweep_ids: Sequence[str] | None = None
     tasks: Sequence[str] | None = None
-    flag: str | None = None
+    flags: Sequence[str] | None = None
     id_prefix: str | None = None
     indicator_min: float | None = None
     indicator_max: float | None = None
     text: str | None = None
-    equals: Mapping[str, str | int | None] = field(default_factory=dict)
+    equals: Mapping[str, str | int | Sequence[str] | None] = field(default_factory=dict)
+
+    def values(self, column: str) -> Sequence[Any] | None:
+        """Which values a column may have; None for any."""
+        wanted = self.equals.get(column)
+        return [wanted] if isinstance(wanted, str | int) else wanted
 
 
 def distinct_values(column: ColumnElement[Any]) -> TextClause:
@@ -86,12 +91,16 @@ def conditions_of(connection: Connection, wanted: JobFilter) -> list[ColumnEleme
 
 def conditions_but_text(wanted: JobFilter) -> list[ColumnElement[bool]]:
     """What a filter comes to, but for its text."""
-    found = [jobs.c[name] == value for name, value in wanted.equals.items() if value is not None]
-    if wanted.sweep_id is not None:
-        members = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
-        found.append(jobs.c.id.in_(members))
-    if wanted.flag is not None:
-        found.append(jobs.c.flags.contains([wanted.flag]))
+    found = [
+        _is_one_of(jobs.c[name], values)
+        for name in wanted.equals
+        if (values := wanted.values(name)) is not None
+    ]
+    if wanted.sweep_ids is not None:
+        of_one = _is_one_of(sweep_jobs.c.sweep_id, wanted.sweep_ids)
+        found.append(jobs.c.id.in_(select(sweep_jobs.c.job_id).where(of_one)))
+    if wanted.flags is not None:
+        found.append(or_(*(jobs.c.flags.contains([flag]) for flag in wanted.flags)))
     if wanted.id_prefix is not None:
         found.append(begins_with(jobs.c.id, wanted.id_prefix))
     if wanted.indicator_min is not None:
@@ -100,10 +109,14 @@ def conditions_but_text(wanted: JobFilter) -> list[ColumnElement[bool]]:
         found.append(jobs.c.indicator <= wanted.indicator_max)
     if wanted.tasks is not None:
         found.append(jobs.c.task == func.any(bound_texts(wanted.tasks)))
-    if wanted.equals.get("state") == JobState.DONE or wanted.equals.get("outcome") is not None:
+    if wanted.values("state") == [JobState.DONE] or wanted.values("outcome") is not None:
         # Said so that an order's index of ended jobs alone can serve.
         found.append(jobs.c.state == literal_column(f"'{JobState.DONE}'", Text))
     return found
+
+
+def _is_one_of(column: ColumnElement[Any], values: Sequence[Any]) -> ColumnElement[bool]:
+    return column == values[0] if len(values) == 1 else column.in_(values)
 
 
 def ways_to_hold(connection: Connection, wanted: str) -> list[ColumnElement[bool]]:

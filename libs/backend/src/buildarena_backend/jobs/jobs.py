@@ -89,7 +89,7 @@ class Jobs:
             sweep_id: Only this sweep's jobs, in the place of ``wanted``.
             equals: Column values to match, in the place of ``wanted``; None means any.
         """
-        chosen = wanted or JobFilter(sweep_id=sweep_id, equals=equals)
+        chosen = wanted or JobFilter(sweep_ids=[sweep_id] if sweep_id else None, equals=equals)
         with self._database.transaction() as connection:
             # One plan for all values would be a bad one for the rare ones.
             connection.execute(text("SET LOCAL plan_cache_mode = force_custom_plan"))

@@ -111,7 +111,8 @@ def read_page(
         after: What the last job of the page before is sorted by, and its id.
         limit: Rows at most.
     """
-    if wanted.equals.get("state") not in (None, JobState.DONE) and order.by in _LACKING:
+    states = wanted.values("state")
+    if states is not None and JobState.DONE not in states and order.by in _LACKING:
         # None of them has such a figure, and looking for one would take all of its index.
         among = conditions_of(connection, wanted)
         are_few = _are_few(connection, wanted, among)
@@ -192,8 +193,8 @@ def _are_few(
     Along an order's index they might be the very last; the database expects them anywhere.
     """
     some = select(jobs.c.id).where(*conditions)
-    if wanted.sweep_id is not None and wanted.text is None:
-        some = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id == wanted.sweep_id)
+    if wanted.sweep_ids is not None and wanted.text is None:
+        some = select(sweep_jobs.c.job_id).where(sweep_jobs.c.sweep_id.in_(wanted.sweep_ids))
     counted = some.limit(MAX_SORTED + 1).subquery()
     number = connection.execute(select(func.count()).select_from(counted)).scalar_one()
     return int(number) <= MAX_SORTED

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
-from sqlalchemy import Connection, Text, bindparam, text
+from sqlalchemy import ARRAY, BindParameter, Connection, Text, bindparam, text
 
 from buildarena_backend.database.tables import ANSWER_WORDS, FEEDBACK_WORDS, REPLY_WORDS, TOLD_WORDS
 from buildarena_backend.states import TURN
@@ -25,15 +25,15 @@ class TranscriptFilter:
     """Which transcripts are searched; None means any.
 
     Attributes:
-        task: Of jobs on this task.
-        model: Of this model's jobs.
-        sweep_id: Of this sweep's jobs.
+        tasks: Of jobs on these tasks.
+        models: Of these models' jobs.
+        sweep_ids: Of these sweeps' jobs.
         prompts: Whether what roles were told is searched, in place of what was said and answered.
     """
 
-    task: str | None = None
-    model: str | None = None
-    sweep_id: str | None = None
+    tasks: Sequence[str] | None = None
+    models: Sequence[str] | None = None
+    sweep_ids: Sequence[str] | None = None
     prompts: bool = False
 
 
@@ -62,19 +62,6 @@ class TranscriptMatch:
     excerpt: Sequence[tuple[str, bool]]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TranscriptMatches:
-    """What a search came to.
-
-    Attributes:
-        matches: The turns, those of the newest jobs first.
-        complete: Whether all turns with the words were looked at and are here.
-    """
-
-    matches: Sequence[TranscriptMatch]
-    complete: bool
-
-
 def has_words(connection: Connection, words: str) -> bool:
     """Whether there is anything to search for: "the" is nothing, and "-wheel" is nearly all."""
     query = text("SELECT querytree(websearch_to_tsquery('english', :words))")
@@ -82,9 +69,9 @@ def has_words(connection: Connection, words: str) -> bool:
 
 
 def search_transcripts(
-    connection: Connection, words: str, wanted: TranscriptFilter, *, limit: int
-) -> TranscriptMatches:
-    """The turns in which words stand, in any form that English has of them.
+    connection: Connection, words: str, wanted: TranscriptFilter, *, limit: int, offset: int = 0
+) -> list[TranscriptMatch]:
+    """The turns in which words stand, in any form of English; those of the newest jobs first.
 
     Histories that were packed are not searched. Of prompts, which repeat themselves, it is the
     first turn of each job.
@@ -94,30 +81,29 @@ def search_transcripts(
         words: As search engines take them: ``"a phrase"``, ``or``, ``-not``.
         wanted: Whose transcripts.
         limit: Turns at most.
+        offset: How many of the first are left out.
     """
     # However many turns the words are expected in, the indexes find them.
     connection.execute(text("SET LOCAL enable_seqscan = off"))
     values = {
         "words": words,
-        "task": wanted.task,
-        "model": wanted.model,
-        "sweep": wanted.sweep_id,
-        "most": MAX_MATCHES + 1,
-        "limit": limit + 1,
+        "tasks": wanted.tasks,
+        "models": wanted.models,
+        "sweeps": wanted.sweep_ids,
+        "most": MAX_MATCHES,
+        "limit": limit,
+        "offset": offset,
         "options": f"StartSel={BEGIN}, StopSel={END}, MinWords=15, MaxWords=35",
     }
     rows = connection.execute(SEARCH_PROMPTS if wanted.prompts else SEARCH, values).all()
-    return TranscriptMatches(
-        matches=[
-            TranscriptMatch(
-                **{name: getattr(row, name) for name in ("job_id", *FOUND)},
-                where=row.place,
-                excerpt=_pieces(row.excerpt),
-            )
-            for row in rows[:limit]
-        ],
-        complete=len(rows) <= limit and not any(row.crowded for row in rows),
-    )
+    return [
+        TranscriptMatch(
+            **{name: getattr(row, name) for name in ("job_id", *FOUND)},
+            where=row.place,
+            excerpt=_pieces(row.excerpt),
+        )
+        for row in rows
+    ]
 
 
 def _pieces(excerpt: str) -> list[tuple[str, bool]]:
@@ -134,12 +120,15 @@ def _pieces(excerpt: str) -> list[tuple[str, bool]]:
 
 
 FOUND: Final = ("task", "model", "seed", "outcome", "turn")
-TEXTS: Final = ("words", "task", "model", "sweep")
+TYPES: Final[Sequence[BindParameter[Any]]] = (
+    bindparam("words", type_=Text()),
+    *(bindparam(name, type_=ARRAY(Text)) for name in ("tasks", "models", "sweeps")),
+)
 WANTED: Final = """
-    (CAST(:task AS text) IS NULL OR jobs.task = :task)
-    AND (CAST(:model AS text) IS NULL OR jobs.model = :model)
-    AND (CAST(:sweep AS text) IS NULL OR EXISTS (
-        SELECT FROM sweep_jobs WHERE sweep_id = :sweep AND job_id = jobs.id
+    (CAST(:tasks AS text[]) IS NULL OR jobs.task = ANY(:tasks))
+    AND (CAST(:models AS text[]) IS NULL OR jobs.model = ANY(:models))
+    AND (CAST(:sweeps AS text[]) IS NULL OR EXISTS (
+        SELECT FROM sweep_jobs WHERE sweep_id = ANY(:sweeps) AND job_id = jobs.id
     ))
 """
 SEARCH: Final = text(
@@ -166,19 +155,14 @@ SEARCH: Final = text(
         SELECT places.*, jobs.task, jobs.model, jobs.seed, jobs.outcome, jobs.created_at
         FROM places JOIN jobs ON jobs.id = places.job_id
         WHERE {WANTED}
-        ORDER BY jobs.created_at DESC, places.job_id, places.event, places.sequence LIMIT :limit
+        ORDER BY jobs.created_at DESC, places.job_id, places.event, places.sequence
+        LIMIT :limit OFFSET :offset
     )
     SELECT
         shown.job_id, shown.task, shown.model, shown.seed, shown.outcome,
         CASE WHEN shown.kind = 'reply' THEN 'reply' ELSE 'feedback' END AS place,
         CASE shown.kind WHEN 'answer' THEN shown.sequence
             ELSE (coalesce(answered.data, taken.data) ->> 'index')::int END AS turn,
-        (
-            SELECT greatest(
-                (SELECT count(*) FROM replies), (SELECT count(*) FROM feedback),
-                (SELECT count(*) FROM answers)
-            ) >= :most
-        ) AS crowded,
         ts_headline('english', left(CASE shown.kind
             WHEN 'reply' THEN said.reply ->> 'text'
             WHEN 'answer' THEN calls.feedback
@@ -200,7 +184,7 @@ SEARCH: Final = text(
     ) AS taken ON TRUE
     ORDER BY shown.created_at DESC, shown.job_id, turn NULLS LAST, place DESC
     """  # noqa: S608 - made of our own constants
-).bindparams(*(bindparam(name, type_=Text()) for name in TEXTS))
+).bindparams(*TYPES)
 # Jobs of one task are told the same, so which jobs are wanted is asked before any are left out;
 # with OFFSET 0 the words are looked up first, by their index.
 SEARCH_PROMPTS: Final = text(
@@ -218,11 +202,11 @@ SEARCH_PROMPTS: Final = text(
             jobs.created_at
         FROM (SELECT job_id, min(sequence) AS sequence FROM told GROUP BY job_id) AS first
         JOIN jobs ON jobs.id = first.job_id
-        ORDER BY jobs.created_at DESC, jobs.id LIMIT :limit
+        ORDER BY jobs.created_at DESC, jobs.id LIMIT :limit OFFSET :offset
     )
     SELECT
         shown.job_id, shown.task, shown.model, shown.seed, shown.outcome, 'prompt' AS place,
-        taken.turn, (SELECT count(*) FROM told) >= :most AS crowded,
+        taken.turn,
         ts_headline('english', concat_ws(
             E'\n\n', said.told ->> 'system',
             (
@@ -239,4 +223,4 @@ SEARCH_PROMPTS: Final = text(
     ) AS taken ON TRUE
     ORDER BY shown.created_at DESC, shown.job_id
     """  # noqa: S608 - made of our own constants
-).bindparams(*(bindparam(name, type_=Text()) for name in TEXTS))
+).bindparams(*TYPES)

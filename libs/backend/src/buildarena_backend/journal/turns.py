@@ -19,7 +19,7 @@ from buildarena_backend.database.database import Database
 from buildarena_backend.database.text import clean
 from buildarena_backend.journal.transcript_search import (
     TranscriptFilter,
-    TranscriptMatches,
+    TranscriptMatch,
     has_words,
     search_transcripts,
 )
@@ -137,10 +137,12 @@ class Turns:
         with self._database.statement() as connection:
             connection.execute(_APPEND, given)
 
-    def search(self, words: str, wanted: TranscriptFilter, *, limit: int) -> TranscriptMatches:
+    def search(
+        self, words: str, wanted: TranscriptFilter, *, limit: int, offset: int = 0
+    ) -> list[TranscriptMatch]:
         """The turns of all jobs in which words stand, see `search_transcripts`."""
         with self._database.transaction() as connection:
-            return search_transcripts(connection, words, wanted, limit=limit)
+            return search_transcripts(connection, words, wanted, limit=limit, offset=offset)
 
     def has_words(self, words: str) -> bool:
         """Whether there is anything to search for."""

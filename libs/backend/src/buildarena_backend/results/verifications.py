@@ -54,10 +54,12 @@ class Requested:
     Attributes:
         ids: Ids of open verifications, by job.
         left: Jobs that found no room, as the owner has as many open as one may.
+        added: How many are new.
     """
 
     ids: Mapping[str, str]
     left: Sequence[str]
+    added: int
 
 
 class Verifications:
@@ -93,7 +95,11 @@ class Verifications:
                 connection.execute(insert(verifications).on_conflict_do_nothing(), rows)
                 known = self._open_ones(job_ids, connection)
         ids = {job_id: known[job_id] for job_id in dict.fromkeys(job_ids) if job_id in known}
-        return Requested(ids=ids, left=tuple(one for one in fresh[room:] if one not in ids))
+        return Requested(
+            ids=ids,
+            left=tuple(one for one in fresh[room:] if one not in ids),
+            added=len(fresh[:room]),
+        )
 
     @staticmethod
     def _open_ones(job_ids: Sequence[str], connection: Connection) -> dict[str, str]:

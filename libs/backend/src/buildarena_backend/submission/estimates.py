@@ -25,15 +25,22 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EstimatedUsage:
+    """What jobs would use; the cost is None when no price is known."""
+
+    requests: int
+    input_tokens: int
+    output_tokens: int
+    cost_usd: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ModelEstimate:
-    """What one model's part of a sweep would use; the cost is None when no price is known."""
+    """What one model's part of a sweep would use."""
 
     model: str
     jobs: int
-    requests: float
-    input_tokens: float
-    output_tokens: float
-    cost_usd: float | None
+    usage: EstimatedUsage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +63,7 @@ def estimate(jobs: Sequence[NewJobs], registry: ModelRegistry) -> SweepEstimate:
     for some in jobs:
         by_model.setdefault(some.model, []).append(some)
     models = [_model(name, found, registry) for name, found in by_model.items()]
-    total = sum(model.cost_usd or 0.0 for model in models)
+    total = sum(model.usage.cost_usd or 0.0 for model in models)
     power = board_power(
         models=len(by_model),
         tasks=len({some.task for some in jobs}),
@@ -70,21 +77,21 @@ def _model(name: str, jobs: Sequence[NewJobs], registry: ModelRegistry) -> Model
     entry = registry.models[name]
     builtin = registry.provider_of(entry).protocol == BUILTIN_PROTOCOL
     figures = [(Figures() if builtin else _figures(some.task), len(some.seeds)) for some in jobs]
-    used_in = sum(f.input_tokens * number for f, number in figures)
-    used_out = sum(f.output_tokens * number for f, number in figures)
+    used_in = round(sum(f.input_tokens * number for f, number in figures))
+    used_out = round(sum(f.output_tokens * number for f, number in figures))
     cost: Decimal | None = Decimal()
     if not builtin:
-        cost = price_usd(
-            entry, input_tokens=round(used_in), output_tokens=round(used_out), cached_tokens=0
-        )
+        cost = price_usd(entry, input_tokens=used_in, output_tokens=used_out, cached_tokens=0)
         cost = cost or None
     return ModelEstimate(
         model=name,
         jobs=sum(number for _, number in figures),
-        requests=round(sum(f.requests * number for f, number in figures), 1),
-        input_tokens=round(used_in, 1),
-        output_tokens=round(used_out, 1),
-        cost_usd=None if cost is None else float(cost),
+        usage=EstimatedUsage(
+            requests=round(sum(f.requests * number for f, number in figures)),
+            input_tokens=used_in,
+            output_tokens=used_out,
+            cost_usd=None if cost is None else float(cost),
+        ),
     )
 
 

@@ -6,12 +6,14 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from sqlalchemy.exc import IntegrityError
+
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prompt_packs import PromptPacks
 from buildarena_backend.catalog.specs import Budget, Decoding, JobSpec, SweepSpec, Variant
 from buildarena_backend.catalog.tracks import Track, make_track
 from buildarena_backend.catalog.workflows import workflow_sources
-from buildarena_backend.errors import SubmissionError
+from buildarena_backend.errors import RequestReusedError, SubmissionError
 from buildarena_backend.ids import content_hash, new_id
 from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
 from buildarena_backend.process.context import Context
@@ -39,12 +41,14 @@ class Submitted:
         jobs: How many jobs it has.
         added: How many of them are new; the others were there before.
         resumed: Whether an earlier submission of the same jobs goes on.
+        fresh: Whether the sweep is new, and no answer to an earlier request.
     """
 
     sweep: Sweep
     jobs: int
     added: int
     resumed: bool = False
+    fresh: bool = True
 
 
 class Submissions:
@@ -97,22 +101,46 @@ class Submissions:
         Args:
             spec: The sweep.
             owner: Id of the API key that submits it, if any.
-            request_key: Idempotency key, if any.
+            request_key: Names the request, if it has a name: one that comes again, or another
+                under its name, gets the first one's sweep.
             resume: Whether the owner's earlier sweep of just these jobs, if there is one, goes
                 on with this one's budget, instead of a further sweep being stored.
 
         Raises:
             SubmissionError: Something of it is unknown; nothing was stored.
+            RequestReusedError: The request's name was another sweep's.
         """
+        sweep_id = new_id("sweep") if request_key is None else f"sweep_{request_key[:20]}"
+        if request_key is not None and (known := self._known(sweep_id, spec)):
+            return known
+        try:
+            return self._store(sweep_id, spec, owner, resume=resume)
+        except IntegrityError:
+            # Another request of this name was quicker.
+            if request_key is None or (known := self._known(sweep_id, spec)) is None:
+                raise
+            return known
+
+    def _known(self, sweep_id: str, spec: SweepSpec) -> Submitted | None:
+        sweep = self._context.store.sweeps.find(sweep_id)
+        if sweep is None:
+            return None
+        if sweep.request_hash != spec_hash(spec):
+            raise RequestReusedError("this Idempotency-Key was used for another sweep")
+        number = self._context.store.sweeps.size(sweep_id)
+        return Submitted(sweep=sweep, jobs=number, added=0, fresh=False)
+
+    def _store(
+        self, sweep_id: str, spec: SweepSpec, owner: str | None, *, resume: bool
+    ) -> Submitted:
         new = self.plan(spec)
         job_ids = [id_ for some in new for id_ in some.job_ids]
         jobs_hash = content_hash(sorted(job_ids))
         sweep = NewSweep(
-            id=new_id("sweep"),
+            id=sweep_id,
             name=spec.name,
             spec=spec.model_dump(mode="json", exclude_none=True),
             owner=owner,
-            request_key=request_key,
             request_hash=spec_hash(spec),
             jobs_hash=jobs_hash,
         )
@@ -137,6 +165,7 @@ class Submissions:
             jobs=len(job_ids),
             added=added,
             resumed=before is not None,
+            fresh=before is None,
         )
 
     def resume(self, sweep_id: str, budget: Budget | None) -> None:

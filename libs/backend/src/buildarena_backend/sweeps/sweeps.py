@@ -10,7 +10,7 @@ from decimal import Decimal
 from typing import Any, Final
 
 from cachetools import TTLCache
-from sqlalchemy import Connection, Row, func, literal, select
+from sqlalchemy import Connection, Row, case, exists, func, literal, select
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
@@ -36,7 +36,6 @@ class NewSweep:
         name: What its owner calls it.
         spec: The submitted matrix.
         owner: Id of the API key that submitted it, if any.
-        request_key: Idempotency key of the submission, if any.
         request_hash: Content hash of the submission.
         jobs_hash: Content hash of its jobs' ids.
     """
@@ -45,7 +44,6 @@ class NewSweep:
     name: str
     spec: Mapping[str, Any]
     owner: str | None = None
-    request_key: str | None = None
     request_hash: str | None = None
     jobs_hash: str | None = None
 
@@ -137,14 +135,16 @@ class Sweeps:
         Raises:
             UnknownIdError: Nobody has it.
         """
-        found = self._find(sweeps.c.id == sweep_id)
+        found = self.find(sweep_id)
         if found is None:
             raise UnknownIdError("sweep", sweep_id)
         return found
 
-    def by_request_key(self, request_key: str) -> Sweep | None:
-        """The sweep that was submitted with this idempotency key, if any."""
-        return self._find(sweeps.c.request_key == request_key)
+    def find(self, sweep_id: str) -> Sweep | None:
+        """The sweep with this id, if there is one."""
+        with self._database.statement() as connection:
+            row = connection.execute(select(*_COLUMNS).where(sweeps.c.id == sweep_id)).first()
+        return None if row is None else value_of(Sweep, row)
 
     def with_jobs(self, jobs_hash: str, *, owner: str | None, connection: Connection) -> str | None:
         """Id of an owner's newest sweep of just these jobs that was not cancelled, if any.
@@ -165,22 +165,26 @@ class Sweeps:
         found: str | None = connection.execute(query).scalar()
         return found
 
-    def _find(self, condition: Any) -> Sweep | None:
-        with self._database.statement() as connection:
-            row = connection.execute(select(*_COLUMNS).where(condition)).first()
-        return None if row is None else value_of(Sweep, row)
-
     def page(
         self,
         *,
         limit: int,
         after: tuple[datetime, str] | None = None,
         id_prefix: str | None = None,
+        names: Sequence[str] | None = None,
+        states: Sequence[SweepState] | None = None,
+        owners: Sequence[str] | None = None,
     ) -> list[Sweep]:
         """The newest sweeps first, with keyset paging and beginnings of ids as for jobs."""
         query = select(*_COLUMNS).order_by(sweeps.c.created_at.desc(), sweeps.c.id).limit(limit)
         if id_prefix is not None:
             query = query.where(begins_with(sweeps.c.id, id_prefix))
+        if names is not None:
+            query = query.where(sweeps.c.name == func.any(bound_texts(names)))
+        if owners is not None:
+            query = query.where(sweeps.c.owner == func.any(bound_texts(owners)))
+        if states is not None:
+            query = query.where(_SHOWN_STATE.in_(states))
         if after is not None:
             created_at, id_ = after
             query = query.where(
@@ -274,6 +278,14 @@ class Sweeps:
             return [row.job_id for row in connection.execute(query)]
 
 
+_OPEN: Final = exists().where(
+    sweep_jobs.c.sweep_id == sweeps.c.id,
+    jobs.c.id == sweep_jobs.c.job_id,
+    jobs.c.state != JobState.DONE,
+)
+_SHOWN_STATE: Final = case(
+    ((sweeps.c.state == SweepState.ACTIVE) & ~_OPEN, SweepState.DONE.value), else_=sweeps.c.state
+)
 _USE: Final = ("requests", "lost_requests", "input_tokens", "output_tokens", "cost_usd")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from datetime import UTC
 from itertools import groupby
 from typing import Any, Final
 
@@ -40,9 +41,9 @@ def _job_of(event: Event) -> str:
 
 def _text(event: Event, turn: Mapping[str, Any] | None) -> bytes:
     data = {
-        "job": event.job_id,
-        "sweep": event.sweep_id,
-        "at": event.at.isoformat(),
+        "job_id": event.job_id,
+        "sweep_id": event.sweep_id,
+        "at": event.at.astimezone(UTC).isoformat().replace("+00:00", "Z"),
         **({"turn": _bounded(turn)} if turn is not None else event.data),
     }
     return ServerSentEvent(json.dumps(data), event=event.kind, id=str(event.id)).encode()

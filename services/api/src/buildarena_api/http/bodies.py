@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import json
 from collections.abc import Awaitable, Callable, Collection
 from contextlib import AbstractAsyncContextManager, nullcontext, suppress
 from typing import IO, Final
 
 import structlog
+from anyio import to_thread
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.places import Places
 from buildarena_api.http.problems import ProblemError, send_problem
+from buildarena_benchmark import SourceError, ValidationIssue
+from buildarena_benchmark.tasks.sources import read_source
 from buildarena_geometry.json_texts import MAX_DEPTH, is_too_deep
 
 MAX_BYTES = 4 * 1024 * 1024
@@ -27,6 +32,9 @@ FILE_S: Final = 600.0
 """How long an uploaded file may take to come."""
 DRAIN_BYTES: Final = 256 * 1024
 DRAIN_S: Final = 0.5
+YAML: Final = "application/yaml"
+YAML_TYPES: Final = frozenset({YAML, "application/x-yaml", "text/yaml", "text/x-yaml"})
+_OF_BODY: Final = (b"content-type", b"content-length", b"transfer-encoding")
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "X-Frame-Options": "DENY",
@@ -86,8 +94,8 @@ class BodyLimitMiddleware:
                 await self._pass_whole(scope, headers, receive, safe_send)
         except ProblemError as error:
             await _drain(receive)
-            closing = {**(error.headers or {}), "Connection": "close"}
-            await send_problem(safe_send, error.status, error.detail, headers=closing)
+            error.headers["Connection"] = "close"
+            await send_problem(safe_send, error)
         except ConnectionError:
             log.info("body_cut_off", path=scope["path"])
 
@@ -111,12 +119,56 @@ class BodyLimitMiddleware:
             async with asyncio.timeout(BODY_S):
                 body = await _read(receive, most)
         except TimeoutError as error:
-            raise ProblemError(408, f"the body did not come within {BODY_S:g} s") from error
-        if path not in self._documents and is_too_deep(body):
-            detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
-            await send_problem(send, 422, detail)
+            raise ProblemError(
+                ErrorCode.BODY_TIMEOUT, f"the body did not come within {BODY_S:g} s"
+            ) from error
+        try:
+            if path not in self._documents:
+                scope, body = await _as_json(scope, headers, body)
+        except ProblemError as error:
+            await send_problem(send, error)
         else:
             await self._app(scope, _replay(body, receive), send)
+
+
+async def _as_json(scope: Scope, headers: Headers, body: bytes) -> tuple[Scope, bytes]:
+    """A request whose body is JSON of bounded depth, in the place of one in YAML too.
+
+    Raises:
+        ProblemError: It is nested too deeply, or no YAML.
+    """
+    if is_yaml(headers):
+        try:
+            text = body.decode()
+            source = await to_thread.run_sync(lambda: read_source(text, origin="body"))
+        except UnicodeDecodeError as error:
+            raise not_utf8(body, error) from error
+        except SourceError as error:
+            raise ProblemError(ErrorCode.INVALID_YAML, str(error), errors=error.issues) from error
+        body = json.dumps(source.content, default=str).encode()
+        others = [header for header in scope["headers"] if header[0] not in _OF_BODY]
+        own = [
+            (b"content-type", b"application/json"),
+            (b"content-length", str(len(body)).encode()),
+        ]
+        scope = {**scope, "headers": [*others, *own]}
+    if is_too_deep(body):
+        detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
+        raise ProblemError(ErrorCode.TOO_DEEP, detail)
+    return scope, body
+
+
+def is_yaml(headers: Headers) -> bool:
+    """Whether a request says that its body is YAML."""
+    return headers.get("content-type", "").partition(";")[0].strip().lower() in YAML_TYPES
+
+
+def not_utf8(body: bytes, error: UnicodeDecodeError) -> ProblemError:
+    """The problem of a text that is no UTF-8."""
+    line = body.count(b"\n", 0, error.start) + 1
+    message = "the text is not UTF-8"
+    issue = ValidationIssue(path="", message=message, line=line)
+    return ProblemError(ErrorCode.INVALID_YAML, f"line {line}: {message}", errors=[issue])
 
 
 def _has_body(headers: Headers) -> bool:
@@ -159,9 +211,11 @@ async def receive_file(request: Request, file: IO[bytes], *, max_bytes: int) -> 
                 digest.update(part)
                 file.write(part)
     except TimeoutError as error:
-        raise ProblemError(408, f"the file did not come within {FILE_S:g} s") from error
+        raise ProblemError(
+            ErrorCode.BODY_TIMEOUT, f"the file did not come within {FILE_S:g} s"
+        ) from error
     except ClientDisconnect as error:
-        raise ProblemError(400, "the file was cut off") from error
+        raise ProblemError(ErrorCode.BROKEN_BODY, "the file was cut off") from error
     return digest.hexdigest()
 
 
@@ -178,7 +232,7 @@ async def _drain(receive: Receive) -> None:
 
 
 def _too_large(most: int) -> ProblemError:
-    return ProblemError(413, f"the request is larger than {most:,} bytes")
+    return ProblemError(ErrorCode.TOO_LARGE, f"the request is larger than {most:,} bytes")
 
 
 def _with_headers(send: Send) -> Send:

@@ -10,7 +10,6 @@ at once, is answered however many others say nothing.
 from __future__ import annotations
 
 import asyncio
-import json
 import os
 import resource
 import signal
@@ -27,7 +26,9 @@ import structlog
 import uvicorn
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.outer_address import Networks
+from buildarena_api.http.problems import ProblemError
 from buildarena_backend.keepalive import socket_options
 from buildarena_backend.settings import Settings
 
@@ -128,7 +129,7 @@ class FrontDoor(HttpToolsProtocol):
         self._awaits_header = True
         self._header_bytes = 0
         self._deadline: asyncio.TimerHandle | None = None
-        self._refusal = (HTTPStatus.BAD_REQUEST, "this is no HTTP request")
+        self._refusal = ProblemError(ErrorCode.BROKEN_BODY, "this is no HTTP request")
         self.is_admitted = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
@@ -166,7 +167,7 @@ class FrontDoor(HttpToolsProtocol):
         size = len(self.url) + sum(len(name) + len(value) for name, value in self.headers)
         if len(self.headers) > MAX_HEADERS or size > MAX_HEADER_BYTES:
             self._refuse_header()
-            raise httptools.HttpParserError(self._refusal[1])
+            raise httptools.HttpParserError(self._refusal.detail)
         super().on_headers_complete()
 
     def on_message_complete(self) -> None:
@@ -183,19 +184,18 @@ class FrontDoor(HttpToolsProtocol):
     def send_400_response(self, msg: str) -> None:
         """Says in a problem why a header is refused, and ends the connection."""
         del msg  # uvicorn's own
-        status, detail = self._refusal
-        problem = {"type": "about:blank", "title": status.phrase, "status": int(status)}
-        body = json.dumps({**problem, "detail": detail, "errors": []}).encode()
+        answer = self._refusal.answer()
+        phrase = HTTPStatus(answer.status_code).phrase
         head = (
-            f"HTTP/1.1 {int(status)} {status.phrase}\r\nContent-Type: application/problem+json\r\n"
-            f"Content-Length: {len(body)}\r\nConnection: close\r\n\r\n"
+            f"HTTP/1.1 {answer.status_code} {phrase}\r\nContent-Type: application/problem+json\r\n"
+            f"Content-Length: {len(answer.body)}\r\nConnection: close\r\n\r\n"
         )
-        self.transport.write(head.encode() + body)
+        self.transport.write(head.encode() + answer.body)
         self.transport.close()
 
     def _refuse_header(self) -> None:
-        self._refusal = (
-            HTTPStatus.REQUEST_HEADER_FIELDS_TOO_LARGE,
+        self._refusal = ProblemError(
+            ErrorCode.HEADER_TOO_LARGE,
             f"a header has at most {MAX_HEADER_BYTES:,} bytes and {MAX_HEADERS} fields",
         )
 

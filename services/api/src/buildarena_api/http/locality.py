@@ -13,7 +13,8 @@ from collections.abc import Callable
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from buildarena_api.http.problems import send_problem
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import ProblemError, send_problem
 
 OCTET = r"(?:25[0-5]|2[0-4][0-9]|1[0-9]{2}|[1-9]?[0-9])"
 LOOPBACK_HOST = re.compile(
@@ -39,22 +40,25 @@ class LocalOnlyMiddleware:
         if refusal is None:
             await self._app(scope, receive, send)
         else:
-            await send_problem(send, *refusal)
+            await send_problem(send, refusal)
 
-    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
-        """The status and the reason, if the request is not to be served."""
+    def _refusal(self, scope: Scope) -> ProblemError | None:
+        """Why the request is not to be served, if it is not."""
         hosts, origins = _values(scope, b"host"), _values(scope, b"origin")
         if len(hosts) != 1 or LOOPBACK_HOST.fullmatch(hosts[0]) is None:
             named = ", ".join(map(repr, hosts)) or "nothing"
-            return 421, (
+            return ProblemError(
+                ErrorCode.FOREIGN_HOST,
                 f"Host names {named[:200]}: without keys this service answers only to localhost, "
-                "127.0.0.0/8 and [::1] (BUILDARENA_REQUIRE_KEYS=true lets it have other names)"
+                "127.0.0.0/8 and [::1] (BUILDARENA_REQUIRE_KEYS=true lets it have other names)",
             )
         own = {f"{scheme}://{hosts[0].lower()}" for scheme in ("http", "https")}
         if len(origins) > 1 or any(origin.lower() not in own for origin in origins):
-            return 403, "requests of other origins' pages are not served without keys"
+            detail = "requests of other origins' pages are not served without keys"
+            return ProblemError(ErrorCode.FOREIGN_ORIGIN, detail)
         if "cross-site" in _values(scope, b"sec-fetch-site") and not self._is_link(scope):
-            return 403, "requests that a foreign site makes are not served without keys"
+            detail = "requests that a foreign site makes are not served without keys"
+            return ProblemError(ErrorCode.FOREIGN_ORIGIN, detail)
         return None
 
     def _is_link(self, scope: Scope) -> bool:

@@ -1,4 +1,4 @@
-"""Which methods a path has: any other is 405, whatever the router would make of it.
+"""Which methods a path has: any other is 405, whatever the router would make of it; GET has HEAD.
 
 The router takes the first route that fits path and method, so that GET of a path that only takes
 POST reached a neighbour with a parameter in that place, or the key check, and was answered by it.
@@ -6,12 +6,14 @@ POST reached a neighbour with a parameter in that place, or the key check, and w
 
 from __future__ import annotations
 
+import asyncio
 import re
 from collections.abc import Iterable
 
-from starlette.types import ASGIApp, Receive, Scope, Send
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.problems import send_problem
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import ProblemError, send_problem
 
 PARAMETER = re.compile(r"\{[a-z_]+\}")
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")
@@ -30,6 +32,8 @@ class MethodMiddleware:
         methods: dict[str, set[str]] = {}
         for template, more in routes:
             methods.setdefault(template, set()).update(more)
+            if "GET" in more:
+                methods[template].add("HEAD")
         # The fewer parameters, the closer a template describes a path.
         ordered = sorted(methods, key=lambda template: len(PARAMETER.findall(template)))
         self._methods = [
@@ -43,14 +47,38 @@ class MethodMiddleware:
             return
         if CONTROL.search(scope["path"]):
             # The router's patterns end before a last line break.
-            await send_problem(send, 404, "no path has control characters")
+            detail = "no path has control characters"
+            await send_problem(send, ProblemError(ErrorCode.PATH_NOT_FOUND, detail))
             return
         allowed = self._allowed(scope["path"])
         if allowed and scope["method"] not in allowed:
             detail = f"this path has no {scope['method']}; it has {', '.join(allowed)}"
-            await send_problem(send, 405, detail, headers={"Allow": ", ".join(allowed)})
+            headers = {"Allow": ", ".join(allowed)}
+            problem = ProblemError(ErrorCode.METHOD_NOT_ALLOWED, detail, headers=headers)
+            await send_problem(send, problem)
+            return
+        if scope["method"] == "HEAD" and allowed:
+            await self._head(scope, send)
             return
         await self._app(scope, receive, send)
+
+    async def _head(self, scope: Scope, send: Send) -> None:
+        """Answers as GET does, without a body; what would be streamed ends at once."""
+        begun = asyncio.Event()
+
+        async def receive() -> Message:
+            await begun.wait()
+            return {"type": "http.disconnect"}
+
+        async def send_head(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                await send(message)
+                await send({"type": "http.response.body", "body": b""})
+                begun.set()
+
+        got = {**scope, "method": "GET"}
+        await self._app(got, receive, send_head)
+        scope["route"] = got.get("route")
 
     def _allowed(self, path: str) -> list[str]:
         for pattern, methods in self._methods:

@@ -17,6 +17,7 @@ from weakref import WeakValueDictionary
 from anyio import CapacityLimiter
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.problems import ProblemError, send_problem
 
 WAIT_S: Final = 30.0
@@ -74,25 +75,26 @@ class Places:
         """
         own = self._own.setdefault(who, CapacityLimiter(self._each))
         if own.available_tokens < 1 and own.statistics().tasks_waiting >= self._waiting:
-            raise self._full(429)
+            raise self._full(ErrorCode.TOO_MANY_OPEN)
         if not self._waiting and self._all.available_tokens < 1:
-            raise self._full(503)
+            raise self._full(ErrorCode.BUSY)
         async with AsyncExitStack() as held:
-            status = 429
+            code = ErrorCode.TOO_MANY_OPEN
             try:
                 async with asyncio.timeout(WAIT_S):
                     await held.enter_async_context(own)
-                    status = 503
+                    code = ErrorCode.BUSY
                     await held.enter_async_context(self._all)
             except TimeoutError as error:
-                raise self._full(status) from error
+                raise self._full(code) from error
             yield
 
-    def _full(self, status: int) -> ProblemError:
-        whose = f"you have {self._each}" if status == 429 else f"the service has {self._total}"  # noqa: PLR2004 - Too Many Requests
+    def _full(self, code: ErrorCode) -> ProblemError:
+        own = code == ErrorCode.TOO_MANY_OPEN
+        whose = f"you have {self._each}" if own else f"the service has {self._total}"
         waiting = f", and {self._waiting} wait" if self._waiting else ""
         return ProblemError(
-            status,
+            code,
             f"{whose} {self._what} going on, as many as may be{waiting}",
             headers={"Retry-After": str(self._retry_s)},
         )
@@ -146,7 +148,9 @@ class OpenRequests:
         who = self._who(scope)
         if self._open[who] >= MAX_OPEN:
             detail = f"you have {MAX_OPEN} requests open, as many as may be"
-            await send_problem(holding_send, 429, detail, headers={"Retry-After": "1"})
+            wait = {"Retry-After": "1"}
+            problem = ProblemError(ErrorCode.TOO_MANY_OPEN, detail, headers=wait)
+            await send_problem(holding_send, problem)
             return
         self._open[who] += 1
         try:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from http import HTTPStatus
-from typing import Any, Final
+from types import UnionType
+from typing import Any, Final, get_args, get_origin
 
 import structlog
 from fastapi import FastAPI, Request, Response
@@ -17,6 +20,11 @@ from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
 from starlette.types import Send
 
+from buildarena_api.http.codes import ErrorCode
+from buildarena_backend.agents.sessions import SessionClosedError
+from buildarena_backend.agents.trying import NoTestError
+from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
+from buildarena_backend.catalog.tasks import TaskChangedError
 from buildarena_backend.errors import (
     ArtifactDamagedError,
     ArtifactMissingError,
@@ -24,26 +32,46 @@ from buildarena_backend.errors import (
     EndedKeyError,
     NameTakenError,
     NotOwnedError,
+    RequestReusedError,
+    StaleLeaseError,
     SubmissionError,
     TooManyFilesError,
+    TooManyLeasesError,
     TransitionError,
     UnknownIdError,
+    UploadError,
 )
-from buildarena_benchmark import ValidationIssue
+from buildarena_benchmark import SourceError, ValidationIssue
+from buildarena_benchmark.environment import NothingToSubmitError
 
 PROBLEM_JSON = "application/problem+json"
 QUOTED = re.compile(r"'([^']*)'")
 """How pydantic spells the values that it expects."""
-PLAIN: Final[Mapping[type[Exception], tuple[int, int | None]]] = {
-    TransitionError: (409, None),
-    EndedKeyError: (409, None),
-    NotOwnedError: (403, None),
-    NameTakenError: (403, None),
-    TooManyFilesError: (429, 5),
-    UnknownIdError: (404, None),
-    ArtifactMissingError: (404, None),
+PLAIN: Final[Mapping[type[Exception], ErrorCode]] = {
+    TransitionError: ErrorCode.ILLEGAL_STATE,
+    EndedKeyError: ErrorCode.ILLEGAL_STATE,
+    TaskChangedError: ErrorCode.ILLEGAL_STATE,
+    SessionClosedError: ErrorCode.SESSION_CLOSED,
+    NothingToSubmitError: ErrorCode.NOTHING_TO_SUBMIT,
+    NoTestError: ErrorCode.NO_TEST_TRIAL,
+    StaleLeaseError: ErrorCode.LEASE_ENDED,
+    RequestReusedError: ErrorCode.IDEMPOTENCY_KEY_REUSED,
+    NotOwnedError: ErrorCode.NOT_OWNER,
+    NameTakenError: ErrorCode.NAME_TAKEN,
+    TooManyFilesError: ErrorCode.TOO_MANY_OPEN,
+    TooManyLeasesError: ErrorCode.TOO_MANY_OPEN,
+    ArtifactMissingError: ErrorCode.ARTIFACT_NOT_FOUND,
+    UploadError: ErrorCode.UPLOAD_REFUSED,
+    OutcomeRefusedError: ErrorCode.UPLOAD_REFUSED,
 }
-"""Status of errors that say all there is to say, and when the caller may come back."""
+"""Codes of errors that say all there is to say."""
+BY_STATUS: Final = {
+    400: ErrorCode.INVALID_FIELD,  # a body that is not text is as wrong as one that is not JSON
+    404: ErrorCode.PATH_NOT_FOUND,
+    405: ErrorCode.METHOD_NOT_ALLOWED,
+}
+"""Codes of what the framework refuses itself."""
+RETRY_S: Final = "5"
 MAX_SHOWN = 100
 """Characters of a wrong value that are repeated."""
 
@@ -56,6 +84,7 @@ class Problem(BaseModel):
     type: str = Field(default="about:blank", examples=["about:blank"])
     title: str = Field(examples=["Unprocessable Content"])
     status: int = Field(examples=[422])
+    code: ErrorCode = Field(examples=["unknown_name"])
     detail: str = Field(examples=["tasks[0]: there is no task 'support-9'"])
     errors: list[ValidationIssue] = []
 
@@ -64,25 +93,62 @@ class ProblemError(Exception):
     """Answers the request with a problem.
 
     Attributes:
-        status: HTTP status.
-        detail: What went wrong, for people.
+        code: What went wrong, for programs; it has the HTTP status.
+        detail: The same for people.
         errors: What is wrong with the request.
         headers: Headers of the answer.
     """
 
     def __init__(
         self,
-        status: int,
+        code: ErrorCode,
         detail: str,
         *,
         errors: Sequence[ValidationIssue] = (),
-        headers: dict[str, str] | None = None,
+        headers: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(detail)
-        self.status = status
-        self.detail = detail
-        self.errors = list(errors)
-        self.headers = headers
+        self.code, self.detail = code, detail
+        self.errors, self.headers = list(errors), dict(headers or {})
+
+    def answer(self) -> JSONResponse:
+        """The problem as it is sent."""
+        status = self.code.status
+        problem = Problem(
+            title=HTTPStatus(status).phrase,
+            status=status,
+            code=self.code,
+            detail=self.detail,
+            errors=self.errors,
+        )
+        content = problem.model_dump(mode="json", by_alias=True)
+        return JSONResponse(content, status, self.headers, media_type=PROBLEM_JSON)
+
+
+def invalid(
+    field: str,
+    message: str,
+    *,
+    choices: Iterable[str] = (),
+    code: ErrorCode = ErrorCode.INVALID_FIELD,
+) -> ProblemError:
+    """The problem of one field or parameter."""
+    issue = ValidationIssue(path=field, message=message, choices=tuple(choices))
+    return ProblemError(code, f"{field}: {message}{_nearest(issue)}", errors=[issue])
+
+
+def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:
+    """The problem of a name that nobody has."""
+    message = f"there is no {field} {value!r}"
+    return invalid(field, message, choices=choices, code=ErrorCode.UNKNOWN_NAME)
+
+
+def _nearest(issue: ValidationIssue) -> str:
+    """`; did you mean …?` with the choice that is nearest to the wrong word, if one is near."""
+    quoted = QUOTED.findall(issue.message)
+    word = quoted[-1] if quoted else issue.path.rpartition(".")[2]
+    near = get_close_matches(word, issue.choices, 1)
+    return f"; did you mean {near[0]}?" if near else ""
 
 
 def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError:
@@ -91,122 +157,128 @@ def database_problem(error: OperationalError | PoolTimeoutError) -> ProblemError
     event = "database_connections_in_use" if busy else "database_unreachable"
     log.warning(event, error=str(error).splitlines()[0])
     what = "all connections to the database are in use" if busy else "the database can't be reached"
-    return ProblemError(503, f"{what}; nothing was stored", headers={"Retry-After": "2"})
-
-
-def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """OpenAPI entries of the problems that an operation answers with."""
-    return {
-        status: {
-            "model": Problem,
-            "description": HTTPStatus(status).phrase,
-            "content": {PROBLEM_JSON: {"schema": {"$ref": "#/components/schemas/Problem"}}},
-        }
-        for status in statuses
-    }
-
-
-def _answer(
-    status: int,
-    detail: str,
-    errors: Sequence[ValidationIssue] = (),
-    headers: dict[str, str] | None = None,
-) -> JSONResponse:
-    problem = Problem(
-        title=HTTPStatus(status).phrase, status=status, detail=detail, errors=list(errors)
-    )
-    return JSONResponse(
-        problem.model_dump(mode="json", by_alias=True),
-        status_code=status,
-        media_type=PROBLEM_JSON,
-        headers=headers,
+    return ProblemError(
+        ErrorCode.DATABASE_UNAVAILABLE, f"{what}; nothing was stored", headers={"Retry-After": "2"}
     )
 
 
-async def send_problem(
-    send: Send, status: int, detail: str, *, headers: Mapping[str, str] | None = None
-) -> None:
+async def send_problem(send: Send, error: ProblemError) -> None:
     """Answers a request that no route was asked for with a problem."""
-    answer = _answer(status, detail, headers=dict(headers or {}))
-    start = {"type": "http.response.start", "status": status, "headers": answer.raw_headers}
-    await send(start)
+    answer = error.answer()
+    await send(
+        {
+            "type": "http.response.start",
+            "status": answer.status_code,
+            "headers": answer.raw_headers,
+        }
+    )
     await send({"type": "http.response.body", "body": answer.body})
 
 
 def add_problem_handlers(app: FastAPI) -> None:
     """Makes every error of the app a problem."""
 
-    @app.exception_handler(ProblemError)
-    async def on_problem(_: Request, error: ProblemError) -> JSONResponse:
-        return _answer(error.status, error.detail, error.errors, error.headers)
+    def handle(kind: type[Exception], problem_of: Callable[[Any], ProblemError]) -> None:
+        def answer(_: Request, error: Exception) -> Response:
+            return problem_of(error).answer()
 
-    @app.exception_handler(SubmissionError)
-    async def on_submission(_: Request, error: SubmissionError) -> JSONResponse:
-        return _answer(422, str(error), error.issues)
+        app.add_exception_handler(kind, answer)
+
+    handle(ProblemError, lambda error: error)
+    for kind in PLAIN:
+        handle(kind, _plain)
+    handle(UnknownIdError, lambda e: ProblemError(ErrorCode[f"{e.kind}_not_found".upper()], str(e)))
+    for of_issues in (SubmissionError, SourceError):
+        handle(of_issues, _of_issues)
+    handle(OperationalError, database_problem)
+    handle(PoolTimeoutError, database_problem)
+    handle(HTTPException, _of_framework)
+    handle(DataError, _unstorable)
+    handle(ArtifactDamagedError, _damaged)
+    handle(ArtifactStoreError, _store_fails)
 
     @app.exception_handler(RequestValidationError)
-    async def on_invalid(_: Request, error: RequestValidationError) -> JSONResponse:
-        errors = [_issue(entry) for entry in error.errors()]
-        detail = "; ".join(map(_described, errors))
-        # A path that nothing can have is as unknown as one that nothing has.
-        in_path = any(entry["loc"][0] == "path" for entry in error.errors())
-        return _answer(404 if in_path else 422, detail, errors)
-
-    @app.exception_handler(HTTPException)
-    async def on_http(_: Request, error: HTTPException) -> JSONResponse:
-        headers = dict(error.headers) if error.headers else None
-        status = error.status_code
-        if status == HTTPStatus.BAD_REQUEST:
-            # A body that is not text is as wrong as one that is not JSON, and answered like it.
-            status = HTTPStatus.UNPROCESSABLE_ENTITY
-        return _answer(status, str(error.detail), headers=headers)
+    async def on_invalid(request: Request, error: RequestValidationError) -> JSONResponse:
+        return _invalid_request(request, error).answer()
 
     @app.exception_handler(Exception)
     async def on_bug(request: Request, error: Exception) -> JSONResponse:
         log.error("unexpected", path=request.url.path, exc_info=error)
-        return _answer(500, "something went wrong here; it is in the log")
-
-    for kind, (status, wait_s) in PLAIN.items():
-        app.add_exception_handler(kind, _plain(status, wait_s))
-    _add_store_handlers(app)
+        detail = "something went wrong here; it is in the log"
+        return ProblemError(ErrorCode.INTERNAL_ERROR, detail).answer()
 
 
-def _plain(status: int, wait_s: int | None) -> Callable[[Request, Exception], Response]:
-    """Answers an error with what it says itself."""
-    headers = None if wait_s is None else {"Retry-After": str(wait_s)}
-
-    def answer(_: Request, error: Exception) -> Response:
-        return _answer(status, str(error), headers=headers)
-
-    return answer
+def _plain(error: Exception) -> ProblemError:
+    code = PLAIN[type(error)]
+    wait = {"Retry-After": RETRY_S} if code.status == HTTPStatus.TOO_MANY_REQUESTS else None
+    return ProblemError(code, str(error), headers=wait)
 
 
-def _add_store_handlers(app: FastAPI) -> None:
-    @app.exception_handler(DataError)
-    async def on_unstorable(_: Request, error: DataError) -> JSONResponse:
-        log.info("unstorable", error=str(error.orig))
-        return _answer(422, "a text or number of the request is none that can be stored or found")
-
-    @app.exception_handler(OperationalError)
-    @app.exception_handler(PoolTimeoutError)
-    async def on_database(_: Request, error: OperationalError | PoolTimeoutError) -> JSONResponse:
-        problem = database_problem(error)
-        return _answer(problem.status, problem.detail, headers=problem.headers)
-
-    @app.exception_handler(ArtifactDamagedError)
-    async def on_damaged(_: Request, error: ArtifactDamagedError) -> JSONResponse:
-        log.error("artifact_damaged", error=str(error))
-        return _answer(500, f"{error}; it must be restored from a backup")
-
-    @app.exception_handler(ArtifactStoreError)
-    async def on_store(_: Request, error: ArtifactStoreError) -> JSONResponse:
-        log.error("artifact_store_fails", error=str(error))
-        return _answer(503, f"{error}; nothing is lost", headers={"Retry-After": "5"})
+def _of_issues(error: SubmissionError | SourceError) -> ProblemError:
+    # A name with choices, if that is all that is wrong.
+    named = all(issue.choices for issue in error.issues)
+    code = ErrorCode.UNKNOWN_NAME if named else ErrorCode.INVALID_FIELD
+    return ProblemError(code, str(error), errors=error.issues)
 
 
-def _issue(entry: Mapping[str, Any]) -> ValidationIssue:
-    """What FastAPI found; where values are spelled out, with the value and the choices."""
+def _of_framework(error: HTTPException) -> ProblemError:
+    code = BY_STATUS.get(error.status_code, ErrorCode.INTERNAL_ERROR)
+    return ProblemError(code, str(error.detail), headers=error.headers)
+
+
+def _unstorable(error: DataError) -> ProblemError:
+    log.info("unstorable", error=str(error.orig))
+    detail = "a text or number of the request is none that can be stored or found"
+    return ProblemError(ErrorCode.INVALID_FIELD, detail)
+
+
+def _damaged(error: ArtifactDamagedError) -> ProblemError:
+    log.error("artifact_damaged", error=str(error))
+    detail = "a stored file is damaged; it must be restored from a backup"
+    return ProblemError(ErrorCode.ARTIFACT_DAMAGED, detail)
+
+
+def _store_fails(error: ArtifactStoreError) -> ProblemError:
+    # Where the store is, which the error names, is the operator's affair.
+    log.error("artifact_store_fails", error=str(error))
+    detail = "files can't be stored or read now; nothing is lost"
+    return ProblemError(ErrorCode.STORE_UNAVAILABLE, detail, headers={"Retry-After": RETRY_S})
+
+
+def _invalid_request(request: Request, error: RequestValidationError) -> ProblemError:
+    """What FastAPI found."""
+    entries = error.errors()
+    if entries[0]["type"] == "json_invalid":
+        return _invalid_json(error)
+    body = getattr(request.scope.get("route"), "body_field", None)
+    schema = None if body is None else body.field_info.annotation
+    issues = [_issue(entry, schema) for entry in entries]
+    detail = "; ".join(map(_described, issues))
+    # A path that nothing can have is as unknown as one that nothing has.
+    if any(entry["loc"][0] == "path" for entry in entries):
+        return ProblemError(ErrorCode.PATH_NOT_FOUND, detail, errors=issues)
+    extra = all(entry["type"] == "extra_forbidden" for entry in entries)
+    code = ErrorCode.UNKNOWN_FIELD if extra else ErrorCode.INVALID_FIELD
+    return ProblemError(code, detail, errors=issues)
+
+
+def _invalid_json(error: RequestValidationError) -> ProblemError:
+    text = error.body.decode(errors="replace") if isinstance(error.body, bytes) else error.body
+    try:
+        json.loads(str(text))
+    except json.JSONDecodeError as syntax:
+        message = f"{syntax.msg}, line {syntax.lineno}, column {syntax.colno}"
+        issue = ValidationIssue(path="body", message=message, line=syntax.lineno)
+        return ProblemError(ErrorCode.INVALID_JSON, f"not JSON: {message}", errors=[issue])
+    return ProblemError(ErrorCode.INVALID_JSON, "the body is not JSON")
+
+
+def _issue(entry: Mapping[str, Any], schema: Any) -> ValidationIssue:
+    """One mistake; where values are spelled out, with the value and the choices."""
     path, message = _field(entry["loc"]), str(entry["msg"])
+    if entry["type"] == "extra_forbidden":
+        choices = _fields_beside(entry["loc"], schema)
+        return ValidationIssue(path=path, message="there is no such field", choices=choices)
     if entry["type"] not in {"literal_error", "enum"}:
         return ValidationIssue(path=path, message=message)
     given = repr(entry["input"])[:MAX_SHOWN]
@@ -214,13 +286,32 @@ def _issue(entry: Mapping[str, Any]) -> ValidationIssue:
     return ValidationIssue(path=path, message=f"there is no such value: {given}", choices=choices)
 
 
+def _fields_beside(location: Sequence[str | int], schema: Any) -> tuple[str, ...]:
+    """The names of the fields that are valid where an unknown one was found."""
+    for step in location[1:-1]:
+        here = _model_in(schema)
+        schema = here.model_fields[step].annotation if here and step in here.model_fields else None
+    here = _model_in(schema)
+    return () if here is None else tuple(here.model_fields)
+
+
+def _model_in(kind: Any) -> type[BaseModel] | None:
+    """The model that a type is, or may be, or is a list of."""
+    if isinstance(kind, type) and not get_origin(kind) and issubclass(kind, BaseModel):
+        return kind
+    inside = get_args(kind) if get_origin(kind) in {list, UnionType} else ()
+    return next((found for found in map(_model_in, inside) if found is not None), None)
+
+
 def _described(issue: ValidationIssue) -> str:
     choices = f"; choose from {', '.join(issue.choices)}" if issue.choices else ""
-    return f"{issue.path}: {issue.message}{choices}"
+    return f"{issue.path}: {issue.message}{choices}{_nearest(issue)}"
 
 
 def _field(location: Sequence[str | int]) -> str:
-    """``("body", "tasks", 1)`` as ``tasks[1]``."""
+    """``("body", "tasks", 1)`` as ``tasks[1]``; a parameter by its name."""
+    if location[0] == "query":
+        return str(location[-1] if len(location) == 1 else location[1])
     parts = [part for part in location if part not in {"body", "query", "path", "header"}]
     text = ""
     for part in parts:

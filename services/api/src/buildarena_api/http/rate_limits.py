@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Final
 
 import structlog
 from limits import WindowStats, parse
@@ -12,7 +13,7 @@ from limits.aio.storage import RedisStorage
 from limits.aio.strategies import SlidingWindowCounterRateLimiter as SharedLimiter
 from limits.storage import MemoryStorage
 from limits.strategies import SlidingWindowCounterRateLimiter as OwnLimiter
-from redis.asyncio import ConnectionPool
+from redis.asyncio import ConnectionPool, Redis
 from redis.asyncio.retry import Retry
 from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
@@ -21,9 +22,35 @@ TIMEOUT_S = 0.3
 """How long a request waits for its count."""
 AGAIN_S = 1.0
 """How long a store that failed is left alone before one request asks it again."""
+REMEMBERED_S: Final = 24 * 3600
 GROUP = "buildarena"
 
 log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Count:
+    """Where a caller's requests stand.
+
+    Attributes:
+        passes: Whether the request may pass.
+        limit: Requests in a window.
+        remaining: Requests that are left of them.
+        reset_s: Seconds until the window ends, at least 1.
+    """
+
+    passes: bool
+    limit: int
+    remaining: int
+    reset_s: int
+
+    def headers(self) -> dict[str, str]:
+        """The same as headers of an answer."""
+        return {
+            "RateLimit-Limit": str(self.limit),
+            "RateLimit-Remaining": str(self.remaining),
+            "RateLimit-Reset": str(self.reset_s),
+        }
 
 
 class RateLimits:
@@ -50,30 +77,44 @@ class RateLimits:
         self._failed, self._asked_again_at = False, 0.0
         self.spelled = rate.replace("/", " per ")
 
-    async def hit(self, who: str) -> int | None:
-        """Counts a request; None when it may pass, otherwise in how many seconds it may."""
+    async def hit(self, who: str) -> Count:
+        """Counts a request."""
         if not self._failed or time.monotonic() >= self._asked_again_at:
             # Of a store that failed one request asks; the others go on without it.
             self._asked_again_at = time.monotonic() + AGAIN_S
             try:
                 passes = await self._shared.hit(self._item, GROUP, who)
+                stats = await self._shared.get_window_stats(self._item, GROUP, who)
                 self._failed = False
-                if passes:
-                    return None
-                return _wait_s(await self._shared.get_window_stats(self._item, GROUP, who))
+                return self._count(passes, stats)
             # What uvloop says of a connection that ended while nobody looked is a RuntimeError.
             except (RedisError, OSError, RuntimeError) as error:
                 if not self._failed:
                     log.warning("rate_limits_unreachable", error=str(error))
                 self._failed = True
-        if self._own.hit(self._item, GROUP, who):
-            return None
-        return _wait_s(self._own.get_window_stats(self._item, GROUP, who))
+        passes = self._own.hit(self._item, GROUP, who)
+        return self._count(passes, self._own.get_window_stats(self._item, GROUP, who))
+
+    async def first_said(self, name: str, said: str) -> str:
+        """What was first said under a name within a day: this, if nothing was or nobody knows."""
+        try:
+            store = Redis(connection_pool=self._pool)
+            before: Any = await store.set(
+                f"{GROUP}:{name}", said, nx=True, get=True, ex=REMEMBERED_S
+            )
+        except (RedisError, OSError, RuntimeError) as error:
+            log.warning("rate_limits_unreachable", error=str(error))
+            return said
+        return said if before is None else str(before.decode())
 
     async def close(self) -> None:
         """Closes the connections."""
         await self._pool.aclose()
 
-
-def _wait_s(stats: WindowStats) -> int:
-    return max(1, math.ceil(stats.reset_time - time.time()))
+    def _count(self, passes: bool, stats: WindowStats) -> Count:
+        return Count(
+            passes=passes,
+            limit=self._item.amount,
+            remaining=max(0, stats.remaining),
+            reset_s=max(1, math.ceil(stats.reset_time - time.time())),
+        )

@@ -39,7 +39,7 @@ class Question:
 
     Attributes:
         track: The track.
-        query: Which tasks, models and times.
+        query: Which tasks and models.
         sweeps: Ids of sweeps, if only jobs of these count.
         members: How many jobs these sweeps have: answers from before one had more are not true.
     """
@@ -52,7 +52,7 @@ class Question:
     @property
     def is_partial(self) -> bool:
         """Whether only some jobs of a cell may count, so that no kept summary tells."""
-        return (self.sweeps, self.query.since, self.query.until) != (None, None, None)
+        return self.sweeps is not None
 
     def filter(self) -> TrialFilter:
         """The same for a query of jobs."""
@@ -61,8 +61,6 @@ class Question:
             tasks=self.query.tasks,
             models=self.query.models,
             sweeps=self.sweeps,
-            since=self.query.since,
-            until=self.query.until,
         )
 
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_benchmark import Task
 from buildarena_benchmark.leaderboard import Board, OverallRow, Tally, cost_bins_of, failure_row
 
+Whole = Annotated[int, BeforeValidator(round)]
+
 
 class _View(BaseModel):
     model_config = ConfigDict(from_attributes=True)
 
 
-class FailureView(_View):
+class FailureRow(_View):
     """How the jobs of one model configuration ended."""
 
     model: str
@@ -30,24 +33,24 @@ class FailureView(_View):
     refused_actions: int
 
 
-class BinView(_View):
+class CostBin(_View):
     """Jobs whose sessions wrote about as much."""
 
-    low: float = Field(description="Fewest output tokens")
-    high: float = Field(description="Most output tokens")
-    trials: int
+    min_output_tokens: Whole = Field(validation_alias="low")
+    max_output_tokens: Whole = Field(validation_alias="high")
+    counted: int = Field(validation_alias="trials")
     mean: float | None = Field(description="Of the performance; the task's best job has 1")
     median: float | None
 
 
-class CostView(BaseModel):
+class CategoryCost(BaseModel):
     """Performance in bins of output tokens, over the tasks of a category."""
 
     category: str
-    bins: list[BinView]
+    bins: list[CostBin]
 
 
-class FrontView(_View):
+class FrontPoint(_View):
     """One model configuration's cost and performance over all tasks."""
 
     model: str
@@ -61,7 +64,7 @@ class FrontView(_View):
     pareto: bool = Field(description="No other model is both better and cheaper")
 
 
-class DimensionsView(_View):
+class DifficultyScores(_View):
     """Scores along the difficulty dimensions, from 0 (last on every task) to 1 (first)."""
 
     model: str
@@ -73,10 +76,10 @@ class Figures(BaseModel):
     """What a board's figures are drawn from."""
 
     track: str | None
-    dimensions: list[DimensionsView] = Field(description="Ranked configurations, the best first")
-    failures: list[FailureView]
-    cost: list[CostView]
-    front: list[FrontView] = Field(description="Cost against performance, the best first")
+    dimensions: list[DifficultyScores] = Field(description="Ranked configurations, the best first")
+    failures: list[FailureRow]
+    cost: list[CategoryCost]
+    front: list[FrontPoint] = Field(description="Cost against performance, the best first")
 
 
 def figures_view(
@@ -104,13 +107,13 @@ def figures_view(
     failures = [failure_row(*row, tallies) for row, tallies in sorted(by_row.items())]
     return Figures(
         track=track,
-        dimensions=[DimensionsView.model_validate(row) for row in _with_dimensions(board)],
-        failures=[FailureView.model_validate(row) for row in failures],
+        dimensions=[DifficultyScores.model_validate(row) for row in _with_dimensions(board)],
+        failures=[FailureRow.model_validate(row) for row in failures],
         cost=[
-            CostView(category=name, bins=[BinView.model_validate(one) for one in bins])
+            CategoryCost(category=name, bins=[CostBin.model_validate(one) for one in bins])
             for name, bins in sorted(found.items())
         ],
-        front=[FrontView.model_validate(row) for row in board.overall],
+        front=[FrontPoint.model_validate(row) for row in board.overall],
     )
 
 

@@ -26,7 +26,7 @@ class _View(BaseModel):
     model_config = ConfigDict(from_attributes=True)
 
 
-class Row(_View):
+class BoardRow(_View):
     """One model configuration on one task. What does not exist is null."""
 
     rank: int | None = Field(description="Statistically tied models share a rank")
@@ -40,7 +40,9 @@ class Row(_View):
         description="How replies were sampled, and the limits of the sessions, if any"
     )
     baseline: bool = Field(description="A built-in model for comparison")
-    trials: int = Field(description="Counted jobs: the denominator of the averages")
+    counted: int = Field(
+        description="Jobs that count: the denominator of the averages", validation_alias="trials"
+    )
     ended: int = Field(description="All ended jobs, also errored and cancelled ones")
     errored: int = Field(description="Jobs that infrastructure faults ended: in no average")
     cancelled: int
@@ -52,7 +54,7 @@ class Row(_View):
     )
     refuted: int = Field(description="Jobs whose verification came to other figures")
     simulated: int = Field(description="Counted jobs whose machine was finished and simulated")
-    successes: float
+    successes: float = Field(description="Sum of the shares of worlds in which jobs succeed")
     success_rate: float | None = Field(description="null when nothing was scored")
     success_low: float | None = Field(description="Lower end of the 95 % exact interval")
     success_high: float | None = Field(description="Upper end of the 95 % exact interval")
@@ -84,13 +86,15 @@ class Row(_View):
     output_tokens_mean: float | None
     cost_usd_mean: float | None
     cost_per_success_usd: float | None
-    invalid_action_rate: float | None
+    refused_action_rate: float | None = Field(validation_alias="invalid_action_rate")
     pass_at: dict[str, float] = Field(description="Chance that one of k tries succeeds, by k")
     pass_all: dict[str, float] = Field(description="Chance that all of k tries succeed, by k")
     outcomes: dict[str, int]
     reasons: dict[str, int] = Field(description="Counted jobs that failed, by reason")
     refusals: dict[str, int] = Field(description="Refused actions by class")
-    newest: datetime | None = Field(description="When the last of its jobs ended")
+    last_finished_at: datetime | None = Field(
+        description="When the last of its jobs ended", validation_alias="newest"
+    )
     jobs: str = Field(description="Path of the list of its jobs")
     manifest: str = Field(description="Path of the versions behind its score")
 
@@ -104,10 +108,10 @@ class TaskBoard(_View):
     outdated: int = Field(description="Ended jobs of other versions, which are left out")
     indicator: str
     unit: str
-    rows: list[Row]
+    rows: list[BoardRow]
 
 
-class OverallView(_View):
+class OverallRow(_View):
     """One model configuration over the built-in tasks of the board, or over those asked for."""
 
     rank: int | None = Field(description="null when a task is missing")
@@ -121,7 +125,7 @@ class OverallView(_View):
     score_mean: float | None = Field(
         description="Mean of the tasks' scores; null where a task or its expert is missing"
     )
-    trials: int
+    counted: int = Field(validation_alias="trials")
     success_rate_mean: float | None
     cost_usd_mean: float | None
     output_tokens_mean: float | None
@@ -139,7 +143,7 @@ class FlagView(_View):
 FLAGS = [FlagView.model_validate(flag, from_attributes=True) for flag in known_flags().values()]
 
 
-class VerdictView(_View):
+class RankingVerdict(_View):
     """What the overall ranking comes to, by the same tests as its ranks."""
 
     sentence: str = Field(description="Who is best, and whether the trials show it; for people")
@@ -163,31 +167,28 @@ class Board(BaseModel):
     tracks: list[str] = Field(description="Every track with ended jobs")
     flags: list[FlagView] = Field(default_factory=lambda: FLAGS)
     tasks: list[TaskBoard]
-    overall: list[OverallView] = Field(default=[])
+    overall: list[OverallRow] = Field(default=[])
     ranked: list[str] = Field(default=[], description="Tasks that `overall` is over")
-    verdict: VerdictView | None = Field(default=None, description="null when `overall` has no row")
+    verdict: RankingVerdict | None = Field(
+        default=None, description="null when `overall` has no row"
+    )
 
 
-class ChangeView(_View):
+class BoardChangeView(_View):
     """Something that changed on a board."""
 
     id: int
+    track: str
     kind: Literal["entered", "left", "rescored", "corrected", "unscored"]
     job_id: str
     task: str
     model: str
     before: dict[str, Any] | None
     after: dict[str, Any] | None
-    why: str | None = Field(description="Reason that came with the change, if any")
+    reason: str | None = Field(
+        description="That came with the change, if any", validation_alias="why"
+    )
     at: datetime
-
-
-class ChangePage(_View):
-    """Some changes, the newest first."""
-
-    track: str | None
-    changes: list[ChangeView]
-    next_before: int | None = Field(description="Give it as `before` to get the next page")
 
 
 _CELL = tuple(Cell.__dataclass_fields__)
@@ -217,14 +218,14 @@ def board_view(
     def is_baseline(model: str) -> bool:
         return model in registry.models and registry.models[model].baseline
 
-    def row(ranked: Any, task: str) -> Row:
+    def row(ranked: Any, task: str) -> BoardRow:
         cell: Cell = ranked.cell
         query = f"task={quoted(task)}&model={quoted(cell.model)}"
         one = (
             f"track={quoted(track)}&task_version={quoted(versions[task])}"
             f"&configuration={quoted(cell.configuration)}"
         )
-        return Row.model_validate(
+        return BoardRow.model_validate(
             {
                 **dict(zip(_CELL, _VALUES(cell), strict=True)),
                 "rank": ranked.rank,
@@ -252,7 +253,7 @@ def board_view(
             for found, task in ((found, tasks[found.task]) for found in board.tasks)
         ],
         overall=[
-            OverallView.model_validate(
+            OverallRow.model_validate(
                 {
                     **{name: getattr(place, name) for name in place.__dataclass_fields__},
                     "baseline": is_baseline(place.model),
@@ -261,7 +262,7 @@ def board_view(
             for place in board.overall
         ],
         ranked=list(board.ranked),
-        verdict=None if verdict is None else VerdictView.model_validate(verdict),
+        verdict=None if verdict is None else RankingVerdict.model_validate(verdict),
     )
 
 

@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from hashlib import sha256
 from typing import Any, Final
 
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import Answer, ResponseCache
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.job_records import missing
 from buildarena_api.replays.views import replay_view
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
@@ -50,7 +52,7 @@ class Replays:
         """
         transcript = self._transcripts.read(job)
         if transcript is None:
-            raise ProblemError(404, f"job {job.id} has no turns yet")
+            raise missing(job.id, "turns")
         kept = self._jobs.artifacts(job.id)
         names = (kept.get("machine"), kept.get("transcript"), sha256(transcript).hexdigest())
         return self._answers.get_or_make(
@@ -70,7 +72,7 @@ class Replays:
                 replay = replay_of_document(document, turns)
         except DocumentError as error:
             detail = f"job {job.id} has a machine that this version does not read: {error}"
-            raise ProblemError(404, detail) from error
+            raise ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, detail) from error
         return _body(replay, exact=replay.complete and replay.machine == machine)
 
     def _task(self, job: Job) -> Task | None:

@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-class PlacedView(BaseModel):
+class PlacedPart(BaseModel):
     """A block, and where it would have been."""
 
     id: str
@@ -23,7 +23,7 @@ class PlacedView(BaseModel):
     quaternion: Quaternion = Field(description="World from block, (w, x, y, z)")
 
 
-class PartView(PlacedView):
+class PartView(PlacedPart):
     """A part, and where it is after the step."""
 
     start: Vector | None = Field(description="Of a connector: where it begins, world frame, units")
@@ -32,7 +32,7 @@ class PartView(PlacedView):
     bindings: dict[str, list[str]] = Field(description="Keys by action")
 
 
-class PressView(BaseModel):
+class KeyPress(BaseModel):
     """A key that is held for a while."""
 
     model_config = ConfigDict(from_attributes=True)
@@ -57,10 +57,10 @@ class StepView(BaseModel):
     moved: list[PartView] = Field(description="Parts in another place than before")
     removed: list[str] = Field(description="Ids of parts that are gone")
     rebound: list[PartView] = Field(description="Parts with other keys or sense of rotation")
-    control_sequence: list[PressView] | None = Field(
+    control_sequence: list[KeyPress] | None = Field(
         description="All key presses, if the action changed them"
     )
-    attempted: list[PlacedView] = Field(
+    attempted: list[PlacedPart] = Field(
         description="Blocks where a refused action would have put them, if that is known"
     )
 
@@ -120,7 +120,7 @@ def _step(step: ReplayStep) -> StepView:
         rebound=_parts(changed.rebound),
         control_sequence=None
         if pressed is None
-        else [PressView.model_validate(one) for one in pressed],
+        else [KeyPress.model_validate(one) for one in pressed],
         attempted=[_attempted(block) for block in step.attempted],
     )
 
@@ -159,7 +159,7 @@ def connector_view(link: Connector) -> PartView:
     )
 
 
-def _attempted(block: AttemptedBlock) -> PlacedView:
-    return PlacedView(
+def _attempted(block: AttemptedBlock) -> PlacedPart:
+    return PlacedPart(
         id=block.id, module=block.module, position=block.position, quaternion=block.quaternion
     )

@@ -9,7 +9,10 @@ from fastapi import APIRouter, Query
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.pages import Page, PagingDep
+from buildarena_api.http.problems import ProblemError, invalid
+from buildarena_api.leaderboard.views import FlagView
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import module_set
 from buildarena_geometry.modules.module import Face
@@ -53,63 +56,52 @@ class ModuleView(_View):
     simulated: bool = Field(description="Whether both engines have its physics")
 
 
-class ScorerFlag(_View):
-    """A remark that a scorer may make on a trial."""
-
-    name: str
-    meaning: str
-    disqualifying: bool = Field(description="Whether its trials count as failures in our rankings")
-
-
-class ScorerView(BaseModel):
+class ScorerView(_View):
     """A scorer that task files can name."""
 
     name: str = Field(examples=["support"])
     description: str = Field(description="What its indicator is")
-    parameters: dict[str, Any] = Field(
+    parameters: Annotated[dict[str, Any], BeforeValidator(lambda m: m.model_json_schema())] = Field(
         description="JSON schema of what a task file says under `scoring`"
     )
-    flags: list[ScorerFlag]
+    flags: list[FlagView]
 
 
 @router.get("/models")
-def list_models(registry: RegistryDep) -> list[ModelView]:
+def list_models(registry: RegistryDep, paging: PagingDep) -> Page[ModelView]:
     """Lists the models of the registry."""
-    return [ModelView.model_validate(model) for model in registry.models.values()]
+    return Page[ModelView].model_validate(paging.of(list(registry.models.values())))
 
 
-@router.get("/modules", responses=problem_responses(404, 422, 503))
+@router.get("/modules")
 def list_modules(
     context: ContextDep,
+    paging: PagingDep,
     set_: Annotated[
         Literal["basic", "workshop", "all"] | None,
         Query(alias="set", description="The modules of a set; the basic ones by default"),
     ] = None,
     task: Annotated[str | None, Query(description="What builders of this task may use")] = None,
     version: Annotated[str | None, Query(description="Of the task; the newest by default")] = None,
-) -> list[ModuleView]:
+) -> Page[ModuleView]:
     """Lists modules: the basic ones, those of a set, or those that a task allows."""
     if task is not None and set_ is not None:
-        raise ProblemError(422, "modules are those of a set or of a task: give one of the two")
+        raise _contradictory("set", "pass either `set` or `task`, not both")
     if task is None and version is not None:
-        raise ProblemError(422, "version is a task's: give the task too")
+        raise _contradictory("version", "requires `task`")
     catalogue = (
         module_set(set_ or "basic")
         if task is None
         else context.tasks.find(task, version).task.constraints.catalogue
     )
-    return [ModuleView.model_validate(module) for module in catalogue.values()]
+    return Page[ModuleView].model_validate(paging.of(list(catalogue.values())))
 
 
 @router.get("/scorers")
-def list_scorers() -> list[ScorerView]:
+def list_scorers(paging: PagingDep) -> Page[ScorerView]:
     """Lists the scorers that task files can name, with their parameters and flags."""
-    return [
-        ScorerView(
-            name=scorer.name,
-            description=scorer.description,
-            parameters=scorer.parameters.model_json_schema(),
-            flags=[ScorerFlag.model_validate(flag) for flag in scorer.flags],
-        )
-        for scorer in known_scorers().values()
-    ]
+    return Page[ScorerView].model_validate(paging.of(list(known_scorers().values())))
+
+
+def _contradictory(field: str, message: str) -> ProblemError:
+    return invalid(field, message, code=ErrorCode.CONTRADICTORY_PARAMETERS)

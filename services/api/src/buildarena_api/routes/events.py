@@ -2,22 +2,41 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header
+from pydantic import BaseModel, ConfigDict, Field
 from sse_starlette import EventSourceResponse
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ServicesDep
 from buildarena_api.events.hub import EventHub
-from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(
     prefix="/v1", tags=["events"], dependencies=[limited("streams", until="request")]
 )
 
+
+class StreamEvent(BaseModel):
+    """What the data of an event is; its `event` is the job's or sweep's new state, or `turn`."""
+
+    model_config = ConfigDict(extra="allow")
+
+    job_id: str | None = Field(description="Of the job it happened to, if it is about one")
+    sweep_id: str | None = Field(description="Of the sweep it is about, if it is about one")
+    at: datetime
+    turn: dict[str, Any] | None = Field(
+        default=None, description="Of `turn`: as in the transcript; `shortened` if it is long"
+    )
+
+
 STREAM: dict[int | str, dict[str, Any]] = {
-    200: {"content": {"text/event-stream": {}}, "description": "Events as they happen"}
+    200: {
+        "model": StreamEvent,
+        "content": {"text/event-stream": {"schema": {"$ref": "#/components/schemas/StreamEvent"}}},
+        "description": "Events as they happen: the schema is that of each one's data",
+    }
 }
 PING_S = 15
 SEND_TIMEOUT_S = 60
@@ -36,7 +55,7 @@ LastEventId = Annotated[
 @router.get(
     "/jobs/{job_id}/events",
     response_class=EventSourceResponse,
-    responses=STREAM | problem_responses(404, 422, 503),
+    responses=STREAM,
 )
 async def stream_job(
     job_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0
@@ -48,7 +67,7 @@ async def stream_job(
 @router.get(
     "/sweeps/{sweep_id}/events",
     response_class=EventSourceResponse,
-    responses=STREAM | problem_responses(404, 422, 503),
+    responses=STREAM,
 )
 async def stream_sweep(
     sweep_id: str, services: ServicesDep, caller: CallerDep, last_event_id: LastEventId = 0

@@ -14,9 +14,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.board_filters import SelectionDep
 from buildarena_api.dependencies import ServicesDep
-from buildarena_api.http.problems import problem_responses
-from buildarena_api.leaderboard.views import Board, Row, board_view
-from buildarena_backend.store import Store
+from buildarena_api.http.pages import Page, PagingDep, seal
+from buildarena_api.leaderboard.views import Board, BoardRow, board_view
+from buildarena_api.schemas import UsageView
+from buildarena_backend.states import Outcome
 from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import (
@@ -42,17 +43,15 @@ class RoundView(BaseModel):
 
     model_config = ConfigDict(from_attributes=True)
 
-    machine: str = Field(description="Hash of its document")
+    machine_sha256: str = Field(description="Of its document", validation_alias="machine")
     success: bool
     indicator: float
     parts: int | None
     flags: list[str]
 
 
-class Result(BaseModel):
+class JobResult(BaseModel):
     """One ended job, with all that reports are made of."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     job_id: str
     track: str
@@ -62,7 +61,7 @@ class Result(BaseModel):
     configuration: str
     decoding: dict[str, Any]
     seed: int
-    outcome: str
+    outcome: Outcome
     reason: str | None
     success: bool
     indicator: float
@@ -75,12 +74,7 @@ class Result(BaseModel):
     parts: int | None
     flags: list[str]
     refusals: dict[str, int]
-    requests: int | None = Field(
-        description="null, as the next three, for an external agent: it reports none"
-    )
-    input_tokens: int | None
-    output_tokens: int | None
-    cost_usd: float | None
+    usage: UsageView
     actions: int
     refused_actions: int
     by_runner: bool = Field(description="A runner ran one of its trials")
@@ -90,12 +84,14 @@ class Result(BaseModel):
     rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
 
 
+_PLAIN = sorted({*JobResult.model_fields} - {"usage", "rounds"})
+
+
 @router.get(
     "/leaderboard/export",
     response_class=Response,
     responses={
         200: {"content": {kind.split(";")[0]: {} for kind in MEDIA_TYPES.values()}},
-        **problem_responses(404, 422, 503),
     },
 )
 def export(
@@ -132,31 +128,26 @@ def export(
     return Response(body, media_type=MEDIA_TYPES[format], headers=headers)
 
 
-@router.get(
-    "/sweeps/{sweep_id}/results",
-    response_model=list[Result],
-    responses=problem_responses(404, 503),
-)
-def sweep_results(sweep_id: str, services: ServicesDep) -> Response:
-    """All ended jobs of a sweep with their rounds: what a report is made of."""
-    body = _results(services.context.store, sweep_id)
-    return Response(body, media_type="application/json")
-
-
-def _results(store: Store, sweep_id: str) -> bytes:
+@router.get("/sweeps/{sweep_id}/results", response_model=Page[JobResult])
+def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Response:
+    """Lists the ended jobs of a sweep with their rounds, by id: what a report is made of."""
+    store = services.context.store
     store.sweeps.get(sweep_id)
-    found = [
-        Result.model_validate(
+    found = store.results.boards.of_sweep(sweep_id, after=paging.text or "", limit=paging.limit + 1)
+    shown, following = paging.cut(found, lambda one: seal([one[0].job_id]))
+    results = [
+        JobResult.model_validate(
             {
-                **{name: getattr(trial, name) for name in Result.model_fields if name != "rounds"},
+                **{name: getattr(trial, name) for name in _PLAIN},
                 "flags": list(trial.flags),
+                "usage": UsageView.of(trial),
                 "rounds": rounds,
             }
         )
-        for trial, rounds in store.results.boards.of_sweep(sweep_id)
+        for trial, rounds in shown
     ]
-    # One by one: no call keeps the interpreter for long.
-    return b"[" + b",".join(result.model_dump_json().encode() for result in found) + b"]"
+    page = Page[JobResult](data=results, next_cursor=following)
+    return Response(page.model_dump_json(), media_type="application/json")
 
 
 def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:
@@ -167,7 +158,7 @@ def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], B
 
 
 def _columns() -> list[str]:
-    names = [name for name in Row.model_fields if name not in PLACES]
+    names = [name for name in BoardRow.model_fields if name not in PLACES]
     about = ("track", "task_version", "indicator", "unit")
     return list(dict.fromkeys(["task", "model", *about, *names]))
 
@@ -214,7 +205,7 @@ def _parquet(rows: Sequence[dict[str, Any]]) -> bytes:
 
 def _kind(name: str) -> type:
     """What a column holds, be it optional or not; text for all that is not a plain number."""
-    fields = Row.model_fields
+    fields = BoardRow.model_fields
     annotation = fields[name].annotation if name in fields else str
     choices = get_args(annotation) if get_origin(annotation) is UnionType else (annotation,)
     return next((choice for choice in choices if choice in (int, float, bool)), str)

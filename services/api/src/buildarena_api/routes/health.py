@@ -31,7 +31,7 @@ FEW_LOST: Final = 3
 CLOCK_TOLERANCE_S: Final = 5.0
 
 
-class Check(BaseModel):
+class HealthCheck(BaseModel):
     """One part of the service."""
 
     name: str = Field(examples=["database"])
@@ -44,7 +44,7 @@ class Health(BaseModel):
     """The service as a whole."""
 
     status: Literal["ok", "degraded", "down"]
-    checks: list[Check]
+    checks: list[HealthCheck]
 
 
 @router.get(
@@ -71,7 +71,7 @@ async def health(services: ServicesDep, response: Response) -> Health:
     return Health(status="ok" if all(c.ok for c in checks) else "degraded", checks=checks)
 
 
-def _database(parts: Parts) -> tuple[Check, WorkerCounts | None]:
+def _database(parts: Parts) -> tuple[HealthCheck, WorkerCounts | None]:
     try:
         counts = parts.database.latest()
     except PartFailedError as error:
@@ -80,8 +80,8 @@ def _database(parts: Parts) -> tuple[Check, WorkerCounts | None]:
             advice = "run `buildarena admin migrate`"
         elif error.is_silent:
             advice = "look at Postgres' log, disk and locks; it accepts connections"
-        return Check(name="database", ok=False, detail=str(error), advice=advice), None
-    return Check(name="database", ok=True, detail="reachable, schema as expected"), counts
+        return HealthCheck(name="database", ok=False, detail=str(error), advice=advice), None
+    return HealthCheck(name="database", ok=True, detail="reachable, schema as expected"), counts
 
 
 def _figures(parts: Parts) -> MetricValues | None:
@@ -90,35 +90,37 @@ def _figures(parts: Parts) -> MetricValues | None:
     return None
 
 
-def _broker(parts: Parts) -> Check:
+def _broker(parts: Parts) -> HealthCheck:
     try:
         waiting = parts.broker.latest()
     except PartFailedError as error:
-        return Check(
+        return HealthCheck(
             name="broker",
             ok=False,
             detail=f"{error}; jobs are kept and wait",
             advice="start Valkey or Redis, or correct BUILDARENA_BROKER_URL",
         )
-    return Check(name="broker", ok=True, detail=f"reachable, {waiting} messages for construct")
+    return HealthCheck(
+        name="broker", ok=True, detail=f"reachable, {waiting} messages for construct"
+    )
 
 
-def _artifacts(parts: Parts) -> Check:
+def _artifacts(parts: Parts) -> HealthCheck:
     try:
         parts.artifacts.latest()
     except PartFailedError as error:
-        return Check(
+        return HealthCheck(
             name="artifacts",
             ok=False,
             detail=f"{error}; jobs wait and lose nothing",
             advice="free space, or correct BUILDARENA_ARTIFACTS_URL and its permissions",
         )
-    return Check(name="artifacts", ok=True, detail="can be written and read")
+    return HealthCheck(name="artifacts", ok=True, detail="can be written and read")
 
 
 def _workers(
     context: Context, counts: WorkerCounts, figures: MetricValues | None
-) -> Iterator[Check]:
+) -> Iterator[HealthCheck]:
     """Each queue that has workers or should have: those of our simulators, and where jobs wait."""
     waiting = {each.queue: each for each in figures.queues if each.jobs} if figures else {}
     ours = [CONSTRUCT_QUEUE, *map(simulate_queue, configured_simulators(context.settings))]
@@ -126,15 +128,15 @@ def _workers(
         serving, depth = counts.serving.get(queue, 0), waiting.get(queue)
         detail = f"{serving} alive" + (f"; {depth.jobs} waiting" if depth else "")
         advice = "" if serving else f"start a worker for the queue {queue}"
-        yield Check(name=f"workers of {queue}", ok=not advice, detail=detail, advice=advice)
+        yield HealthCheck(name=f"workers of {queue}", ok=not advice, detail=detail, advice=advice)
 
 
-def _waiting(figures: MetricValues) -> Check:
+def _waiting(figures: MetricValues) -> HealthCheck:
     oldest = max(figures.queues, key=lambda depth: depth.oldest_s, default=None)
     if oldest is None or oldest.oldest_s < 1:
-        return Check(name="waiting", ok=True, detail="no job")
+        return HealthCheck(name="waiting", ok=True, detail="no job")
     long = oldest.oldest_s > LONG_WAIT_S
-    return Check(
+    return HealthCheck(
         name="waiting",
         ok=not long,
         detail=f"the oldest job for {_duration(oldest.oldest_s)}, in {oldest.queue}",
@@ -147,10 +149,10 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min" if minutes else f"{seconds:.0f} s"
 
 
-def _lost(counts: WorkerCounts) -> Check:
+def _lost(counts: WorkerCounts) -> HealthCheck:
     many = max(counts.lost.values(), default=0) > FEW_LOST
     lost = [f"{number} of {kind}" for kind, number in sorted(counts.lost.items()) if number]
-    return Check(
+    return HealthCheck(
         name="silent workers",
         ok=not many,
         detail=f"{', '.join(lost) or 'none'} within the last hour",
@@ -158,15 +160,15 @@ def _lost(counts: WorkerCounts) -> Check:
     )
 
 
-def _audits(figures: MetricValues) -> Check:
+def _audits(figures: MetricValues) -> HealthCheck:
     waiting = figures.audits.get(Audit.REQUIRED, 0)
-    return Check(name="audits", ok=True, detail=f"{waiting} jobs wait for their verification")
+    return HealthCheck(name="audits", ok=True, detail=f"{waiting} jobs wait for their verification")
 
 
-def _budgets(figures: MetricValues) -> Check:
+def _budgets(figures: MetricValues) -> HealthCheck:
     """Not wrong, but somebody waits: an alert of the least severity."""
     waiting = figures.sweeps.get(SweepState.BUDGET_EXHAUSTED, 0)
-    return Check(
+    return HealthCheck(
         name="budgets",
         ok=True,
         detail=f"{waiting} sweeps wait for a larger one",
@@ -174,14 +176,14 @@ def _budgets(figures: MetricValues) -> Check:
     )
 
 
-def _clocks(counts: WorkerCounts) -> Check:
+def _clocks(counts: WorkerCounts) -> HealthCheck:
     """Leases go by the database's clock; but limits in seconds and logs go by each process' own."""
     wrong = [
         f"{worker} is {abs(ahead_s):.0f} s {'ahead' if ahead_s > 0 else 'behind'}"
         for worker, ahead_s in counts.clocks
         if abs(ahead_s) > CLOCK_TOLERANCE_S
     ]
-    return Check(
+    return HealthCheck(
         name="clocks",
         ok=not wrong,
         detail="; ".join(wrong) or "workers and database agree",
@@ -189,13 +191,13 @@ def _clocks(counts: WorkerCounts) -> Check:
     )
 
 
-def _disk(context: Context) -> Check:
+def _disk(context: Context) -> HealthCheck:
     folder = context.settings.artifact_folder
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     disk = shutil.disk_usage(Path(existing))
     share = disk.free / disk.total
     low = disk.free < LOW_DISK_BYTES or share < LOW_DISK_SHARE
-    return Check(
+    return HealthCheck(
         name="disk",
         ok=not low,
         detail=f"{disk.free / 1e9:.1f} GB free, {share:.0%}",

@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 from hashlib import sha256
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
 from buildarena_api.access import CallerDep, limited
-from buildarena_api.dependencies import MAX_ROWS, ContextDep, RegistryDep, ServicesDep
-from buildarena_api.http import cursors
+from buildarena_api.dependencies import ContextDep, RegistryDep, ServicesDep
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.http.pages import Page, PagingDep, encode
 from buildarena_api.http.places import Kind
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.problems import ProblemError
 from buildarena_api.job_filters import JobFilterDep, require_known
+from buildarena_api.job_records import machine_hash, missing, require_told
 from buildarena_api.routes.transcripts import as_markdown
 from buildarena_api.schemas import (
+    EXISTED,
+    ArtifactView,
     AttemptView,
     JobDetail,
-    JobFileView,
-    JobPage,
     JobSummaryView,
     JobView,
-    PromptsView,
     PromptView,
 )
-from buildarena_api.withholding import require_told
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
-from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
-from buildarena_backend.process.context import Context
 
 
 def _kind(request: Request) -> Kind:
@@ -41,26 +40,21 @@ def _kind(request: Request) -> Kind:
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[limited(_kind)])
 
-DEFAULT_LIMIT: Final = 100
+JSON = "application/json"
 
 
-ARTIFACT_TYPES = {
-    "machine": "application/json",
-    "transcript": "application/json",
-}
-
-
-@router.post("", status_code=202, responses=problem_responses(422, 503))
+@router.post("", status_code=201, responses=EXISTED)
 def submit_job(
-    spec: JobSpec, response: Response, services: ServicesDep, caller: CallerDep
+    spec: JobSpec, response: Response, services: ServicesDep, caller: CallerDep, _: RequestKey
 ) -> JobView:
     """Submits one job. An equal job that exists already is returned as it is, never redone."""
-    job, _ = services.submissions.submit_job(spec, owner=caller.key_id)
+    job, added = services.submissions.submit_job(spec, owner=caller.key_id)
+    response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
 
 
-@router.get("", response_model=JobPage, responses=problem_responses(404, 422, 503))
+@router.get("", response_model=Page[JobView])
 def list_jobs(
     context: ContextDep,
     registry: RegistryDep,
@@ -72,8 +66,7 @@ def list_jobs(
     order: Annotated[
         Literal["asc", "desc"], Query(description="desc: the newest, or greatest, first")
     ] = "desc",
-    cursor: Annotated[str | None, Query(max_length=1000)] = None,
-    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = DEFAULT_LIMIT,
+    paging: PagingDep,
 ) -> Response:
     """Lists jobs, newest first by default.
 
@@ -82,27 +75,22 @@ def list_jobs(
     """
     in_order = Order(by=sort, descending=order == "desc")
     found = context.store.jobs.page(
-        limit=limit,
-        after=None if cursor is None else cursors.decode_in(cursor, in_order),
+        limit=paging.limit + 1,
+        after=paging.after(in_order),
         order=in_order,
         wanted=wanted,
     )
     if not found:
         require_known(context, registry, wanted)
-    more = len(found) == limit
-    page = JobPage(
-        jobs=[JobView.of(job) for job in found],
-        next_cursor=_cursor(in_order, found[-1]) if more else None,
+    shown, following = paging.cut(
+        found, lambda job: encode(in_order, sort_value(job, sort), job.id)
     )
+    page = Page[JobView](data=[JobView.of(job) for job in shown], next_cursor=following)
     # Made here: the event loop serves others meanwhile.
-    return Response(page.model_dump_json(), media_type="application/json")
+    return Response(page.model_dump_json(), media_type=JSON)
 
 
-def _cursor(order: Order, job: Job) -> str:
-    return cursors.encode_in(order, sort_value(job, order.by), job.id)
-
-
-@router.get("/summary", responses=problem_responses(404, 422, 503))
+@router.get("/summary")
 def summarise_jobs(
     context: ContextDep, registry: RegistryDep, wanted: JobFilterDep
 ) -> JobSummaryView:
@@ -113,20 +101,23 @@ def summarise_jobs(
     return JobSummaryView.model_validate(counted)
 
 
-@router.get("/{job_id}", responses=problem_responses(404, 503))
+@router.get("/{job_id}")
 def show_job(job_id: str, context: ContextDep) -> JobDetail:
     """Shows a job with its manifest, attempts and artifacts."""
     job = context.store.jobs.get(job_id)
+    known = job.usage_is_known
     return JobDetail(
         **JobView.of(job).model_dump(),
         manifest=None if job.manifest is None else dict(job.manifest),
         attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
         artifacts=context.store.jobs.artifacts(job_id),
+        cached_tokens=job.cached_tokens if known else None,
+        reasoning_tokens=job.reasoning_tokens if known else None,
     )
 
 
-@router.get("/{job_id}/prompts", responses=problem_responses(404, 503))
-def show_prompts(job_id: str, context: ContextDep) -> PromptsView:
+@router.get("/{job_id}/prompts")
+def list_prompts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[PromptView]:
     """What each role was told before its turns: system messages, the task, results of trials.
 
     Of a session under way, what was told so far. Very long messages are cut.
@@ -135,10 +126,10 @@ def show_prompts(job_id: str, context: ContextDep) -> PromptsView:
     """
     context.store.jobs.get(job_id)
     found = context.store.turns.prompts(job_id)
-    return PromptsView(prompts=[PromptView.model_validate(prompt) for prompt in found])
+    return Page[PromptView].model_validate(paging.of(found))
 
 
-@router.post("/{job_id}/cancel", responses=problem_responses(404, 409, 503))
+@router.post("/{job_id}/cancel")
 def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Ends a job that has not ended; the model request that is open ends at once.
 
@@ -146,11 +137,11 @@ def cancel_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     ends. An admin ends it whoever wants it.
     """
     if not context.store.lifecycle.cancel_job(job_id, owner=caller.key_id, force=caller.is_admin):
-        raise ProblemError(409, f"job {job_id} has ended already")
+        raise ProblemError(ErrorCode.ILLEGAL_STATE, f"job {job_id} has ended already")
     return JobView.of(context.store.jobs.get(job_id))
 
 
-@router.post("/{job_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
+@router.post("/{job_id}/retry")
 def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     """Queues an errored job where it failed, or a refuted one for its trial by a runner.
 
@@ -160,7 +151,7 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
         job = context.store.jobs.get(job_id)
         state = job.outcome or job.state
         raise ProblemError(
-            409,
+            ErrorCode.ILLEGAL_STATE,
             f"only errored jobs and refuted trials of runners are retried; job {job_id} is {state}",
         )
     job = context.store.jobs.get(job_id)
@@ -168,29 +159,28 @@ def retry_job(job_id: str, context: ContextDep, caller: CallerDep) -> JobView:
     return JobView.of(job)
 
 
-@router.get("/{job_id}/artifacts", responses=problem_responses(404, 503))
-def list_artifacts(job_id: str, context: ContextDep) -> list[JobFileView]:
+@router.get("/{job_id}/artifacts")
+def list_artifacts(job_id: str, context: ContextDep, paging: PagingDep) -> Page[ArtifactView]:
     """Lists all artifacts of a job, by name."""
     context.store.jobs.get(job_id)
-    return [JobFileView.model_validate(file) for file in context.store.jobs.files(job_id)]
+    return Page[ArtifactView].model_validate(paging.of(context.store.jobs.files(job_id)))
 
 
 @router.get(
-    "/{job_id}/artifacts/{name}",
+    "/{job_id}/artifacts/{artifact}",
     responses={
         200: {"content": {kind: {} for kind in MEDIA_TYPES}},
-        **problem_responses(404, 503),
     },
     response_class=Response,
 )
-def get_artifact_by_name(job_id: str, name: str, context: ContextDep) -> Response:
+def get_artifact(job_id: str, artifact: str, context: ContextDep) -> Response:
     """An artifact of a job; its ETag is the SHA-256 of its bytes."""
     job = context.store.jobs.get(job_id)
-    if name.startswith("trajectory-"):
+    if artifact.startswith("trajectory-"):
         require_told(context, job)
-    found = [file for file in context.store.jobs.files(job_id) if file.name == name]
+    found = [file for file in context.store.jobs.files(job_id) if file.name == artifact]
     if not found:
-        raise ProblemError(404, f"job {job_id} has no {name!r}")
+        raise missing(job_id, repr(artifact))
     return Response(
         context.artifacts.get(found[0].hash),
         media_type=found[0].media_type,
@@ -199,50 +189,32 @@ def get_artifact_by_name(job_id: str, name: str, context: ContextDep) -> Respons
     )
 
 
+@router.get("/{job_id}/machine", response_class=Response, responses={200: {"content": {JSON: {}}}})
+def get_machine(job_id: str, context: ContextDep) -> Response:
+    """The machine document of a job."""
+    digest = machine_hash(context, context.store.jobs.get(job_id))
+    headers = {"ETag": f'"{digest}"'}
+    return Response(context.artifacts.get(digest), media_type=JSON, headers=headers)
+
+
 @router.get(
-    "/{job_id}/{artifact}",
-    responses={
-        200: {
-            "content": {kind: {} for kind in sorted({*ARTIFACT_TYPES.values(), "text/markdown"})}
-        },
-        **problem_responses(404, 422, 503),
-    },
+    "/{job_id}/transcript",
     response_class=Response,
+    responses={200: {"content": {JSON: {}, "text/markdown": {}}}},
 )
-def get_artifact(
+def get_transcript(
     job_id: str,
-    artifact: Literal["machine", "transcript"],
     context: ContextDep,
     style: Annotated[
-        Literal["json", "markdown"], Query(description="markdown: a transcript for people")
+        Literal["json", "markdown"], Query(alias="format", description="markdown: for people")
     ] = "json",
 ) -> Response:
-    """The machine document or the transcript of a job.
-
-    The transcript of a session that is under way goes as far as that has come.
-    """
+    """The transcript of a job; of a session that is under way as far as that has come."""
     job = context.store.jobs.get(job_id)
-    if artifact == "transcript":
-        return _transcript(context, job, style)
-    digest = context.store.jobs.artifacts(job_id).get(artifact)
-    if digest is None:
-        raise ProblemError(404, f"job {job_id} has no {artifact} yet")
-    return Response(
-        context.artifacts.get(digest),
-        media_type=ARTIFACT_TYPES[artifact],
-        headers={"ETag": f'"{digest}"'},
-    )
-
-
-def _transcript(context: Context, job: Job, style: str) -> Response:
     data = Transcripts(context.store, context.artifacts).read(job)
     if data is None:
-        raise ProblemError(404, f"job {job.id} has no transcript yet")
+        raise missing(job_id, "transcript")
     if style == "markdown":
         title = f"{job.task} by {job.model}, seed {job.seed}"
         return Response(as_markdown(data, title), media_type="text/markdown; charset=utf-8")
-    return Response(
-        data,
-        media_type=ARTIFACT_TYPES["transcript"],
-        headers={"ETag": f'"{sha256(data).hexdigest()}"'},
-    )
+    return Response(data, media_type=JSON, headers={"ETag": f'"{sha256(data).hexdigest()}"'})

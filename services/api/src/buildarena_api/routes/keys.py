@@ -5,13 +5,13 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from typing import Annotated, Literal, Self
 
-from fastapi import APIRouter, Depends, Response
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from fastapi import APIRouter, Response
+from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
 
-from buildarena_api.access import admin_only
 from buildarena_api.dependencies import ContextDep, ServicesDep
-from buildarena_api.http.problems import problem_responses
-from buildarena_api.schemas import BudgetView
+from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.http.pages import Page, PagingDep
+from buildarena_api.schemas import EXISTED, BudgetUse
 from buildarena_backend.accounts.keys import ApiKey
 from buildarena_backend.catalog.specs import Budget, Title
 from buildarena_backend.errors import SubmissionError
@@ -20,7 +20,7 @@ from buildarena_backend.settings import SimulatorName
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.trials.known_simulators import simulator_issues
 
-router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[Depends(admin_only)])
+router = APIRouter(prefix="/v1/keys", tags=["keys"])
 
 
 class NewKey(BaseModel):
@@ -54,8 +54,8 @@ class NewKey(BaseModel):
             description="Of a runner key: ids of the keys whose jobs may be leased; null for all",
         ),
     ] = None
-    days: Annotated[
-        int | None, Field(ge=1, le=3650, description="Days until it expires; null for never")
+    expires_in_days: Annotated[
+        StrictInt | None, Field(ge=1, le=3650, description="Days until it expires; null for never")
     ] = None
     budget: Budget | None = None
 
@@ -109,47 +109,56 @@ class KeyView(BaseModel):
     suspended_for: str | None = Field(
         description="The verification that refuted a trial of its runners"
     )
-    previous_until: datetime | None = Field(
-        description="Until when the secret before the present one is good; null without one"
+    previous_expires_at: datetime | None = Field(
+        description="Until when the secret before the present one is good; null without one",
+        validation_alias="previous_until",
     )
-    budget: BudgetView | None = None
+    budget: BudgetUse | None = None
 
 
 class KeyCreated(KeyView):
     """A key that was just made."""
 
-    secret: str = Field(description="What requests carry; it can't be read again")
+    secret: str | None = Field(
+        description="What requests carry; it can't be read again. null if the key was there "
+        "already, under the same Idempotency-Key"
+    )
 
 
-@router.post("", status_code=201, responses=problem_responses(422, 503))
-def create_key(body: NewKey, response: Response, context: ContextDep) -> KeyCreated:
+@router.post("", status_code=201, responses=EXISTED)
+def create_key(
+    body: NewKey, response: Response, context: ContextDep, request_key: RequestKey
+) -> KeyCreated:
     """Makes a key. Its secret is in this answer only."""
     issues = simulator_issues(context, *(body.simulators or ()), path="simulators")
     if issues:
         raise SubmissionError(issues)
-    ttl = None if body.days is None else timedelta(days=body.days)
+    ttl = None if body.expires_in_days is None else timedelta(days=body.expires_in_days)
     key, secret = context.store.keys.create(
         name=body.name,
         scopes=body.scopes,
         ttl=ttl,
         simulators=body.simulators,
         job_owners=body.job_owners,
+        key_id=None if request_key is None else f"key_{request_key[:20]}",
     )
-    if body.budget is not None:
+    response.status_code = 200 if secret is None else 201
+    if body.budget is not None and secret is not None:
         with context.store.database.transaction() as connection:
             context.store.budgets.set(key.id, body.budget.as_limits(), connection=connection)
     response.headers["Location"] = f"/v1/keys/{key.id}"
     response.headers["Cache-Control"] = "no-store"
-    return KeyCreated(**_view(context, key).model_dump(), secret=secret)
+    return _created(context, key, secret)
 
 
-@router.get("", responses=problem_responses(503))
-def list_keys(context: ContextDep) -> list[KeyView]:
+@router.get("")
+def list_keys(context: ContextDep, paging: PagingDep) -> Page[KeyView]:
     """Lists all keys, oldest first, including revoked and expired ones."""
-    return [_view(context, key) for key in context.store.keys.all()]
+    page = paging.of(context.store.keys.all())
+    return Page[KeyView](**page | {"data": [_view(context, key) for key in page["data"]]})
 
 
-@router.post("/{key_id}/rotate", responses=problem_responses(404, 409, 422, 503))
+@router.post("/{key_id}/rotate")
 def rotate_key(
     key_id: str, body: Rotation, response: Response, services: ServicesDep
 ) -> KeyCreated:
@@ -161,10 +170,10 @@ def rotate_key(
     key, secret = services.context.store.keys.rotate(key_id, overlap=overlap)
     services.key_checks.forget()
     response.headers["Cache-Control"] = "no-store"
-    return KeyCreated(**_view(services.context, key).model_dump(), secret=secret)
+    return _created(services.context, key, secret)
 
 
-@router.post("/{key_id}/revoke", responses=problem_responses(404, 503))
+@router.post("/{key_id}/revoke")
 def revoke_key(key_id: str, services: ServicesDep) -> KeyView:
     """Revokes a key at once; its jobs continue."""
     revoked = _view(services.context, services.context.store.keys.revoke(key_id))
@@ -172,7 +181,7 @@ def revoke_key(key_id: str, services: ServicesDep) -> KeyView:
     return revoked
 
 
-@router.post("/{key_id}/reinstate", responses=problem_responses(404, 503))
+@router.post("/{key_id}/reinstate")
 def reinstate_key(key_id: str, services: ServicesDep) -> KeyView:
     """Lets a key work again that was suspended because a trial of its runners was refuted."""
     reinstated = _view(services.context, services.context.store.keys.reinstate(key_id))
@@ -180,7 +189,7 @@ def reinstate_key(key_id: str, services: ServicesDep) -> KeyView:
     return reinstated
 
 
-@router.put("/{key_id}/budget", responses=problem_responses(404, 422, 503))
+@router.put("/{key_id}/budget")
 def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
     """Sets the budget of all jobs of a key, and resumes its single jobs that had to stop.
 
@@ -194,7 +203,12 @@ def set_budget(key_id: str, body: Budget, context: ContextDep) -> KeyView:
     return _view(context, key)
 
 
+def _created(context: Context, key: ApiKey, secret: str | None) -> KeyCreated:
+    view = _view(context, key)
+    return KeyCreated.model_construct(**dict(view), secret=secret)
+
+
 def _view(context: Context, key: ApiKey) -> KeyView:
     view = KeyView.model_validate(key)
-    view.budget = BudgetView.of(context.store.budgets.get(key.id))
+    view.budget = BudgetUse.of(context.store.budgets.get(key.id))
     return view

@@ -5,19 +5,20 @@ from __future__ import annotations
 import random
 from collections import Counter
 from collections.abc import Mapping
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.access import CallerDep
-from buildarena_api.board_filters import SelectionDep, unknown
-from buildarena_api.dependencies import MAX_ROWS, ContextDep, ServicesDep
+from buildarena_api.board_filters import SelectionDep
+from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.etags import conditional
-from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.pages import Page, PagingDep, seal
+from buildarena_api.http.problems import unknown
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
-from buildarena_api.leaderboard.views import Board, ChangePage, ChangeView, board_view
+from buildarena_api.leaderboard.views import Board, BoardChangeView, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
@@ -28,10 +29,7 @@ MAX_DISTINCT = 20
 """Values of a manifest that are spelled out; of a name with more, seeds say, only their number."""
 
 
-DEFAULT_LIMIT: Final = 100
-
-
-class TestView(BaseModel):
+class PairedTest(BaseModel):
     """A paired test on shared seeds."""
 
     model_config = ConfigDict(from_attributes=True)
@@ -42,19 +40,21 @@ class TestView(BaseModel):
     p_value: float
 
 
-class TaskDuelView(BaseModel):
+class TaskComparisonView(BaseModel):
     """Two models on one task; tests only where they share seeds."""
 
     model_config = ConfigDict(from_attributes=True)
 
     task: str
     successes: tuple[float, float]
-    trials: tuple[int, int]
+    counted_jobs: tuple[int, int] = Field(validation_alias="trials")
     difference: float = Field(description="Success rate of the first minus that of the second")
-    low: float = Field(description="Lower end of its 95 % interval, unpaired")
-    high: float
-    success: TestView | None
-    indicator: TestView | None
+    ci_low: float = Field(
+        description="Lower end of its 95 % interval, unpaired", validation_alias="low"
+    )
+    ci_high: float = Field(validation_alias="high")
+    success: PairedTest | None
+    indicator: PairedTest | None
     success_p: float | None = Field(
         description="Adjusted over the tests of both figures on all tasks (Holm)"
     )
@@ -67,7 +67,7 @@ class Comparison(BaseModel):
     track: str | None
     first: str
     second: str
-    tasks: list[TaskDuelView]
+    tasks: list[TaskComparisonView]
 
 
 class ManifestEntry(BaseModel):
@@ -96,14 +96,14 @@ class VerifyAccepted(BaseModel):
     """Verifications that were requested."""
 
     scored: int = Field(description="Scored jobs of the model")
-    verifications: list[str] = Field(description="Ids; see /v1/verifications/{id}")
-    left: list[str] = Field(
-        description="Jobs that found no room, as a key has a number of verifications open at "
-        "most: ask for them one by one when some have ended"
+    verification_ids: list[str] = Field(description="See /v1/verifications/{verification_id}")
+    skipped_job_ids: list[str] = Field(
+        description="Jobs that were not queued, as the key has as many open verifications as it "
+        "may: request them again when some have ended"
     )
 
 
-@router.get("/leaderboard", response_model=Board, responses=problem_responses(404, 422, 503))
+@router.get("/leaderboard", response_model=Board)
 def leaderboard(
     services: ServicesDep,
     selection: SelectionDep,
@@ -131,9 +131,7 @@ def leaderboard(
     return conditional(request, answer, "application/json")
 
 
-@router.get(
-    "/leaderboard/figures", response_model=Figures, responses=problem_responses(404, 422, 503)
-)
+@router.get("/leaderboard/figures", response_model=Figures)
 def figures(services: ServicesDep, selection: SelectionDep, request: Request) -> Any:
     """What the figures of a board are drawn from; reports are drawn from the same."""
     track = selection.track
@@ -152,7 +150,7 @@ def figures(services: ServicesDep, selection: SelectionDep, request: Request) ->
     return conditional(request, answer, "application/json")
 
 
-@router.get("/leaderboard/compare", responses=problem_responses(404, 422, 503))
+@router.get("/leaderboard/compare")
 def compare(
     services: ServicesDep,
     selection: SelectionDep,
@@ -173,7 +171,7 @@ def compare(
         track=selection.track,
         first=first,
         second=second,
-        tasks=[TaskDuelView.model_validate(task) for task in tasks],
+        tasks=[TaskComparisonView.model_validate(task) for task in tasks],
     )
 
 
@@ -191,50 +189,41 @@ def _usual(every: Mapping[CellId, CellRecord], field: str, name: str) -> list[Ce
     return [id_ for id_ in every if id_.configuration == usual]
 
 
-@router.get(
-    "/leaderboard/changes",
-    response_model=ChangePage,
-    responses=problem_responses(404, 422, 503),
-)
-def changes(
+@router.get("/leaderboard/changes", response_model=Page[BoardChangeView])
+def list_changes(
     context: ContextDep,
     selection: SelectionDep,
+    paging: PagingDep,
     *,
-    before: Annotated[int | None, Query(ge=0, description="Only older ones")] = None,
-    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = DEFAULT_LIMIT,
     unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
 ) -> Response:
     """What entered a track's board, left it or was scored again, and why; newest first."""
-    page = ChangePage(track=None, changes=[], next_before=None)
-    if selection.track is not None:
-        found = context.store.results.boards.changes(
-            selection.track, before=before, limit=limit, scored_only=not unscored
-        )
-        page = ChangePage(
-            track=selection.track,
-            changes=[ChangeView.model_validate(change) for change in found],
-            next_before=found[-1].id if len(found) == limit else None,
-        )
+    found = context.store.results.boards.changes(
+        selection.track or "",
+        before=paging.number,
+        limit=paging.limit + 1,
+        scored_only=not unscored,
+    )
+    shown, following = paging.cut(found, lambda change: seal([change.id]))
+    page = Page[BoardChangeView].model_validate({"data": shown, "next_cursor": following})
     return Response(page.model_dump_json(), media_type="application/json")
 
 
-@router.get("/leaderboard/manifest", responses=problem_responses(404, 422, 503))
-def manifest(
-    context: ContextDep, services: ServicesDep, selection: SelectionDep
-) -> list[ManifestEntry]:
+@router.get("/leaderboard/manifest")
+def list_manifest_entries(
+    context: ContextDep, services: ServicesDep, selection: SelectionDep, paging: PagingDep
+) -> Page[ManifestEntry]:
     """The versions behind an entry (name task and model): what its jobs' manifests say."""
-    if selection.track is None:
-        return []
-    inside = services.boards.inside(selection.question)
     entries: dict[str, list[dict[str, Any]]] = {}
+    inside = services.boards.inside(selection.question) if selection.track else {}
     for task, version, model in sorted(
         {(i.task, i.task_version, cell.model) for i, cell in inside.items()}
     ):
         for name, value, jobs in context.store.results.boards.manifest_values(
-            selection.track, task, version, model
+            selection.question.track, task, version, model
         ):
             entries.setdefault(name, []).append({"value": value, "jobs": jobs})
-    return [
+    views = [
         ManifestEntry(
             name=name,
             distinct=len(values),
@@ -242,9 +231,10 @@ def manifest(
         )
         for name, values in entries.items()
     ]
+    return Page[ManifestEntry](**paging.of(views))
 
 
-@router.post("/leaderboard/verify", status_code=202, responses=problem_responses(422, 503))
+@router.post("/leaderboard/verify")
 def verify(
     body: VerifyRequest, context: ContextDep, services: ServicesDep, caller: CallerDep
 ) -> VerifyAccepted:
@@ -269,5 +259,7 @@ def verify(
         chosen = random.Random(body.seed).sample(scored, body.sample)  # noqa: S311
     asked = request_verifications(context, chosen, caller)
     return VerifyAccepted(
-        scored=len(scored), verifications=list(asked.ids.values()), left=list(asked.left)
+        scored=len(scored),
+        verification_ids=list(asked.ids.values()),
+        skipped_job_ids=list(asked.left),
     )

@@ -9,20 +9,21 @@ from pydantic import BaseModel, Field
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.http.problems import unknown
 from buildarena_api.machine_uploads import (
     MAX_BYTES,
     read_uploaded,
     refused,
     uploaded,
 )
-from buildarena_api.replays.views import PressView
+from buildarena_api.replays.views import KeyPress
 from buildarena_api.scenes import MachineScene, Vector, machine_scene
-from buildarena_api.schemas import JobView
+from buildarena_api.schemas import EXISTED, JobView
 from buildarena_backend.agents.machine_trials import request_trial
 from buildarena_backend.catalog.specs import MAX_SEED, Name
 from buildarena_backend.process.context import Context
-from buildarena_benchmark import ValidationIssue, broken_constraint
+from buildarena_benchmark import broken_constraint
 from buildarena_geometry import Machine
 from buildarena_simulation import DEFAULT_ENGINE
 
@@ -47,14 +48,6 @@ FileDep = Annotated[bytes, Depends(uploaded)]
 TaskName = Annotated[Name | None, Query(description="Also hold it against this task's rules")]
 
 
-class TrialQuery(BaseModel):
-    """Which trial."""
-
-    task: Name
-    simulator: Name = DEFAULT_ENGINE
-    seed: int = Field(default=0, ge=0, le=MAX_SEED)
-
-
 class MachineCheckView(BaseModel):
     """What a file holds, and what is wrong with it."""
 
@@ -68,14 +61,13 @@ class MachineCheckView(BaseModel):
     bounds: tuple[Vector, Vector] | None = Field(
         description="Smallest and largest coordinates, units; null without blocks"
     )
-    control_sequence: list[PressView]
+    control_sequence: list[KeyPress]
     scene: MachineScene
 
 
 @router.post(
     "/check",
     response_model=MachineCheckView,
-    responses=problem_responses(404, 413, 422, 503),
     openapi_extra=FILE,
 )
 def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> Response:
@@ -94,7 +86,7 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
         parts=machine.part_count,
         mass=machine.mass,
         bounds=_bounds(machine),
-        control_sequence=[PressView.model_validate(one) for one in machine.control_sequence],
+        control_sequence=[KeyPress.model_validate(one) for one in machine.control_sequence],
         scene=machine_scene(machine),
     )
     return Response(view.model_dump_json(), media_type="application/json")
@@ -102,20 +94,20 @@ def check_machine(data: FileDep, context: ContextDep, task: TaskName = None) -> 
 
 @router.post(
     "/trials",
-    status_code=202,
-    responses={
-        200: {"model": JobView, "description": "An equal one was tried, or is being tried"},
-        **problem_responses(413, 422, 429, 503),
-    },
+    status_code=201,
+    responses=EXISTED,
     openapi_extra=FILE,
 )
 def try_file(
     data: FileDep,
     *,
-    wanted: Annotated[TrialQuery, Query()],
+    task: Annotated[Name, Query(description="Whose trial")],
+    simulator: Annotated[Name, Query()] = DEFAULT_ENGINE,
+    seed: Annotated[int, Query(ge=0, le=MAX_SEED)] = 0,
     context: ContextDep,
     caller: CallerDep,
     response: Response,
+    _: RequestKey,
 ) -> JobView:
     """Puts a machine from a file through a task's trial, on no leaderboard.
 
@@ -128,12 +120,12 @@ def try_file(
     job, fresh = request_trial(
         context,
         upload.content.machine,
-        task=wanted.task,
-        simulator=wanted.simulator,
-        seed=wanted.seed,
+        task=task,
+        simulator=simulator,
+        seed=seed,
         owner=caller.key_id,
     )
-    response.status_code = 202 if fresh else 200
+    response.status_code = 201 if fresh else 200
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
 
@@ -141,9 +133,7 @@ def try_file(
 def _broken_rule(context: Context, machine: Machine, name: str) -> str | None:
     task = context.tasks.named([name]).get(name)
     if task is None:
-        choices = tuple(sorted(context.tasks.newest()))
-        issue = ValidationIssue(path="task", message=f"there is no task {name!r}", choices=choices)
-        raise ProblemError(422, str(issue), errors=[issue])
+        raise unknown("task", name, sorted(context.tasks.newest()))
     broken = broken_constraint(task, machine)
     return None if broken is None else broken[1]
 

@@ -6,7 +6,6 @@ from fastapi import APIRouter, Response
 from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 
 from buildarena_api.dependencies import ServicesDep
-from buildarena_api.http.problems import problem_responses
 
 router = APIRouter(prefix="/v1", tags=["health"])
 
@@ -15,7 +14,7 @@ router = APIRouter(prefix="/v1", tags=["health"])
     "/metrics",
     response_class=Response,
     # Where a key of the database's is used, which is then asked for it.
-    responses={200: {"content": {"text/plain": {}}}, **problem_responses(503)},
+    responses={200: {"content": {"text/plain": {}}}},
 )
 async def show_metrics(services: ServicesDep) -> Response:
     """Figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests.

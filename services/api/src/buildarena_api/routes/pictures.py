@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from difflib import get_close_matches
 from functools import cache
 from typing import Final
@@ -10,12 +9,14 @@ from typing import Final
 from fastapi import APIRouter, Request, Response
 
 from buildarena_api.dependencies import ContextDep, ServicesDep
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import Answer, conditional
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.problems import ProblemError
+from buildarena_api.job_records import machine_hash, machine_of, task_of
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
-from buildarena_geometry import DocumentError, Machine, module_set
+from buildarena_geometry import module_set
 from buildarena_geometry.export import machine_glb, module_glb
 from buildarena_simulation import MachineNotSimulable
 from buildarena_simulation.render.still import still_png
@@ -30,27 +31,28 @@ MAX_CACHED_PICTURES: Final = 64 << 20
 
 
 @router.get(
-    "/modules/{name}.glb",
+    "/modules/{module}.glb",
     response_class=Response,
-    responses={200: {"content": {GLB: {}}}, **problem_responses(404)},
+    responses={200: {"content": {GLB: {}}}},
 )
-def module_model(name: str, request: Request) -> Response:
+def module_model(module: str, request: Request) -> Response:
     """A module as a GLB file, its root point at the origin; a connector as a rod of length 1."""
-    return conditional(request, _module_answer(name), GLB)
+    return conditional(request, _module_answer(module), GLB)
 
 
 @router.get(
     "/jobs/{job_id}/machine.glb",
     response_class=Response,
-    responses={200: {"content": {GLB: {}}}, **problem_responses(404, 503)},
+    responses={200: {"content": {GLB: {}}}},
 )
 def machine_model(
     job_id: str, context: ContextDep, services: ServicesDep, request: Request
 ) -> Response:
     """The job's machine as a GLB file: a node for each part, named by its id."""
-    digest = _machine_hash(context, context.store.jobs.get(job_id))
+    job = context.store.jobs.get(job_id)
+    digest = machine_hash(context, job)
     answer = services.pictures.get_or_make(
-        f"glb {digest}", lambda: machine_glb(_machine(context, digest, job_id))
+        f"glb {digest}", lambda: machine_glb(machine_of(context, digest, job))
     )
     return conditional(request, answer, GLB)
 
@@ -58,7 +60,7 @@ def machine_model(
 @router.get(
     "/jobs/{job_id}/thumbnail.png",
     response_class=Response,
-    responses={200: {"content": {PNG: {}}}, **problem_responses(404, 503)},
+    responses={200: {"content": {PNG: {}}}},
 )
 def thumbnail(
     job_id: str, context: ContextDep, services: ServicesDep, request: Request
@@ -68,7 +70,7 @@ def thumbnail(
     It is drawn when it is first asked for; that of an ended job is then one of its artifacts.
     """
     job = context.store.jobs.get(job_id)
-    digest = _machine_hash(context, job)
+    digest = machine_hash(context, job)
     answer = services.pictures.get_or_make(
         f"png {digest} {job.task} {job.task_version} {job.state}",
         lambda: _thumbnail(context, job, digest),
@@ -87,23 +89,9 @@ def _module_answer(name: str) -> Answer:
     found = _module_models().get(name)
     if found is None:
         near = get_close_matches(name, _module_models(), n=3, cutoff=0.0)
-        raise ProblemError(404, f"there is no module {name!r}; the nearest are {', '.join(near)}")
+        detail = f"there is no module {name!r}; the nearest are {', '.join(near)}"
+        raise ProblemError(ErrorCode.MODULE_NOT_FOUND, detail)
     return found
-
-
-def _machine_hash(context: Context, job: Job) -> str:
-    digest = context.store.jobs.artifacts(job.id).get("machine")
-    if digest is None:
-        raise ProblemError(404, f"job {job.id} has no machine yet")
-    return digest
-
-
-def _machine(context: Context, digest: str, job_id: str) -> Machine:
-    try:
-        return Machine.from_document(json.loads(context.artifacts.get(digest)))
-    except DocumentError as error:
-        detail = f"job {job_id} has a machine that this version does not read: {error}"
-        raise ProblemError(404, detail) from error
 
 
 def _thumbnail(context: Context, job: Job, digest: str) -> bytes:
@@ -111,13 +99,11 @@ def _thumbnail(context: Context, job: Job, digest: str) -> bytes:
     ended = job.state == JobState.DONE
     if kept is not None and ended:
         return context.artifacts.get(kept)
-    task = context.tasks.exact(job.task, job.task_version)
-    if task is None:
-        raise ProblemError(404, f"task {job.task} is no longer at version {job.task_version}")
     try:
-        drawn = still_png(_machine(context, digest, job.id), task.scenario)
+        drawn = still_png(machine_of(context, digest, job), task_of(context, job).scenario)
     except MachineNotSimulable as error:
-        raise ProblemError(404, f"job {job.id} has nothing to draw: {error}") from error
+        detail = f"job {job.id} has nothing to draw: {error}"
+        raise ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, detail) from error
     if ended:
         _keep(context, job, drawn)
     return drawn

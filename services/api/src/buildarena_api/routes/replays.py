@@ -8,13 +8,12 @@ from fastapi import APIRouter, Request
 
 from buildarena_api.dependencies import ServicesDep
 from buildarena_api.http.etags import conditional
-from buildarena_api.http.problems import problem_responses
 from buildarena_api.replays.views import ReplayView
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
 
-@router.get("/{job_id}/replay", response_model=ReplayView, responses=problem_responses(404, 503))
+@router.get("/{job_id}/replay", response_model=ReplayView)
 def show_replay(job_id: str, services: ServicesDep, request: Request) -> Any:
     """How the job's machine came about: every action with what it changed, or why it was refused.
 

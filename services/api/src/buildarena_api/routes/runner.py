@@ -17,28 +17,26 @@ from fastapi.concurrency import run_in_threadpool
 from buildarena_api.access import Caller, RunnerDep, RunnerRights, limited, runner_of
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.bodies import receive_file
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import ProblemError, invalid
 from buildarena_api.runners.lease_queue import MAX_NAMES, Leased, LeaseQuery
-from buildarena_api.runners.outcomes import stale
 from buildarena_api.runners.views import (
-    Ended,
-    Fault,
     Heartbeat,
-    HeartbeatAnswer,
     LeasedTrial,
+    LeaseEnd,
     LeaseRequest,
-    Outcome,
-    RunnerAbout,
-    RunnerFacts,
+    LeaseStates,
+    RunnerReport,
+    RunnerTerms,
+    TrialFault,
+    TrialOutcome,
 )
 from buildarena_backend.artifacts.uploads import MAX_FILE_BYTES, MAX_LEASE_BYTES
 from buildarena_backend.errors import PermanentError, StaleLeaseError, UploadError
 from buildarena_backend.leases.runner_leases import JobToken, runner_prefix
-from buildarena_backend.process.context import Context
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
 from buildarena_backend.trials.trial_repository import TrialRepository
-from buildarena_benchmark import ValidationIssue
 
 PREFIX: Final = "/v1/runner"
 OCTETS: Final = "application/octet-stream"
@@ -74,12 +72,12 @@ def _named(
 NamedDep = Annotated[JobToken, Depends(_named)]
 
 
-@router.get("", dependencies=[_ORDINARY], responses=problem_responses(503))
-def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerFacts:
+@router.get("", dependencies=[_ORDINARY])
+def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerTerms:
     """What a runner should know before it begins: whose jobs it may lease, versions, limits."""
     known, rights = known_simulators(context), _rights(caller)
     allowed = list(known if rights.simulators is None else rights.simulators)
-    return RunnerFacts(
+    return RunnerTerms(
         simulators=allowed,
         versions={name: known[name].version for name in allowed if name in known},
         lease_s=context.settings.lease_s,
@@ -91,10 +89,7 @@ def show_runner(caller: RunnerDep, context: ContextDep) -> RunnerFacts:
 @router.post(
     "/leases",
     dependencies=[limited("runner_waits", caller=runner_of)],
-    responses={
-        204: {"description": "There is none now"},
-        **problem_responses(404, 422, 429, 500, 503),
-    },
+    responses={204: {"description": "There is none now"}},
     response_model=LeasedTrial,
 )
 async def lease_trial(
@@ -127,15 +122,15 @@ async def lease_trial(
     return _view(leased, context.settings.lease_s)
 
 
-@router.post("/heartbeat", dependencies=[_ORDINARY], responses=problem_responses(422, 503))
-def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> HeartbeatAnswer:
+@router.post("/heartbeat", dependencies=[_ORDINARY])
+def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> LeaseStates:
     """Keeps leases alive, many in one request, and says which are over."""
     _require_allowed(body, _rights(caller))
     store, prefix = context.store, runner_prefix(caller.key_id)
     owner = prefix + body.name
     if store.runner_leases.counts(prefix, besides=owner)["names"] >= MAX_NAMES:
         raise ProblemError(
-            429,
+            ErrorCode.TOO_MANY_OPEN,
             f"the key's runners had {MAX_NAMES} names within a minute, as many as they may",
             headers={"Retry-After": "30"},
         )
@@ -152,43 +147,40 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> H
     # Old names of the key leave the register long before they would be forgotten.
     store.workers.trim(prefix, most=MAX_NAMES)
     live = store.runner_leases.heartbeat([(one.job_id, one.token) for one in body.leases], prefix)
-    answer = HeartbeatAnswer(live=[], lost=[])
+    answer = LeaseStates(live=[], lost=[])
     for one in body.leases:
         kept = (one.job_id, one.token) in live
         (answer.live if kept else answer.lost).append(one)
     return answer
 
 
-@router.post("/goodbye", dependencies=[_ORDINARY], responses=problem_responses(422, 503))
-def leave(body: RunnerAbout, caller: RunnerDep, context: ContextDep) -> HeartbeatAnswer:
+@router.post("/goodbye", dependencies=[_ORDINARY])
+def leave(body: RunnerReport, caller: RunnerDep, context: ContextDep) -> LeaseStates:
     """Takes a runner that shuts down off the list of workers; leases that it still has go back."""
     runner = runner_prefix(caller.key_id) + body.name
     context.store.runner_leases.hand_back(runner)
     context.store.workers.leave(runner)
-    return HeartbeatAnswer(live=[], lost=[])
+    return LeaseStates(live=[], lost=[])
 
 
 @router.get(
     "/leases/{job_id}/{token}",
     dependencies=[_ORDINARY],
-    responses=problem_responses(404, 409, 422, 500, 503),
 )
 def get_leased_trial(named: NamedDep, caller: RunnerDep, context: ContextDep) -> LeasedTrial:
     """The trial of a live lease, as the lease's own answer had it."""
+    lease = context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
     try:
-        lease = context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
-        return _view(
-            Leased(lease, TrialRepository(context).due(lease.job)), context.settings.lease_s
-        )
-    except (StaleLeaseError, PermanentError) as error:
-        raise stale(named) from error
+        due = TrialRepository(context).due(lease.job)
+    except PermanentError as error:
+        raise StaleLeaseError(*named) from error
+    return _view(Leased(lease, due), context.settings.lease_s)
 
 
 @router.put(
     "/leases/{job_id}/{token}/uploads/{sha256}",
     status_code=204,
     dependencies=[limited("uploads", caller=runner_of)],
-    responses=problem_responses(404, 408, 409, 413, 422, 503),
     openapi_extra={
         "requestBody": {
             "required": True,
@@ -204,48 +196,45 @@ async def upload_file(
     services: ServicesDep,
 ) -> None:
     """Takes a whole file; one that was received before changes nothing."""
-    await run_in_threadpool(_require_live, services.context, named, caller)
+    leases, prefix = services.context.store.runner_leases, runner_prefix(caller.key_id)
+    await run_in_threadpool(leases.live, *named, prefix)
     with TemporaryFile() as file:
         if await receive_file(request, file, max_bytes=MAX_FILE_BYTES) != sha256:
-            raise ProblemError(422, "the file's SHA-256 is not the one in the path: send it again")
-        try:
-            await run_in_threadpool(services.runners.uploads.keep, named, sha256, file)
-        except UploadError as error:
-            raise ProblemError(422, str(error)) from error
+            raise UploadError("the file's SHA-256 is not the one in the path: send it again")
+        await run_in_threadpool(services.runners.uploads.keep, named, sha256, file)
 
 
 @router.post(
     "/leases/{job_id}/{token}/outcome",
     dependencies=[limited("runner_outcomes", caller=runner_of)],
-    responses=problem_responses(404, 409, 422, 500, 503),
 )
 def complete_trial(
-    named: NamedDep, body: Outcome, caller: RunnerDep, services: ServicesDep
-) -> Ended:
+    named: NamedDep, body: TrialOutcome, caller: RunnerDep, services: ServicesDep
+) -> LeaseEnd:
     """Hands over what came of a trial, which is checked and scored here; ends the lease."""
     prefix = runner_prefix(caller.key_id)
-    return Ended(status=services.runners.outcomes.complete(named, prefix, body))
+    return LeaseEnd(status=services.runners.outcomes.complete(named, prefix, body))
 
 
 @router.post(
     "/leases/{job_id}/{token}/fault",
     dependencies=[limited("runner_outcomes", caller=runner_of)],
-    responses=problem_responses(404, 409, 422, 500, 503),
 )
-def report_fault(named: NamedDep, body: Fault, caller: RunnerDep, services: ServicesDep) -> Ended:
+def report_fault(
+    named: NamedDep, body: TrialFault, caller: RunnerDep, services: ServicesDep
+) -> LeaseEnd:
     """Reports that the runner or its simulator failed; ends the lease."""
     prefix = runner_prefix(caller.key_id)
-    return Ended(status=services.runners.outcomes.fault(named, prefix, body))
+    return LeaseEnd(status=services.runners.outcomes.fault(named, prefix, body))
 
 
 @router.post(
     "/leases/{job_id}/{token}/hand-back",
     dependencies=[_ORDINARY],
-    responses=problem_responses(404, 409, 422, 503),
 )
-def hand_back(named: NamedDep, caller: RunnerDep, services: ServicesDep) -> Ended:
+def hand_back(named: NamedDep, caller: RunnerDep, services: ServicesDep) -> LeaseEnd:
     """Gives a trial back without fault, as at shutdown; ends the lease."""
-    return Ended(status=services.runners.outcomes.hand_back(named, runner_prefix(caller.key_id)))
+    return LeaseEnd(status=services.runners.outcomes.hand_back(named, runner_prefix(caller.key_id)))
 
 
 def _rights(caller: Caller) -> RunnerRights:
@@ -253,20 +242,12 @@ def _rights(caller: Caller) -> RunnerRights:
     return caller.runner
 
 
-def _require_allowed(about: RunnerAbout, rights: RunnerRights) -> None:
+def _require_allowed(about: RunnerReport, rights: RunnerRights) -> None:
     choices = tuple(about.simulators if rights.simulators is None else rights.simulators)
     for name in about.simulators:
         if name not in choices:
             message = f"the key may not lease jobs of {name}"
-            issue = ValidationIssue(path="simulators", message=message, choices=choices)
-            raise ProblemError(403, f"{message}; choose from {', '.join(choices)}", errors=[issue])
-
-
-def _require_live(context: Context, named: JobToken, caller: Caller) -> None:
-    try:
-        context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
-    except StaleLeaseError as error:
-        raise stale(named) from error
+            raise invalid("simulators", message, choices=choices, code=ErrorCode.NOT_ALLOWED)
 
 
 def _view(leased: Leased, lease_s: float) -> LeasedTrial:

@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.access import Caller, CallerDep
-from buildarena_api.benches import BenchMachineView, machine_view
-from buildarena_api.dependencies import ContextDep, ServicesDep
-from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_api.schemas import JobView
+from buildarena_api.benches import WorkbenchMachine, machine_view
+from buildarena_api.dependencies import Services, ServicesDep
+from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.schemas import EXISTED, JobView
 from buildarena_backend.agents.briefing import LIMITS
-from buildarena_backend.agents.sessions import SessionClosedError
-from buildarena_backend.agents.trying import NoTestError
+from buildarena_backend.agents.sessions import SessionState
 from buildarena_backend.catalog.specs import Name, Seed, Worlds
-from buildarena_backend.errors import UnknownIdError
-from buildarena_backend.process.context import Context
-from buildarena_benchmark.environment import ASSEMBLY, MAIN, NothingToSubmitError, Workbench
+from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
 from buildarena_benchmark.environment.tools import building_tools
 from buildarena_simulation import DEFAULT_ENGINE
 
@@ -66,7 +62,7 @@ class ToolView(BaseModel):
     parameters: dict[str, Any] = Field(description="JSON schema of its arguments")
 
 
-class LimitsView(BaseModel):
+class SessionLimits(BaseModel):
     """How much a session may do."""
 
     model_config = ConfigDict(from_attributes=True)
@@ -75,20 +71,6 @@ class LimitsView(BaseModel):
     session_bytes: int = Field(description="Bytes of all arguments and answers")
     call_bytes: int = Field(description="Bytes of one call's arguments")
     idle_s: int = Field(description="Seconds without a call after which it is cancelled")
-
-
-class SessionOpened(BaseModel):
-    """An open session."""
-
-    id: str = Field(description="Also the id of the job that will hold the score")
-    briefing: str = Field(
-        description="All that an agent must know, as Markdown: how it plays, the statement, the "
-        "frame, the rules, the modules with their data, and the world"
-    )
-    statement: str = Field(description="What to build; part of the briefing")
-    tools: list[ToolView]
-    limits: LimitsView
-    calls: int = Field(description="Calls made so far; more than 0 if it was open already")
 
 
 class TestTrialView(BaseModel):
@@ -106,17 +88,23 @@ class TestTrialView(BaseModel):
 class SessionView(BaseModel):
     """A session and what stands on its workbench."""
 
+    id: str = Field(description="Also the id of the job that will hold the score")
     job: JobView
+    briefing: str = Field(
+        description="All that an agent must know, as Markdown: how it plays, the statement, the "
+        "frame, the rules, the modules with their data, and the world"
+    )
+    statement: str = Field(description="What to build; part of the briefing")
     open: bool = Field(description="Whether it takes calls")
-    machines: list[BenchMachineView] = Field(
+    machines: list[WorkbenchMachine] = Field(
         description="What was built so far; the one that is simulated is the assembly, or the only"
     )
     tools: list[ToolView]
-    limits: LimitsView
+    limits: SessionLimits
     calls: int = Field(description="Calls made so far")
     bytes: int = Field(description="Bytes of all arguments and answers so far")
     tests: list[TestTrialView] = Field(description="Its test trials so far, in order")
-    most_tests: int = Field(description="Test trials that it may have; 0 for most tasks")
+    max_tests: int = Field(description="Test trials that it may have; 0 for most tasks")
 
 
 class ToolCall(BaseModel):
@@ -142,143 +130,90 @@ class ToolOutcome(BaseModel):
     feedback: str = Field(description="The state in words, or what would have been allowed")
 
 
-@router.post(
-    "",
-    status_code=201,
-    responses={
-        200: {"model": SessionOpened, "description": "It was open already"},
-        **problem_responses(403, 422, 503),
-    },
-)
+@router.post("", status_code=201, responses=EXISTED)
 def open_session(
-    body: OpenSession,
-    response: Response,
-    services: ServicesDep,
-    caller: CallerDep,
-) -> SessionOpened:
+    body: OpenSession, response: Response, services: ServicesDep, caller: CallerDep, _: RequestKey
+) -> SessionView:
     """Opens a session in which an agent of yours, or you yourself, build for one task.
 
     The same name, kind, task, seed, simulator, worlds and data sheets give the same session for as
     long as it is open.
     """
-    opened = services.external.open(
-        task=body.task,
-        agent=body.agent,
-        seed=body.seed,
-        simulator=body.simulator,
-        kind=body.kind,
-        owner=caller.key_id,
-        force=caller.is_admin,
-        data_sheets=body.data_sheets,
-        worlds=body.worlds,
-    )
-    response.headers["Location"] = f"/v1/jobs/{opened.job.id}"
-    if opened.reopened:
-        response.status_code = 200
-    return SessionOpened(
-        id=opened.job.id,
-        briefing=opened.briefing,
-        statement=opened.task.statement,
-        limits=LimitsView.model_validate(LIMITS),
-        calls=opened.job.actions,
-        tools=_tools(
-            on_demand=opened.task.constraints.on_demand, programs=opened.task.takes_programs
-        ),
-    )
+    state, fresh = services.external.open(**dict(body), owner=caller.key_id, force=caller.is_admin)
+    response.status_code = 201 if fresh else 200
+    response.headers["Location"] = f"/v1/sessions/{state.job.id}"
+    return _view(state)
 
 
-@router.get("/{session_id}", responses=problem_responses(404, 503))
+@router.get("/{session_id}")
 def show_session(session_id: str, services: ServicesDep) -> SessionView:
     """Shows a session: its machines with every part's faces, its tools, and how much is left.
 
     Whoever builds by hand sees by it where something can be attached. What came of each call is in
     the job's transcript.
     """
-    state = services.external.view(session_id)
+    return _view(services.external.view(session_id))
+
+
+def _view(state: SessionState) -> SessionView:
+    on_demand = bool(state.job.track_config.get("looked_up"))
+    tools = building_tools(on_demand=on_demand, programs=state.programs)
     return SessionView(
+        id=state.job.id,
         job=JobView.of(state.job),
+        briefing=state.briefing,
+        statement=state.statement,
         open=state.open,
         machines=[machine_view(name, machine) for name, machine in state.machines.items()],
-        tools=_tools(
-            on_demand=bool(state.job.track_config.get("looked_up")), programs=state.programs
-        ),
-        limits=LimitsView.model_validate(LIMITS),
+        tools=[ToolView.model_validate(tool.as_document()) for tool in tools],
+        limits=SessionLimits.model_validate(LIMITS),
         calls=state.calls,
         bytes=state.size,
         tests=[TestTrialView.model_validate(test) for test in state.tests],
-        most_tests=state.most_tests,
+        max_tests=state.most_tests,
     )
 
 
-@router.get("/{session_id}/machine", responses=problem_responses(404, 409, 503))
+@router.get("/{session_id}/machine")
 def session_machine(session_id: str, services: ServicesDep) -> dict[str, Any]:
     """The machine that a submission would try now, as a document: try it, and build on."""
-    try:
-        return (
-            Workbench.holding(services.external.view(session_id).machines).submitted().to_document()
-        )
-    except NothingToSubmitError as error:
-        raise ProblemError(409, str(error)) from error
+    machines = services.external.view(session_id).machines
+    return Workbench.holding(machines).submitted().to_document()
 
 
-@router.post("/{session_id}/calls", responses=problem_responses(404, 409, 422, 503))
+@router.post("/{session_id}/calls")
 def call_tool(
-    session_id: str, body: ToolCall, services: ServicesDep, context: ContextDep, caller: CallerDep
+    session_id: str, body: ToolCall, services: ServicesDep, caller: CallerDep
 ) -> ToolOutcome:
     """Carries out one action; a refused one changes nothing."""
-    _require_own(session_id, context, caller)
-    try:
-        done = services.external.call(
-            session_id, machine=body.machine, tool=body.tool, arguments=body.arguments
-        )
-    except SessionClosedError as error:
-        raise ProblemError(409, str(error)) from error
+    _require_own(session_id, services, caller)
+    done = services.external.call(
+        session_id, machine=body.machine, tool=body.tool, arguments=body.arguments
+    )
     return ToolOutcome.model_validate(done)
 
 
-@router.post("/{session_id}/tests", status_code=202, responses=problem_responses(404, 409, 503))
-def test_session(
-    session_id: str, services: ServicesDep, context: ContextDep, caller: CallerDep
-) -> JobView:
+@router.post("/{session_id}/tests")
+def test_session(session_id: str, services: ServicesDep, caller: CallerDep) -> JobView:
     """Has the machine tried as it stands, where the task has test trials; the session goes on then.
 
     What was measured stands in the session (`tests`) once it is open again. It counts for nothing.
     """
-    _require_own(session_id, context, caller)
-    try:
-        return JobView.of(services.external.test(session_id))
-    except (SessionClosedError, NothingToSubmitError, NoTestError) as error:
-        raise ProblemError(409, str(error)) from error
+    _require_own(session_id, services, caller)
+    return JobView.of(services.external.test(session_id))
 
 
-@router.post("/{session_id}/submit", status_code=202, responses=problem_responses(404, 409, 503))
+@router.post("/{session_id}/submit")
 def submit_session(
-    session_id: str,
-    response: Response,
-    services: ServicesDep,
-    context: ContextDep,
-    caller: CallerDep,
+    session_id: str, response: Response, services: ServicesDep, caller: CallerDep
 ) -> JobView:
     """Ends the session; the machine is simulated and scored."""
-    _require_own(session_id, context, caller)
-    try:
-        job = services.external.submit(session_id)
-    except (SessionClosedError, NothingToSubmitError) as error:
-        raise ProblemError(409, str(error)) from error
+    _require_own(session_id, services, caller)
+    job = services.external.submit(session_id)
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobView.of(job)
 
 
-def _tools(*, on_demand: bool, programs: bool) -> list[ToolView]:
-    return [
-        ToolView.model_validate(tool.as_document())
-        for tool in building_tools(on_demand=on_demand, programs=programs)
-    ]
-
-
-def _require_own(session_id: str, context: Context, caller: Caller) -> None:
-    """An agent plays its own session only. An unknown one is for the sessions to refuse."""
-    if caller.scope == "admin":
-        return
-    with contextlib.suppress(UnknownIdError):
-        caller.require_owner(context.store.jobs.get(session_id).owner, f"session {session_id}")
+def _require_own(session_id: str, services: Services, caller: Caller) -> None:
+    """An agent plays its own session only."""
+    caller.require_owner(services.external.job(session_id).owner, f"session {session_id}")

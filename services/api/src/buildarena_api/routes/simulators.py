@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.problems import problem_responses
+from buildarena_api.http.pages import Page, PagingDep
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
 from buildarena_backend.trials.simulator import SimulatorKind
@@ -26,18 +26,20 @@ class SimulatorView(BaseModel):
         description="As tracks have it in their names: trials of two versions are never compared",
         examples=["3"],
     )
-    kind: SimulatorKind = Field(description="An engine calculates; a game is played")
+    kind: SimulatorKind = Field(
+        description="engine: physics simulation; game: Besiege in its window"
+    )
     repeatable: bool = Field(description="Whether the same machine has the same trial again")
     default: bool = Field(description="Whether jobs that name none are run by it")
     workers: int = Field(description="Workers that reported within the last 15 seconds")
     served: bool = Field(description="Whether there is such a worker, so that jobs don't wait")
 
 
-@router.get("", responses=problem_responses(503))
-def list_simulators(context: ContextDep) -> list[SimulatorView]:
+@router.get("")
+def list_simulators(context: ContextDep, paging: PagingDep) -> Page[SimulatorView]:
     """Lists what jobs can name as `simulator`, and whether it is served at the moment."""
     serving = Counter(context.store.workers.counts().serving)
-    return [
+    views = [
         SimulatorView(
             **asdict(simulator),
             default=simulator.name == DEFAULT_ENGINE,
@@ -46,3 +48,4 @@ def list_simulators(context: ContextDep) -> list[SimulatorView]:
         )
         for simulator in known_simulators(context).values()
     ]
+    return Page[SimulatorView](**paging.of(views))

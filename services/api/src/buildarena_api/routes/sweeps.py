@@ -4,50 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from decimal import Decimal
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict
-from sqlalchemy.exc import IntegrityError
 
 from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep, IdPrefix, ServicesDep
-from buildarena_api.http import cursors
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.schemas import (
-    DONE,
-    BudgetView,
+    EXISTED,
+    BudgetUse,
     ForecastView,
     ProgressView,
     SweepAccepted,
     SweepEstimate,
-    SweepPage,
     SweepView,
     TroubleView,
 )
 from buildarena_backend.catalog.specs import Budget, SweepSpec
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import CONSTRUCT_QUEUE, SweepState
-from buildarena_backend.submission.submission import spec_hash
 from buildarena_backend.sweeps.sweeps import Sweep, SweepProgress
 
 router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
 MAX_TROUBLES: Final = 50
 """Kinds of trouble that one answer has."""
-DEFAULT_LIMIT: Final = 20
-
-
-RequestKey = Annotated[
-    str | None,
-    Header(
-        alias="Idempotency-Key",
-        min_length=1,
-        max_length=200,
-        description="The same key with the same sweep returns the first submission's answer",
-    ),
-]
-
-
 Resume = Annotated[
     bool,
     Query(
@@ -65,55 +48,32 @@ class Resumption(BaseModel):
     budget: Budget | None = None
 
 
-@router.post("", status_code=202, responses=problem_responses(409, 422, 503))
+@router.post("", status_code=201, responses=EXISTED)
 def submit_sweep(
     spec: SweepSpec,
     response: Response,
     *,
-    context: ContextDep,
     services: ServicesDep,
     caller: CallerDep,
-    request_key: RequestKey = None,
+    request_key: RequestKey,
     resume: Resume = False,
 ) -> SweepAccepted:
     """Submits every task with every model and every seed; all of it is stored, or nothing."""
-    if request_key is not None:
-        # One key's idempotency keys are not another's.
-        request_key = f"{caller.key_id or ''}/{request_key}"
-        before = context.store.sweeps.by_request_key(request_key)
-        if before is not None:
-            return _accepted_before(before, spec, response, context)
-    try:
-        done = services.submissions.submit_sweep(
-            spec, owner=caller.key_id, request_key=request_key, resume=resume
-        )
-    except IntegrityError:
-        # Another request with this key was quicker.
-        before = None if request_key is None else context.store.sweeps.by_request_key(request_key)
-        if before is None:
-            raise
-        return _accepted_before(before, spec, response, context)
+    done = services.submissions.submit_sweep(
+        spec, owner=caller.key_id, request_key=request_key, resume=resume
+    )
+    response.status_code = 201 if done.fresh else 200
     response.headers["Location"] = f"/v1/sweeps/{done.sweep.id}"
     return SweepAccepted(id=done.sweep.id, jobs=done.jobs, added=done.added, resumed=done.resumed)
 
 
-def _accepted_before(
-    sweep: Sweep, spec: SweepSpec, response: Response, context: Context
-) -> SweepAccepted:
-    if sweep.request_hash != spec_hash(spec):
-        raise ProblemError(409, "this Idempotency-Key was used for another sweep")
-    response.headers["Location"] = f"/v1/sweeps/{sweep.id}"
-    total = context.store.sweeps.progress(sweep.id).total
-    return SweepAccepted(id=sweep.id, jobs=total, added=0)
-
-
-@router.post("/estimate", responses=problem_responses(422, 503))
+@router.post("/estimate")
 def estimate_sweep(spec: SweepSpec, services: ServicesDep) -> SweepEstimate:
     """Estimates a sweep's jobs and their cost; stores nothing."""
     return SweepEstimate.model_validate(services.submissions.estimate(spec))
 
 
-@router.post("/{sweep_id}/pause", responses=problem_responses(404, 409, 503))
+@router.post("/{sweep_id}/pause")
 def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Puts the sweep's waiting jobs on hold; running jobs continue.
 
@@ -124,7 +84,7 @@ def pause_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepV
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
-@router.post("/{sweep_id}/resume", responses=problem_responses(404, 409, 422, 503))
+@router.post("/{sweep_id}/resume")
 def resume_sweep(
     sweep_id: str,
     context: ContextDep,
@@ -138,7 +98,7 @@ def resume_sweep(
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
-@router.put("/{sweep_id}/budget", responses=problem_responses(404, 409, 422, 503))
+@router.put("/{sweep_id}/budget")
 def set_sweep_budget(
     sweep_id: str,
     body: Budget,
@@ -155,7 +115,7 @@ def set_sweep_budget(
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
-@router.post("/{sweep_id}/cancel", responses=problem_responses(404, 409, 503))
+@router.post("/{sweep_id}/cancel")
 def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Ends the sweep's jobs that have not ended and that nobody else wants.
 
@@ -167,7 +127,7 @@ def cancel_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> Sweep
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
-@router.post("/{sweep_id}/retry", status_code=202, responses=problem_responses(404, 409, 503))
+@router.post("/{sweep_id}/retry")
 def retry_sweep(sweep_id: str, context: ContextDep, caller: CallerDep) -> SweepView:
     """Queues the sweep's errored jobs again where they failed; scored ones are never redone.
 
@@ -183,33 +143,36 @@ def _require_owner(context: Context, caller: Caller, sweep_id: str) -> None:
     caller.require_owner(context.store.sweeps.get(sweep_id).owner, f"sweep {sweep_id}")
 
 
-@router.get("", responses=problem_responses(422, 503))
+@router.get("")
 def list_sweeps(
     context: ContextDep,
-    cursor: Annotated[str | None, Query(max_length=500)] = None,
-    limit: Annotated[int, Query(ge=1, le=100)] = DEFAULT_LIMIT,
+    paging: PagingDep,
+    *,
+    name: Annotated[list[str] | None, Query(description="Only sweeps with these names")] = None,
+    state: Annotated[list[SweepState] | None, Query(description="Only in these states")] = None,
+    key_id: Annotated[list[str] | None, Query(description="Only of these API keys")] = None,
     id_prefix: IdPrefix = None,
-) -> SweepPage:
+) -> Page[SweepView]:
     """Lists sweeps, newest first."""
     found = context.store.sweeps.page(
-        limit=limit,
-        after=None if cursor is None else cursors.decode(cursor),
+        limit=paging.limit + 1,
+        after=paging.after(),
         id_prefix=id_prefix,
+        names=name,
+        states=state,
+        owners=key_id,
     )
-    more = len(found) == limit
-    return SweepPage(
-        sweeps=_views(context, found),
-        next_cursor=cursors.encode(found[-1].created_at, found[-1].id) if more else None,
-    )
+    shown, following = paging.cut(found, lambda one: encode(NEWEST_FIRST, one.created_at, one.id))
+    return Page[SweepView](data=_views(context, shown), next_cursor=following)
 
 
-@router.get("/{sweep_id}", responses=problem_responses(404, 503))
+@router.get("/{sweep_id}")
 def show_sweep(sweep_id: str, context: ContextDep) -> SweepView:
     """Shows a sweep and its progress."""
     return _view(context, context.store.sweeps.get(sweep_id))
 
 
-@router.get("/{sweep_id}/forecast", responses=problem_responses(404, 503))
+@router.get("/{sweep_id}/forecast")
 def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
     """Forecasts when a sweep ends and what it comes to cost, from what ran so far."""
     store = context.store
@@ -219,25 +182,25 @@ def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
     if budget is not None and most is not None:
         short = float(max(Decimal(), budget.spent_cost_usd + ahead.own_cost_usd_left - most))
     return ForecastView(
-        jobs_left=ahead.jobs_left,
+        remaining_jobs=ahead.jobs_left,
         jobs_per_minute=ahead.jobs_per_minute,
-        ends_at=ahead.ends_at,
-        cost_usd_left=float(ahead.cost_usd_left),
-        cost_usd_total=float(store.sweeps.progress(sweep_id).cost_usd + ahead.cost_usd_left),
-        budget_usd_short=short,
+        finish_at=ahead.ends_at,
+        remaining_cost_usd=float(ahead.cost_usd_left),
+        total_cost_usd=float(store.sweeps.progress(sweep_id).cost_usd + ahead.cost_usd_left),
+        lacking_budget_usd=short,
         unknown_models=list(ahead.unknown_models),
     )
 
 
-@router.get("/{sweep_id}/troubles", responses=problem_responses(404, 503))
-def sweep_troubles(sweep_id: str, context: ContextDep) -> list[TroubleView]:
+@router.get("/{sweep_id}/troubles")
+def list_troubles(sweep_id: str, context: ContextDep, paging: PagingDep) -> Page[TroubleView]:
     """Attempts at the sweep's jobs that faults ended, at providers say; the newest kinds first.
 
     Transient ones are made again; jobs that ended by them have the outcome `errored`.
     """
     context.store.sweeps.get(sweep_id)
     found = context.store.sweeps.troubles(sweep_id, limit=MAX_TROUBLES)
-    return [TroubleView.model_validate(trouble) for trouble in found]
+    return Page[TroubleView].model_validate(paging.of(found))
 
 
 def _view(context: Context, sweep: Sweep) -> SweepView:
@@ -253,10 +216,10 @@ def _views(context: Context, found: Sequence[Sweep]) -> list[SweepView]:
             id=sweep.id,
             name=sweep.name,
             state=_state(sweep, progress[sweep.id]),
-            owner=sweep.owner,
+            key_id=sweep.owner,
             created_at=sweep.created_at,
             spec=dict(sweep.spec),
-            budget=BudgetView.of(context.store.budgets.get(sweep.id)),
+            budget=BudgetUse.of(context.store.budgets.get(sweep.id)),
             progress=ProgressView.of(progress[sweep.id]),
             last_event=last_event,
         )
@@ -264,6 +227,6 @@ def _views(context: Context, found: Sequence[Sweep]) -> list[SweepView]:
     ]
 
 
-def _state(sweep: Sweep, progress: SweepProgress) -> Any:
+def _state(sweep: Sweep, progress: SweepProgress) -> SweepState:
     ended = sweep.state == SweepState.ACTIVE and progress.done == progress.total
-    return DONE if ended else sweep.state
+    return SweepState.DONE if ended else SweepState(sweep.state)

@@ -6,21 +6,25 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
-from pydantic import BaseModel, Field, TypeAdapter
+from pydantic import BaseModel, Field
 
 from buildarena_api.access import CallerDep
 from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.bodies import YAML, is_yaml, not_utf8
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import Answer, conditional
-from buildarena_api.http.problems import ProblemError, problem_responses
-from buildarena_backend.catalog.tasks import CatalogueEntry, TaskChangedError
-from buildarena_benchmark import TaskError, ValidationIssue, parse_custom_task
+from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.http.pages import Page, PagingDep
+from buildarena_api.http.problems import ProblemError
+from buildarena_api.schemas import EXISTED
+from buildarena_backend.catalog.tasks import CatalogueEntry
+from buildarena_benchmark import parse_custom_task
 from buildarena_benchmark.tasks.sources import MAX_BYTES
 
 PATH = "/v1/tasks"
 router = APIRouter(prefix=PATH, tags=["tasks"])
 
-YAML = "application/yaml"
-YAML_TYPES = frozenset({YAML, "application/x-yaml", "text/yaml", "text/x-yaml"})
+JSON = "application/json"
 EXAMPLE = """\
 name: narrow-gap
 title: A bridge over a gap of 3
@@ -67,34 +71,27 @@ class TaskDetail(TaskView):
     )
 
 
-_LIST = TypeAdapter(list[TaskView])
-
-
-async def _yaml_text(request: Request) -> str:
-    """The request's body, as long as it is YAML of an acceptable size."""
+async def _text(request: Request) -> str:
+    """The request's body, as long as it is YAML or JSON, which is YAML, of an acceptable size."""
     media_type = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if media_type not in YAML_TYPES:
-        message = f"the body's type is {media_type or 'not named'}; send {YAML}"
-        raise ProblemError(415, message, headers={"Accept-Post": YAML})
+    if media_type != JSON and not is_yaml(request.headers):
+        message = f"the body's type is {media_type or 'not named'}; send {YAML} or {JSON}"
+        headers = {"Accept-Post": f"{YAML}, {JSON}"}
+        raise ProblemError(ErrorCode.UNSUPPORTED_MEDIA_TYPE, message, headers=headers)
     body = await request.body()
     if len(body) > MAX_BYTES:
-        raise ProblemError(413, f"a task has at most {MAX_BYTES:,} bytes, this {len(body):,}")
+        detail = f"a task has at most {MAX_BYTES:,} bytes, this {len(body):,}"
+        raise ProblemError(ErrorCode.TOO_LARGE, detail)
     try:
         return body.decode()
     except UnicodeDecodeError as error:
-        line = body.count(b"\n", 0, error.start) + 1
-        message = "the text is not UTF-8"
-        problem = ValidationIssue(path="", message=message, line=line)
-        raise ProblemError(422, f"line {line}: {message}", errors=[problem]) from error
+        raise not_utf8(body, error) from error
 
 
 @router.post(
     "",
     status_code=201,
-    responses={
-        200: {"model": TaskDetail, "description": "This version was there"},
-        **problem_responses(403, 409, 413, 415, 422, 503),
-    },
+    responses=EXISTED,
     openapi_extra={
         "requestBody": {
             "required": True,
@@ -102,42 +99,39 @@ async def _yaml_text(request: Request) -> str:
                 YAML: {
                     "schema": {"type": "string", "maxLength": MAX_BYTES},
                     "examples": {"bridge": {"summary": "A narrow gap", "value": EXAMPLE}},
-                }
+                },
+                JSON: {"schema": {"type": "object"}},
             },
         }
     },
 )
 def add_task(
-    text: Annotated[str, Depends(_yaml_text)],
+    text: Annotated[str, Depends(_text)],
     response: Response,
     context: ContextDep,
     caller: CallerDep,
+    _: RequestKey,
 ) -> TaskDetail:
     """Uploads a task, or a new version of one of your own; new submissions get it from then on."""
     catalogue = context.tasks
-    try:
-        task = parse_custom_task(text, origin="task")
-    except TaskError as error:
-        raise _refusal(error) from error
-    try:
-        added = catalogue.add(task, text, owner=caller.key_id, force=caller.is_admin)
-    except TaskChangedError as error:
-        raise ProblemError(409, str(error)) from error
+    task = parse_custom_task(text, origin="task")
+    added = catalogue.add(task, text, owner=caller.key_id, force=caller.is_admin)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/tasks/{task.name}?version={task.version}"
     return _detail(catalogue.find(task.name, task.version))
 
 
-@router.get("", response_model=list[TaskView], responses=problem_responses(503))
-def list_tasks(context: ContextDep, request: Request) -> Any:
+@router.get("", response_model=Page[TaskView])
+def list_tasks(context: ContextDep, request: Request, paging: PagingDep) -> Any:
     """Lists the tasks in their newest versions, the built-in ones first."""
     views = [TaskView(**_fields(entry)) for entry in context.tasks.entries()]
-    return conditional(request, Answer.of(_LIST.dump_json(views)), "application/json")
+    page = Page[TaskView](**paging.of(views))
+    return conditional(request, Answer.of(page.model_dump_json().encode()), JSON)
 
 
-@router.get("/{name}", response_model=TaskDetail, responses=problem_responses(404, 422, 503))
+@router.get("/{task}", response_model=TaskDetail)
 def show_task(
-    name: Annotated[str, Path(max_length=60, pattern=r"^[a-z0-9-]+$")],
+    task: Annotated[str, Path(max_length=60, pattern=r"^[a-z0-9-]+$")],
     context: ContextDep,
     request: Request,
     version: Annotated[
@@ -145,8 +139,8 @@ def show_task(
     ] = None,
 ) -> Any:
     """Shows a task with its whole document."""
-    view = _detail(context.tasks.find(name, version))
-    return conditional(request, Answer.of(view.model_dump_json().encode()), "application/json")
+    view = _detail(context.tasks.find(task, version))
+    return conditional(request, Answer.of(view.model_dump_json().encode()), JSON)
 
 
 def _fields(entry: CatalogueEntry) -> dict[str, Any]:
@@ -167,7 +161,3 @@ def _detail(entry: CatalogueEntry) -> TaskDetail:
     return TaskDetail(
         **_fields(entry), current=entry.current, document=dict(entry.task.as_document())
     )
-
-
-def _refusal(error: TaskError) -> ProblemError:
-    return ProblemError(422, str(error), errors=error.issues)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Final, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from buildarena_api.dependencies import ContextDep, RegistryDep
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.pages import Page, PagingDep, seal
+from buildarena_api.http.problems import invalid
 from buildarena_api.job_filters import require_known
-from buildarena_api.schemas import AnyOutcome
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.journal.transcript_search import TranscriptFilter
-from buildarena_benchmark import ValidationIssue
+from buildarena_backend.states import Outcome
 
-SHARED: Final = ("task", "model", "seed", "outcome", "turn", "where")
 router = APIRouter(prefix="/v1/transcripts", tags=["jobs"])
 
 
@@ -29,28 +28,26 @@ class ExcerptPiece(BaseModel):
 class TranscriptMatchView(BaseModel):
     """A turn in which the words stand."""
 
-    job: str = Field(description="Id of the turn's job")
+    model_config = ConfigDict(from_attributes=True)
+
+    job_id: str
     task: str
     model: str
     seed: int
-    outcome: AnyOutcome | None = Field(description="null while the job has not ended")
+    outcome: Outcome | None = Field(description="null while the job has not ended")
     turn: int | None = Field(
         description="Place in the transcript, from 0; null where only the reply is kept"
     )
     where: Literal["reply", "feedback", "prompt"] = Field(
         description="In what was said, in what it was answered, or in what the role was told before"
     )
-    excerpt: list[ExcerptPiece]
+    excerpt: Annotated[
+        list[ExcerptPiece],
+        BeforeValidator(lambda pieces: [{"text": text, "match": hit} for text, hit in pieces]),
+    ]
 
 
-class TranscriptMatchesView(BaseModel):
-    """What a search came to."""
-
-    matches: list[TranscriptMatchView] = Field(description="Those of the newest jobs first")
-    complete: bool = Field(description="false when there are more than are here")
-
-
-@router.get("", responses=problem_responses(404, 422, 503))
+@router.get("")
 def search_transcripts(
     context: ContextDep,
     registry: RegistryDep,
@@ -63,42 +60,30 @@ def search_transcripts(
             description='Words in any of their forms; "a phrase", or, -not as in search engines',
         ),
     ],
-    task: Annotated[str | None, Query()] = None,
-    model: Annotated[str | None, Query()] = None,
-    sweep: Annotated[str | None, Query(description="Only of this sweep's jobs")] = None,
-    of: Annotated[
+    paging: PagingDep,
+    task: Annotated[list[str] | None, Query(description="Only on these tasks")] = None,
+    model: Annotated[list[str] | None, Query(description="Only by these models")] = None,
+    sweep: Annotated[list[str] | None, Query(description="Only of these sweeps' jobs")] = None,
+    search_in: Annotated[
         Literal["transcripts", "prompts"],
         Query(description="prompts: what roles were told; the first turn of each job is found"),
     ] = "transcripts",
-    limit: Annotated[int, Query(ge=1, le=200)] = 50,
-) -> TranscriptMatchesView:
+) -> Page[TranscriptMatchView]:
     """Searches the transcripts of all jobs for words, in what models said and were answered.
 
-    With `of=prompts`, in system messages, tasks and results that sessions told their roles.
+    With `search_in=prompts`, in system messages, tasks and results that sessions told their roles.
     Histories that were packed are not searched.
     """
     if "\0" in text or not context.store.turns.has_words(text):
-        message = f"{text!r} has no word to search for"
-        issue = ValidationIssue(path="text", message=message)
-        raise ProblemError(422, f"text: {message}", errors=[issue])
-    if sweep is not None:
-        context.store.sweeps.get(sweep)
-    wanted = TranscriptFilter(task=task, model=model, sweep_id=sweep, prompts=of == "prompts")
-    found = context.store.turns.search(text, wanted, limit=limit)
-    if not found.matches:
-        require_known(context, registry, JobFilter(equals={"task": task, "model": model}))
-    return TranscriptMatchesView(
-        matches=[
-            TranscriptMatchView.model_validate(
-                {
-                    **{name: getattr(match, name) for name in SHARED},
-                    "job": match.job_id,
-                    "excerpt": [
-                        ExcerptPiece(text=piece, match=hit) for piece, hit in match.excerpt
-                    ],
-                }
-            )
-            for match in found.matches
-        ],
-        complete=found.complete,
+        raise invalid("text", f"{text!r} has no word to search for")
+    for sweep_id in sweep or ():
+        context.store.sweeps.get(sweep_id)
+    wanted = TranscriptFilter(
+        tasks=task, models=model, sweep_ids=sweep, prompts=search_in == "prompts"
     )
+    first = paging.number or 0
+    found = context.store.turns.search(text, wanted, limit=paging.limit + 1, offset=first)
+    if not found:
+        require_known(context, registry, JobFilter(equals={"task": task, "model": model}))
+    shown, following = paging.cut(found, lambda _: seal([first + paging.limit]))
+    return Page[TranscriptMatchView].model_validate({"data": shown, "next_cursor": following})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from threading import Lock
 from typing import Annotated, Any, Final
 
@@ -10,13 +9,13 @@ from fastapi import APIRouter, Query, Request, Response
 
 from buildarena_api.access import limited
 from buildarena_api.dependencies import ContextDep, ServicesDep
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import conditional
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.problems import ProblemError
+from buildarena_api.job_records import machine_of, missing, require_told, task_of
 from buildarena_api.scenes import SceneView, scene_view
-from buildarena_api.withholding import require_told
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
-from buildarena_geometry import DocumentError, Machine
 from buildarena_simulation import TrajectoryFormatError
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
 from buildarena_simulation.arrow import arrow_stream, unpacked_bytes
@@ -37,7 +36,6 @@ _unpacking = Lock()
     dependencies=[limited("trajectories", until="request")],
     responses={
         200: {"content": {PARQUET: {}, ARROW: {}}, "description": "As Parquet, or Arrow IPC"},
-        **problem_responses(404, 413, 422, 503),
     },
     response_class=Response,
 )
@@ -71,7 +69,6 @@ def get_trajectory(
     "/{job_id}/scene",
     response_model=SceneView,
     dependencies=[limited("heavy")],
-    responses=problem_responses(404, 422, 503),
 )
 def show_scene(job_id: str, services: ServicesDep, request: Request, number: Number = 0) -> Any:
     """All that is needed to draw a trial: the scenario, the machine's parts and their bodies.
@@ -93,7 +90,7 @@ def _trajectory_hash(context: Context, job: Job, number: int) -> str:
     require_told(context, job)
     digest = context.store.jobs.artifacts(job.id).get(f"trajectory-{number}")
     if digest is None:
-        raise ProblemError(404, f"job {job.id} has no trajectory-{number} yet")
+        raise missing(job.id, f"trajectory-{number}")
     return digest
 
 
@@ -103,7 +100,7 @@ def _tried(context: Context, job: Job, number: int) -> tuple[str | None, int | N
         if record.number == number:
             return record.machine_hash, record.seed
     if number:
-        raise ProblemError(404, f"job {job.id} has no rollout {number} yet")
+        raise missing(job.id, f"rollout {number}")
     return context.store.jobs.artifacts(job.id).get("machine"), None
 
 
@@ -112,7 +109,7 @@ def _arrow(data: bytes, job_id: str) -> bytes:
         size = unpacked_bytes(data)
         if size > MAX_ARROW_BYTES:
             raise ProblemError(
-                413,
+                ErrorCode.TOO_LARGE,
                 f"the trajectory of job {job_id} has {size:,} bytes unpacked, more than the "
                 f"{MAX_ARROW_BYTES:,} that are sent as Arrow: ask for {PARQUET}",
             )
@@ -120,20 +117,11 @@ def _arrow(data: bytes, job_id: str) -> bytes:
         with _unpacking:
             return arrow_stream(data)
     except TrajectoryFormatError as error:
-        raise ProblemError(
-            404, f"job {job_id} has no trajectory that can be read: {error}"
-        ) from error
+        detail = f"job {job_id} has no trajectory that can be read: {error}"
+        raise ProblemError(ErrorCode.ARTIFACT_NOT_FOUND, detail) from error
 
 
 def _scene(context: Context, job: Job, digest: str | None, seed: int | None) -> bytes:
-    task = context.tasks.exact(job.task, job.task_version)
-    if task is None:
-        raise ProblemError(404, f"task {job.task} is no longer at version {job.task_version}")
-    machine = None
-    if digest is not None:
-        try:
-            machine = Machine.from_document(json.loads(context.artifacts.get(digest)))
-        except DocumentError as error:
-            detail = f"job {job.id} has a machine that this version does not read: {error}"
-            raise ProblemError(404, detail) from error
-    return scene_view(task.scenario.world(seed), machine).model_dump_json().encode()
+    machine = None if digest is None else machine_of(context, digest, job)
+    scenario = task_of(context, job).scenario
+    return scene_view(scenario.world(seed), machine).model_dump_json().encode()

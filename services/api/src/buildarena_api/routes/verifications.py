@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any
 
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.problems import ProblemError, problem_responses
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.http.problems import ProblemError
+from buildarena_api.schemas import EXISTED
 from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import MAX_OPEN, Requested
 from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
@@ -29,8 +32,8 @@ class VerificationView(BaseModel):
 
     id: str
     job_id: str
-    state: Literal[VerificationState.QUEUED, VerificationState.RUNNING, VerificationState.DONE]
-    verdict: Literal[Verdict.VERIFIED, Verdict.REFUTED, Verdict.INCONCLUSIVE] | None = Field(
+    state: VerificationState
+    verdict: Verdict | None = Field(
         description="null until it is done; a refuted job counts nowhere, and nothing follows from "
         "an inconclusive verification"
     )
@@ -41,11 +44,9 @@ class VerificationView(BaseModel):
     finished_at: datetime | None
 
 
-@router.post(
-    "/jobs/{job_id}/verify", status_code=202, responses=problem_responses(404, 409, 429, 503)
-)
+@router.post("/jobs/{job_id}/verify", status_code=201, responses=EXISTED)
 def verify_job(
-    job_id: str, context: ContextDep, response: Response, caller: CallerDep
+    job_id: str, context: ContextDep, response: Response, caller: CallerDep, _: RequestKey
 ) -> VerificationView:
     """Replays a scored job without a model, re-simulates it, and compares every figure.
 
@@ -53,8 +54,10 @@ def verify_job(
     """
     job = context.store.jobs.get(job_id)
     if job.success is None:
-        raise ProblemError(409, f"job {job_id} has no score to verify")
-    (verification_id,) = request_verifications(context, [job_id], caller).ids.values()
+        raise ProblemError(ErrorCode.ILLEGAL_STATE, f"job {job_id} has no score to verify")
+    requested = request_verifications(context, [job_id], caller)
+    (verification_id,) = requested.ids.values()
+    response.status_code = 201 if requested.added else 200
     response.headers["Location"] = f"/v1/verifications/{verification_id}"
     return VerificationView.model_validate(context.store.verifications.get(verification_id))
 
@@ -68,7 +71,7 @@ def request_verifications(context: Context, job_ids: Sequence[str], caller: Call
     requested = context.store.verifications.request(job_ids, owner=caller.key_id)
     if not requested.ids:
         raise ProblemError(
-            429,
+            ErrorCode.TOO_MANY_OPEN,
             f"{MAX_OPEN} verifications are open, as many as one key may have: wait for some to end",
             headers={"Retry-After": str(RETRY_S)},
         )
@@ -77,7 +80,7 @@ def request_verifications(context: Context, job_ids: Sequence[str], caller: Call
     return requested
 
 
-@router.get("/verifications/{verification_id}", responses=problem_responses(404, 503))
+@router.get("/verifications/{verification_id}")
 def show_verification(verification_id: str, context: ContextDep) -> VerificationView:
     """Shows a verification and, once it is done, what it found."""
     return VerificationView.model_validate(context.store.verifications.get(verification_id))

@@ -6,7 +6,6 @@ from fastapi import APIRouter
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.problems import problem_responses
 from buildarena_backend import __version__
 from buildarena_backend.trials.known_simulators import known_simulators
 from buildarena_benchmark.statistics import ERROR, MIN_SUCCESSES
@@ -30,13 +29,15 @@ class VersionsView(BaseModel):
     feedback: str = Field(description="Of what builders are answered")
     scorers: int = Field(description="Of how trials are judged; part of each task's version")
     simulators: list[SimulatorVersion]
-    error: float = Field(description="Chance that a board makes any false claim, at most")
+    family_wise_error_rate: float = Field(
+        description="Chance that a board makes any false claim, at most"
+    )
     min_successes: int = Field(
         description="Successes below which a mean indicator has no interval, as none would hold"
     )
 
 
-@router.get("", responses=problem_responses(503))
+@router.get("")
 def show_versions(context: ContextDep) -> VersionsView:
     """Shows the versions in use, and the constants of the boards' statistics."""
     return VersionsView(
@@ -47,6 +48,6 @@ def show_versions(context: ContextDep) -> VersionsView:
             SimulatorVersion(name=simulator.name, version=simulator.version)
             for simulator in known_simulators(context).values()
         ],
-        error=ERROR,
+        family_wise_error_rate=ERROR,
         min_successes=MIN_SUCCESSES,
     )

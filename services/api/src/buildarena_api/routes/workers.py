@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.dependencies import MAX_ROWS, ContextDep
-from buildarena_api.http import cursors
-from buildarena_api.http.problems import problem_responses
+from buildarena_api.dependencies import ContextDep
+from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 
 router = APIRouter(prefix="/v1/workers", tags=["workers"])
 
@@ -37,24 +36,9 @@ class WorkerView(BaseModel):
     clock_ahead_s: float | None = Field(description="How far its clock is ahead of the database's")
 
 
-class WorkerPage(BaseModel):
-    """Some workers, the last started first."""
-
-    workers: list[WorkerView]
-    next_cursor: str | None = Field(description="Give it as `cursor` to get the next page")
-
-
-@router.get("", responses=problem_responses(422, 503))
-def list_workers(
-    context: ContextDep,
-    limit: Annotated[int, Query(ge=1, le=MAX_ROWS)] = 100,
-    cursor: str | None = None,
-) -> WorkerPage:
+@router.get("")
+def list_workers(context: ContextDep, paging: PagingDep) -> Page[WorkerView]:
     """Lists the workers that reported within the last hour, the last started first."""
-    after = None if cursor is None else cursors.decode(cursor)
-    page = context.store.workers.page(limit=limit + 1, after=after)
-    shown, more = page[:limit], len(page) > limit
-    return WorkerPage(
-        workers=[WorkerView.model_validate(worker) for worker in shown],
-        next_cursor=cursors.encode(shown[-1].started_at, shown[-1].id) if more else None,
-    )
+    found = context.store.workers.page(limit=paging.limit + 1, after=paging.after())
+    shown, following = paging.cut(found, lambda one: encode(NEWEST_FIRST, one.started_at, one.id))
+    return Page[WorkerView].model_validate({"data": shown, "next_cursor": following})

@@ -9,8 +9,9 @@ from typing import Final
 
 from fastapi.concurrency import run_in_threadpool
 
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.problems import ProblemError
-from buildarena_backend.errors import PermanentError, StaleLeaseError, TooManyLeasesError
+from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.leases.runner_leases import prefix_of
 from buildarena_backend.process.context import Context
@@ -123,9 +124,11 @@ class LeaseQueue:
             return self._due(held)
         counts = leases.counts(prefix, besides=owner)
         if counts["leases"] >= MAX_LEASES or counts["names"] >= MAX_NAMES:
-            raise _too_many(
+            raise ProblemError(
+                ErrorCode.TOO_MANY_OPEN,
                 f"the key's runners have {counts['leases']} leases and {counts['names']} names, "
-                f"of {MAX_LEASES} and {MAX_NAMES} that they may have"
+                f"of {MAX_LEASES} and {MAX_NAMES} that they may have",
+                headers={"Retry-After": "5"},
             )
         return None
 
@@ -142,18 +145,15 @@ class LeaseQueue:
     def _claim(
         self, lease_request: LeaseQuery, turn: _Turn, owner: str, simulator: str, version: str
     ) -> Lease | None:
-        try:
-            lease = self._context.store.leases.claim(
-                simulate_queue(simulator),
-                owner=owner,
-                last=turn.last,
-                only=lease_request.job_owners,
-                version=version,
-                prefix=prefix_of(owner),
-                most=MAX_LEASES,
-            )
-        except TooManyLeasesError as error:
-            raise _too_many(str(error)) from error
+        lease = self._context.store.leases.claim(
+            simulate_queue(simulator),
+            owner=owner,
+            last=turn.last,
+            only=lease_request.job_owners,
+            version=version,
+            prefix=prefix_of(owner),
+            most=MAX_LEASES,
+        )
         if lease is not None:
             turn.last = lease.job.owner or ""
         return lease
@@ -179,7 +179,3 @@ class LeaseQueue:
 
     def _give_up(self, lease: Lease, error: PermanentError) -> None:
         self._context.store.leases.give_up(lease, str(error), reason=error.reason)
-
-
-def _too_many(detail: str) -> ProblemError:
-    return ProblemError(429, detail, headers={"Retry-After": "5"})

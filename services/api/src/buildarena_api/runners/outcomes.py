@@ -7,9 +7,8 @@ from typing import Final, Literal
 
 import structlog
 
-from buildarena_api.http.problems import ProblemError
 from buildarena_api.runners.checking import shared_checker
-from buildarena_api.runners.views import Fault, NamedFile, Outcome
+from buildarena_api.runners.views import NamedFile, TrialFault, TrialOutcome
 from buildarena_backend.artifacts.kinds import EVIDENCE
 from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
 from buildarena_backend.artifacts.uploads import Uploads
@@ -53,11 +52,12 @@ class Outcomes:
         self._uploads = uploads
         self._checker = shared_checker()
 
-    def complete(self, named: JobToken, prefix: str, said: Outcome) -> Status:
+    def complete(self, named: JobToken, prefix: str, said: TrialOutcome) -> Status:
         """Scores a trial and moves its job on.
 
         Raises:
-            ProblemError: 409 when the lease is over, 422 for what is no outcome of its trial.
+            StaleLeaseError: The lease is over.
+            OutcomeRefusedError, UploadError: It is no outcome of its trial.
         """
 
         def end(lease: Lease) -> None:
@@ -67,7 +67,7 @@ class Outcomes:
             except (OutcomeRefusedError, UploadError) as error:
                 log.warning("outcome_refused", job=named[0], runner=lease.owner, error=str(error))
                 self._uploads.drop(named)
-                raise ProblemError(422, str(error)) from error
+                raise
             known: dict[str, Attribute] = {
                 "buildarena.job": lease.job.id,
                 "buildarena.token": lease.token,
@@ -79,21 +79,19 @@ class Outcomes:
 
         return self._ended(named, prefix, AttemptResult.DONE, end)
 
-    def fault(self, named: JobToken, prefix: str, said: Fault) -> Status:
+    def fault(self, named: JobToken, prefix: str, said: TrialFault) -> Status:
         """Records a failure of the runner or its simulator; see `RunnerLeases.fault`.
 
         Raises:
-            ProblemError: As of `complete`.
+            StaleLeaseError: The lease is over.
+            UploadError: A file was not uploaded, or is too large.
         """
 
         def end(lease: Lease) -> None:
-            try:
-                number = self._trials.due(lease.job).request.number
-                files = self._files(named, number, said.files)
-                _require_small(files)
-                self._trials.keep_evidence(lease.job, files)
-            except UploadError as error:
-                raise ProblemError(422, str(error)) from error
+            number = self._trials.due(lease.job).request.number
+            files = self._files(named, number, said.files)
+            _require_small(files)
+            self._trials.keep_evidence(lease.job, files)
             detail = str(clean(said.detail))[:LONGEST_DETAIL]
             self._context.store.runner_leases.fault(
                 lease, detail, reason=said.reason, permanent=said.permanent
@@ -106,7 +104,7 @@ class Outcomes:
         """Gives the job back, without fault.
 
         Raises:
-            ProblemError: 409 when the lease is over.
+            StaleLeaseError: The lease is over.
         """
         return self._ended(
             named, prefix, AttemptResult.HANDED_BACK, self._context.store.leases.hand_back
@@ -119,14 +117,14 @@ class Outcomes:
         leases = self._context.store.runner_leases
         try:
             end(leases.live(*named, prefix))
-        except StaleLeaseError as error:
+        except StaleLeaseError:
             if leases.ending(*named, prefix) == as_:
                 return "already_done"
-            raise stale(named) from error
+            raise
         self._uploads.drop(named)
         return "done"
 
-    def _checked(self, named: JobToken, due: DueTrial, said: Outcome) -> TrialResult:
+    def _checked(self, named: JobToken, due: DueTrial, said: TrialOutcome) -> TrialResult:
         simulator, version = due.request.engine, due.version
         if said.annotations is not None and simulator != BESIEGE:
             raise OutcomeRefusedError("only trials in the game have annotations")
@@ -193,13 +191,6 @@ def _require_small(files: Mapping[str, File]) -> None:
         raise UploadError(
             f"what shows a fault has at most {MAX_EVIDENCE_BYTES:,} bytes, these files {size:,}"
         )
-
-
-def stale(named: JobToken) -> ProblemError:
-    """The answer to whoever names a lease that is over, or never was theirs."""
-    return ProblemError(
-        409, f"lease {named[1]} on {named[0]} is over, or is not this key's: nothing was written"
-    )
 
 
 def drop_dead_uploads(context: Context, uploads: Uploads) -> int:

@@ -53,7 +53,7 @@ class _Document(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class RunnerAbout(_Document):
+class RunnerReport(_Document):
     """What a runner says of itself."""
 
     name: Annotated[
@@ -82,7 +82,7 @@ class RunnerAbout(_Document):
     )
 
 
-class LeaseRequest(RunnerAbout):
+class LeaseRequest(RunnerReport):
     """A request for a trial."""
 
     wait_s: Annotated[
@@ -90,7 +90,7 @@ class LeaseRequest(RunnerAbout):
     ] = 0.0
 
 
-class RunnerFacts(BaseModel):
+class RunnerTerms(BaseModel):
     """What a runner should know before it begins."""
 
     simulators: list[str] = Field(description="Whose jobs the key may lease")
@@ -128,13 +128,13 @@ class HeldLease(_Document):
     token: Annotated[int, Field(ge=1, lt=2**63)]
 
 
-class Heartbeat(RunnerAbout):
+class Heartbeat(RunnerReport):
     """A runner's sign of life, for itself and for its leases."""
 
     leases: Annotated[list[HeldLease], Field(max_length=128)] = []
 
 
-class HeartbeatAnswer(BaseModel):
+class LeaseStates(BaseModel):
     """Which leases live on; work under the others must stop, nothing of it will be taken."""
 
     live: list[HeldLease]
@@ -173,7 +173,7 @@ class Annotation(_Document):
 EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ALL_ENGINES))]
 
 
-class Outcome(_Document):
+class TrialOutcome(_Document):
     """What came of a trial; its score is found here."""
 
     trajectory: Sha256 | None = Field(
@@ -186,7 +186,7 @@ class Outcome(_Document):
     annotations: Annotated[dict[EngineName, Annotation], Field(max_length=8)] | None = None
 
 
-class Fault(_Document):
+class TrialFault(_Document):
     """A failure of the runner or its simulator: the trial is not scored."""
 
     reason: FaultReason
@@ -199,7 +199,7 @@ class Fault(_Document):
     files: Files = []
 
 
-class Ended(BaseModel):
+class LeaseEnd(BaseModel):
     """The end of a lease."""
 
     status: Literal["done", "already_done"] = Field(

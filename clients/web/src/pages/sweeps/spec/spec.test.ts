@@ -8,7 +8,7 @@ const TEXT = "name: a # mine\ntasks: [lift-1, nope]\nmodels:\n  - builtin/idle\n
 
 function problem(...fields: string[]): Problem {
   const errors = fields.map((field) => ({ field, message: "is wrong", choices: [], line: null }));
-  return { type: "about:blank", title: "", status: 422, detail: "", errors };
+  return { type: "about:blank", title: "", status: 422, code: "invalid_field", detail: "", errors };
 }
 
 describe("a sweep as YAML", () => {

@@ -1,0 +1,87 @@
+"""The OpenAPI document: what holds for every operation is said here, once."""
+
+from __future__ import annotations
+
+import json
+import re
+from http import HTTPStatus
+from typing import Any, Final
+
+from fastapi import FastAPI
+
+from buildarena_api.http.bodies import YAML
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import PROBLEM_JSON, Problem
+
+JSON: Final = "application/json"
+REFERENCE: Final = "#/components/schemas/"
+OPEN: Final = "/v1/health"
+"""The path that anybody may ask for."""
+STREAM: Final = "text/event-stream"
+
+
+def describe(app: FastAPI) -> None:
+    """Make the app's document say what all operations have in common."""
+    plain = app.openapi
+
+    def document() -> dict[str, Any]:
+        if app.openapi_schema is None:
+            app.openapi_schema = _completed(plain())
+        return app.openapi_schema
+
+    app.openapi = document  # type: ignore[method-assign]
+
+
+def _completed(plain: dict[str, Any]) -> dict[str, Any]:
+    problem = Problem.model_json_schema(ref_template=REFERENCE + "{model}")
+    schemas = plain["components"]["schemas"] | problem.pop("$defs") | {"Problem": problem}
+    for path, operations in plain["paths"].items():
+        for method, operation in operations.items():
+            _complete(path, method, operation)
+    named = {
+        _schema_name(name): {**schema, "title": _schema_name(name)}
+        for name, schema in schemas.items()
+        if name not in {"HTTPValidationError", "ValidationError"}
+    }
+    if len(named) != len(schemas) - 2:
+        raise ValueError("two schemas have one name")
+    plain["components"]["schemas"] = dict(sorted(named.items()))
+    text = re.sub(
+        rf'"{REFERENCE}(\w+)"',
+        lambda found: f'"{REFERENCE}{_schema_name(found[1])}"',
+        json.dumps(plain),
+    )
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+def _schema_name(name: str) -> str:
+    """``JobView`` is the answer's class, apart from the job's own; its schema is ``Job``."""
+    listed = re.fullmatch(r"Page_(\w+)_", name)
+    return _schema_name(listed[1]) + "List" if listed else name.removesuffix("View")
+
+
+def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
+    """Adds what every operation may answer, and that every JSON body may be YAML."""
+    answers, body = operation["responses"], operation.get("requestBody", {}).get("content", {})
+    statuses = {400, 405, 422, 500} if path == OPEN else {400, 401, 403, 405, 422, 429, 500, 503}
+    names = {one["name"] for one in operation.get("parameters", ())}
+    statuses |= {404} if "{" in path or names & {"sweep", "task"} else set()
+    statuses |= {409} if method == "post" else set()
+    statuses |= {408, 413} if body else set()
+    for status in statuses:
+        problem = {PROBLEM_JSON: {"schema": {"$ref": REFERENCE + "Problem"}}}
+        answers[str(status)] = {"description": HTTPStatus(status).phrase, "content": problem}
+    if JSON in body and not path.startswith("/v1/runner"):
+        body.setdefault(YAML, body[JSON])
+    if "201" in answers:
+        answers["200"]["content"] = answers["201"]["content"]
+    if STREAM in answers["200" if "200" in answers else "204"].get("content", {}):
+        del answers["200"]["content"][JSON]
+    operation["responses"] = dict(sorted(answers.items()))
+
+
+def code_table() -> str:
+    """The codes of errors as a table in Markdown."""
+    rows = [f"| `{code}` | {code.status} | {code.meaning} |" for code in ErrorCode]
+    return "\n".join(["| code | status | meaning |", "|---|---|---|", *rows]) + "\n"

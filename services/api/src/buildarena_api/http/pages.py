@@ -1,0 +1,208 @@
+"""Lists: one envelope for all of them, opaque cursors, and parameters that must be known."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from decimal import Decimal
+from typing import Annotated, Any, Final, Generic, TypeVar
+
+from fastapi import Depends, Query, Request, params
+from fastapi.dependencies.utils import get_flat_params
+from fastapi.routing import APIRoute
+from pydantic import BaseModel, Field
+
+from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import ProblemError, invalid
+from buildarena_backend.jobs.pages import Order, SortValue
+
+T = TypeVar("T")
+R = TypeVar("R")
+MAX_ROWS: Final = 200
+"""Of one page of a list."""
+NEWEST_FIRST: Final = Order(by="created", descending=True)
+
+
+class Page(BaseModel, Generic[T]):
+    """A page of a list."""
+
+    data: list[T]
+    next_cursor: str | None = Field(description="Pass it as `cursor` for the next page; null: last")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paging:
+    """Which page of a list is wanted."""
+
+    cursor: str | None
+    limit: int
+
+    def after(self, order: Order = NEWEST_FIRST) -> tuple[Any, str] | None:
+        """What the row before the page is sorted by, and its id; None for the first page.
+
+        Raises:
+            ProblemError: The cursor is none, or of another order.
+        """
+        return None if self.cursor is None else decode(self.cursor, order)
+
+    def cut(
+        self, found: Sequence[R], cursor_of: Callable[[R], str]
+    ) -> tuple[Sequence[R], str | None]:
+        """The rows of the page, of which one more was looked for, and the next page's cursor."""
+        shown = found[: self.limit]
+        return shown, cursor_of(shown[-1]) if len(found) > self.limit else None
+
+    def of(self, every: Sequence[T]) -> dict[str, Any]:
+        """The page of a list that is in memory, for `Page`."""
+        first = self.number or 0
+        following = first + self.limit
+        more = following < len(every)
+        shown = list(every[first:following])
+        return {"data": shown, "next_cursor": seal([following]) if more else None}
+
+    @property
+    def text(self) -> str | None:
+        """The text that the cursor stands for; None for the first page.
+
+        Raises:
+            ProblemError: The cursor is none.
+        """
+        if self.cursor is None:
+            return None
+        (text,) = _opened(self.cursor, 1)
+        if not isinstance(text, str) or "\0" in text:
+            raise _bad()
+        return text
+
+    @property
+    def number(self) -> int | None:
+        """The number that the cursor of a numbered list stands for; None for the first page.
+
+        Raises:
+            ProblemError: The cursor is none.
+        """
+        if self.cursor is None:
+            return None
+        (number,) = _opened(self.cursor, 1)
+        if type(number) is not int or not 0 <= number < 2**63:
+            raise _bad()
+        return number
+
+
+def _paging(
+    cursor: Annotated[
+        str | None, Query(max_length=1000, description="`next_cursor` of the page before")
+    ] = None,
+    limit: Annotated[int, Query(ge=1, le=MAX_ROWS, description="Rows of a page")] = MAX_ROWS,
+) -> Paging:
+    return Paging(cursor=cursor, limit=limit)
+
+
+PagingDep = Annotated[Paging, Depends(_paging)]
+
+
+def encode(order: Order, value: SortValue, id_: str) -> str:
+    """The cursor behind a row in some order."""
+    plain = value.isoformat() if isinstance(value, datetime) else value
+    plain = str(plain) if isinstance(plain, Decimal) else plain
+    return seal([order.by, order.descending, plain, id_])
+
+
+def decode(cursor: str, order: Order) -> tuple[SortValue, str]:
+    """What the row that a cursor stands behind is sorted by, and its id.
+
+    Raises:
+        ProblemError: It was not made by us, or for another order.
+    """
+    by, descending, plain, id_ = _opened(cursor, 4)
+    if not isinstance(id_, str) or "\0" in id_:
+        raise _bad()
+    if (by, descending) != (order.by, order.descending):
+        raise _bad("belongs to a list in another order; leave it out to start at the first page")
+    try:
+        return _value(order, plain), id_
+    except (ValueError, TypeError, ArithmeticError) as error:
+        raise _bad() from error
+
+
+def _value(order: Order, plain: Any) -> SortValue:
+    """A cursor's value as the database compares it.
+
+    Raises:
+        ValueError: It is of another kind.
+    """
+    if plain is None and order.by != "created":
+        return None
+    if order.by in {"created", "finished"}:
+        when = datetime.fromisoformat(plain)
+        if when.tzinfo is None:
+            raise ValueError("a time without zone")
+        return when
+    if order.by == "cost":
+        cost = Decimal(plain)
+        if not cost.is_finite():
+            raise ValueError("no amount")
+        return cost
+    if isinstance(plain, float):
+        return plain
+    raise ValueError("a value of another kind")
+
+
+def seal(parts: Sequence[Any]) -> str:
+    """A cursor that holds some values."""
+    return base64.urlsafe_b64encode(json.dumps(parts).encode()).decode().rstrip("=")
+
+
+def _opened(cursor: str, parts: int) -> list[Any]:
+    try:
+        found = json.loads(base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode())
+    except (ValueError, RecursionError) as error:
+        raise _bad() from error
+    if not isinstance(found, list) or len(found) != parts:
+        raise _bad()
+    return found
+
+
+def _bad(
+    message: str = "not a cursor; use next_cursor of the previous page, or leave it out",
+) -> ProblemError:
+    return invalid("cursor", message, code=ErrorCode.INVALID_CURSOR)
+
+
+async def known_parameters(request: Request) -> None:
+    """Refuses query parameters that the operation does not have, and single ones given twice.
+
+    Raises:
+        ProblemError: There is one.
+    """
+    given = request.query_params
+    if not given:
+        return
+    route: APIRoute = request.scope["route"]
+    name = f"{request.method} {route.path}"
+    if name not in _known:
+        _known[name] = _parameters(route)
+    known = _known[name]
+    for name in given:
+        if name not in known:
+            raise invalid(
+                name, "there is no such parameter", choices=known, code=ErrorCode.UNKNOWN_PARAMETER
+            )
+        if not known[name] and len(given.getlist(name)) > 1:
+            message = "takes one value, and was given several"
+            raise invalid(name, message, code=ErrorCode.REPEATED_PARAMETER)
+
+
+_known: Final[dict[str, dict[str, bool]]] = {}
+
+
+def _parameters(route: APIRoute) -> dict[str, bool]:
+    """The query parameters of a route, and whether each takes several values."""
+    return {
+        field.alias: "list[" in str(field.field_info.annotation)
+        for field in get_flat_params(route.dependant)
+        if isinstance(field.field_info, params.Query)
+    }
