@@ -66,7 +66,7 @@ def test_boards_comparisons_and_exports_count_disqualified_trials_as_failures(
 
 def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(url, context) -> None:
     sessions = ExternalSessions(context)
-    job = sessions.open(task="support-1", agent="me", seed=0, simulator="mujoco").job
+    job = sessions.open(task="support-1", agent="me", seed=0, simulator="mujoco")[0].job
     sessions.call(job.id, machine="main", tool="start", arguments={})
     sessions.submit(job.id)
     work(context)

@@ -44,7 +44,7 @@ def test_a_unique_prefix_is_enough_and_an_ambiguous_one_refused(url, ids, sweep)
     for word in (prefix, prefix.removeprefix("job_")):
         assert json.loads(printed(url, "job", "show", word, "--json"))["id"] == wanted
     assert json.loads(printed(url, "sweep", "status", sweep[:9], "--json"))["id"] == sweep
-    assert json.loads(printed(url, "job", "list", "--sweep", sweep[6:10], "--json"))["jobs"]
+    assert json.loads(printed(url, "job", "list", "--sweep", sweep[6:10], "--json"))["data"]
     doubled = next(p for p in "0123456789abcdef" if sum(i[4] == p for i in ids) > 1)
     done = run_cli(url, "job", "cancel", doubled)
     assert done.returncode == 1
@@ -93,8 +93,8 @@ def test_a_jobs_files_are_fetched_whole_or_not_at_all(
     printed(url, "job", "files", job, "machine", "--out", str(tmp_path / "one"))
     assert [f.name for f in (tmp_path / "one").iterdir()] == ["machine.json"]
     assert "did you mean machine?" in run_cli(url, "job", "files", job, "machin").stderr
-    stored = [{**file, "hash": "0" * 64} for file in Client(url).artifacts(job)]
-    monkeypatch.setattr(Client, "get", lambda *_, **__: stored)
+    stored = [{**file, "sha256": "0" * 64} for file in Client(url).artifacts(job)]
+    monkeypatch.setattr(Client, "every", lambda *_, **__: stored)
     done = run_cli(url, "job", "files", job, "--out", str(tmp_path / "damaged"))
     assert (done.returncode, "arrived damaged" in done.stderr) == (1, True)
     assert list((tmp_path / "damaged").iterdir()) == []
@@ -128,4 +128,4 @@ def test_nonsense_is_no_id_and_no_other_path_is_ever_sent(url) -> None:
             assert f"{word!r} is not a name" in run_cli(server.url, "task", "show", word).stderr
         assert server.received == []
     for word in ("x?limit=1", "%2e%2e", "x#y"):
-        assert "name: String should match" in run_cli(url, "task", "show", word).stderr
+        assert "task: String should match" in run_cli(url, "task", "show", word).stderr

@@ -20,12 +20,17 @@ from buildarena_client.client import run
 
 PROJECT = Path(__file__).parents[2] / "clients" / "python"
 CONTRACT = contract()
+EMPTY = b'{"data": [], "next_cursor": null}'
 METHODS = [
     name for name, _ in inspect.getmembers(AsyncClient, callable) if not name.startswith("_")
 ]
 CALLED = {
-    "get_artifact": "transcript",
-    "get_artifact_by_name": "artifact",
+    "get_artifact": "artifact",
+    "get_machine": "machine",
+    "get_transcript": "transcript",
+    "manifest_entries": "manifest",
+    "results": "sweep_results",
+    "troubles": "sweep_troubles",
     "get_trajectory": "trajectory",
     "export": "export_leaderboard",
     "forecast_sweep": "sweep_forecast",
@@ -139,7 +144,9 @@ class CountingServer:
                 gone.cancel()
                 with contextlib.suppress(asyncio.CancelledError):
                     await gone
-                writer.write(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\n[]")
+                writer.write(
+                    b"HTTP/1.1 200 OK\r\nContent-Length: %d\r\n\r\n%b" % (len(EMPTY), EMPTY)
+                )
                 await writer.drain()
                 self.answered += 1
         except (asyncio.IncompleteReadError, ConnectionError):

@@ -39,6 +39,7 @@ SPEC = {"tasks": ["lift-1"], "models": ["builtin/idle"]}
 HTML = answer(200, b"<html>")
 SHORT = b"HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\n{}"
 SHORT_PIECES = b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n5\r\n[1,2\r\n"
+EMPTY = b'{"data": [], "next_cursor": null}'
 BUSY = answer(429, b'{"detail": "too many", "errors": []}', Retry_After="0")
 STREAM = b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\n\r\n"
 AWAY = answer(503, b'{"detail": "away", "errors": []}', Retry_After="0")
@@ -49,7 +50,7 @@ NOTHING_TWICE = {
 }
 """Methods that change something more when they are sent again."""
 GENERAL = {
-    *("get", "get_bytes", "get_patiently", "health", "post", "put"),
+    *("get", "get_bytes", "get_patiently", "every", "health", "post", "put"),
     *("upload", "download", "pages", "close"),
 }
 WAITING = {"wait_for_job", "wait_for_verification", "wait_for_sweep"}
@@ -170,7 +171,7 @@ def test_what_is_no_name_or_path_is_never_sent(make, tmp_path) -> None:
 def test_as_much_time_passes_as_the_service_asks_for_and_retries_end(make, pauses) -> None:
     for asked, seconds in (("1", 1.0), ("7", 7.0), ("30", LONGEST_PAUSE_S)):
         pauses.clear()
-        with wrong_server(answer(429, Retry_After=asked), answer(200, b"[]")) as server:
+        with wrong_server(answer(429, Retry_After=asked), answer(200, EMPTY)) as server:
             assert make(server.url).tasks() == []
         assert pauses == [seconds]
     pauses.clear()
@@ -187,7 +188,7 @@ def test_as_much_time_passes_as_the_service_asks_for_and_retries_end(make, pause
 
 
 def test_pauses_take_their_time(make) -> None:
-    with wrong_server(b"", answer(200, b"[]")) as server:
+    with wrong_server(b"", answer(200, EMPTY)) as server:
         began = time.monotonic()
         assert make(server.url).tasks() == []
     assert time.monotonic() - began >= BREAK_PAUSE_S
@@ -232,7 +233,8 @@ def test_a_download_is_there_whole_or_not_at_all(make, tmp_path) -> None:
 
 
 def test_bytes_that_arrive_damaged_are_not_given(make, tmp_path) -> None:
-    listed = json.dumps([{"name": "machine", "hash": "0" * 64, "size": 2, "media_type": "x"}])
+    file = {"name": "machine", "sha256": "0" * 64, "size": 2, "media_type": "x"}
+    listed = json.dumps({"data": [file], "next_cursor": None})
     said = [answer(200, listed.encode()), answer(200, b"{}")]
     with wrong_server(*said, *said) as server:
         client = make(server.url)
@@ -254,7 +256,7 @@ def test_a_file_is_sent_whole_each_time(make, tmp_path) -> None:
 
 
 def event(number: int, **data: Any) -> bytes:
-    told = json.dumps({"job": JOB, "sweep": None, "at": "2026-01-01T00:00:00+00:00", **data})
+    told = json.dumps({"job_id": JOB, "sweep_id": None, "at": "2026-01-01T00:00:00+00:00", **data})
     return f"id: {number}\r\nevent: turn\r\ndata: {told}\r\n\r\n".encode()
 
 
@@ -268,7 +270,7 @@ def test_events_are_the_same_wherever_the_stream_is_cut(make) -> None:
         with wrong_server(head + chunks + b"0\r\n\r\n") as server:
             seen = list(islice(make(server.url).job_events(JOB), 3))
         assert [(each["id"], each["data"]["said"]) for each in seen] == list(enumerate(texts, 1))
-        assert {(each["kind"], each["job"], each["sweep"]) for each in seen} == {
+        assert {(each["kind"], each["job_id"], each["sweep_id"]) for each in seen} == {
             ("turn", JOB, None)
         }
 

@@ -47,8 +47,8 @@ def agent_plays(context) -> Callable[..., Job]:
 
     def play_task(task: str, design: str = "support-1", seed: int = 0) -> Job:
         sessions = ExternalSessions(context)
-        job = sessions.open(task=task, agent="me", seed=seed, simulator="mujoco").job
-        for tool, arguments in next(iter(expert_designs()[design](0).parts.values())).actions:
+        job = sessions.open(task=task, agent="me", seed=seed, simulator="mujoco")[0].job
+        for tool, arguments in next(iter(DESIGNS[design](0).parts.values())).actions:
             done = sessions.call(job.id, machine="main", tool=tool, arguments=arguments)
             assert done.ok, done.feedback
         return sessions.submit(job.id)
@@ -95,7 +95,7 @@ def test_what_a_task_asks_of_modules_is_checked(context, agent_plays) -> None:
 def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(context, finish) -> None:
     add(context, BRIDGE.read_text())
     sessions = ExternalSessions(context)
-    job = sessions.open(task="suspension-bridge", agent="me", seed=0, simulator="mujoco").job
+    job = sessions.open(task="suspension-bridge", agent="me", seed=0, simulator="mujoco")[0].job
     for machine, actions in SUSPENSION["with ropes"].items():
         for tool, arguments in actions:
             done = sessions.call(job.id, machine=machine, tool=tool, arguments=arguments)

@@ -128,7 +128,7 @@ ROCKET = (
 
 def _submitted(context) -> str:
     sessions = ExternalSessions(context)
-    job = sessions.open(task="lift-1", agent="me", seed=0, simulator="mujoco").job
+    job = sessions.open(task="lift-1", agent="me", seed=0, simulator="mujoco")[0].job
     for tool, arguments in ROCKET:
         done = sessions.call(job.id, machine="main", tool=tool, arguments=arguments)
         assert done.ok, done.feedback

@@ -189,7 +189,7 @@ def test_every_role_is_told_of_the_worlds_that_score_it(subtests) -> None:
 def test_agents_are_told_of_the_worlds_that_score_them(context, subtests) -> None:
     for worlds in [0, 1, 5]:
         with subtests.test(worlds=worlds):
-            opened = ExternalSessions(context).open(
+            opened, _ = ExternalSessions(context).open(
                 task="lift-1", agent="told", seed=worlds, simulator="pybullet", worlds=worlds
             )
             assert_tells(told_of_worlds(opened.briefing), worlds)

@@ -18,7 +18,7 @@ from buildarena_cli.terminal.output import (
 ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "#": lambda row: _rank(row["rank"]),
     "model": lambda row: row["model"] + _marks(row),
-    "success": lambda row: f"{row['successes']:g}/{row['trials']}",
+    "success": lambda row: f"{row['successes']:g}/{row['counted']}",
     "95 %": lambda row: _interval(row["success_low"], row["success_high"]),
     "indicator": lambda row: number(row["indicator_mean"], at_least=_is_censored(row)),
     "of it 95 %": lambda row: _spread(

@@ -126,7 +126,7 @@ class Submissions:
         if sweep is None:
             return None
         if sweep.request_hash != spec_hash(spec):
-            raise RequestReusedError("this Idempotency-Key was used for another sweep")
+            raise RequestReusedError("this Idempotency-Key was used for another request")
         number = self._context.store.sweeps.size(sweep_id)
         return Submitted(sweep=sweep, jobs=number, added=0, fresh=False)
 

@@ -10,10 +10,10 @@ from fastapi import APIRouter, Query, Request, Response
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RegistryDep, ServicesDep
 from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.idempotency import RequestKey
 from buildarena_api.http.pages import Page, PagingDep, encode
 from buildarena_api.http.places import Kind
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.idempotency import RequestKey
 from buildarena_api.job_filters import JobFilterDep, require_known
 from buildarena_api.job_records import machine_hash, missing, require_told
 from buildarena_api.routes.transcripts import as_markdown

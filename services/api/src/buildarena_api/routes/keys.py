@@ -9,8 +9,8 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
 
 from buildarena_api.dependencies import ContextDep, ServicesDep
-from buildarena_api.http.idempotency import RequestKey
 from buildarena_api.http.pages import Page, PagingDep
+from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import EXISTED, BudgetUse
 from buildarena_backend.accounts.keys import ApiKey
 from buildarena_backend.catalog.specs import Budget, Title

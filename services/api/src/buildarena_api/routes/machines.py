@@ -9,8 +9,8 @@ from pydantic import BaseModel, Field
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.idempotency import RequestKey
 from buildarena_api.http.problems import unknown
+from buildarena_api.idempotency import RequestKey
 from buildarena_api.machine_uploads import (
     MAX_BYTES,
     read_uploaded,

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from buildarena_api.access import Caller, CallerDep
 from buildarena_api.benches import WorkbenchMachine, machine_view
 from buildarena_api.dependencies import Services, ServicesDep
-from buildarena_api.http.idempotency import RequestKey
+from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import EXISTED, JobView
 from buildarena_backend.agents.briefing import LIMITS
 from buildarena_backend.agents.sessions import SessionState

@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict
 
 from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep, IdPrefix, ServicesDep
-from buildarena_api.http.idempotency import RequestKey
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
+from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import (
     EXISTED,
     BudgetUse,

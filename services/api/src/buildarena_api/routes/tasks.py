@@ -13,9 +13,9 @@ from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.bodies import YAML, is_yaml, not_utf8
 from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import Answer, conditional
-from buildarena_api.http.idempotency import RequestKey
 from buildarena_api.http.pages import Page, PagingDep
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import EXISTED
 from buildarena_backend.catalog.tasks import CatalogueEntry
 from buildarena_benchmark import parse_custom_task

@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from buildarena_api.access import Caller, CallerDep
 from buildarena_api.dependencies import ContextDep
 from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.idempotency import RequestKey
 from buildarena_api.http.problems import ProblemError
+from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import EXISTED
 from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import MAX_OPEN, Requested
