@@ -52,7 +52,7 @@ def _large_sweeps(url: str, jobs: int) -> dict[str, Any]:
             started = time.perf_counter()
             answer = client.post("/v1/sweeps", json={**SWEEP, "seeds": seeds})
             times.append(time.perf_counter() - started)
-            assert answer.status_code == 202, answer.text
+            assert answer.status_code == 201, answer.text
             assert answer.json()["added"] == jobs
             client.post(f"/v1/sweeps/{answer.json()['id']}/cancel").raise_for_status()
     median = statistics.median(times)
@@ -72,7 +72,7 @@ async def _submit_steadily(
             started = time.perf_counter()
             answer = await client.post("/v1/jobs", json=body)
             latencies.append(time.perf_counter() - started)
-            assert answer.status_code == 202, answer.text
+            assert answer.status_code == 201, answer.text
 
         async with asyncio.TaskGroup() as tasks:
             begun = time.perf_counter()

@@ -150,7 +150,6 @@ def measure_boards(settings: dict[str, str], database: Database, times: int) -> 
         other = {
             "other_track": ask(client, "/v1/leaderboard", track=TRACKS[1]),
             "figures": ask(client, "/v1/leaderboard/figures"),
-            "half_a_year": ask(client, "/v1/leaderboard", since="2025-06-01T00:00:00Z"),
             "sweep": ask(client, "/v1/leaderboard", sweep="sweep_ended0"),
         }
         return {

@@ -5,6 +5,7 @@ attacker is a process of its own, so that it does not slow the measurement itsel
 """
 
 import asyncio
+import itertools
 import resource
 import statistics
 import subprocess
@@ -22,6 +23,7 @@ from support.clients.tenants import ADMIN
 from support.servers.api_process import Service, api_service
 
 from buildarena_backend.database.database import Database
+from buildarena_benchmark import builtin_tasks
 
 JOBS = 1000
 FLOODS = {
@@ -206,7 +208,7 @@ def _paths(kind: str, count: int, url: str, secret: str, sweep: str) -> list[tup
         headers = {"Authorization": f"Bearer {secret}"}
         params = {"sweep": sweep, "limit": 200}
         jobs = httpx.get(f"{url}/v1/jobs", params=params, headers=headers, timeout=30).json()
-        ids = [job["id"] for job in jobs["jobs"]]
+        ids = [job["id"] for job in jobs["data"]]
         return [("POST", f"/v1/jobs/{ids[n % len(ids)]}/verify") for n in range(count)]
     if kind == "half requests":
         return [("GET", "")] * count
@@ -216,7 +218,9 @@ def _paths(kind: str, count: int, url: str, secret: str, sweep: str) -> list[tup
     }
     if kind in path:
         return [("GET", path[kind])] * count
-    return [("GET", f"/v1/leaderboard?since=2020-01-01T00:00:{n % 60:02}Z") for n in range(count)]
+    pairs = itertools.cycle(itertools.combinations(sorted(builtin_tasks()), 2))
+    some = itertools.islice(pairs, count)
+    return [("GET", f"/v1/leaderboard?task={one}&task={other}") for one, other in some]
 
 
 async def _attack(words: list[str]) -> Counter[str]:

@@ -68,7 +68,7 @@ def stopped_broker(arena: Arena) -> Tried:
             body = {"task": "support-1", "model": "builtin/idle", "seed": 5000 + number}
             answer = arena.innocent.ask("POST", "/v1/jobs", json=body)
             slowest = max(slowest, time.monotonic() - started)
-            found.require(answer.status_code == 202, f"a submission got {answer.status_code}")
+            found.require(answer.status_code == 201, f"a submission got {answer.status_code}")
             ids.append(answer.json()["id"])
             number += 1
             time.sleep(0.1)

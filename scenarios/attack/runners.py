@@ -162,7 +162,7 @@ def _counted(arena: Arena) -> int:
         if f"/{ENGINE}-" in track
     ]
     rows = [row for board in boards for task in board["tasks"] for row in task["rows"]]
-    return sum(row["trials"] for row in rows if row["model"] == "builtin/expert")
+    return sum(row["counted"] for row in rows if row["model"] == "builtin/expert")
 
 
 def _submitted(arena: Arena, seed: int) -> str:

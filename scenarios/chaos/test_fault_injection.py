@@ -57,7 +57,7 @@ def submitted(client: httpx.Client, payload: dict[str, object], key: str) -> str
             answer = client.post("/v1/sweeps", json=payload, headers={"Idempotency-Key": key})
         except httpx.TransportError:
             return None
-        return answer.json()["id"] if answer.status_code == 202 else None
+        return answer.json()["id"] if answer.is_success else None
 
     return str(wait_until(submit, 60, f"sweep {key} is accepted"))
 

@@ -136,7 +136,7 @@ def submit(url: str, tenant: Tenant, number: int, rng: random.Random) -> str:
                 "Authorization": f"Bearer {tenant.secret}",
             }
             answer = httpx.post(f"{url}/v1/sweeps", json=payload, headers=headers, timeout=30)
-            return answer.json()["id"] if answer.status_code == 202 else None
+            return answer.json()["id"] if answer.is_success else None
         return None
 
     return str(wait_until(ask, 120, f"batch {number} is accepted"))

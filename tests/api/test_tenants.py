@@ -77,7 +77,7 @@ def test_anothers_limits_never_become_my_result(a, b, context) -> None:
     # The same limits are the same job, however they are spelled.
     ids = {mine["id"], tight["id"]}
     for name, one, spelled in (
-        *(("max_tokens", 1, 1), ("max_seconds", 2, 2.0), ("max_cost_usd", 1, 1.0)),
+        *(("max_tokens", 1, 1), ("max_duration_s", 2, 2.0), ("max_cost_usd", 1, 1.0)),
         ("max_requests", 2, 2),
     ):
         job, again = (a.post("/v1/jobs", {**JOB, "limits": {name: n}}) for n in (one, spelled))

@@ -31,7 +31,7 @@ def submitted(context, path: str = "/v1/jobs", headers=None, **spec: object) -> 
         answer = api.post(
             path, json={**JOB, **spec} if path == "/v1/jobs" else spec, headers=headers
         )
-    assert answer.status_code == 202, answer.text
+    assert answer.status_code == 201, answer.text
     return answer.json()
 
 

@@ -75,8 +75,8 @@ def test_a_wait_between_tries_ends_with_the_lease(context, tmp_path) -> None:
 @pytest.mark.parametrize("how", ["hang", "drip", "500", "garbage"])
 def test_a_job_s_seconds_end_its_request_and_are_verified(context, tmp_path, how) -> None:
     with stuck(how) as bad, crew(context, tmp_path, bad=bad) as workers:
-        job = workers.ended(workers.submit("bad", limits={"max_seconds": 1.5}), 10)
-    assert (job.outcome, job.reason) == ("limit", "max_seconds"), job.detail
+        job = workers.ended(workers.submit("bad", limits={"max_duration_s": 1.5}), 10)
+    assert (job.outcome, job.reason) == ("limit", "max_duration_s"), job.detail
     entries = workers.requests(job.id)
     assert {"garbage", "out_of_time"} >= {entry["finish"] for entry in entries}
     assert how == "garbage" or len(entries) == 1

@@ -88,7 +88,7 @@ def test_limits_stop_a_session_within_one_request(play, subtests) -> None:
     for limits, requests in [
         ({"max_requests": 3}, 3),
         ({"max_tokens": 40}, 3),
-        ({"max_seconds": 4}, 4),
+        ({"max_duration_s": 4}, 4),
     ]:
         with subtests.test(limits=limits):
             played = play(workflow="builder", client=Scripted(last=START), limits=limits)
@@ -358,10 +358,10 @@ def test_a_request_that_did_not_come_in_time_reaches_the_limit_whatever_was_used
     rng = random.Random(4)
     for _ in range(2000):
         limit = rng.choice([0.1, 1.5, 60, 1e9]) * rng.uniform(0.5, 2)
-        spending = Spending({"max_seconds": limit}, seconds=limit * rng.random())
+        spending = Spending({"max_duration_s": limit}, seconds=limit * rng.random())
         left = spending.seconds_left
         latency_s = spending.to_the_end(left * rng.choice([1e-9, 0.5, 1.0, 1.01]))
         spending.seconds += latency_s
         assert latency_s <= left * 1.01 + 1e-6 * limit
-        with pytest.raises(SessionEnded, match="max_seconds"):
+        with pytest.raises(SessionEnded, match="max_duration_s"):
             spending.require_room()

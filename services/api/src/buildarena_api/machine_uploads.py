@@ -16,6 +16,7 @@ from fastapi import Request
 from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.problems import ProblemError, invalid
+from buildarena_backend.database.text import clean
 from buildarena_besiege import (
     ImportedMachine,
     MachineFileError,
@@ -125,7 +126,7 @@ def _json(data: bytes) -> object:
     if data.startswith(_GLB):
         raise _RefusedError("a GLB file has shapes only: it can be looked at, not checked or tried")
     try:
-        content: object = read_json(data.decode("utf-8-sig"))
+        content: object = clean(read_json(data.decode("utf-8-sig")))
     except TooDeepError as error:
         raise _RefusedError(f"the file has {error}") from error
     except ValueError as error:

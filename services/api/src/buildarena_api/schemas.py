@@ -45,7 +45,7 @@ class AttemptView(_Answer):
     """One worker's attempt at a job's stage."""
 
     token: int = Field(description="Fencing token: grows with every attempt")
-    stage: str
+    stage: Stage
     worker: str
     started_at: datetime
     finished_at: datetime | None = Field(validation_alias="ended_at")

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, fi
 
 from buildarena_backend.accounts.budgets import BudgetLimits
 from buildarena_backend.catalog.workflows import DEFAULT_WORKFLOW
+from buildarena_backend.database.text import INVISIBLE
 from buildarena_simulation import DEFAULT_ENGINE
 from buildarena_simulation.constants import MAX_WORLDS
 
@@ -27,8 +28,11 @@ Worlds = Annotated[
 ]
 Seed = Annotated[StrictInt, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
-Title = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]+$")]
-"""What people call something of theirs: one line, of characters that can be stored."""
+Title = Annotated[str, Field(min_length=1, max_length=200, pattern=f"^[^{INVISIBLE}]+$")]
+"""What people call something of theirs: one line, of characters that can be seen."""
+
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
 class Decoding(BaseModel):
@@ -36,9 +40,9 @@ class Decoding(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    temperature: Annotated[float | None, Field(ge=0, le=2)] = 0.5
-    top_p: Annotated[float | None, Field(gt=0, le=1)] = 0.7
-    max_tokens: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+    temperature: Annotated[Number | None, Field(ge=0, le=2)] = 0.5
+    top_p: Annotated[Number | None, Field(gt=0, le=1)] = 0.7
+    max_tokens: Annotated[StrictInt | None, Field(ge=1, le=1_000_000)] = None
 
 
 class Limits(BaseModel):
@@ -46,10 +50,12 @@ class Limits(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    max_requests: Annotated[int | None, Field(ge=1)] = None
-    max_tokens: Annotated[int | None, Field(ge=1, description="Input and output together")] = None
-    max_cost_usd: Annotated[float | None, Field(gt=0)] = None
-    max_seconds: Annotated[float | None, Field(gt=0)] = None
+    max_requests: Annotated[StrictInt | None, Field(ge=1)] = None
+    max_tokens: Annotated[
+        StrictInt | None, Field(ge=1, description="Input and output together")
+    ] = None
+    max_cost_usd: Annotated[Number | None, Field(gt=0)] = None
+    max_duration_s: Annotated[Number | None, Field(gt=0)] = None
 
 
 class Budget(BaseModel):
@@ -57,11 +63,11 @@ class Budget(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    max_cost_usd: Annotated[float | None, Field(gt=0, le=10_000_000)] = None
+    max_cost_usd: Annotated[Number | None, Field(gt=0, le=10_000_000)] = None
     max_tokens: Annotated[
-        int | None, Field(ge=1, le=MAX_SEED, description="Input and output together")
+        StrictInt | None, Field(ge=1, le=MAX_SEED, description="Input and output together")
     ] = None
-    max_requests: Annotated[int | None, Field(ge=1, le=MAX_SEED)] = None
+    max_requests: Annotated[StrictInt | None, Field(ge=1, le=MAX_SEED)] = None
 
     def as_limits(self) -> BudgetLimits:
         """The form that the store keeps."""

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
-REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+REPLACEMENT: Final = "\N{REPLACEMENT CHARACTER}"
+INVISIBLE: Final = (
+    r"\x00-\x1f\x7f\u{80}-\u{9f}\u{ad}\u{61c}\u{180e}"
+    r"\u{200b}-\u{200f}\u{2028}-\u{202e}\u{2060}-\u{206f}\u{feff}"
+)
+"""Control, zero-width and bidirectional characters, as in a character class of pydantic's regular
+expressions: in a name they would make it look like another, or like nothing."""
 
 
 def clean(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import json
+import re
 from collections.abc import Awaitable, Callable, Collection
 from contextlib import AbstractAsyncContextManager, nullcontext, suppress
 from typing import IO, Final
@@ -18,6 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.places import Places
 from buildarena_api.http.problems import ProblemError, send_problem
+from buildarena_backend.database.text import clean
 from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import read_source
 from buildarena_geometry.json_texts import MAX_DEPTH, is_too_deep
@@ -34,6 +36,8 @@ DRAIN_BYTES: Final = 256 * 1024
 DRAIN_S: Final = 0.5
 YAML: Final = "application/yaml"
 YAML_TYPES: Final = frozenset({YAML, "application/x-yaml", "text/yaml", "text/x-yaml"})
+_ESCAPED: Final = re.compile(rb"\\u(?:0000|[dD][89a-fA-F])")
+"""What JSON texts may hold that nothing can store: NUL, and halves of characters."""
 _OF_BODY: Final = (b"content-type", b"content-length", b"transfer-encoding")
 SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -155,6 +159,10 @@ async def _as_json(scope: Scope, headers: Headers, body: bytes) -> tuple[Scope, 
     if is_too_deep(body):
         detail = f"the body has more than {MAX_DEPTH} arrays or objects inside each other"
         raise ProblemError(ErrorCode.TOO_DEEP, detail)
+    if _ESCAPED.search(body):
+        # What is no JSON is for the route to refuse.
+        with suppress(ValueError):
+            body = json.dumps(clean(json.loads(body))).encode()
     return scope, body
 
 

@@ -134,7 +134,7 @@ def invalid(
 ) -> ProblemError:
     """The problem of one field or parameter."""
     issue = ValidationIssue(path=field, message=message, choices=tuple(choices))
-    return ProblemError(code, f"{field}: {message}{_nearest(issue)}", errors=[issue])
+    return ProblemError(code, _described(issue), errors=[issue])
 
 
 def unknown(field: str, value: str, choices: Iterable[str]) -> ProblemError:

@@ -18,6 +18,7 @@ from buildarena_api.http.problems import ProblemError
 from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import EXISTED
 from buildarena_backend.catalog.tasks import CatalogueEntry
+from buildarena_backend.database.text import clean
 from buildarena_benchmark import parse_custom_task
 from buildarena_benchmark.tasks.sources import MAX_BYTES
 
@@ -115,6 +116,10 @@ def add_task(
     """Uploads a task, or a new version of one of your own; new submissions get it from then on."""
     catalogue = context.tasks
     task = parse_custom_task(text, origin="task")
+    document = dict(task.as_document())
+    if clean(document) != document:
+        detail = "a text has NUL or half a character, which can't be stored"
+        raise ProblemError(ErrorCode.INVALID_FIELD, detail)
     added = catalogue.add(task, text, owner=caller.key_id, force=caller.is_admin)
     response.status_code = 201 if added else 200
     response.headers["Location"] = f"/v1/tasks/{task.name}?version={task.version}"

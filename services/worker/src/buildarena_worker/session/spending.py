@@ -44,7 +44,7 @@ class Spending:
 
     @property
     def _most_seconds(self) -> float:
-        limit = self.limits.get("max_seconds")
+        limit = self.limits.get("max_duration_s")
         return math.inf if limit is None else float(limit)
 
     def require_room(self) -> None:
@@ -57,7 +57,7 @@ class Spending:
             "max_requests": self.usage.requests,
             "max_tokens": self.usage.input_tokens + self.usage.output_tokens,
             "max_cost_usd": self.usage.cost_usd,
-            "max_seconds": self.seconds,
+            "max_duration_s": self.seconds,
         }
         for name, value in spent.items():
             limit = self.limits.get(name)

@@ -58,7 +58,7 @@ describe("a sweep as YAML", () => {
 
   it("has fields by their keys", () => {
     expect(keysOf("tasks[0]")).toEqual(["tasks", 0]);
-    expect(keysOf("limits.max_seconds")).toEqual(["limits", "max_seconds"]);
+    expect(keysOf("limits.max_duration_s")).toEqual(["limits", "max_duration_s"]);
   });
 });
 
