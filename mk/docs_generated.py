@@ -12,13 +12,18 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from buildarena_api.http.openapi import api_page
 from docs_modules import module_guide
 from docs_pictures import PICTURES, pictures
 from mkdocs.structure.files import File
 
 LOG = logging.getLogger("mkdocs.hooks.generated")
 TESTS = str(Path(__file__).parents[1] / "tests")
-PAGES = {"the module guide": "modules.md", "what a model sees": "what-a-model-sees.md"}
+PAGES = {
+    "the module guide": "modules.md",
+    "what a model sees": "what-a-model-sees.md",
+    "the API's page": "api.md",
+}
 """Pages by how documents call them, followed by (`make docs`)."""
 CALLED = re.compile(rf"({'|'.join(PAGES)}) \(`make docs`\)", re.IGNORECASE)
 PICTURE = re.compile(r"^\*Picture \(`make docs`\): (.+)\.\*$", re.MULTILINE)
@@ -27,6 +32,7 @@ PICTURE = re.compile(r"^\*Picture \(`make docs`\): (.+)\.\*$", re.MULTILINE)
 def on_files(files: Any, *, config: Any) -> Any:
     """Called by mkdocs with the files that it found."""
     made = {**module_guide(), **pictures(), "what-a-model-sees.md": _what_a_model_sees()}
+    made["api.md"] = api_page()
     for path, text in made.items():
         files.append(File.generated(config, path, content=text))
     return files

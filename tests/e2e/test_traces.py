@@ -64,7 +64,7 @@ def test_what_is_submitted_is_one_trace_and_goes_on_a_callers(context) -> None:
     root, other = request_of(spans, "/v1/jobs"), request_of(spans, "/v1/sweeps")
     assert root.parent is None
     assert root.kind == SpanKind.SERVER
-    assert root.attributes[http_attributes.HTTP_RESPONSE_STATUS_CODE] == 202
+    assert root.attributes[http_attributes.HTTP_RESPONSE_STATUS_CODE] == 201
     stages = [one for one in spans.named(*STAGES) if one.attributes["buildarena.job"] == job["id"]]
     assert [one.name for one in stages] == list(STAGES)
     assert stages[0].attributes["buildarena.token"] == lease.token + 1

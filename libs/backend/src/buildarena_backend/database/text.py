@@ -6,11 +6,11 @@ from typing import Any, Final
 
 REPLACEMENT: Final = "\N{REPLACEMENT CHARACTER}"
 INVISIBLE: Final = (
-    r"\x00-\x1f\x7f\u{80}-\u{9f}\u{ad}\u{61c}\u{180e}"
-    r"\u{200b}-\u{200f}\u{2028}-\u{202e}\u{2060}-\u{206f}\u{feff}"
+    r"\x00-\x1f\x7f\u0080-\u009f\u00ad\u061c\u180e"
+    r"\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff"
 )
-"""Control, zero-width and bidirectional characters, as in a character class of pydantic's regular
-expressions: in a name they would make it look like another, or like nothing."""
+"""Control, zero-width and bidirectional characters, for a character class: in a name they
+would make it look like another, or like nothing."""
 
 
 def clean(value: Any) -> Any:

@@ -18,6 +18,20 @@ REFERENCE: Final = "#/components/schemas/"
 OPEN: Final = "/v1/health"
 """The path that anybody may ask for."""
 STREAM: Final = "text/event-stream"
+ABOUT: Final = """\
+# The HTTP API
+
+The contract is `/openapi.json`, with a page at `/docs`. For every operation:
+
+- A list is `{"data": [...], "next_cursor": ...}`: pass `next_cursor` as `cursor` for the next page,
+  which has up to `limit` rows. Filters can be repeated; unknown parameters are refused.
+- An object has its `id`; others name it `job_id`, `sweep_id`, `key_id`. Moments end in `_at` and are
+  UTC, lengths in `_s`, money in `_usd`. Empty is `[]` or `{}`; null is unknown.
+- What creates answers 201, or 200 where an equal one exists, and takes an `Idempotency-Key`. A JSON
+  body may be YAML.
+- `RateLimit-*` headers say how many requests are left.
+- An error is a problem (RFC 9457); programs go by its `code`:
+"""
 
 
 def describe(app: FastAPI) -> None:
@@ -81,7 +95,7 @@ def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
     operation["responses"] = dict(sorted(answers.items()))
 
 
-def code_table() -> str:
-    """The codes of errors as a table in Markdown."""
+def api_page() -> str:
+    """The document about the API, with the codes of its errors."""
     rows = [f"| `{code}` | {code.status} | {code.meaning} |" for code in ErrorCode]
-    return "\n".join(["| code | status | meaning |", "|---|---|---|", *rows]) + "\n"
+    return "\n".join([ABOUT, "| code | status | meaning |", "|---|---|---|", *rows]) + "\n"
