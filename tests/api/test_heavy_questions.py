@@ -22,7 +22,7 @@ from buildarena_backend.catalog.specs import SweepSpec
 
 MAX_WAITING = 64
 BOARDS = (
-    *("/v1/leaderboard", "/v1/leaderboard/figures", "/v1/leaderboard/manifest"),
+    *("/v1/leaderboard", "/v1/leaderboard/figures"),
     *("/v1/jobs?text=x", "/v1/jobs?flag=invented", "/v1/jobs/summary"),
     "/v1/leaderboard/compare?first=builtin/idle&second=builtin/idle",
 )
@@ -35,7 +35,7 @@ def test_a_page_has_at_most_200_rows(api, submissions) -> None:
     assert len(page["data"]) == 200
     rest = api.get("/v1/jobs", params={"limit": 200, "cursor": page["next_cursor"]}).json()
     assert len(rest["data"]) == 1
-    for path in ("/v1/jobs", "/v1/leaderboard/changes", "/v1/workers"):
+    for path in ("/v1/jobs", "/v1/sweeps", "/v1/workers"):
         answer = api.get(f"{path}?limit=201")
         assert answer.status_code == 422
         assert "200" in answer.json()["detail"]
@@ -54,7 +54,7 @@ def board(context, submissions) -> None:
 @pytest.mark.ci
 @pytest.mark.usefixtures("board")
 def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(context) -> None:
-    path = "/v1/leaderboard/changes"
+    path = "/v1/leaderboard/figures"
     with (
         changed(context, **WITH_KEYS) as own,
         live_api(own) as url,

@@ -246,14 +246,8 @@ def test_words_are_found_in_all_their_forms_with_their_turns(api, sweep_of_talke
         assert answer.status_code == status, (name, bad)
 
 
-def test_what_roles_were_told_is_kept_and_found_once_a_job(api, sweep_of_talkers) -> None:
-    (match,) = found(api, "gearbox", search_in="prompts")
-    assert (match["turn"], match["where"], marked(match)) == (0, "prompt", ["gearboxes"])
-    assert found(api, '"lift weights"', search_in="prompts") == []
-    assert found(api, "gearbox")[0]["where"] == "reply"
-    both = found(api, "bridge or gearbox", search_in="prompts", sweep=sweep_of_talkers)
-    assert len({match["job_id"] for match in both}) == 2
-    assert found(api, "gearbox", search_in="prompts", task="lift-1") == []
+def test_what_roles_were_told_is_kept(api, sweep_of_talkers) -> None:
+    (match,) = found(api, '"overlap block 3"', sweep=sweep_of_talkers)
     kept = api.get(f"/v1/jobs/{match['job_id']}/prompts").json()["data"]
     again = {"turn": 2, "system": None, "user": ["Draw the gearbox again."]}
     assert kept == [{"turn": 0, **TOLD}, again]

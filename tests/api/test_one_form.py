@@ -53,7 +53,6 @@ def test_codes_say_what_was_not_found(api) -> None:
         ("/v1/tasks/nothing", "task_not_found"),
         ("/v1/sessions/job_0", "session_not_found"),
         ("/v1/verifications/check_0", "verification_not_found"),
-        ("/v1/modules/x.glb", "module_not_found"),
         ("/v1/nothing", "path_not_found"),
     ):
         assert code_of(api.get(path)) == (404, code), path
@@ -110,7 +109,7 @@ def test_the_missing_scope_is_the_one_that_is_needed(guarded) -> None:
         assert "'admin'" in refused.json()["detail"]
 
 
-def test_a_request_that_is_sent_again_creates_nothing_twice(api, context) -> None:
+def test_a_request_that_is_sent_again_creates_nothing_twice(api) -> None:
     again = {"Idempotency-Key": "monday"}
     bodies = {
         "/v1/jobs": (JOB, {**JOB, "seed": 5}),

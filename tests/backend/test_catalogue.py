@@ -36,21 +36,6 @@ models:
   - {name: own/cached, provider: own, model: c, price: {input: 0, output: 0, cached: 1}}
   - {name: own/dear, provider: own, model: dear, price: {input: 1, output: 0}}
 """
-PUBLISHED = """
-agents:
-  planner: {system_message: Plan it.}
-  draft_reviewer: {system_message: Review it.}
-controller: Drive it.
-"""
-LEVELS = """
-category: support
-level: soft
-task: Carry it over.
----
-category: lift
-level: hard
-task: Lift it.
-"""
 
 
 def test_an_operator_adds_models_and_only_what_costs_nothing_is_free(tmp_path: Path) -> None:
@@ -96,34 +81,11 @@ def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path)
     assert varied.id.startswith("five-role+one-shot+data-sheets+5-rounds-analyst/pybullet-")
 
 
-def test_a_pack_of_the_published_layout_takes_the_place_of_our_sentences(tmp_path: Path) -> None:
-    folder = tmp_path / "packs" / "theirs"
-    folder.mkdir(parents=True)
-    (folder / "prompt.yaml").write_text(PUBLISHED)
-    (folder / "levels.yaml").write_text(LEVELS)
-    packs = PromptPacks(tmp_path / "packs")
-    assert packs.names == ["default", "theirs"]
-    pack, default = packs.load("theirs"), packs.load("default")
-    told = {"planner": "Plan it.", "reviewer": "Review it.", "controller": "Drive it."}
-    assert pack.roles == {**default.roles, **told}
-    assert pack.statements == {"support-1": "Carry it over.", "lift-3": "Lift it."}
-    assert pack.digest != default.digest
-
-
 def test_a_malformed_pack_is_named(tmp_path: Path) -> None:
     with pytest.raises(StartupError, match=r"planner\.md"):
         read_pack(tmp_path, name="empty")
     with pytest.raises(StartupError, match="no prompt pack 'x'; there are default"):
         PromptPacks().load("x")
-    for file, text, says in [
-        ("prompt.yaml", "agents: {planner: {}}", "system_message"),
-        ("prompt.yaml", "agents: [", "can't be read"),
-        ("levels.yaml", "category: x\nlevel: extreme\ntask: y", "document 1 .* soft, medium, hard"),
-    ]:
-        (tmp_path / "prompt.yaml").write_text(PUBLISHED)
-        (tmp_path / file).write_text(text)
-        with pytest.raises(StartupError, match=says):
-            read_pack(tmp_path, name="bad")
 
 
 def add(context, text: str) -> str:

@@ -28,7 +28,6 @@ CALLED = {
     "get_artifact": "artifact",
     "get_machine": "machine",
     "get_transcript": "transcript",
-    "manifest_entries": "manifest",
     "results": "sweep_results",
     "troubles": "sweep_troubles",
     "get_trajectory": "trajectory",

@@ -37,7 +37,6 @@ def test_the_catalogue(client) -> None:
     task = client.task("lift-1")
     assert client.task("lift-1", version=task["version"]) == task
     assert "builtin/idle" in [model["name"] for model in client.models()]
-    assert client.module_model(client.modules()[0]["name"]).startswith(b"glTF")
     assert client.versions()["family_wise_error_rate"] == 0.05
     assert list(client.workers()) == []
 
@@ -82,11 +81,7 @@ def test_the_leaderboard_and_what_stands_beside_it(client, service) -> None:
     found = client.compare("builtin/expert", "builtin/idle", task=["lift-1"])
     assert found["tasks"][0]["counted_jobs"] == [3, 3]
     assert client.figures()["failures"]
-    assert client.manifest(task=["lift-1"], model=["builtin/idle"])
     assert b"builtin/idle" in client.export_leaderboard("csv")
-    numbers = [change["id"] for change in client.changes()]
-    assert numbers == sorted(numbers, reverse=True)
-    assert [change["id"] for change in client.changes(limit=2)] == numbers[:2]
     asked = client.verify_leaderboard("builtin/expert", sample=1)
     assert asked["scored"] == 3
     assert client.verification(asked["verification_ids"][0])["id"] == asked["verification_ids"][0]

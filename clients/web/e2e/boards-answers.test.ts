@@ -56,7 +56,7 @@ describe("failures", () => {
 
   it("have what roles were told, which their turns say when they are asked", async () => {
     const { data: matches } = await ask<Schemas["TranscriptMatchList"]>(
-      "/v1/transcripts?text=drawing&search_in=prompts",
+      "/v1/transcripts?text=drawing",
     );
     const id = matches[0]?.job_id ?? "";
     const { page, context } = await opened(`/jobs/${id}?turn=${matches[0]?.turn ?? ""}`);

@@ -167,15 +167,12 @@ class Client:
     versions = _call(Api.versions)
     simulators = _call(Api.simulators)
     modules = _call(Api.modules)
-    module_model = _call(Api.module_model)
     workers = _iteration(Api.workers)
 
     leaderboard = _call(Api.leaderboard)
     compare = _call(Api.compare)
     figures = _call(Api.figures)
-    changes = _iteration(Api.changes)
     verify_leaderboard = _call(Api.verify_leaderboard)
-    manifest = _call(Api.manifest)
     export_leaderboard = _call(Api.export_leaderboard)
 
     jobs = _iteration(Api.jobs)

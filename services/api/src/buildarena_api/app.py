@@ -38,7 +38,6 @@ from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.leaderboard.cache import BoardCache
 from buildarena_api.replays.making import Replays
 from buildarena_api.routes import (
-    callers,
     catalogue,
     events,
     exports,
@@ -49,17 +48,13 @@ from buildarena_api.routes import (
     machines,
     metrics,
     pictures,
-    replays,
     runner,
     sessions,
-    simulators,
     sweeps,
     tasks,
     transcript_search,
     trials,
     verifications,
-    versions,
-    workers,
 )
 from buildarena_api.runners.service import RunnerService
 from buildarena_backend import __version__
@@ -84,13 +79,9 @@ ORDINARY = (
     sweeps,
     tasks,
     catalogue,
-    callers,
     keys,
-    simulators,
-    versions,
-    workers,
 )
-HEAVY = (replays, transcript_search, pictures, leaderboard, exports)
+HEAVY = (transcript_search, pictures, leaderboard, exports)
 """Routes whose questions take a core for as long as they last."""
 LIMITED_THEMSELVES = (events, machines, trials, jobs, metrics)
 """Routes that say how much of what they answer goes on at once; metrics take no thread."""

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncGenerator
 from typing import TYPE_CHECKING, Literal, Unpack, cast
 
-from buildarena_client.endpoints.sending import PAGE, Sender
+from buildarena_client.endpoints.sending import Sender
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import (
         Board,
-        BoardChange,
         BoardFilters,
         Comparison,
         Figures,
-        ManifestEntry,
         VerifyAccepted,
     )
 
@@ -45,17 +42,6 @@ class Boards(Sender):
         """What a leaderboard's figures are drawn from."""
         return cast("Figures", await self.get("/v1/leaderboard/figures", **filters))
 
-    def changes(
-        self, *, limit: int | None = 100, **filters: Unpack[BoardFilters]
-    ) -> AsyncGenerator[BoardChange, None]:
-        """What entered a leaderboard, left it or was scored again, the newest first.
-
-        Args:
-            limit: Entries at most.
-            filters: Which leaderboard.
-        """
-        return self._listed("/v1/leaderboard/changes", limit, PAGE, dict(filters))
-
     async def verify_leaderboard(
         self,
         model: str,
@@ -76,14 +62,6 @@ class Boards(Sender):
         """
         body = {"model": model, "track": track, "tasks": tasks, "sample": sample, "seed": seed}
         return cast("VerifyAccepted", await self.post("/v1/leaderboard/verify", body))
-
-    async def manifest(self, **filters: Unpack[BoardFilters]) -> list[ManifestEntry]:
-        """The versions behind an entry: what its jobs' manifests say.
-
-        Args:
-            filters: Which entry: name ``task`` and ``model``.
-        """
-        return await self.every("/v1/leaderboard/manifest", **filters)
 
     async def export_leaderboard(
         self, kind: Literal["csv", "parquet", "latex"], **filters: Unpack[BoardFilters]

@@ -88,7 +88,3 @@ class Catalogue(Sender):
             page: How many are asked for at once, 1 to 500.
         """
         return self._listed("/v1/workers", limit, page, {})
-
-    async def module_model(self, name: str) -> bytes:
-        """The shape of a module, as GLB."""
-        return await self.get_bytes(at("modules", f"{name}.glb"))

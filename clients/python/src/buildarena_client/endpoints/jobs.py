@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncGenerator
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Unpack, cast
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
 from buildarena_client.endpoints.sending import PAGE, Sender
 from buildarena_client.errors import BadArgumentError
@@ -56,7 +56,6 @@ class Jobs(Sender):
         task: str | None = None,
         model: str | None = None,
         sweep: str | None = None,
-        search_in: Literal["transcripts", "prompts"] = "transcripts",
     ) -> AsyncGenerator[TranscriptMatch, None]:
         """Turns of all jobs in which words stand, in what was said or answered.
 
@@ -66,10 +65,9 @@ class Jobs(Sender):
             task: Only of jobs on this task.
             model: Only of this model's jobs.
             sweep: Only of this sweep's jobs.
-            search_in: ``prompts``: what roles were told; finds the first turn of each job.
         """
         asked = {"text": words, "task": task, "model": model, "sweep": sweep}
-        return self._listed("/v1/transcripts", limit, 50, {**asked, "search_in": search_in})
+        return self._listed("/v1/transcripts", limit, 50, asked)
 
     async def job(self, job_id: str) -> JobDetail:
         """A job with its manifest, attempts and artifacts."""

@@ -1,46 +1,19 @@
-"""Ended jobs in bulk, and the log of what changed on boards, and why."""
+"""Ended jobs in bulk."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
-from sqlalchemy import Row, func, select, text
+from sqlalchemy import Row, select
 
 from buildarena_backend.boards.cells import BoardCells
 from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, read_trials
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import columns_of, value_of
-from buildarena_backend.database.tables import board_changes, jobs, rollouts, sweep_jobs
+from buildarena_backend.database.tables import jobs, rollouts, sweep_jobs
 from buildarena_backend.states import JobState
 from buildarena_benchmark.flags import is_disqualified
 from buildarena_benchmark.leaderboard import SCORED, EndedJob
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BoardChange:
-    """One line of the change log.
-
-    Attributes:
-        kind: ``entered``, ``left``, ``rescored``, ``corrected`` (a figure beside the score), or
-            ``unscored`` (a job ended without a score).
-        before: Outcome, reason, success, indicator and flags, if it had ended before.
-        after: The same now, if it has ended.
-        why: What the writer said, if anything.
-    """
-
-    id: int
-    job_id: str
-    track: str
-    task: str
-    model: str
-    kind: str
-    before: Mapping[str, Any] | None
-    after: Mapping[str, Any] | None
-    why: str | None
-    at: datetime
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,7 +33,7 @@ class Round:
 
 
 class Boards:
-    """Reads ended jobs and their changes.
+    """Reads ended jobs.
 
     Attributes:
         cells: The same by cell, as boards are made of them.
@@ -121,49 +94,6 @@ class Boards:
             for row in connection.execute(simulated):
                 _add_rollout(rounds.setdefault(row.job_id, []), row)
         return [(trial, rounds.get(trial.job_id, [])) for trial in found]
-
-    def changes(
-        self, track: str, *, before: int | None = None, limit: int = 100, scored_only: bool = True
-    ) -> list[BoardChange]:
-        """The change log of a track, the newest first.
-
-        Args:
-            track: The track.
-            before: Only changes with smaller ids.
-            limit: Rows at most.
-            scored_only: Leave out jobs that ended without a score.
-        """
-        query = select(*columns_of(BoardChange, board_changes)).where(
-            board_changes.c.track == track
-        )
-        if before is not None:
-            query = query.where(board_changes.c.id < before)
-        if scored_only:
-            query = query.where(board_changes.c.kind != "unscored")
-        query = query.order_by(board_changes.c.id.desc()).limit(limit)
-        with self._database.transaction() as connection:
-            return [value_of(BoardChange, row) for row in connection.execute(query)]
-
-    def manifest_values(
-        self, track: str, task: str, task_version: str, model: str
-    ) -> list[tuple[str, Any, int]]:
-        """What a board entry's manifests say: name, value, and how many scored jobs say so."""
-        entries = func.jsonb_each(jobs.c.manifest).table_valued("key", "value")
-        query = (
-            select(entries.c.key, entries.c.value, func.count().label("jobs"))
-            .select_from(jobs.join(entries, text("true")))
-            .where(
-                jobs.c.track == track,
-                jobs.c.task == task,
-                jobs.c.task_version == task_version,
-                jobs.c.model == model,
-                jobs.c.success.is_not(None),
-            )
-            .group_by(entries.c.key, entries.c.value)
-            .order_by(entries.c.key, func.count().desc())
-        )
-        with self._database.transaction() as connection:
-            return [(row.key, row.value, row.jobs) for row in connection.execute(query)]
 
 
 def _add_rollout(rounds: list[Round], row: Row[Any]) -> None:

@@ -1,22 +1,17 @@
 """Prompt packs: all texts that a session sends to a model, in a folder, with a hash.
 
-A pack of our layout is a folder of Markdown files: ``planner.md`` … are the roles' system
-messages, files under ``messages/`` are the frames of what the roles read, with ``$name``
-places. A pack of the published layout has ``prompt.yaml`` and maybe ``levels.yaml``; what it does
-not say is taken from the default pack.
+A pack is a folder of Markdown files: ``planner.md`` … are the roles' system messages, files under
+``messages/`` are the frames of what the roles read, with ``$name`` places.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from string import Template
-from typing import Any
-
-import yaml
 
 from buildarena_backend.errors import StartupError
 
@@ -59,14 +54,6 @@ MESSAGES = (
     "advice",
     "example",
 )
-PUBLISHED_ROLES = {
-    "planner": "planner",
-    "drafter": "drafter",
-    "draft_reviewer": "reviewer",
-    "builder": "builder",
-    "guidance": "guidance",
-}
-PUBLISHED_LEVELS = {"soft": 1, "medium": 2, "hard": 3}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,14 +65,12 @@ class PromptPack:
         digest: SHA-256 over all its sentences; part of every result.
         roles: System messages by role.
         messages: Frames by name.
-        statements: Task statements by ``category-level`` that take the place of the tasks' own.
     """
 
     name: str
     digest: str
     roles: Mapping[str, str]
     messages: Mapping[str, str]
-    statements: Mapping[str, str] = field(default_factory=dict)
 
     def say(self, message: str, **values: str) -> str:
         """A frame with its places filled."""
@@ -136,16 +121,18 @@ def _packs_in(folder: Path) -> dict[str, Path]:
 
 
 def read_pack(folder: Path, *, name: str) -> PromptPack:
-    """Reads a pack from a folder of either layout.
+    """Reads a pack from a folder.
 
     Raises:
-        StartupError: A file is missing or malformed.
+        StartupError: A file is missing.
     """
-    if (folder / "prompt.yaml").exists():
-        return _read_published(folder, name)
     roles = {role: _text(folder, f"{role}.md", name) for role in ROLES}
     messages = {frame: _text(folder, f"messages/{frame}.md", name) for frame in MESSAGES}
-    return _pack(name, roles, messages, {})
+    digest = hashlib.sha256()
+    for kind, texts in (("role", roles), ("message", messages)):
+        for key, text in sorted(texts.items()):
+            digest.update(f"{kind}\0{key}\0{text}\0".encode())
+    return PromptPack(name=name, digest=digest.hexdigest(), roles=roles, messages=messages)
 
 
 def _text(folder: Path, file: str, name: str) -> str:
@@ -154,64 +141,3 @@ def _text(folder: Path, file: str, name: str) -> str:
         return path.read_text(encoding="utf-8").strip()
     except OSError as error:
         raise StartupError(f"prompt pack {name!r} lacks {path}") from error
-
-
-def _pack(
-    name: str, roles: Mapping[str, str], messages: Mapping[str, str], statements: Mapping[str, str]
-) -> PromptPack:
-    digest = hashlib.sha256()
-    for kind, texts in (("role", roles), ("message", messages), ("statement", statements)):
-        for key, text in sorted(texts.items()):
-            digest.update(f"{kind}\0{key}\0{text}\0".encode())
-    return PromptPack(
-        name=name,
-        digest=digest.hexdigest(),
-        roles=roles,
-        messages=messages,
-        statements=statements,
-    )
-
-
-def _read_published(folder: Path, name: str) -> PromptPack:
-    base = read_pack(builtin_folder() / "default", name="default")
-    roles = dict(base.roles)
-    document = _yaml(folder / "prompt.yaml", name)[0]
-    try:
-        for theirs, ours in PUBLISHED_ROLES.items():
-            if theirs in document["agents"]:
-                roles[ours] = str(document["agents"][theirs]["system_message"]).strip()
-        if "controller" in document:
-            controller = document["controller"]
-            text = controller["system_message"] if isinstance(controller, dict) else controller
-            roles["controller"] = str(text).strip()
-    except (KeyError, TypeError) as error:
-        raise StartupError(
-            f"prompt pack {name!r}: {folder / 'prompt.yaml'} needs agents, each with a "
-            f"system_message ({error})"
-        ) from error
-    return _pack(name, roles, base.messages, _statements(folder, name))
-
-
-def _statements(folder: Path, name: str) -> dict[str, str]:
-    path = folder / "levels.yaml"
-    if not path.exists():
-        return {}
-    statements = {}
-    for number, entry in enumerate(_yaml(path, name), start=1):
-        try:
-            level = PUBLISHED_LEVELS[entry["level"]]
-            statements[f"{entry['category']}-{level}"] = str(entry["task"]).strip()
-        except (KeyError, TypeError) as error:
-            raise StartupError(
-                f"prompt pack {name!r}: document {number} of {path} needs category, task and "
-                f"level, one of {', '.join(PUBLISHED_LEVELS)} ({error})"
-            ) from error
-    return statements
-
-
-def _yaml(path: Path, name: str) -> list[Any]:
-    try:
-        documents: Iterable[Any] = yaml.safe_load_all(path.read_text(encoding="utf-8"))
-        return [document for document in documents if document is not None]
-    except (OSError, yaml.YAMLError) as error:
-        raise StartupError(f"prompt pack {name!r}: {path} can't be read: {error}") from error

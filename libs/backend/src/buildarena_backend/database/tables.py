@@ -239,18 +239,7 @@ FEEDBACK_WORDS = text(
     "ELSE NULL::tsvector\nEND)"
 )
 ANSWER_WORDS = text("to_tsvector('english'::regconfig, \"left\"(feedback, 100000))")
-TOLD_WORDS = text(
-    "(\nCASE\n    WHEN length(told::text) < 100000 "
-    "THEN to_tsvector('english'::regconfig, told)\n    ELSE NULL::tsvector\nEND)"
-)
 Index("ix_journal_words", REPLY_WORDS, postgresql_using="gin", _table=journal)
-Index(
-    "ix_journal_told",
-    TOLD_WORDS,
-    postgresql_using="gin",
-    postgresql_where=journal.c.told.is_not(None),
-    _table=journal,
-)
 Index("ix_journal_owner", journal.c.owner, postgresql_where=journal.c.owner.is_not(None))
 
 external_calls = Table(

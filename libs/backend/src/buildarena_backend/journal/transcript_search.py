@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 
 from sqlalchemy import ARRAY, BindParameter, Connection, Text, bindparam, text
 
-from buildarena_backend.database.tables import ANSWER_WORDS, FEEDBACK_WORDS, REPLY_WORDS, TOLD_WORDS
+from buildarena_backend.database.tables import ANSWER_WORDS, FEEDBACK_WORDS, REPLY_WORDS
 from buildarena_backend.states import TURN
 
 MAX_MATCHES: Final = 5_000
@@ -17,7 +17,7 @@ MAX_MATCHES: Final = 5_000
 BEGIN, END = "\x02", "\x03"
 """What stands around a match in an excerpt; transcripts have neither."""
 
-Where = Literal["reply", "feedback", "prompt"]
+Where = Literal["reply", "feedback"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,13 +28,11 @@ class TranscriptFilter:
         tasks: Of jobs on these tasks.
         models: Of these models' jobs.
         sweep_ids: Of these sweeps' jobs.
-        prompts: Whether what roles were told is searched, in place of what was said and answered.
     """
 
     tasks: Sequence[str] | None = None
     models: Sequence[str] | None = None
     sweep_ids: Sequence[str] | None = None
-    prompts: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,7 +46,7 @@ class TranscriptMatch:
         seed: Which try it was.
         outcome: How the job ended; None while it has not.
         turn: The turn's place in the transcript; None where only its reply is kept.
-        where: In what the model said, in what it was answered, or in what it was told before.
+        where: In what the model said, or in what it was answered.
         excerpt: The text around the words: pieces, and whether each is one of them.
     """
 
@@ -73,9 +71,6 @@ def search_transcripts(
 ) -> list[TranscriptMatch]:
     """The turns in which words stand, in any form of English; those of the newest jobs first.
 
-    Histories that were packed are not searched. Of prompts, which repeat themselves, it is the
-    first turn of each job.
-
     Args:
         connection: A transaction of its own.
         words: As search engines take them: ``"a phrase"``, ``or``, ``-not``.
@@ -95,7 +90,7 @@ def search_transcripts(
         "offset": offset,
         "options": f"StartSel={BEGIN}, StopSel={END}, MinWords=15, MaxWords=35",
     }
-    rows = connection.execute(SEARCH_PROMPTS if wanted.prompts else SEARCH, values).all()
+    rows = connection.execute(SEARCH, values).all()
     return [
         TranscriptMatch(
             **{name: getattr(row, name) for name in ("job_id", *FOUND)},
@@ -183,44 +178,5 @@ SEARCH: Final = text(
             AND (events.data ->> 'sequence')::int = shown.sequence LIMIT 1
     ) AS taken ON TRUE
     ORDER BY shown.created_at DESC, shown.job_id, turn NULLS LAST, place DESC
-    """  # noqa: S608 - made of our own constants
-).bindparams(*TYPES)
-# Jobs of one task are told the same, so which jobs are wanted is asked before any are left out;
-# with OFFSET 0 the words are looked up first, by their index.
-SEARCH_PROMPTS: Final = text(
-    f"""
-    WITH asked AS MATERIALIZED (SELECT websearch_to_tsquery('english', :words) AS words),
-    told AS MATERIALIZED (
-        SELECT found.job_id, found.sequence FROM (
-            SELECT job_id, sequence FROM journal
-            WHERE told IS NOT NULL AND ({TOLD_WORDS.text}) @@ (SELECT words FROM asked) OFFSET 0
-        ) AS found JOIN jobs ON jobs.id = found.job_id
-        WHERE {WANTED} LIMIT :most
-    ),
-    shown AS (
-        SELECT first.job_id, first.sequence, jobs.task, jobs.model, jobs.seed, jobs.outcome,
-            jobs.created_at
-        FROM (SELECT job_id, min(sequence) AS sequence FROM told GROUP BY job_id) AS first
-        JOIN jobs ON jobs.id = first.job_id
-        ORDER BY jobs.created_at DESC, jobs.id LIMIT :limit OFFSET :offset
-    )
-    SELECT
-        shown.job_id, shown.task, shown.model, shown.seed, shown.outcome, 'prompt' AS place,
-        taken.turn,
-        ts_headline('english', concat_ws(
-            E'\n\n', said.told ->> 'system',
-            (
-                SELECT string_agg(text, E'\\n\\n')
-                FROM json_array_elements_text(said.told -> 'user') AS text
-            )
-        ), (SELECT words FROM asked), :options) AS excerpt
-    FROM shown
-    JOIN journal AS said ON said.job_id = shown.job_id AND said.sequence = shown.sequence
-    LEFT JOIN LATERAL (
-        SELECT (data ->> 'index')::int AS turn FROM events
-        WHERE events.job_id = shown.job_id AND events.kind = '{TURN}'
-            AND (events.data ->> 'sequence')::int = shown.sequence LIMIT 1
-    ) AS taken ON TRUE
-    ORDER BY shown.created_at DESC, shown.job_id
     """  # noqa: S608 - made of our own constants
 ).bindparams(*TYPES)

@@ -46,7 +46,6 @@ class ErrorCode(StrEnum):
     SESSION_NOT_FOUND = "session_not_found", 404, "There is no such session of an agent."
     KEY_NOT_FOUND = "key_not_found", 404, "There is no such API key."
     VERIFICATION_NOT_FOUND = "verification_not_found", 404, "There is no such verification."
-    MODULE_NOT_FOUND = "module_not_found", 404, "There is no such module."
     ARTIFACT_NOT_FOUND = "artifact_not_found", 404, "The job has no such artifact, or not yet."
     RESULT_WITHHELD = "result_withheld", 404, "It would tell hidden numbers before the job ends."
     METHOD_NOT_ALLOWED = "method_not_allowed", 405, "The path has other methods."

@@ -25,7 +25,7 @@ The contract is `/openapi.json`, with a page at `/docs`. For every operation:
 
 - A list is `{"data": [...], "next_cursor": ...}`: pass `next_cursor` as `cursor` for the next page,
   which has up to `limit` rows. Filters can be repeated; unknown parameters are refused.
-- An object has its `id`; others name it `job_id`, `sweep_id`, `key_id`. Moments end in `_at` and are
+- An object has its `id`; others name it `job_id`, `sweep_id`, `key_id`. Moments end in `_at`, in
   UTC, lengths in `_s`, money in `_usd`. Empty is `[]` or `{}`; null is unknown.
 - What creates answers 201, or 200 where an equal one exists, and takes an `Idempotency-Key`. A JSON
   body may be YAML.

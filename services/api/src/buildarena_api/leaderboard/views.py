@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from functools import cache
 from operator import attrgetter
-from typing import Any, Literal
+from typing import Any
 from urllib.parse import quote_plus
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -96,7 +96,6 @@ class BoardRow(_View):
         description="When the last of its jobs ended", validation_alias="newest"
     )
     jobs: str = Field(description="Path of the list of its jobs")
-    manifest: str = Field(description="Path of the versions behind its score")
 
 
 class TaskBoard(_View):
@@ -174,23 +173,6 @@ class Board(BaseModel):
     )
 
 
-class BoardChangeView(_View):
-    """Something that changed on a board."""
-
-    id: int
-    track: str
-    kind: Literal["entered", "left", "rescored", "corrected", "unscored"]
-    job_id: str
-    task: str
-    model: str
-    before: dict[str, Any] | None
-    after: dict[str, Any] | None
-    reason: str | None = Field(
-        description="That came with the change, if any", validation_alias="why"
-    )
-    at: datetime
-
-
 _CELL = tuple(Cell.__dataclass_fields__)
 _VALUES = attrgetter(*_CELL)
 
@@ -233,7 +215,6 @@ def board_view(
                 "rank_high": ranked.rank_high,
                 "baseline": is_baseline(cell.model),
                 "jobs": f"/v1/jobs?{query}&{one}",
-                "manifest": f"/v1/leaderboard/manifest?{query}&track={quoted(track)}",
             }
         )
 

@@ -1,23 +1,34 @@
-"""Routes of what can be named besides tasks: models, modules and scorers."""
+"""Routes of what the service has besides tasks (models, modules, workers, …), and of who asks."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
+from dataclasses import asdict
+from datetime import datetime
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
+from buildarena_api.access import SCOPES, CallerDep
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.pages import Page, PagingDep
+from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.http.problems import ProblemError, invalid
 from buildarena_api.leaderboard.views import FlagView
+from buildarena_backend import __version__
+from buildarena_backend.states import simulate_queue
+from buildarena_backend.trials.known_simulators import known_simulators
+from buildarena_backend.trials.simulator import SimulatorKind
 from buildarena_benchmark.scoring.registry import known_scorers
-from buildarena_geometry import module_set
+from buildarena_benchmark.statistics import ERROR, MIN_SUCCESSES
+from buildarena_benchmark.tasks.task import SCORER_VERSION
+from buildarena_geometry import FEEDBACK_VERSION, module_set
 from buildarena_geometry.modules.module import Face
+from buildarena_simulation import DEFAULT_ENGINE
 
-router = APIRouter(prefix="/v1", tags=["catalogue"])
+router = APIRouter(prefix="/v1")
 
 
 def _labels(faces: Iterable[Face]) -> list[str]:
@@ -67,13 +78,13 @@ class ScorerView(_View):
     flags: list[FlagView]
 
 
-@router.get("/models")
+@router.get("/models", tags=["catalogue"])
 def list_models(registry: RegistryDep, paging: PagingDep) -> Page[ModelView]:
     """Lists the models of the registry."""
     return Page[ModelView].model_validate(paging.of(list(registry.models.values())))
 
 
-@router.get("/modules")
+@router.get("/modules", tags=["catalogue"])
 def list_modules(
     context: ContextDep,
     paging: PagingDep,
@@ -97,7 +108,7 @@ def list_modules(
     return Page[ModuleView].model_validate(paging.of(list(catalogue.values())))
 
 
-@router.get("/scorers")
+@router.get("/scorers", tags=["catalogue"])
 def list_scorers(paging: PagingDep) -> Page[ScorerView]:
     """Lists the scorers that task files can name, with their parameters and flags."""
     return Page[ScorerView].model_validate(paging.of(list(known_scorers().values())))
@@ -105,3 +116,128 @@ def list_scorers(paging: PagingDep) -> Page[ScorerView]:
 
 def _contradictory(field: str, message: str) -> ProblemError:
     return invalid(field, message, code=ErrorCode.CONTRADICTORY_PARAMETERS)
+
+
+class SimulatorView(BaseModel):
+    """A simulator that jobs can name."""
+
+    name: str = Field(examples=["pybullet"])
+    version: str = Field(
+        description="As tracks have it in their names: trials of two versions are never compared",
+        examples=["3"],
+    )
+    kind: SimulatorKind = Field(
+        description="engine: physics simulation; game: Besiege in its window"
+    )
+    repeatable: bool = Field(description="Whether the same machine has the same trial again")
+    default: bool = Field(description="Whether jobs that name none are run by it")
+    workers: int = Field(description="Workers that reported within the last 15 seconds")
+    served: bool = Field(description="Whether there is such a worker, so that jobs don't wait")
+
+
+@router.get("/simulators", tags=["simulators"])
+def list_simulators(context: ContextDep, paging: PagingDep) -> Page[SimulatorView]:
+    """Lists what jobs can name as `simulator`, and whether it is served at the moment."""
+    serving = Counter(context.store.workers.counts().serving)
+    views = [
+        SimulatorView(
+            **asdict(simulator),
+            default=simulator.name == DEFAULT_ENGINE,
+            workers=serving[simulate_queue(simulator.name)],
+            served=serving[simulate_queue(simulator.name)] > 0,
+        )
+        for simulator in known_simulators(context).values()
+    ]
+    return Page[SimulatorView](**paging.of(views))
+
+
+class SimulatorVersion(BaseModel):
+    """A simulator and its version, as tracks have them in their names."""
+
+    name: str
+    version: str
+
+
+class VersionsView(BaseModel):
+    """What a result depends on besides model and task: results of other versions never mix."""
+
+    buildarena: str = Field(description="Of the service")
+    feedback: str = Field(description="Of what builders are answered")
+    scorers: int = Field(description="Of how trials are judged; part of each task's version")
+    simulators: list[SimulatorVersion]
+    family_wise_error_rate: float = Field(
+        description="Chance that a board makes any false claim, at most"
+    )
+    min_successes: int = Field(
+        description="Successes below which a mean indicator has no interval, as none would hold"
+    )
+
+
+@router.get("/versions", tags=["catalogue"])
+def show_versions(context: ContextDep) -> VersionsView:
+    """Shows the versions in use, and the constants of the boards' statistics."""
+    return VersionsView(
+        buildarena=__version__,
+        feedback=FEEDBACK_VERSION,
+        scorers=SCORER_VERSION,
+        simulators=[
+            SimulatorVersion(name=simulator.name, version=simulator.version)
+            for simulator in known_simulators(context).values()
+        ],
+        family_wise_error_rate=ERROR,
+        min_successes=MIN_SUCCESSES,
+    )
+
+
+class WorkerView(_View):
+    """A process that works on jobs."""
+
+    id: str = Field(
+        description="KIND@HOST:PID beside the database, runner@KEY/NAME where it reaches only the "
+        "API",
+        examples=["simulate@lab3:4711-9f2c41", "runner@key_0a1b2c3d4e5f60718293/lab4-4711"],
+    )
+    kind: str = Field(examples=["simulate"])
+    queues: list[str] = Field(examples=[["simulate.mujoco"]])
+    host: str
+    pid: int
+    versions: dict[str, Any]
+    started_at: datetime
+    seen_at: datetime
+    alive: bool = Field(description="Whether it reported within the last 15 seconds")
+    peak_memory_bytes: int | None
+    clock_ahead_s: float | None = Field(description="How far its clock is ahead of the database's")
+
+
+@router.get("/workers", tags=["workers"])
+def list_workers(context: ContextDep, paging: PagingDep) -> Page[WorkerView]:
+    """Lists the workers that reported within the last hour, the last started first."""
+    found = context.store.workers.page(limit=paging.limit + 1, after=paging.after())
+    shown, following = paging.cut(found, lambda one: encode(NEWEST_FIRST, one.started_at, one.id))
+    return Page[WorkerView].model_validate({"data": shown, "next_cursor": following})
+
+
+class CallerView(BaseModel):
+    """Who asks, and what they may do."""
+
+    key_id: str | None = Field(
+        description="Of the API key; null for the operator, and where no keys are asked for"
+    )
+    scopes: list[Literal["read", "submit", "admin"]] = Field(
+        description="What the key may do: each includes those before it"
+    )
+    keys_required: bool = Field(description="Whether requests need an API key")
+
+
+@router.get("/caller", tags=["keys"])
+async def show_caller(caller: CallerDep, context: ContextDep, response: Response) -> CallerView:
+    """Returns the authenticated caller and its scopes."""
+    # Another key has another answer, at the same address.
+    response.headers["Cache-Control"] = "no-store"
+    return CallerView.model_validate(
+        {
+            "key_id": caller.key_id,
+            "scopes": SCOPES[: SCOPES.index(caller.scope) + 1],
+            "keys_required": context.settings.require_keys,
+        }
+    )

@@ -34,7 +34,7 @@ MEDIA_TYPES = {
     "parquet": "application/vnd.apache.parquet",
     "latex": "text/x-tex; charset=utf-8",
 }
-PLACES = ("jobs", "manifest")
+PLACES = ("jobs",)
 """Fields of a row that are paths of this API: of no use in a file."""
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from hashlib import sha256
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -16,7 +18,6 @@ from buildarena_api.http.problems import ProblemError
 from buildarena_api.idempotency import RequestKey
 from buildarena_api.job_filters import JobFilterDep, require_known
 from buildarena_api.job_records import machine_hash, missing, require_told
-from buildarena_api.routes.transcripts import as_markdown
 from buildarena_api.schemas import (
     EXISTED,
     ArtifactView,
@@ -216,5 +217,53 @@ def get_transcript(
         raise missing(job_id, "transcript")
     if style == "markdown":
         title = f"{job.task} by {job.model}, seed {job.seed}"
-        return Response(as_markdown(data, title), media_type="text/markdown; charset=utf-8")
+        return Response(_as_markdown(data, title), media_type="text/markdown; charset=utf-8")
     return Response(data, media_type=JSON, headers={"ETag": f'"{sha256(data).hexdigest()}"'})
+
+
+FENCE = "```"
+
+
+def _as_markdown(data: bytes, title: str) -> str:
+    """A kept transcript as a page.
+
+    Args:
+        data: The JSON document that is kept as the artifact.
+        title: Heading of the page.
+    """
+    turns: list[dict[str, Any]] = json.loads(data)["turns"]
+    lines = [f"# {title}", "", _summary(turns), ""]
+    place: tuple[str, str | None] | None = None
+    for turn in turns:
+        here = (turn["stage"], turn.get("sub_structure"))
+        if here != place:
+            place = here
+            lines += [f"## {here[0]}" + (f": {here[1]}" if here[1] else ""), ""]
+        lines += _turn(turn)
+    return "\n".join(lines)
+
+
+def _summary(turns: list[dict[str, Any]]) -> str:
+    actions = [action for turn in turns for action in turn["actions"]]
+    refused = Counter(action["reason"] or "refused" for action in actions if not action["ok"])
+    share = sum(refused.values()) / len(actions) if actions else 0.0
+    rendered = ", ".join(f"{count} {name}" for name, count in refused.most_common()) or "none"
+    return f"{len(turns)} turns, {len(actions)} actions, {share:.1%} of them refused ({rendered})."
+
+
+def _turn(turn: dict[str, Any]) -> list[str]:
+    cost = ""
+    if "input_tokens" in turn:
+        cost = (
+            f" · {turn['input_tokens']:,} in, {turn['output_tokens']:,} out"
+            f" · ${turn['cost_usd']} · {turn['latency_s']:.2f} s"
+        )
+    lines = [f"**{turn['index']} {turn['role']}**{cost}", ""]
+    if turn["text"]:
+        lines += [f"> {line}" for line in turn["text"].splitlines()] + [""]
+    for action in turn["actions"]:
+        mark = "accepted" if action["ok"] else f"refused: {action['reason']}"
+        arguments = json.dumps(action["arguments"], ensure_ascii=False)
+        lines += [f"`{action['name']}` {arguments} ({mark})", ""]
+        lines += [FENCE, action["feedback"].replace(FENCE, "'''"), FENCE, ""]
+    return lines

@@ -7,26 +7,23 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.access import CallerDep
 from buildarena_api.board_filters import SelectionDep
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.etags import conditional
-from buildarena_api.http.pages import Page, PagingDep, seal
 from buildarena_api.http.problems import unknown
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
-from buildarena_api.leaderboard.views import Board, BoardChangeView, board_view
+from buildarena_api.leaderboard.views import Board, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
 
 router = APIRouter(prefix="/v1", tags=["leaderboard"])
-MAX_DISTINCT = 20
-"""Values of a manifest that are spelled out; of a name with more, seeds say, only their number."""
 
 
 class PairedTest(BaseModel):
@@ -68,16 +65,6 @@ class Comparison(BaseModel):
     first: str
     second: str
     tasks: list[TaskComparisonView]
-
-
-class ManifestEntry(BaseModel):
-    """What the manifests behind an entry say about one thing."""
-
-    name: str
-    distinct: int
-    values: list[dict[str, Any]] = Field(
-        description="value, and jobs that have it; empty when there are too many"
-    )
 
 
 class VerifyRequest(BaseModel):
@@ -187,51 +174,6 @@ def _usual(every: Mapping[CellId, CellRecord], field: str, name: str) -> list[Ce
         raise unknown(field, name, choices)
     usual = max(sorted(jobs), key=jobs.__getitem__)
     return [id_ for id_ in every if id_.configuration == usual]
-
-
-@router.get("/leaderboard/changes", response_model=Page[BoardChangeView])
-def list_changes(
-    context: ContextDep,
-    selection: SelectionDep,
-    paging: PagingDep,
-    *,
-    unscored: Annotated[bool, Query(description="Also jobs that ended without a score")] = False,
-) -> Response:
-    """What entered a track's board, left it or was scored again, and why; newest first."""
-    found = context.store.results.boards.changes(
-        selection.track or "",
-        before=paging.number,
-        limit=paging.limit + 1,
-        scored_only=not unscored,
-    )
-    shown, following = paging.cut(found, lambda change: seal([change.id]))
-    page = Page[BoardChangeView].model_validate({"data": shown, "next_cursor": following})
-    return Response(page.model_dump_json(), media_type="application/json")
-
-
-@router.get("/leaderboard/manifest")
-def list_manifest_entries(
-    context: ContextDep, services: ServicesDep, selection: SelectionDep, paging: PagingDep
-) -> Page[ManifestEntry]:
-    """The versions behind an entry (name task and model): what its jobs' manifests say."""
-    entries: dict[str, list[dict[str, Any]]] = {}
-    inside = services.boards.inside(selection.question) if selection.track else {}
-    for task, version, model in sorted(
-        {(i.task, i.task_version, cell.model) for i, cell in inside.items()}
-    ):
-        for name, value, jobs in context.store.results.boards.manifest_values(
-            selection.question.track, task, version, model
-        ):
-            entries.setdefault(name, []).append({"value": value, "jobs": jobs})
-    views = [
-        ManifestEntry(
-            name=name,
-            distinct=len(values),
-            values=values if len(values) <= MAX_DISTINCT else [],
-        )
-        for name, values in entries.items()
-    ]
-    return Page[ManifestEntry](**paging.of(views))
 
 
 @router.post("/leaderboard/verify")

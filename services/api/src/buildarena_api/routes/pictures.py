@@ -1,23 +1,21 @@
-"""Routes of what machines and modules look like: GLB files and thumbnails."""
+"""Routes of how machines came about and look: replays, GLB files and thumbnails."""
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-from functools import cache
-from typing import Final
+from typing import Any, Final
 
 from fastapi import APIRouter, Request, Response
 
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.etags import Answer, conditional
+from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import ProblemError
 from buildarena_api.job_records import machine_hash, machine_of, task_of
+from buildarena_api.replays.views import ReplayView
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState
-from buildarena_geometry import module_set
-from buildarena_geometry.export import machine_glb, module_glb
+from buildarena_geometry.export import machine_glb
 from buildarena_simulation import MachineNotSimulable
 from buildarena_simulation.render.still import still_png
 
@@ -28,16 +26,6 @@ PNG: Final = "image/png"
 THUMBNAIL: Final = "thumbnail"
 MAX_CACHED_PICTURES: Final = 64 << 20
 """Bytes of GLB files and pictures in memory."""
-
-
-@router.get(
-    "/modules/{module}.glb",
-    response_class=Response,
-    responses={200: {"content": {GLB: {}}}},
-)
-def module_model(module: str, request: Request) -> Response:
-    """A module as a GLB file, its root point at the origin; a connector as a rod of length 1."""
-    return conditional(request, _module_answer(module), GLB)
 
 
 @router.get(
@@ -78,22 +66,6 @@ def thumbnail(
     return conditional(request, answer, PNG)
 
 
-@cache
-def _module_models() -> dict[str, Answer]:
-    # The cargo of the basic set has a shape too, and the name of a module of the others.
-    modules = {**module_set("basic"), **module_set("all")}
-    return {name: Answer.of(module_glb(module)) for name, module in modules.items()}
-
-
-def _module_answer(name: str) -> Answer:
-    found = _module_models().get(name)
-    if found is None:
-        near = get_close_matches(name, _module_models(), n=3, cutoff=0.0)
-        detail = f"there is no module {name!r}; the nearest are {', '.join(near)}"
-        raise ProblemError(ErrorCode.MODULE_NOT_FOUND, detail)
-    return found
-
-
 def _thumbnail(context: Context, job: Job, digest: str) -> bytes:
     kept = context.store.jobs.artifacts(job.id).get(THUMBNAIL)
     ended = job.state == JobState.DONE
@@ -113,3 +85,14 @@ def _keep(context: Context, job: Job, drawn: bytes) -> None:
     made = {THUMBNAIL: context.artifacts.put(drawn, PNG)}
     with context.store.database.transaction() as connection:
         context.store.results.attach(job.id, made, connection=connection)
+
+
+@router.get("/jobs/{job_id}/replay", response_model=ReplayView)
+def show_replay(job_id: str, services: ServicesDep, request: Request) -> Any:
+    """How the job's machine came about: every action with what it changed, or why it was refused.
+
+    It is the geometry library's own account: the kept actions are done again. Of a session in
+    several rounds it tells the last. While a session is under way it goes as far as that has come.
+    """
+    answer = services.replays.answer(services.context.store.jobs.get(job_id))
+    return conditional(request, answer, "application/json")

@@ -8,15 +8,23 @@ from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.access import Caller, CallerDep
-from buildarena_api.benches import WorkbenchMachine, machine_view
 from buildarena_api.dependencies import Services, ServicesDep
 from buildarena_api.idempotency import RequestKey
+from buildarena_api.replays.views import (
+    KeyPress,
+    PartView,
+    Vector,
+    block_view,
+    connector_view,
+)
 from buildarena_api.schemas import EXISTED, JobView
 from buildarena_backend.agents.briefing import LIMITS
 from buildarena_backend.agents.sessions import SessionState
 from buildarena_backend.catalog.specs import Name, Seed, Worlds
 from buildarena_benchmark.environment import ASSEMBLY, MAIN, Workbench
 from buildarena_benchmark.environment.tools import building_tools
+from buildarena_geometry import Block, Connector, Machine
+from buildarena_geometry.feedback.words import caption
 from buildarena_simulation import DEFAULT_ENGINE
 
 router = APIRouter(prefix="/v1/sessions", tags=["sessions"])
@@ -71,6 +79,53 @@ class SessionLimits(BaseModel):
     session_bytes: int = Field(description="Bytes of all arguments and answers")
     call_bytes: int = Field(description="Bytes of one call's arguments")
     idle_s: int = Field(description="Seconds without a call after which it is cancelled")
+
+
+class FaceView(BaseModel):
+    """A face of a block under construction."""
+
+    label: str = Field(examples=["A"])
+    side: str = Field(description="Where it looks, as feedback says it", examples=["East"])
+    center: Vector = Field(description="World frame, units")
+    normal: Vector = Field(description="Outwards, world frame, unit length")
+    taken_by: str | None = Field(
+        description="The block that it touches by an attachment; null if it takes a block"
+    )
+
+
+class WorkbenchPart(PartView):
+    """A part of a machine under construction."""
+
+    sits_on: tuple[str, str] | None = Field(
+        description="Block and face that it is attached to; null for starting blocks, connectors "
+        "and blocks whose base was removed"
+    )
+    ends: list[tuple[str, str]] = Field(description="Block and face of a connector's two ends")
+    faces: list[FaceView] = Field(description="Of a block: what can be built on")
+    actions: list[str] = Field(description="What keys can be bound to")
+    spins: bool = Field(description="Whether its spin can be flipped")
+
+
+class SubStructureView(BaseModel):
+    """A copy of a machine in an assembly."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    letter: str
+    source: str = Field(description="The machine that it is a copy of")
+
+
+class WorkbenchMachine(BaseModel):
+    """A machine under construction."""
+
+    name: str
+    parts: list[WorkbenchPart]
+    control_sequence: list[KeyPress]
+    controller: str = Field(description="The program that acts in place of it, Lua; empty for none")
+    sub_structures: list[SubStructureView] = Field(description="Of an assembly")
+    available: list[str] = Field(description="Machines that an assembly can be put together from")
+    mass: float = Field(description="Mass units")
+    detached: list[str] = Field(description="Blocks without a path to the starting block")
 
 
 class TestTrialView(BaseModel):
@@ -164,7 +219,7 @@ def _view(state: SessionState) -> SessionView:
         briefing=state.briefing,
         statement=state.statement,
         open=state.open,
-        machines=[machine_view(name, machine) for name, machine in state.machines.items()],
+        machines=[_machine(name, machine) for name, machine in state.machines.items()],
         tools=[ToolView.model_validate(tool.as_document()) for tool in tools],
         limits=SessionLimits.model_validate(LIMITS),
         calls=state.calls,
@@ -217,3 +272,64 @@ def submit_session(
 def _require_own(session_id: str, services: Services, caller: Caller) -> None:
     """An agent plays its own session only."""
     caller.require_owner(services.external.job(session_id).owner, f"session {session_id}")
+
+
+def _machine(name: str, machine: Machine) -> WorkbenchMachine:
+    """A machine under construction.
+
+    Args:
+        name: Its name on the workbench.
+        machine: The machine.
+    """
+    return WorkbenchMachine(
+        name=name,
+        parts=[
+            *(_block(block, machine) for block in machine.blocks.values()),
+            *(_connector(link) for link in machine.connectors.values()),
+        ],
+        control_sequence=[KeyPress.model_validate(one) for one in machine.control_sequence],
+        controller=machine.controller,
+        sub_structures=[
+            SubStructureView.model_validate(one) for one in machine.sub_structures.values()
+        ],
+        available=list(machine.available),
+        mass=machine.mass,
+        detached=list(machine.detached),
+    )
+
+
+def _block(block: Block, machine: Machine) -> WorkbenchPart:
+    return WorkbenchPart(
+        **block_view(block).model_dump(),
+        sits_on=block.mount,
+        ends=[],
+        faces=[_face(block, face.label, machine) for face in block.module.faces],
+        actions=list(block.module.actions),
+        spins=block.module.spins,
+    )
+
+
+def _connector(link: Connector) -> WorkbenchPart:
+    return WorkbenchPart(
+        **connector_view(link).model_dump(),
+        sits_on=None,
+        ends=[link.start, link.end],
+        faces=[],
+        actions=list(link.module.actions),
+        spins=False,
+    )
+
+
+def _face(block: Block, label: str, machine: Machine) -> FaceView:
+    state = machine.state
+    normal = block.face_normal(label)
+    taken_by = state.occupants.get((block.id, label))
+    if taken_by is None and state.is_occupied(block, label):
+        taken_by = None if block.mount is None else block.mount[0]
+    return FaceView(
+        label=label,
+        side=caption(normal).strip("<>"),
+        center=block.face_center(label),
+        normal=normal,
+        taken_by=taken_by,
+    )

@@ -38,8 +38,8 @@ class TranscriptMatchView(BaseModel):
     turn: int | None = Field(
         description="Place in the transcript, from 0; null where only the reply is kept"
     )
-    where: Literal["reply", "feedback", "prompt"] = Field(
-        description="In what was said, in what it was answered, or in what the role was told before"
+    where: Literal["reply", "feedback"] = Field(
+        description="In what was said, or in what it was answered"
     )
     excerpt: Annotated[
         list[ExcerptPiece],
@@ -64,23 +64,13 @@ def search_transcripts(
     task: Annotated[list[str] | None, Query(description="Only on these tasks")] = None,
     model: Annotated[list[str] | None, Query(description="Only by these models")] = None,
     sweep: Annotated[list[str] | None, Query(description="Only of these sweeps' jobs")] = None,
-    search_in: Annotated[
-        Literal["transcripts", "prompts"],
-        Query(description="prompts: what roles were told; the first turn of each job is found"),
-    ] = "transcripts",
 ) -> Page[TranscriptMatchView]:
-    """Searches the transcripts of all jobs for words, in what models said and were answered.
-
-    With `search_in=prompts`, in system messages, tasks and results that sessions told their roles.
-    Histories that were packed are not searched.
-    """
+    """Searches the transcripts of all jobs for words, in what models said and were answered."""
     if "\0" in text or not context.store.turns.has_words(text):
         raise invalid("text", f"{text!r} has no word to search for")
     for sweep_id in sweep or ():
         context.store.sweeps.get(sweep_id)
-    wanted = TranscriptFilter(
-        tasks=task, models=model, sweep_ids=sweep, prompts=search_in == "prompts"
-    )
+    wanted = TranscriptFilter(tasks=task, models=model, sweep_ids=sweep)
     first = paging.number or 0
     found = context.store.turns.search(text, wanted, limit=paging.limit + 1, offset=first)
     if not found:

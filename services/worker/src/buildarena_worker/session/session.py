@@ -65,9 +65,8 @@ class Session:
 
     @property
     def statement(self) -> str:
-        """The task as the model reads it: the pack's or the task's words, and additions."""
-        statement = self.pack.statements.get(self.task.name, self.task.statement)
-        return "\n\n".join([statement.strip(), *self._given, *self.additions])
+        """The task as the model reads it: its words, and additions."""
+        return "\n\n".join([self.task.statement.strip(), *self._given, *self.additions])
 
     def say(self, message: str, **values: str) -> str:
         """One of the pack's messages about the task, with its places filled."""
