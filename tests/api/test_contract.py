@@ -35,7 +35,7 @@ from arena.models import JobSpec, Problem, SweepSpec
 with AuthenticatedClient(base_url=sys.argv[2], token=sys.argv[3]) as client:
     job = submit_job.sync(client=client, body=JobSpec(task="lift-1", model="builtin/idle", seed=5))
     assert show_job.sync(job.id, client=client).seed == 5
-    assert [found.id for found in list_jobs.sync(client=client).jobs] == [job.id]
+    assert [found.id for found in list_jobs.sync(client=client).data] == [job.id]
     payload = SweepSpec(tasks=["lift-1"], models=["builtin/idle"], seeds=[5, 6])
     sweep = submit_sweep.sync(client=client, body=payload)
     assert show_sweep.sync(sweep.id, client=client).progress.total == 2

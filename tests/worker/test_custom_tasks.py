@@ -6,7 +6,6 @@ import json
 import re
 import tomllib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,15 +14,12 @@ from support.stages import assert_verified, work
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.agents.sessions import ExternalSessions
-from buildarena_backend.catalog.prompt_packs import PromptPacks
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.trials.installed_simulators import announced, installed_simulators
 from buildarena_benchmark import parse_custom_task
-from buildarena_benchmark.experts import expert_designs
-from buildarena_worker.session.host import JournalHost
+from buildarena_worker.builtin.designs import DESIGNS
 from buildarena_worker.session.messages import Completion
-from buildarena_worker.session.session import Session
 
 BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
 SUSPENSION = json.loads((Path(__file__).parents[1] / "data/suspension-bridge.json").read_text())
@@ -104,14 +100,6 @@ def test_the_papers_suspension_bridge_is_built_from_parts_and_scored(context, fi
     assert_verified(context, job.id)
     assert (job.outcome, job.flags) == ("success", [])
     assert 900 < job.indicator < 1500
-
-
-def test_a_prompt_pack_without_the_task_uses_the_tasks_own_words() -> None:
-    pack = replace(PromptPacks().load("default"), statements={"support-1": "Of another task."})
-    task = parse_custom_task(EXAMPLE, origin="task")
-    host = JournalHost(entries=[], rollouts=[], limits={}, load_trajectory={}.__getitem__)
-    session = Session(task=task, seed=0, model_config={}, pack=pack, host=host)
-    assert session.statement == task.statement.strip()
 
 
 DOCS = Path(__file__).parents[2] / "docs"

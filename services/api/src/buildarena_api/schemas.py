@@ -226,7 +226,7 @@ class SweepView(_Answer):
     )
     key_id: str | None = Field(description="Of the API key that submitted it")
     created_at: datetime
-    spec: dict[str, Any]
+    spec: dict[str, Any] = Field(title="Specification", description="What was submitted")
     budget: BudgetUse | None
     progress: ProgressView
     last_event: int = Field(

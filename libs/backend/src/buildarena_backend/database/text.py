@@ -7,10 +7,10 @@ from typing import Any, Final
 REPLACEMENT: Final = "\N{REPLACEMENT CHARACTER}"
 INVISIBLE: Final = (
     r"\x00-\x1f\x7f\u0080-\u009f\u00ad\u061c\u180e"
-    r"\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff"
+    r"\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufffd"
 )
 """Control, zero-width and bidirectional characters, for a character class: in a name they
-would make it look like another, or like nothing."""
+would make it look like another, or like nothing. What replaces a broken character, as well."""
 
 
 def clean(value: Any) -> Any:
