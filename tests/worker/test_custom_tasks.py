@@ -18,7 +18,7 @@ from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.trials.installed_simulators import announced, installed_simulators
 from buildarena_benchmark import parse_custom_task
-from buildarena_worker.builtin.designs import DESIGNS
+from buildarena_benchmark.experts import expert_designs
 from buildarena_worker.session.messages import Completion
 
 BRIDGE = Path(__file__).parents[2] / "examples" / "tasks" / "suspension-bridge.yaml"
@@ -44,7 +44,7 @@ def agent_plays(context) -> Callable[..., Job]:
     def play_task(task: str, design: str = "support-1", seed: int = 0) -> Job:
         sessions = ExternalSessions(context)
         job = sessions.open(task=task, agent="me", seed=seed, simulator="mujoco")[0].job
-        for tool, arguments in next(iter(DESIGNS[design](0).parts.values())).actions:
+        for tool, arguments in next(iter(expert_designs()[design](0).parts.values())).actions:
             done = sessions.call(job.id, machine="main", tool=tool, arguments=arguments)
             assert done.ok, done.feedback
         return sessions.submit(job.id)
