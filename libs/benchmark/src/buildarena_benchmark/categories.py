@@ -52,3 +52,9 @@ def categories() -> tuple[Category, ...]:
         for file in files
     ]
     return tuple(sorted(found, key=lambda category: (category.order, category.name)))
+
+
+def title_of(name: str) -> str:
+    """Return what people call a category; its name in words where it has no folder."""
+    titles = {category.name: category.title for category in categories()}
+    return titles.get(name) or name.replace("-", " ").capitalize()

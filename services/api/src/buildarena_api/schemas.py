@@ -108,6 +108,9 @@ class JobView(_Answer):
 class JobDetail(JobView):
     """A job with its manifest, attempts and artifacts."""
 
+    explanation: str | None = Field(
+        description="What happened and by how much it missed, in words; null until it has ended"
+    )
     manifest: dict[str, Any] | None = Field(description="Versions of what can change the score")
     attempts: list[AttemptView]
     artifacts: dict[str, str] = Field(description="SHA-256 of each artifact by name")

@@ -104,16 +104,14 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     if as_json:
         print_json(job)
         return
-    from buildarena_benchmark.flags import meaning
-
     say(f"{job['id']}  {job['task']} x {job['model']} x seed {job['seed']}")
     say(f"track     {job['track']}")
     ended = job["outcome"] or f"{job['stage']} {job['state']}"
     say(f"outcome   {ended}" + (f" ({job['reason']})" if job["reason"] else ""))
-    if job["detail"]:
-        say(f"detail    {job['detail']}")
-    for flag in job["flags"]:
-        say(f"flag      {flag}: {meaning(flag)}" if meaning(flag) else f"flag      {flag}")
+    if job.get("explanation"):
+        say(f"why       {job['explanation']}")
+    if job["flags"]:
+        say(f"flags     {', '.join(job['flags'])}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")
     if job.get("by_runner"):
         say("trials    by a runner")

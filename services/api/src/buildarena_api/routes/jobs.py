@@ -30,6 +30,7 @@ from buildarena_api.schemas import (
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.jobs.explanations import explain_job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
 
 
@@ -109,6 +110,7 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
     known = job.usage_is_known
     return JobDetail(
         **JobView.of(job).model_dump(),
+        explanation=explain_job(job, context.tasks),
         manifest=None if job.manifest is None else dict(job.manifest),
         attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
         artifacts=context.store.jobs.artifacts(job_id),

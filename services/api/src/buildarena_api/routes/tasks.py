@@ -20,6 +20,7 @@ from buildarena_api.schemas import EXISTED
 from buildarena_backend.catalog.tasks import CatalogueEntry
 from buildarena_backend.database.text import clean
 from buildarena_benchmark import parse_custom_task
+from buildarena_benchmark.categories import title_of
 from buildarena_benchmark.tasks.sources import MAX_BYTES
 
 PATH = "/v1/tasks"
@@ -51,6 +52,7 @@ class TaskView(BaseModel):
     version: str = Field(description="Content hash of all that can change a score")
     title: str
     category: str
+    category_title: str = Field(description="What people call it", examples=["Bridges"])
     level: int
     statement: str = Field(description="What the model reads")
     indicator: str = Field(description="Name of the figure it is ranked by", examples=["load"])
@@ -152,6 +154,7 @@ def _fields(entry: CatalogueEntry) -> dict[str, Any]:
     task = entry.task
     return {
         **{name: getattr(task, name) for name in ("name", "version", "title", "category", "level")},
+        "category_title": title_of(task.category),
         "statement": task.statement,
         "indicator": task.indicator.name,
         "unit": task.indicator.unit,
