@@ -30,8 +30,8 @@ from buildarena_api.schemas import (
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
-from buildarena_backend.jobs.explanations import explain_job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
+from buildarena_backend.trials.explanations import explain_job
 
 
 def _kind(request: Request) -> Kind:
