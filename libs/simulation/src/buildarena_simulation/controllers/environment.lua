@@ -5,18 +5,18 @@
 -- long between two counted instructions but strings, which the clock bounds.
 local seed, tick_limit, trial_limit, tick_clock_s, trial_clock_s = ...
 
-local STEP = 100  -- instructions between two looks at the count
+local STEP = 25  -- instructions between two looks at the count and at the clock
 local MODULUS, FACTOR = 2147483647, 48271  -- Park and Miller's; exact in doubles too
 
 local raw_next, raw_type, raw_tostring, raw_error = next, type, tostring, error
 local raw_tonumber, raw_select, raw_assert, raw_pcall = tonumber, select, assert, pcall
 local raw_unpack, raw_concat, raw_sort, raw_ipairs = table.unpack, table.concat, table.sort, ipairs
 local clock, floor, raw_min, raw_max = os.clock, math.floor, math.min, math.max
-local read, set_hook, memory_kb = load, debug.sethook, collectgarbage
+local read, set_hook = load, debug.sethook
 debug.setmetatable("", nil)  -- ("x"):rep, patterns and sums of texts cannot be interrupted
 
 local TOO_MANY, TOO_MANY_IN_ALL, TOO_LONG = {}, {}, {}  -- told apart by being themselves
-local LARGE_KB = 256  -- below it no text is long enough to take long
+local LONGEST_TEXT = 4096  -- bytes of what is joined or read as a number
 local left, left_in_all = 0, trial_limit
 local began_s = nil  -- when the clock was first looked at in this call
 
@@ -25,10 +25,9 @@ local function spend(instructions)
   left_in_all = left_in_all - instructions
   if left < 0 then raw_error(TOO_MANY, 0) end
   if left_in_all < 0 then raw_error(TOO_MANY_IN_ALL, 0) end
-  if memory_kb("count") > LARGE_KB then
-    began_s = began_s or clock()
-    if clock() - began_s > raw_min(tick_clock_s, trial_clock_s) then raw_error(TOO_LONG, 0) end
-  end
+  local now_s = clock()
+  began_s = began_s or now_s
+  if now_s - began_s > raw_min(tick_clock_s, trial_clock_s) then raw_error(TOO_LONG, 0) end
 end
 
 local function hook() spend(STEP) end
@@ -131,13 +130,25 @@ local function concat(t, between, first, last)
     raw_error("table.concat joins " .. MOST_TOGETHER .. " texts at most", 2)
   end
   spend(last - first + 1)
-  return raw_concat(t, between, first, last)
+  local joined = raw_concat(t, between, first, last)
+  if #joined > LONGEST_TEXT then
+    raw_error("table.concat makes texts of " .. LONGEST_TEXT .. " bytes at most", 2)
+  end
+  return joined
 end
 
 local function unpack(t, first, last)
   first, last = first or 1, last or #t
   if last - first >= 250 then raw_error("table.unpack gives 250 values at most", 2) end
   return raw_unpack(t, first, last)
+end
+
+local function own_tonumber(value, base)
+  if raw_type(value) == "string" and #value > LONGEST_TEXT then
+    raw_error("tonumber reads texts of " .. LONGEST_TEXT .. " bytes at most", 2)
+  end
+  if base == nil then return raw_tonumber(value) end
+  return raw_tonumber(value, base)
 end
 
 local drawn = seed % (MODULUS - 1) + 1
@@ -155,6 +166,7 @@ local atan2, log, abs, ceil, infinite = math.atan2, math.log, math.abs, math.cei
 local own_math = { random = random, pi = math.pi, huge = infinite }
 
 function own_math.atan(y, x) return atan2(y, x or 1) end
+own_math.atan2 = atan2
 
 function own_math.log(x, base)
   if base == nil then return log(x) end
@@ -182,7 +194,7 @@ local environment = {
   math = own_math,
   table = { insert = insert, remove = remove, concat = concat, unpack = unpack },
   pairs = ordered_pairs, ipairs = raw_ipairs, next = ordered_next, type = raw_type,
-  tonumber = raw_tonumber, tostring = plain_tostring, select = raw_select, error = raw_error,
+  tonumber = own_tonumber, tostring = plain_tostring, select = raw_select, error = raw_error,
   assert = raw_assert,
 }
 environment._G = environment
