@@ -10,7 +10,6 @@ import pytest
 from support.machines.repairs import faulty
 from support.providers.scripted import Recording, Scripted, call
 
-from buildarena_backend.catalog.prompt_packs import PromptPack, PromptPacks
 from buildarena_backend.errors import PermanentError, StartupError
 from buildarena_backend.replays.from_turns import replay_of_turns
 from buildarena_benchmark import builtin_tasks
@@ -45,7 +44,7 @@ def test_a_failed_round_is_followed_by_one_that_is_reported_the_result(play, rol
     assert (played.suspended.number, played.suspended.final) == (1, False)
     assert "12.50" not in text_of(model.requests[0])
     told = text_of(model.requests[3])
-    assert "It did not succeed. Criterion: fall height 4, " in told
+    assert "It did not succeed. " in told
     assert "Load: 12.50 mass units." in told
 
 
@@ -128,21 +127,6 @@ def test_one_shot_shows_an_example_that_zero_shot_does_not(play) -> None:
     assert "## Example" in text_of(shown.requests[0])
     assert "## Example" not in text_of(plain.requests[0])
     assert shown.requests[0].hash != plain.requests[0].hash
-
-
-def test_a_packs_own_statement_takes_the_tasks_place(play) -> None:
-    default = PromptPacks().load("default")
-    pack = PromptPack(
-        name="p",
-        digest="d",
-        roles=default.roles,
-        messages=default.messages,
-        statements={"support-1": "Carry it over."},
-    )
-    model = Scripted(*CROSS)
-    play(workflow="builder", client=model, pack=pack)
-    assert "Carry it over." in text_of(model.requests[0])
-    assert "Two fixed terrains" not in text_of(model.requests[0])
 
 
 OWN = '''
