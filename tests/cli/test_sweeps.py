@@ -1,6 +1,9 @@
 """Sweep files: every mistake named with line and field, flags, budgets, schema and examples."""
 
 import json
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -137,3 +140,29 @@ def test_the_sweeps_that_come_as_examples_can_be_submitted(context, submissions)
         assert sum(len(some.seeds) for some in jobs) == len(spec.tasks) * len(spec.models) * len(
             spec.all_seeds()
         ), file.name
+
+
+def test_ctrl_c_says_that_the_sweep_goes_on_and_twice_pauses_it(url, context, sweep) -> None:
+    words = [sys.executable, "-m", "buildarena_cli", "sweep", "watch", sweep, "--url", url]
+    with subprocess.Popen(
+        words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as watching:
+        assert watching.stdout is not None
+        assert watching.stderr is not None
+        assert "jobs ended" in watching.stdout.readline()
+        watching.send_signal(signal.SIGINT)
+        watching.stderr.readline()
+        told = watching.stderr.readline()
+        for verb in ("watch", "pause", "cancel"):
+            assert f"`buildarena sweep {verb} {sweep}`" in told
+        assert context.store.sweeps.get(sweep).state == "active"
+        watching.send_signal(signal.SIGINT)
+        assert watching.wait(timeout=20) == 130
+    assert context.store.sweeps.get(sweep).state == "paused"
+
+
+def test_a_budget_keeps_what_is_not_named(url, sweep) -> None:
+    printed(url, "sweep", "budget", sweep, "--max-cost-usd", "5")
+    printed(url, "sweep", "budget", sweep, "--max-requests", "9")
+    budget = json.loads(printed(url, "sweep", "status", sweep, "--json"))["budget"]
+    assert (budget["max_cost_usd"], budget["max_requests"], budget["max_tokens"]) == (5, 9, None)

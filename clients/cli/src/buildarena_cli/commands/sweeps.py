@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -25,7 +26,7 @@ from buildarena_cli.options import (
     UrlOption,
     budget_of,
 )
-from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say
+from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say, warn
 from buildarena_cli.terminal.progress import (
     exit_code,
     forecast_lines,
@@ -37,6 +38,9 @@ if TYPE_CHECKING:
     from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate
 
 app = new_group("Submit and watch sweeps.")
+AGAIN_S = 3
+"""For so long a second Ctrl-C pauses a sweep that is no longer watched."""
+LIMITS = ("max_cost_usd", "max_tokens", "max_requests")
 
 MAX_LIMIT = 100
 LIST = ("sweep", "name", "state", "ended", "jobs", "outcomes", "USD", "created")
@@ -185,7 +189,7 @@ def set_budget(
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
 ) -> None:
-    """Set a sweep's budget while it runs or after it was used up; what is not given is unlimited.
+    """Set limits of a sweep's budget while it runs or after it was used up; the others stay.
 
     What was spent before counts. A sweep whose budget was used up goes on.
     """
@@ -193,8 +197,10 @@ def set_budget(
     if budget is None:
         raise typer.BadParameter("give --max-cost-usd, --max-tokens or --max-requests")
     client = Client(url)
-    path = at("sweeps", whole_id(client, "sweep", sweep_id), "budget")
-    _show(client.put(path, budget), as_json=as_json)
+    whole = whole_id(client, "sweep", sweep_id)
+    before = client.sweep(whole)["budget"] or {}
+    kept = {name: before[name] for name in LIMITS if before.get(name) is not None}
+    _show(client.put(at("sweeps", whole, "budget"), kept | budget), as_json=as_json)
 
 
 @app.command("retry")
@@ -294,18 +300,49 @@ def _by(rise: float | None) -> str:
 
 
 def _show_limit(sweep: Sweep) -> None:
-    if sweep["state"] == "budget_exhausted":
+    budget = sweep["budget"]
+    if sweep["state"] == "budget_exhausted" and budget is not None:
+        left = {
+            "--max-cost-usd": budget["remaining_cost_usd"],
+            "--max-tokens": budget["remaining_tokens"],
+            "--max-requests": budget["remaining_requests"],
+        }
+        # Of dollars and tokens a little is left that is not enough for one request.
+        shares = {
+            option: remaining / (budget[option[2:].replace("-", "_")] or 1)
+            for option, remaining in left.items()
+            if remaining is not None
+        }
+        option = min(shares, key=lambda name: shares[name])
         say(
-            f"The budget is used up: `buildarena sweep budget {sweep['id']} --max-cost-usd …` "
+            f"The budget is used up: `buildarena sweep budget {sweep['id']} {option} …` "
             "gives it more, and it goes on."
         )
 
 
 def _watch(client: Client, sweep_id: str, *, as_json: bool) -> Sweep:
-    if not as_json:
+    try:
+        if as_json:
+            sweep = client.wait_for_sweep(sweep_id)
+            print_json(sweep)
+            return sweep
         watched = watch_sweep(client, sweep_id)
-        _show_limit(watched)
-        return watched
-    sweep = client.wait_for_sweep(sweep_id)
-    print_json(sweep)
-    return sweep
+    except KeyboardInterrupt:
+        _stop_watching(client, sweep_id)
+        raise
+    _show_limit(watched)
+    return watched
+
+
+def _stop_watching(client: Client, sweep_id: str) -> None:
+    """Say that the sweep goes on; another Ctrl-C while this waits pauses it."""
+    warn(
+        f"\nThe sweep goes on without this command, and spends. Watch it: `buildarena sweep watch "
+        f"{sweep_id}`; pause it: `buildarena sweep pause {sweep_id}`; cancel it: `buildarena sweep "
+        f"cancel {sweep_id}`. Press Ctrl-C again within {AGAIN_S} s to pause it now."
+    )
+    try:
+        time.sleep(AGAIN_S)
+    except KeyboardInterrupt:
+        client.post(at("sweeps", sweep_id, "pause"))
+        warn(f"It is paused: `buildarena sweep resume {sweep_id}` lets it go on.")
