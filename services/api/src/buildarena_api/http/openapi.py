@@ -81,7 +81,7 @@ def _complete(path: str, method: str, operation: dict[str, Any]) -> None:
     statuses = {400, 405, 422, 500} if path == OPEN else {400, 401, 403, 405, 422, 429, 500, 503}
     names = {one["name"] for one in operation.get("parameters", ())}
     statuses |= {404} if "{" in path or names & {"sweep", "task"} else set()
-    statuses |= {409} if method == "post" else set()
+    statuses |= {409} if method in {"post", "put"} else set()
     statuses |= {408, 413} if body else set()
     for status in statuses:
         problem = {PROBLEM_JSON: {"schema": {"$ref": REFERENCE + "Problem"}}}
