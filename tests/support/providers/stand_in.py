@@ -36,6 +36,7 @@ class Counts:
     output_tokens: int = 0
     cached_tokens: int = 0
     bodies: list[dict[str, Any]] = field(default_factory=list)
+    headers: list[dict[str, str]] = field(default_factory=list)
 
 
 class ProviderStandIn:
@@ -106,6 +107,7 @@ class _Handler(BaseHTTPRequestHandler):
             number = counts.requests
             counts.requests += 1
             counts.bodies.append(body)
+            counts.headers.append({name.lower(): v for name, v in self.headers.items()})
         fault = self.standin.fault(number)
         if self._misbehaves(fault):
             return

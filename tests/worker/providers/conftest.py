@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 from support.providers.stand_in import ProviderStandIn
@@ -21,13 +22,20 @@ def client(monkeypatch) -> Iterator[Callable[..., ProviderClient]]:
     made: list[ProviderClient] = []
 
     def make(
-        standin: ProviderStandIn, protocol: str = "openai", policy: RetryPolicy = QUICK
+        standin: ProviderStandIn,
+        protocol: str = "openai",
+        policy: RetryPolicy | None = QUICK,
+        *,
+        model: dict[str, Any] | None = None,
+        **provider: Any,
     ) -> ProviderClient:
         base = f"{standin.url}/v1" if protocol == "openai" else standin.url
         name = f"{protocol}/standin"
-        entry = ModelEntry(name=name, provider=protocol, model="standin", price=PRICE)
-        provider = ProviderEntry(protocol=protocol, base_url=base, key="STANDIN_KEY")
-        made.append(ProviderClient(entry, provider, policy))
+        entry = ModelEntry(
+            name=name, provider=protocol, model="standin", price=PRICE, **(model or {})
+        )
+        reached = ProviderEntry(protocol=protocol, base_url=base, key="STANDIN_KEY", **provider)
+        made.append(ProviderClient(entry, reached, policy))
         return made[-1]
 
     yield make

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import os
 import random
 import subprocess
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 from support.providers.stand_in import ProviderStandIn
 
 from buildarena_backend.catalog.models import ModelEntry, ProviderEntry, load_registry
@@ -93,6 +95,25 @@ def test_a_silent_provider_times_out(client) -> None:
     with ProviderStandIn("idle", fault=lambda n: "slow" if n == 0 else None) as standin:
         answer = client(standin, policy=policy).complete(ask())
     assert answer.attempts == 2
+
+
+def test_an_operator_says_timeout_headers_and_further_fields(client, subtests) -> None:
+    given = {"max_tokens": 77, "extra_body": {"chat_template_kwargs": {"thinking": False}}}
+    for protocol in PROTOCOLS:
+        with subtests.test(protocol=protocol), ProviderStandIn("idle") as standin:
+            model = given if protocol != "google" else {"max_tokens": 77}
+            asked = client(standin, protocol, model=model, headers={"X-Project": "bridges"})
+            asked.complete(ask())
+            (body,), (headers,) = standin.counts.bodies, standin.counts.headers
+            assert headers["x-project"] == "bridges"
+            assert "77" in json.dumps(body)
+            if protocol != "google":
+                assert body["chat_template_kwargs"] == {"thinking": False}
+    with ProviderStandIn("idle", fault=lambda n: "slow" if n == 0 else None) as standin:
+        answer = client(standin, policy=None, timeout_s=0.3).complete(ask())
+    assert answer.attempts == 2
+    with pytest.raises(ValidationError, match="seed, tools: the session writes that itself"):
+        ModelEntry(name="x/y", provider="x", model="y", extra_body={"tools": [], "seed": 1})
 
 
 def test_refusals_that_stay_are_not_retried(client, subtests) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -198,7 +199,7 @@ def set_budget(
         raise typer.BadParameter("give --max-cost-usd, --max-tokens or --max-requests")
     client = Client(url)
     whole = whole_id(client, "sweep", sweep_id)
-    before = client.sweep(whole)["budget"] or {}
+    before: Mapping[str, Any] = client.sweep(whole)["budget"] or {}
     kept = {name: before[name] for name in LIMITS if before.get(name) is not None}
     _show(client.put(at("sweeps", whole, "budget"), kept | budget), as_json=as_json)
 
@@ -300,7 +301,7 @@ def _by(rise: float | None) -> str:
 
 
 def _show_limit(sweep: Sweep) -> None:
-    budget = sweep["budget"]
+    budget: Mapping[str, Any] | None = sweep["budget"]
     if sweep["state"] == "budget_exhausted" and budget is not None:
         left = {
             "--max-cost-usd": budget["remaining_cost_usd"],

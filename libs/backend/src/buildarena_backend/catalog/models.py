@@ -13,10 +13,19 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import yaml
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AliasChoices,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+)
 
 from buildarena_backend.errors import StartupError
 
+OWN_FIELDS: Final = {"messages", "model", "seed", "stream", "tools", "tool_choice"}
+"""Of a request's body: no entry may replace them."""
 BUILTIN_PROTOCOL: Final = "builtin"
 """Of models that play inside the worker."""
 
@@ -47,6 +56,11 @@ class ProviderEntry(BaseModel):
     ]
     base_url: str | None = None
     key: Annotated[str | None, Field(description="Environment variable of the API key")] = None
+    timeout_s: Annotated[float, Field(gt=0, le=7200, description="For one sending")] = 600.0
+    headers: Annotated[
+        dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{1,100}$")], str],
+        Field(description="Sent with every request, beside those of the protocol"),
+    ] = Field(default={})
 
 
 class ModelEntry(BaseModel):
@@ -62,7 +76,22 @@ class ModelEntry(BaseModel):
         bool,
         Field(description="Takes temperature and top_p, which OpenAI's reasoning models refuse"),
     ] = True
+    max_tokens: Annotated[
+        int | None, Field(gt=0, description="Of a reply, where the job's decoding names none")
+    ] = None
+    extra_body: Annotated[
+        dict[str, Any],
+        Field(description="Further fields of a request's body, as endpoints of vLLM take them"),
+    ] = Field(default={})
     price: Price | None = None
+
+    @field_validator("extra_body")
+    @classmethod
+    def _adds_only(cls, fields: dict[str, Any]) -> dict[str, Any]:
+        taken = sorted(OWN_FIELDS & fields.keys())
+        if taken:
+            raise ValueError(f"{', '.join(taken)}: the session writes that itself")
+        return fields
 
 
 class _File(BaseModel):
@@ -108,6 +137,8 @@ def load_registry(extra: Path | None = None) -> ModelRegistry:
                 f"model {entry.name!r} names the provider {entry.provider!r}; "
                 f"known are {', '.join(sorted(providers))}"
             )
+        if entry.extra_body and providers[entry.provider].protocol == "google":
+            raise StartupError(f"model {entry.name!r}: extra_body can't be sent to Google")
     return ModelRegistry(models=models, providers=providers)
 
 

@@ -33,6 +33,7 @@ from pydantic_ai.models import Model, ModelRequestParameters
 from pydantic_ai.settings import ModelSettings
 from pydantic_ai.tools import ToolDefinition as LibraryTool
 
+from buildarena_backend.catalog.models import ModelEntry
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.bounded_http import RECEIVED, Received
 from buildarena_worker.providers.bounds import MAX_CALLS, arguments_of, bounded, usage_of
@@ -56,13 +57,19 @@ class LibrarySender:
     Args:
         model: The model, as pydantic-ai has it.
         close: Closes its connections.
+        entry: What an operator says of it.
         takes_parallel_tool_calls: Whether the provider lets parallel tool calls be turned off.
     """
 
     def __init__(
-        self, model: Model, close: Callable[[], Awaitable[Any]], *, takes_parallel_tool_calls: bool
+        self,
+        model: Model,
+        close: Callable[[], Awaitable[Any]],
+        entry: ModelEntry,
+        *,
+        takes_parallel_tool_calls: bool,
     ) -> None:
-        self._model = model
+        self._model, self._entry = model, entry
         self.close = close
         self._takes_parallel_tool_calls = takes_parallel_tool_calls
 
@@ -88,8 +95,12 @@ class LibrarySender:
 
     def _settings(self, request: Request) -> ModelSettings:
         decoding = request.model_config["decoding"]
+        if self._entry.max_tokens is not None:
+            decoding = {"max_tokens": self._entry.max_tokens, **decoding}
         given = {name: decoding[name] for name in DECODING if name in decoding}
         settings = cast("ModelSettings", {"seed": request.seed, **given})
+        if self._entry.extra_body:
+            settings["extra_body"] = dict(self._entry.extra_body)
         if request.tools and self._takes_parallel_tool_calls:
             settings["parallel_tool_calls"] = False
         return settings

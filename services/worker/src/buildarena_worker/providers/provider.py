@@ -146,7 +146,7 @@ class ProviderClient:
     ) -> None:
         self._throttle = throttle or Throttle(None, entry.provider)
         self._entry = entry
-        self._policy = policy or RetryPolicy()
+        self._policy = policy or RetryPolicy(timeout_s=provider.timeout_s)
         self._key = _key_of(entry, provider)
         self._sender = sender_for(entry, provider, self._key)
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing

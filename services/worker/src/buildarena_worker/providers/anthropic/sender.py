@@ -17,8 +17,10 @@ def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> Libra
         base_url=provider.base_url,
         api_key=key,
         max_retries=0,
-        http_client=BoundedClient(timeout=None),  # the retry policy's own timeout rules
+        http_client=BoundedClient(
+            timeout=None, headers=provider.headers
+        ),  # the retry policy's own timeout rules
         timeout=None,
     )
     model = AnthropicModel(entry.model, provider=AnthropicProvider(anthropic_client=client))
-    return LibrarySender(model, client.close, takes_parallel_tool_calls=True)
+    return LibrarySender(model, client.close, entry, takes_parallel_tool_calls=True)

@@ -12,7 +12,9 @@ from buildarena_worker.providers.library import LibrarySender
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> LibrarySender:
     """The sender of a model."""
-    http = BoundedClient(timeout=None)  # the retry policy's own timeout rules
+    http = BoundedClient(
+        timeout=None, headers=provider.headers
+    )  # the retry policy's own timeout rules
     google = GoogleProvider(api_key=key, base_url=provider.base_url, http_client=http)
     model = GoogleModel(entry.model, provider=google)
-    return LibrarySender(model, http.aclose, takes_parallel_tool_calls=False)
+    return LibrarySender(model, http.aclose, entry, takes_parallel_tool_calls=False)

@@ -21,20 +21,25 @@ def request_body(entry: ModelEntry, request: Request) -> bytes:
     """The body of a request to a model."""
     messages = json.dumps(write_messages(request.messages), ensure_ascii=False)
     tools = [[tool.name, tool.description, tool.parameters] for tool in request.tools]
-    rest = _rest(entry, json.dumps([tools, request.model_config["decoding"]]))
+    decoding = request.model_config["decoding"]
+    if entry.max_tokens is not None:
+        decoding = {"max_tokens": entry.max_tokens, **decoding}
+    given = json.dumps([tools, decoding, entry.extra_body])
+    rest = _rest(entry.model, given, sampling=entry.sampling)
     return f'{{"messages":{messages},"seed":{request.seed},{rest}'.encode()
 
 
 @lru_cache(maxsize=256)
-def _rest(entry: ModelEntry, given: str) -> str:
+def _rest(model: str, given: str, *, sampling: bool) -> str:
     """All but messages and seed, which is the same for all requests of a role.
 
     Args:
-        entry: The model.
-        given: Tools and decoding, as JSON.
+        model: The provider's name of the model.
+        given: Tools, decoding and further fields, as JSON.
+        sampling: Whether the model takes temperature and top_p.
     """
-    tools, decoding = json.loads(given)
-    rest: dict[str, Any] = {"model": entry.model}
+    tools, decoding, further = json.loads(given)
+    rest: dict[str, Any] = {"model": model}
     if tools:
         rest["parallel_tool_calls"] = False
         rest["tools"] = [function_tool(*tool) for tool in tools]
@@ -42,9 +47,9 @@ def _rest(entry: ModelEntry, given: str) -> str:
     rest["stream"] = False
     if "max_tokens" in decoding:
         rest["max_completion_tokens"] = decoding["max_tokens"]
-    if entry.sampling:
+    if sampling:
         rest |= {name: decoding[name] for name in ("temperature", "top_p") if name in decoding}
-    return json.dumps(rest, ensure_ascii=False)[1:]
+    return json.dumps(further | rest, ensure_ascii=False)[1:]
 
 
 def function_tool(name: str, description: str, parameters: dict[str, Any]) -> dict[str, Any]:

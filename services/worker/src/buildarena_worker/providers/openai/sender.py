@@ -36,12 +36,12 @@ class OpenAIChat:
 
     Args:
         entry: The model.
-        base_url: Where the API is; None for OpenAI's own.
+        provider: Where the API is, by default OpenAI's own, and further headers.
         api_key: The key.
     """
 
-    def __init__(self, entry: ModelEntry, *, base_url: str | None, api_key: str) -> None:
-        base_url = base_url or os.environ.get("OPENAI_BASE_URL") or OPENAI_URL
+    def __init__(self, entry: ModelEntry, provider: ProviderEntry, *, api_key: str) -> None:
+        base_url = provider.base_url or os.environ.get("OPENAI_BASE_URL") or OPENAI_URL
         self._endpoint = f"{base_url.rstrip('/')}/chat/completions"
         self._proxy = _proxy_for(base_url)
         self._entry = entry
@@ -56,6 +56,7 @@ class OpenAIChat:
             for name, header in ACCOUNT_HEADERS.items()
             if name in os.environ
         }
+        self._headers |= provider.headers
         self._http: aiohttp.ClientSession | None = None
 
     async def send(self, request: Request) -> Completion:
@@ -96,7 +97,7 @@ class OpenAIChat:
 
 def create_sender(entry: ModelEntry, provider: ProviderEntry, key: str) -> OpenAIChat:
     """The sender of a model."""
-    return OpenAIChat(entry, base_url=provider.base_url, api_key=key)
+    return OpenAIChat(entry, provider, api_key=key)
 
 
 async def _body(answer: aiohttp.ClientResponse) -> bytes:
