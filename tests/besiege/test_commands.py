@@ -67,12 +67,12 @@ def test_other_keys_may_be_pressed(machine, tmp_path) -> None:
     controls.write_text('[{"time": 2, "key": "Alpha2", "hold_for": 1.5}]', encoding="utf-8")
     file = tmp_path / "m.bsg"
     for task in (("--task", "transport-1"), ()):
-        done = run("machine", "export", machine, "--out", file, "--controls", controls, *task)
+        done = run("machine", "export", machine, "--out", file, "--key-presses", controls, *task)
         assert done.exit_code == 0, done.output
         (press,) = read_machine_file(file.read_bytes()).machine.control_sequence
         assert (press.key, press.time_s, press.hold_for_s) == ("Alpha2", 2, 1.5)
     controls.write_text('[{"time": 2, "key": "Z", "hold_for": 1.5}]', encoding="utf-8")
-    done = run("machine", "export", machine, "--out", file, "--controls", controls)
+    done = run("machine", "export", machine, "--out", file, "--key-presses", controls)
     assert (done.exit_code, "expected one of UpArrow" in done.stderr) == (1, True)
 
 

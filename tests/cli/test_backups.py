@@ -153,7 +153,7 @@ def test_what_is_left_is_saved_and_restored_and_what_is_lost_named(
         file, use = trajectory_in(folder, context)
         file.unlink()
     refused = command(other, "admin", "restore", str(place))
-    assert (refused.returncode, "--despite-missing" in refused.stderr) == (1, True)
+    assert (refused.returncode, "--allow-missing-artifacts" in refused.stderr) == (1, True)
     assert other.store.database.schema() is None
     made = command(context, "admin", "backup", str(place), "--name", "two")
     assert made.returncode == 3

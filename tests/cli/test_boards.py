@@ -73,6 +73,7 @@ def test_what_an_agent_did_not_report_is_null_and_a_dash_and_never_0(url, contex
     usage = json.loads(printed(url, "job", "show", job.id, "--json"))["usage"]
     assert set(usage.values()) == {None}
     shown = printed(url, "job", "show", job.id)
+    assert isinstance(json.loads(printed(url, "job", "transcript", job.id, "--json")), list | dict)
     assert "usage     - requests, - tokens in, - out, $-" in shown
     assert "actions   1, 0 refused" in shown  # what the service counts itself stays
     board = json.loads(printed(url, "leaderboard", "--json"))

@@ -117,7 +117,7 @@ def test_nonsense_is_no_id_and_no_other_path_is_ever_sent(url) -> None:
     with wrong_server(answer(200)) as server:
         client = Client(server.url)
         for word in ("../sweeps/x/cancel#", "", "x" * 5000, "job_0\n", "é", "."):
-            for name in ("cancel", "files", "logs"):
+            for name in ("cancel", "files", "transcript"):
                 done = run_cli(server.url, "job", name, word)
                 assert (done.returncode, "is not the id of a job" in done.stderr) == (1, True)
         handler = make_server(client).get_request_handler("tools/call")

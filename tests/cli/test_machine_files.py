@@ -111,7 +111,8 @@ def test_a_contestant_sees_which_way_each_key_pushes(tmp_path) -> None:
         (THREE, "Z", None, None, "expected one of E, M3, Q, M4, UpArrow"),
     ):
         keys.write_text(json.dumps([{"time": 0, "key": key, "hold_for": 2}]))
-        command = ("machine", "simulate", str(machine), "--task", str(task), "--keys", str(keys))
+        command = ("machine", "simulate", str(machine), "--task", str(task))
+        command += ("--key-presses", str(keys))
         done = run(*command, "--json")
         assert (done.returncode, told in done.stderr) == (low is None, True), done.stderr
         if low is not None:

@@ -91,14 +91,14 @@ def test_a_seed_varies_the_start(run, stored, tmp_path) -> None:
 @pytest.mark.ci
 def test_seeds_tell_how_often_a_machine_succeeds(run, stored) -> None:
     given = ("simulate", stored("beam-braced-on-top"), "--engine", "mujoco")
-    done = run(*given, "--seeds", "3", "--json", task_name="support-1")
+    done = run(*given, "--repeat", "3", "--json", task_name="support-1")
     found = json.loads(done.stdout)
     assert (found["trials"], found["successes"], found["robustness"]) == (3, 3, 1.0)
     loads = [result["indicator"] for result in found["results"]]
     assert len(set(loads)) > 1
     assert max(loads) < 1.3 * min(loads)
     short = stored("beam-too-short")
-    done = run("simulate", short, "--engine", "mujoco", "--seeds", "2", task_name="support-2")
+    done = run("simulate", short, "--engine", "mujoco", "--repeat", "2", task_name="support-2")
     assert "0 of 2 succeed" in done.output
     assert "failed seeds" in done.output
 
@@ -114,7 +114,7 @@ def test_an_empty_machine_is_a_failed_trial_and_bad_input_one_line(run, tmp_path
         ('{"blocks": 3}', [], {}, "blocks: expected a list"),
         ('{"hello": 1}', [], {}, "neither a machine document nor an action log"),
         (beam_of_3, ["--engine", "havok"], {}, "pybullet, mujoco"),
-        (beam_of_3, ["--seeds", "3", "--seed", "1"], {}, "--seed"),
+        (beam_of_3, ["--repeat", "3", "--seed", "1"], {}, "--seed"),
         (beam_of_3, [], {"task_name": "support-9"}, "support-3"),
     ):
         file.write_text(content, encoding="utf-8")
@@ -133,7 +133,7 @@ def test_a_machine_that_breaks_a_constraint_is_not_simulated(run, tmp_path) -> N
     assert "not simulated: unjoined_parts: block 2 (Water Cannon) is not joined" in done.stderr
     report = json.loads(done.stdout)
     assert (report["success"], report["indicator"], report["engine"]) == (False, 0.0, None)
-    repeated = run("simulate", str(file), "--seeds", "3", "--json", task_name="lift-2")
+    repeated = run("simulate", str(file), "--repeat", "3", "--json", task_name="lift-2")
     assert json.loads(repeated.stdout)["successes"] == 0
     checked = run("check", str(file), task_name="lift-2")
     assert checked.exit_code == 1

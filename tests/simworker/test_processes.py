@@ -218,7 +218,7 @@ def started(*words: str, cwd: Path, **environment: str) -> Iterator[subprocess.P
 def runner(folder: Path, url: str, secret: str, at_once: int):
     (folder / "key").write_text(secret + "\n")
     words = ["admin", "worker", QUEUE, "--api", url, "--key-file", str(folder / "key")]
-    words += ["--at-once", str(at_once)]
+    words += ["--concurrency", str(at_once)]
     return started(BUILDARENA, *words, cwd=folder, BUILDARENA_STOP_GRACE_S="3")
 
 
@@ -326,7 +326,7 @@ def test_wrong_options_are_named(subtests) -> None:
     for words, says in [
         (["construct", "--api", "http://127.0.0.1:1"], "needs the database"),
         (["simulate.unity", "--api", "http://127.0.0.1:1"], "choose from"),
-        (["simulate.mujoco", "--at-once", "2"], "--at-once: only with --api"),
+        (["simulate.mujoco", "--concurrency", "2"], "--concurrency: only with --api"),
         (["simulate.mujoco", "--key-file", __file__], "--key-file: only with --api"),
     ]:
         with subtests.test(words=words):

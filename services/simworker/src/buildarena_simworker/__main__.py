@@ -27,7 +27,9 @@ def main() -> None:
     parser.add_argument("--api", metavar="URL", help="reach only this API")
     parser.add_argument("--key-file", type=Path, help="the runner key; default: BUILDARENA_KEY")
     parser.add_argument("--ca-file", type=Path, help="certificates to trust besides the system's")
-    parser.add_argument("--at-once", type=int, help="trials at once")
+    parser.add_argument(
+        "--concurrency", dest="at_once", type=int, help="trials to run concurrently"
+    )
     parser.add_argument("--allow-http", action="store_true", help="send the key unencrypted")
     parser.add_argument("--check", action="store_true", help="only see whether it could work")
     parser.add_argument("--json", action="store_true", help="print the checks as JSON")
@@ -94,7 +96,7 @@ def _serve_api(options: argparse.Namespace, settings: Settings) -> None:
     described = installed_simulators()[name]
     if described.single and (options.at_once or 1) > 1:
         raise StartupError(
-            f"{name} runs one trial at a time, so --at-once is 1: start a runner per machine"
+            f"{name} runs one trial at a time, so --concurrency is 1: start a runner per machine"
         )
     first = described.make(settings)
     make = partial(described.make_isolated or described.make, settings)

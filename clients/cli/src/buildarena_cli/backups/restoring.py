@@ -41,7 +41,7 @@ def restore_backup(
     place: BackupPlace,
     name: str,
     *,
-    despite_missing: bool = False,
+    allow_missing: bool = False,
     tell: Callable[[str], None],
 ) -> Restored:
     """Restores a backup. Broken off, it leaves the database empty and can be done again.
@@ -52,7 +52,7 @@ def restore_backup(
         artifacts: Where artifacts go; what is there stays.
         place: Where the backup lies.
         name: Its name.
-        despite_missing: Restore what is left of a backup whose artifacts are lost or damaged.
+        allow_missing: Restore what is left of a backup whose artifacts are lost or damaged.
         tell: Gets a line for each step.
 
     Raises:
@@ -72,11 +72,11 @@ def restore_backup(
         sizes = read_list(place, name, manifest, dump)
         tell(f"copying {len(sizes):,} artifacts")
         lost = copy_artifacts(place.artifacts, artifacts, sizes).missing
-        if lost and not despite_missing:
+        if lost and not allow_missing:
             raise CommandError(
                 f"{len(lost):,} of backup {name}'s {len(sizes):,} artifacts are lost or "
                 f"damaged, the first: {next(iter(lost.values()))}. The database was not touched; "
-                "--despite-missing restores the rest"
+                "--allow-missing-artifacts restores the rest"
             )
         tell("restoring the database")
         words = ["--no-owner", "--no-privileges", "--exit-on-error", "--single-transaction"]

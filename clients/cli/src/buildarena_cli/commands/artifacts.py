@@ -21,7 +21,12 @@ def collect(
     ] = False,
     keep_days: Annotated[
         float,
-        typer.Option(help="Days that what nothing refers to stays, and again in the trash.", min=1),
+        typer.Option(
+            "--grace-days",
+            help="Days an unreferenced artifact is kept before it moves to the trash, and again "
+            "before it is deleted (total: twice this value).",
+            min=1,
+        ),
     ] = 7,
     data: DataOption = None,
     as_json: JsonOption = False,

@@ -33,7 +33,10 @@ def backup(
     ] = False,
     check: Annotated[
         bool,
-        typer.Option("--check", help="Only read a whole backup, the newest or --name, and check."),
+        typer.Option(
+            "--check",
+            help="Read every byte of the newest complete backup, or of --name, and compare hashes.",
+        ),
     ] = False,
     data: DataOption = None,
     as_json: JsonOption = False,
@@ -82,10 +85,11 @@ def restore(
     name: Annotated[
         str | None, typer.Option("--name", help="Which backup; the newest by default.")
     ] = None,
-    despite_missing: Annotated[
+    allow_missing: Annotated[
         bool,
         typer.Option(
-            "--despite-missing", help="Restore what is left where artifacts are lost or damaged."
+            "--allow-missing-artifacts",
+            help="Restore what is left where artifacts are lost or damaged.",
         ),
     ] = False,
     data: DataOption = None,
@@ -110,7 +114,7 @@ def restore(
                 stores.artifacts,
                 where,
                 chosen,
-                despite_missing=despite_missing,
+                allow_missing=allow_missing,
                 tell=_tell(as_json),
             )
     manifest, lost = restored.manifest, restored.lost

@@ -56,13 +56,15 @@ def show_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption
     _show(client.get(at("jobs", whole_id(client, "job", job_id))), as_json=as_json)
 
 
-@app.command("logs")
-def job_logs(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
+@app.command("transcript")
+@app.command("logs", hidden=True)
+def job_transcript(
+    job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False
+) -> None:
     """Print a job's transcript as Markdown, or as JSON."""
-    style = "json" if as_json else "markdown"
     client = Client(url)
     path = at("jobs", whole_id(client, "job", job_id), "transcript")
-    say(client.get_bytes(path, style=style).decode())
+    say(client.get_bytes(path, format="json" if as_json else "markdown").decode())
 
 
 app.command("files")(job_files)
@@ -76,9 +78,9 @@ def cancel_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOpti
 
 @app.command("retry")
 def retry_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOption = False) -> None:
-    """Queue an errored job where it failed, or a refuted one for its trial by a runner.
+    """Retry an errored job from its failed stage, or re-simulate one whose runner was refuted.
 
-    A job whose score stands is never run again.
+    A scored job is never run again.
     """
     _change(url, job_id, "retry", as_json=as_json)
 

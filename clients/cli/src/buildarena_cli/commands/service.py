@@ -40,7 +40,11 @@ def up(
         bool, typer.Option("--detach", help="Return when it is up; `buildarena down` stops it.")
     ] = False,
     keys: Annotated[
-        bool, typer.Option("--keys", help="Ask for API keys; the operator's is kept in DATA.")
+        bool,
+        typer.Option(
+            "--require-api-keys",
+            help="Require an API key for every request; the admin key is written to DATA.",
+        ),
     ] = False,
 ) -> None:
     """Start the whole service on this machine.
@@ -133,7 +137,7 @@ def _detach(settings: Settings, *, keys: bool) -> None:
             "or choose another folder with --data or BUILDARENA_DATA"
         )
     try:
-        run = start(data, ["--port", str(settings.port), *(["--keys"] if keys else [])])
+        run = start(data, ["--port", str(settings.port), *(["--require-api-keys"] if keys else [])])
     except OSError as error:
         raise unwritable(data, error) from error
     say(

@@ -51,7 +51,10 @@ def worker(
     key_file: KeyFileOption = None,
     ca_file: CaFileOption = None,
     at_once: Annotated[
-        int | None, typer.Option("--at-once", help="Trials at once, with --api.", min=1, max=64)
+        int | None,
+        typer.Option(
+            "--concurrency", help="Trials to run concurrently (runners only).", min=1, max=64
+        ),
     ] = None,
     allow_http: AllowHttpOption = False,
     check: Annotated[
@@ -65,7 +68,7 @@ def worker(
     It uses the servers that BUILDARENA_* name; with --api it is a runner, which needs neither
     database nor broker.
     """
-    options = _options({"--key-file": key_file, "--ca-file": ca_file, "--at-once": at_once})
+    options = _options({"--key-file": key_file, "--ca-file": ca_file, "--concurrency": at_once})
     options += [
         *(["--allow-http"] * allow_http),
         *(["--check"] * check),

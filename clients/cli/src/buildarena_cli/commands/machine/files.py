@@ -82,7 +82,10 @@ def export(
     controls: Annotated[
         Path | None,
         typer.Option(
-            help="For a .bsg: press these keys, a JSON list, in place of its own.", callback=to_read
+            "--key-presses",
+            help="For a .bsg: play these key presses (JSON list of time, key, hold_for) instead "
+            "of the machine's own.",
+            callback=to_read,
         ),
     ] = None,
     *,
@@ -105,7 +108,7 @@ def export(
     with shown_errors():
         if out.suffix not in FORMATS:
             raise CommandError(f"{out}: {out.suffix or 'no'} ending; use {', '.join(FORMATS)}")
-        options = {"--task": task, "--controls": controls, "--controller": controller}
+        options = {"--task": task, "--key-presses": controls, "--controller": controller}
         for option, value in options.items():
             if value is not None and out.suffix != ".bsg":
                 raise CommandError(f"{option} is for .bsg files, not for {out}")

@@ -1,4 +1,4 @@
-"""`buildarena machine simulate --seeds N`: one machine's trial, many times."""
+"""`buildarena machine simulate --repeat N`: one machine's trial, many times."""
 
 from __future__ import annotations
 

@@ -50,13 +50,15 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     seed: Annotated[
         int | None,
         typer.Option(
-            help="Vary the start a little, and draw what the task leaves to it, by this seed."
+            help="Seed for the perturbed start and for the task's randomized parameters. Without "
+            "it, the exact start is simulated."
         ),
     ] = None,
     seeds: Annotated[
         int | None,
         typer.Option(
-            help="Repeat the trial with so many varied starts, to see whether a result is luck.",
+            "--repeat",
+            help="Simulate this many perturbed starts and report how robust the result is.",
             min=2,
             max=1000,
         ),
@@ -81,8 +83,9 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
     keys: Annotated[
         Path | None,
         typer.Option(
-            help="Key presses in place of its own (JSON: time, key, hold_for); of a .bsg its own "
-            "keys, whichever the game has.",
+            "--key-presses",
+            help="Play these key presses (JSON list of time, key, hold_for) instead of the "
+            "machine's own; keys of a .bsg are those that its file names.",
             callback=to_read,
         ),
     ] = None,
@@ -112,7 +115,7 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
         }
         single = [option for option, value in options.items() if value is not None]
         if seeds is not None and single:
-            raise CommandError(f"--seeds makes many trials, {single[0]} is for one; give either")
+            raise CommandError(f"--repeat makes many trials, {single[0]} is for one; give either")
         chosen, imported = chosen_task(task), read_imported(file, dialect)
         machine, presses = _with_presses(imported, keys, file)
         if controller is not None:
