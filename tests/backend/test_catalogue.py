@@ -10,7 +10,7 @@ import pytest
 
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.agents.workbench import bench_of, rebuild
-from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.models import WatchedRegistry, load_registry
 from buildarena_backend.catalog.prices import free_models
 from buildarena_backend.catalog.prompt_packs import PromptPacks, builtin_folder, read_pack
 from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
@@ -190,3 +190,21 @@ def test_calls_made_again_begin_with_the_same_machine() -> None:
     ]
     assert replay_of_turns(turns, task).machine == bench.submitted()
     assert replay_of_turns(turns).machine != bench.submitted()
+
+
+def test_a_models_file_is_read_again_when_it_changes_and_never_half(tmp_path) -> None:
+    file = tmp_path / "models.yaml"
+    entry = "{name: own/%s, provider: own, model: m}"
+    text = "providers:\n  own: {protocol: openai, timeout_s: 9}\nmodels:\n"
+    file.write_text(f"{text}  - {entry % 'a'}\n")
+    registry = WatchedRegistry(file)
+    assert "own/a" in registry.models
+    assert registry.provider_of(registry.models["own/a"]).timeout_s == 9
+    file.write_text(f"{text}  - {entry % 'a'}\n  - {entry % 'second'}\n")
+    assert "own/second" in registry.models
+    file.write_text(f"{text}  - {{name: own/second, provider: nobody, model: m}}\n")
+    assert {"own/a", "own/second"} <= registry.models.keys(), "the last file that could be used"
+    file.unlink()
+    assert "own/a" in registry.models
+    with pytest.raises(StartupError, match="models file"):
+        WatchedRegistry(file)

@@ -12,7 +12,7 @@ from sqlalchemy.exc import OperationalError
 from buildarena_api.access import check_binding
 from buildarena_api.app import POOL_SIZE, POOL_TIMEOUT_S, create_app
 from buildarena_api.http.door import serve, server_config
-from buildarena_backend.catalog.models import load_registry
+from buildarena_backend.catalog.models import WatchedRegistry
 from buildarena_backend.errors import SchemaVersionError, StartupError
 from buildarena_backend.process.context import open_context
 from buildarena_backend.settings import load_settings
@@ -43,7 +43,7 @@ def main() -> None:
     try:
         check_binding(settings)
         tracing = Tracing("api", settings.otlp_endpoint)
-        registry = load_registry(settings.models_file)
+        registry = WatchedRegistry(settings.models_file)
         context = open_context(
             settings, pool_size=POOL_SIZE, pool_timeout_s=POOL_TIMEOUT_S, name="buildarena-api"
         )

@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 
-from buildarena_backend.catalog.models import ModelRegistry, load_registry
+from buildarena_backend.catalog.models import ModelRegistry, WatchedRegistry
 from buildarena_backend.errors import StartupError
 from buildarena_backend.process.context import Context
 from buildarena_backend.process.job_runner import StageHandler
@@ -33,7 +33,7 @@ def main() -> None:
     options = parser.parse_args()
     try:
         settings = load_settings()
-        registry = load_registry(settings.models_file)
+        registry = WatchedRegistry(settings.models_file)
         require_known_protocols(registry)
         if options.check is not None:
             sys.exit(_check(registry, options.check))

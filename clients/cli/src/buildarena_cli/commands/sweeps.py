@@ -339,9 +339,10 @@ def _stop_watching(client: Client, sweep_id: str) -> None:
     """Say that the sweep goes on; another Ctrl-C while this waits pauses it."""
     try:
         warn(
-            "\nThe sweep goes on without this command, and spends. Watch it: `buildarena sweep watch "
-            f"{sweep_id}`; pause it: `buildarena sweep pause {sweep_id}`; cancel it: `buildarena "
-            f"sweep cancel {sweep_id}`. Press Ctrl-C again within {AGAIN_S} s to pause it now."
+            "\nThe sweep goes on without this command, and spends. Watch it: `buildarena sweep "
+            f"watch {sweep_id}`; pause it: `buildarena sweep pause {sweep_id}`; cancel it: "
+            f"`buildarena sweep cancel {sweep_id}`. Press Ctrl-C again within {AGAIN_S} s to "
+            "pause it now."
         )
         time.sleep(AGAIN_S)
     except KeyboardInterrupt:

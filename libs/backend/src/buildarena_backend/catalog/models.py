@@ -12,6 +12,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+import structlog
 import yaml
 from pydantic import (
     AliasChoices,
@@ -23,6 +24,8 @@ from pydantic import (
 )
 
 from buildarena_backend.errors import StartupError
+
+log = structlog.get_logger(__name__)
 
 OWN_FIELDS: Final = {"messages", "model", "seed", "stream", "tools", "tool_choice"}
 """Of a request's body: no entry may replace them."""
@@ -140,6 +143,55 @@ def load_registry(extra: Path | None = None) -> ModelRegistry:
         if entry.extra_body and providers[entry.provider].protocol == "google":
             raise StartupError(f"model {entry.name!r}: extra_body can't be sent to Google")
     return ModelRegistry(models=models, providers=providers)
+
+
+class WatchedRegistry(ModelRegistry):
+    """A registry that reads an operator's file again whenever it has changed.
+
+    A file that can't be used any more changes nothing, and is told once in the log.
+
+    Args:
+        extra: The operator's file; None for the built-in entries alone.
+
+    Raises:
+        StartupError: The file can't be used when the process starts.
+    """
+
+    __slots__ = ("_extra", "_known", "_stamp")
+
+    def __init__(self, extra: Path | None = None) -> None:
+        known, stamp = load_registry(extra), _stamp_of(extra)
+        for name, value in (("_extra", extra), ("_known", known), ("_stamp", stamp)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def models(self) -> Mapping[str, ModelEntry]:  # type: ignore[override]  # a field of the base
+        """All models by name, as the file has them now."""
+        return self._fresh().models
+
+    @property
+    def providers(self) -> Mapping[str, ProviderEntry]:  # type: ignore[override]
+        """All providers by name, as the file has them now."""
+        return self._fresh().providers
+
+    def _fresh(self) -> ModelRegistry:
+        stamp = _stamp_of(self._extra)
+        if stamp != self._stamp:
+            object.__setattr__(self, "_stamp", stamp)
+            try:
+                object.__setattr__(self, "_known", load_registry(self._extra))
+            except StartupError as error:
+                log.warning("models_file_unusable", detail=str(error))
+        return self._known
+
+
+def _stamp_of(file: Path | None) -> tuple[int, int] | None:
+    """What changes with a file: its time and size; None where there is none."""
+    try:
+        found = None if file is None else file.stat()
+    except OSError:
+        return None
+    return None if found is None else (found.st_mtime_ns, found.st_size)
 
 
 def _parse(text: str, name: str) -> _File:

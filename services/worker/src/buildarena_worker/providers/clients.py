@@ -6,7 +6,12 @@ import threading
 from collections.abc import Mapping
 from typing import Any
 
-from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
+from buildarena_backend.catalog.models import (
+    BUILTIN_PROTOCOL,
+    ModelEntry,
+    ModelRegistry,
+    ProviderEntry,
+)
 from buildarena_backend.errors import PermanentError
 from buildarena_worker.builtin import BuiltinClient
 from buildarena_worker.session.messages import ModelClient
@@ -23,7 +28,7 @@ class ModelClients:
     def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
         self._registry = registry
         self._throttle_url = throttle_url
-        self._clients: dict[str, ModelClient] = {}
+        self._clients: dict[str, tuple[object, ModelClient]] = {}
         self._lock = threading.Lock()
 
     def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
@@ -33,18 +38,20 @@ class ModelClients:
             PermanentError: The operator's registry lacks the model, or its key is not set.
         """
         name = str(model_config["name"])
-        with self._lock:
-            if name not in self._clients:
-                self._clients[name] = self._make(name)
-            return self._clients[name]
-
-    def _make(self, name: str) -> ModelClient:
         entry = self._registry.models.get(name)
         if entry is None:
             raise PermanentError(
                 f"this worker's model registry lacks {name!r}", reason="unknown_model"
             )
         provider = self._registry.provider_of(entry)
+        with self._lock:
+            made_for, client = self._clients.get(name, (None, None))
+            if client is None or made_for != (entry, provider):
+                client = self._make(entry, provider)
+                self._clients[name] = (entry, provider), client
+            return client
+
+    def _make(self, entry: ModelEntry, provider: ProviderEntry) -> ModelClient:
         if provider.protocol == BUILTIN_PROTOCOL:
             return BuiltinClient(entry.model)
         from buildarena_worker.providers.provider import ProviderClient
