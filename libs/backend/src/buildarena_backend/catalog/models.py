@@ -6,7 +6,7 @@ a submission can only name them, never say where to send requests.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -157,32 +157,33 @@ class WatchedRegistry(ModelRegistry):
         StartupError: The file can't be used when the process starts.
     """
 
-    __slots__ = ("_extra", "_known", "_stamp")
-
     def __init__(self, extra: Path | None = None) -> None:
         known, stamp = load_registry(extra), _stamp_of(extra)
-        for name, value in (("_extra", extra), ("_known", known), ("_stamp", stamp)):
-            object.__setattr__(self, name, value)
+
+        def fresh() -> ModelRegistry:
+            nonlocal known, stamp
+            now = _stamp_of(extra)
+            if now != stamp:
+                stamp = now
+                try:
+                    known = load_registry(extra)
+                except StartupError as error:
+                    log.warning("models_file_unusable", detail=str(error))
+            return known
+
+        object.__setattr__(self, "fresh", fresh)
+
+    fresh: Callable[[], ModelRegistry]
 
     @property
-    def models(self) -> Mapping[str, ModelEntry]:  # type: ignore[override]  # a field of the base
+    def models(self) -> Mapping[str, ModelEntry]:
         """All models by name, as the file has them now."""
-        return self._fresh().models
+        return self.fresh().models
 
     @property
-    def providers(self) -> Mapping[str, ProviderEntry]:  # type: ignore[override]
+    def providers(self) -> Mapping[str, ProviderEntry]:
         """All providers by name, as the file has them now."""
-        return self._fresh().providers
-
-    def _fresh(self) -> ModelRegistry:
-        stamp = _stamp_of(self._extra)
-        if stamp != self._stamp:
-            object.__setattr__(self, "_stamp", stamp)
-            try:
-                object.__setattr__(self, "_known", load_registry(self._extra))
-            except StartupError as error:
-                log.warning("models_file_unusable", detail=str(error))
-        return self._known
+        return self.fresh().providers
 
 
 def _stamp_of(file: Path | None) -> tuple[int, int] | None:
