@@ -124,8 +124,6 @@ def random_query(rng: random.Random) -> dict[str, object]:
     further = {
         "task": rng.sample(sorted(builtin_tasks()), 8),
         "model": ["made-up/0", "external/1"],
-        "since": START + timedelta(hours=rng.randrange(1000)),
-        "until": START + timedelta(hours=rng.randrange(1000)),
         "sweep": "sweep_some",
     }
     return found | {name: value for name, value in further.items() if rng.random() < 0.3}
@@ -175,8 +173,6 @@ def expected(context, params: dict[str, object]) -> bytes | None:
     query = BoardQuery(
         tasks=frozenset(params["task"]) if "task" in params else None,
         models=frozenset(params["model"]) if "model" in params else None,
-        since=params.get("since"),
-        until=params.get("until"),
         overall=None if "task" in params else frozenset(builtin_tasks()),
     )
     own = [trial for trial in every if trial.track == params["track"]]

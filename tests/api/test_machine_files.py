@@ -269,7 +269,7 @@ def test_a_process_that_is_killed_or_takes_too_long_loses_nothing(
     with stopped(second):
         answer = check(api, written())
     assert answer.status_code == 422
-    assert "the file is too much: it can't be read within" in answer.json()["detail"]
+    assert "the parser's limits: it can't be read within" in answer.json()["detail"]
     assert not second.is_running()
     monkeypatch.undo()
     # Nor is a file read in the API's process.

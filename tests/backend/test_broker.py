@@ -65,7 +65,7 @@ def test_requests_stay_quick_beside_a_stopped_broker_and_jobs_flow_again(
         live_api(own) as api,
         httpx.Client(base_url=api, timeout=30) as client,
     ):
-        assert client.post("/v1/jobs", json=JOB).status_code == 202
+        assert client.post("/v1/jobs", json=JOB).status_code == 201
         with stopped(pid):
             # The first to meet it pay one short time-out each: counting and announcing.
             client.post("/v1/jobs", json={**JOB, "seed": 1})
@@ -86,7 +86,7 @@ def test_requests_stay_quick_beside_a_stopped_broker_and_jobs_flow_again(
             wait_until(says_so, 20, "health says that the broker is away")
             assert max(times) < QUICK_S
             # This process counts alone meanwhile.
-            assert set(answers) == {202, 429}
+            assert set(answers) == {201, 429}
         wait_until(lambda: (own.queues.waiting("construct") or 0) > 20, 20, "jobs flow again")
 
 

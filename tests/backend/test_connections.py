@@ -102,7 +102,7 @@ def test_workers_and_the_api_share_few_servers_of_a_pooler(context, add, tmp_pat
         sweep = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
         with changed(context, database_url=pooled) as own, live_api(own) as url:
             made = httpx.post(f"{url}/v1/sweeps", json=sweep)
-            assert made.status_code == 202, made.text
+            assert made.status_code == 201, made.text
             for path in 8 * ("jobs", "sweeps", "leaderboard", "health", "metrics", "workers"):
                 answer = httpx.get(f"{url}/v1/{path}")
                 assert answer.status_code == 200, answer.text

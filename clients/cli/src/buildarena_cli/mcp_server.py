@@ -50,7 +50,7 @@ def make_server(client: Client) -> Server[Any]:
     async def list_tools(
         _: ServerRequestContext[Any], __: types.PaginatedRequestParams | None
     ) -> types.ListToolsResult:
-        simulators = await asyncio.to_thread(client.get, "/v1/simulators")
+        simulators = (await asyncio.to_thread(client.get, "/v1/simulators"))["data"]
         return types.ListToolsResult(tools=_tools(simulators))
 
     async def call_tool(
