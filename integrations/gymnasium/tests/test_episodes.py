@@ -18,7 +18,7 @@ from buildarena_gymnasium.spaces import MAX_OBSERVATION, UNKNOWN, observed
 SUBMIT = '{"tool": "submit"}'
 START = '{"tool": "start", "arguments": {}}'
 IDS = buildarena_gymnasium.ids()
-EACH = [pytest.param(n, marks=() if n == IDS[3] else pytest.mark.nightly) for n in IDS]
+EACH = [pytest.param(n, marks=() if n == IDS[4] else pytest.mark.nightly) for n in IDS]
 
 
 def task_of(name: str) -> str:
@@ -28,7 +28,7 @@ def task_of(name: str) -> str:
 def test_all_tasks_are_registered_and_registering_twice_is_quiet() -> None:
     buildarena_gymnasium.register_all()
     assert len(IDS) == len(builtin_tasks())
-    assert IDS[3] == "BuildArena/Support-1-v0"
+    assert IDS[4] == "BuildArena/Support-1-v0"
     found = gymnasium.make("buildarena_gymnasium:BuildArena/Lift-3-v0")
     assert found.unwrapped.environment.task.name == "lift-3"
 
@@ -64,7 +64,7 @@ def test_the_expert_scores_what_it_scores_elsewhere(name, actions, experts) -> N
 
 
 def test_nonsense_is_answered_inside_the_spaces() -> None:
-    environment = gymnasium.make(IDS[3], steps=50).unwrapped
+    environment = gymnasium.make(IDS[4], steps=50).unwrapped
     environment.reset()
     space = environment.observation_space
     for action in (
@@ -89,7 +89,7 @@ def test_nonsense_is_answered_inside_the_spaces() -> None:
 
 def test_the_last_step_has_what_was_built_tried(actions) -> None:
     built = actions["support-1"][:-1]
-    environment = gymnasium.make(IDS[3], steps=len(built))
+    environment = gymnasium.make(IDS[4], steps=len(built))
     environment.reset()
     *_, last = [environment.step(action) for action in built]
     observation, reward, terminated, truncated, info = last
@@ -102,7 +102,7 @@ def test_the_last_step_has_what_was_built_tried(actions) -> None:
 
 def test_states_are_reached_again_and_lead_to_the_same(actions) -> None:
     built = actions["lift-1"]
-    environment = gymnasium.make(IDS[6])
+    environment = gymnasium.make(IDS[8])
     environment.reset()
     for action in built[:-4]:
         environment.step(action)
@@ -112,7 +112,7 @@ def test_states_are_reached_again_and_lead_to_the_same(actions) -> None:
     builder.restore(state)
     second = [environment.step(action) for action in built[-4:]]
     assert first == second
-    other = gymnasium.make(IDS[6])
+    other = gymnasium.make(IDS[8])
     other.reset(options={"state": json.loads(json.dumps(state.as_document()))})
     assert [other.step(action)[:4] for action in built[-4:]] == [step[:4] for step in first]
     with pytest.raises(SnapshotError, match="is of lift-1"):
@@ -149,7 +149,7 @@ def test_what_does_not_exist_is_named_with_the_choices() -> None:
 
 
 def test_pictures_show_what_was_built(actions) -> None:
-    environment = gymnasium.make(IDS[3], render_mode="rgb_array")
+    environment = gymnasium.make(IDS[4], render_mode="rgb_array")
     environment.reset()
     empty = environment.render()
     assert (empty.shape, empty.dtype) == ((320, 480, 3), np.uint8)
