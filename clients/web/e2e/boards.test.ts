@@ -1,184 +1,169 @@
-import type { Browser, BrowserContext, Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
+import type { Locator, Page } from "playwright-core";
+import { describe, expect, it } from "vitest";
 import type { components } from "../src/api/contract";
-import { ask, expectNoSeriousFault, launched, textsOf, URL_OF_SERVICE, type Visit, visit } from "./browser";
-import { count, dollars, number, percent, places } from "../src/format";
+import { ask, expectNoSeriousFault, settled, textsOf, type Visit, visit } from "./browser";
 
 type Schemas = components["schemas"];
 
-const TASK = "support-1";
 /** No worker of the tests' service runs this simulator, so its jobs wait once they are built. */
-const WAITING = { tasks: [TASK], models: ["builtin/expert"], simulator: "pybullet" };
+const WAITING = { tasks: ["support-1"], models: ["builtin/expert"], simulator: "pybullet" };
 
-let browser: Browser;
-
-function opened(path: string, url = URL_OF_SERVICE, width = 1280): Promise<Visit> {
-  return visit(browser, path, { url, width, scheme: width < 800 ? "dark" : "light" });
+/** A page, and a click that counts. */
+async function asked(path: string): Promise<Visit & { click: (what: Locator) => Promise<void>; clicks: () => number }> {
+  const seen = await visit(path);
+  await seen.context.grantPermissions(["clipboard-read", "clipboard-write"]);
+  let clicks = 0;
+  const click = async (what: Locator): Promise<void> => {
+    clicks += 1;
+    await what.click();
+  };
+  return { ...seen, click, clicks: () => clicks };
 }
 
-beforeAll(async () => {
-  browser = await launched();
-});
-afterAll(() => browser.close());
+const time = (page: Page): Promise<string | null> => page.getByText(/^\d+\.\d \/ \d+ s$/).textContent();
 
-describe("every figure of the board", () => {
-  let page: Page;
-  let context: BrowserContext;
-  let ofTask: Page;
-  let beside: BrowserContext;
-  let board: Schemas["Board"];
-  let figures: Schemas["Figures"];
-  beforeAll(async () => {
-    ({ page, context } = await opened(`/?task=${TASK}`));
-    board = await ask(`/v1/leaderboard?task=${TASK}`);
-    figures = await ask(`/v1/leaderboard/figures?task=${TASK}`);
-    for (const table of await page.getByText("As a table").all()) await table.click();
-    ({ page: ofTask, context: beside } = await opened(`/tasks/${TASK}`));
-  });
-  afterAll(async () => {
-    await context.close();
-    await beside.close();
-  });
-
-  it("of the overall ranking is the service's", async () => {
-    const shown = await textsOf(page, "section[aria-label=Overall] table");
-    expect(shown).toHaveLength(board.overall.length);
-    board.overall.forEach((row, index) => {
-      const tied = board.overall.filter((other) => other.rank !== null && other.rank === row.rank).length > 1;
-      const place = places(row.rank_low, row.rank_high);
-      expect(shown[index]?.[0]).toContain(row.model);
-      expect(shown[index]?.[0]?.includes("Pareto")).toBe(row.pareto);
-      expect(shown[index]?.slice(1)).toEqual([
-        `${row.rank ?? "–"}${tied ? "tied" : ""}`,
-        place,
-        number(row.mean_rank, 2),
-        number(row.score_mean, 2),
-        percent(row.success_rate_mean, 1),
-        dollars(row.cost_usd_mean),
-        count(row.output_tokens_mean),
-        count(row.counted),
-      ]);
-    });
-  });
-
-  it("is summed up in one sentence on top, the service's", async () => {
-    const said = page
-      .getByRole("status")
-      .filter({ hasText: board.verdict?.sentence ?? "nothing" })
-      .first();
-    expect(await said.textContent()).toContain(board.verdict?.sentence);
-    const heading = await page.locator("section[aria-label=Overall]").boundingBox();
-    expect((await said.boundingBox())?.y ?? Infinity).toBeLessThan(heading?.y ?? 0);
-  });
-
-  it("of each task is the service's", async () => {
-    for (const task of board.tasks) {
-      const shown = await textsOf(ofTask, `table[aria-label="Models on ${task.task}"]`);
-      expect(shown).toHaveLength(task.rows.length);
-      task.rows.forEach((row, index) => {
-        const [model, rank, place, success, indicator, score, best, parts, cost, refused] = shown[index] ?? [];
-        const atLeast = row.censored > 0 ? "≥ " : "";
-        const spread =
-          row.indicator_low === null
-            ? row.too_few_data
-              ? "too few data"
-              : ""
-            : `${number(row.indicator_low)} to ${number(row.indicator_high)}`;
-        expect(model).toContain(row.model);
-        expect(rank?.replace(" tied", "")).toBe(String(row.rank ?? "–"));
-        expect(place).toBe(places(row.rank_low, row.rank_high));
-        expect(success).toBe(
-          `${percent(row.success_rate)} (${row.successes} of ${row.counted})${percent(row.success_low)} to ${percent(row.success_high)}`,
-        );
-        expect(indicator).toBe(`${row.indicator_mean === null ? "" : atLeast}${number(row.indicator_mean)}${spread}`);
-        expect(score?.startsWith(number(row.score, 2))).toBe(true);
-        expect(best).toBe(`${row.indicator_best === null ? "" : atLeast}${number(row.indicator_best)}`);
-        expect([parts, cost, refused]).toEqual([
-          count(row.parts_mean),
-          dollars(row.cost_per_success_usd),
-          percent(row.refused_action_rate),
-        ]);
-      });
-    }
-  });
-
-  it("of the drawings is the service's", async () => {
-    const front = await textsOf(page, 'table[aria-label="Cost and performance"]');
-    expect(front).toEqual(
-      figures.front.map((row) => [
-        row.model,
-        number(row.mean_rank, 2),
-        percent(row.success_rate_mean, 1),
-        dollars(row.cost_usd_mean),
-        count(row.output_tokens_mean),
-        row.pareto ? "yes" : "no",
-      ]),
-    );
-    const ends = await textsOf(page, 'table[aria-label="How jobs end"]');
-    expect(ends.map((row) => row.slice(0, 3).join(" ")).sort()).toEqual(
-      figures.failures
-        .flatMap((row) =>
-          Object.entries(row.outcomes).map(([name, n]) => `${row.model} ${name.replaceAll("_", " ")} ${n}`),
-        )
-        .sort(),
-    );
-  });
-
-  it("has a cell that opens exactly its jobs", async () => {
-    const row = board.tasks[0]?.rows[0];
-    await page.locator("a.heat-cell").first().click();
-    await page.getByRole("region", { name: /jobs, scrolls/ }).waitFor();
-    expect(await page.getByRole("region", { name: `${row?.ended ?? 0} jobs, scrolls` }).count()).toBe(1);
-    await page.goBack();
-  });
-});
-
-describe("what a board is about", () => {
-  it("is chosen by a chip, stands in the address and in the title, and holds for the whole page", async () => {
-    const { page, context } = await opened("/");
-    await page.getByText("The paper’s nine", { exact: true }).waitFor();
-    await page.getByText("Bridges", { exact: true }).click();
+describe("questions from the front page", () => {
+  it("who is best at bridges, and is it real? In two clicks", async () => {
+    const { page, context, click, clicks } = await asked("/");
+    await click(page.getByText("Bridges", { exact: true }));
     await page.waitForURL(/category=/);
     await page.getByRole("heading", { level: 1, name: "Leaderboard: Bridges" }).waitFor();
-    await page.getByText("Ranked over support-1.").waitFor();
-    const rockets = await opened(`/?category=${encodeURIComponent('["lift"]')}`);
-    await rockets.page.getByRole("heading", { level: 1, name: "Leaderboard: Rockets" }).waitFor();
-    await rockets.page.getByText("No job of these tasks has ended on this track").waitFor();
-    await expectNoSeriousFault(rockets.page);
-    await rockets.context.close();
-    // Somebody writes an address by hand.
-    const plain = await opened("/?category=support");
-    await plain.page.getByText("Ranked over support-1.").waitFor();
-    await plain.context.close();
+    const board = await ask<Schemas["Board"]>("/v1/leaderboard?category=support");
+    await page
+      .getByRole("status")
+      .filter({ hasText: board.verdict?.sentence ?? "nothing" })
+      .first()
+      .waitFor();
+    await click(page.getByRole("main").getByRole("link", { name: "Method" }));
+    await page.getByRole("heading", { level: 1, name: "Method" }).waitFor();
+    expect(clicks()).toBeLessThanOrEqual(2);
+    await context.close();
+  });
+
+  it("why did this model fail at that task? In three clicks; a cell opens exactly its jobs", async () => {
+    const { page, context, click, clicks } = await asked("/");
+    const board = await ask<Schemas["Board"]>("/v1/leaderboard");
+    const row = board.tasks[0]?.rows.find(({ model }) => model === "builtin/idle");
+    await click(page.getByText("More: success on each task"));
+    await click(page.locator("a.heat-cell[title^='builtin/idle on support-1:']"));
+    await page.getByRole("region", { name: `${row?.ended ?? 0} jobs, scrolls` }).waitFor();
+    await click(page.locator("main a[href*='/jobs/job_']").first());
+    await page.waitForURL(/\/jobs\/job_/);
+    await settled(page);
+    const id = /job_[0-9a-f]+/.exec(page.url())?.[0] ?? "";
+    const job = await ask<Schemas["JobDetail"]>(`/v1/jobs/${id}`);
+    expect([job.model, job.task]).toEqual(["builtin/idle", "support-1"]);
+    await page
+      .getByText(job.explanation ?? "no sentence")
+      .first()
+      .waitFor();
+    expect(clicks()).toBeLessThanOrEqual(3);
+    await context.close();
+  });
+
+  it("look at this moment of the trial! In one click", async () => {
+    const { data: jobs } = await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/expert&outcome=success&limit=1");
+    const { page, context, click } = await asked(`/jobs/${jobs[0]?.id ?? ""}`);
+    const before = await time(page);
+    await page.getByRole("button", { name: "Play" }).click();
+    await expect.poll(() => time(page), { timeout: 20_000 }).not.toBe(before);
+    await page.getByRole("slider").first().press("End");
+    const shown = await time(page);
+    await click(page.getByRole("button", { name: "Copy link to this moment" }));
+    await page.getByText("The link is copied.").waitFor();
+    await page.goto(await page.evaluate(() => navigator.clipboard.readText()));
+    await settled(page);
+    await expect.poll(() => time(page)).toBe(shown);
+    await page.getByRole("tab", { name: "Building" }).click();
+    await page.getByRole("button", { name: "Build it step by step" }).waitFor();
+    await context.close();
+  });
+
+  it("which of two models is better? In a click, in the board's scope", async () => {
+    const { page, context } = await asked(`/?category=${encodeURIComponent('["support"]')}`);
+    await page.getByRole("link", { name: "Compare models" }).click();
+    await page.waitForURL(/\/compare\?/);
+    const models = (new URL(page.url()).searchParams.get("models") ?? "").split(",");
+    const found = await ask<Schemas["Comparison"]>(
+      `/v1/leaderboard/compare?first=${models[0] ?? ""}&second=${models[1] ?? ""}&category=support`,
+    );
+    await page.getByText("First minus second").waitFor();
+    const shown = await textsOf(page, "div[aria-label='Both models task by task, scrolls'] table");
+    expect(shown.map(([task]) => task)).toEqual(found.tasks.map(({ task }) => task));
+    expect(await page.getByRole("status").first().textContent()).toContain("builtin/");
+    expect(await page.getByLabel("Tasks", { exact: true }).first().inputValue()).toBe("Bridges");
+    await context.close();
+  });
+});
+
+it("filters stand in the address, and are read from it", async () => {
+  const { page, context } = await visit("/");
+  const baselines = page.getByRole("switch", { name: "Baselines" });
+  await page.getByRole("button", { name: "Filters" }).click();
+  await expectNoSeriousFault(page);
+  await baselines.click({ force: true });
+  await page.waitForURL(/baselines=no/);
+  await page.reload();
+  await page.getByRole("button", { name: "Filters" }).click();
+  expect(await baselines.isChecked()).toBe(false);
+  await context.close();
+});
+
+describe("jobs", () => {
+  it("are summed by reason, narrowed down and sorted", async () => {
+    const { page, context } = await visit("/jobs");
+    const summary = page.getByRole("region", { name: "How these jobs ended" });
+    await summary.getByRole("link", { name: /^succeeded/ }).click();
+    await page.waitForURL(/outcome=success/);
+    const wanted = await ask<Schemas["JobList"]>("/v1/jobs?outcome=success&sort=indicator&order=desc&state=done");
+    await page.getByRole("button", { name: "Result" }).click();
+    await page.waitForURL(/sort=indicator/);
+    const first = wanted.data[0]?.id.slice(0, 12) ?? "none";
+    await expect.poll(() => page.locator("tbody tr").first().textContent()).toContain(first);
+    await page.getByLabel("Contains").fill("said by nobody");
+    await page.keyboard.press("Enter");
+    await page.getByText("No job is like that").waitFor();
+    expect(page.url()).toContain("text=said");
+    await context.close();
+  });
+
+  it("are found by what was said, in the turn that said it, with what the role was told", async () => {
+    const { page, context } = await visit("/jobs");
+    await page.getByLabel("Said in transcripts").fill("drawing");
+    await page.keyboard.press("Enter");
+    const hit = page.locator("article.turn").first();
+    await hit.locator("mark").first().waitFor();
+    await hit.getByRole("link").click();
+    const turn = page.locator("article[data-chosen]");
+    await turn.waitFor();
+    const id = /job_[0-9a-f]+/.exec(page.url())?.[0] ?? "";
+    const { data: prompts } = await ask<Schemas["PromptList"]>(`/v1/jobs/${id}/prompts`);
+    const told = prompts.find((prompt) => prompt.turn === Number(new URL(page.url()).searchParams.get("turn")));
+    await turn.locator("details.told summary").click();
+    expect(await turn.locator("pre.told-text").allTextContents()).toEqual([told?.system, ...(told?.user ?? [])]);
     await context.close();
   });
 });
 
 describe("sweeps", () => {
-  it.each([
-    ["/sweeps/new", 1280],
-    ["/sweeps/new", 390],
-    ["/tasks/lift-1", 390],
-  ] as const)("%s at %d px has no serious fault", async (path, width) => {
-    const { page, context } = await opened(path, URL_OF_SERVICE, width);
-    if (path === "/sweeps/new") await page.getByText("YAML", { exact: true }).click();
-    if (path === "/sweeps/new") await page.locator(".cm-content").waitFor();
-    await expectNoSeriousFault(page);
-    expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
-    await context.close();
-  });
-
-  it("are submitted once, however often the button is clicked", async () => {
+  it("are submitted once, however often the button is clicked, and not with a fault", async () => {
     const before = (await ask<Schemas["SweepList"]>("/v1/sweeps?limit=100")).data.length;
-    const { page, context } = await opened("/sweeps/new");
+    const { page, context } = await visit("/sweeps/new");
+    const button = page.getByRole("button", { name: "Start the sweep" });
+    const models = page.getByRole("combobox", { name: "Models" }).or(page.getByLabel("Models")).first();
+    await models.fill("builtin/idel");
+    await models.press("Enter");
     await page
-      .getByRole("textbox", { name: "Simulator" })
-      .or(page.getByRole("combobox", { name: "Simulator" }))
+      .getByText(/choose from.*builtin\/idle/)
       .first()
-      .fill("pybullet");
+      .waitFor();
+    expect(await button.isEnabled()).toBe(false);
+    await models.press("Backspace");
+    await page.getByRole("heading", { name: "New sweep" }).click();
+    await page.getByText("More", { exact: true }).click();
     await page.getByLabel("Name", { exact: true }).fill("clicked twice");
-    const button = page.getByRole("button", { name: "Submit the sweep" });
     await expect.poll(() => button.isEnabled(), { timeout: 10_000 }).toBe(true);
+    await expectNoSeriousFault(page);
     await button.evaluate((found: HTMLButtonElement) => {
       found.click();
       found.click();
@@ -190,38 +175,17 @@ describe("sweeps", () => {
     await context.close();
   });
 
-  it("have their faults at their lines, and none is sent with some", async () => {
-    const { page, context } = await opened("/sweeps/new");
-    await page.getByText("YAML", { exact: true }).click();
-    const editor = page.locator(".cm-content");
-    await editor.click();
-    await page.keyboard.press("Control+a");
-    await page.keyboard.insertText("name: x\ntasks: [support-1, suport-2]\nmodels: [builtin/idle]\nsamples: 2\n");
-    const faults = page.getByRole("status").filter({ hasText: "One fault" });
-    await faults.waitFor();
-    expect(await faults.textContent()).toContain("line 2");
-    expect(await faults.textContent()).toContain("support-3");
-    expect(await page.getByRole("button", { name: "Submit the sweep" }).isEnabled()).toBe(false);
-    expect(await page.locator(".cm-lintRange-error").textContent()).toBe("suport-2");
-    await context.close();
-  });
-
   it("change on the page as they change in the service", async () => {
     const { id } = await ask<Schemas["SweepAccepted"]>("/v1/sweeps", {
       ...WAITING,
       name: "watched",
       seeds: [101, 102],
     });
-    const { page, context } = await opened(`/sweeps/${id}`);
+    const { page, context } = await visit(`/sweeps/${id}`);
     await page.getByText("live", { exact: true }).waitFor();
-    const reads: string[] = [];
-    page.on("request", (request) => {
-      if (request.url().includes("order=asc")) reads.push(request.url());
-    });
     const jobs = await ask<Schemas["JobList"]>(`/v1/jobs?sweep=${id}`);
     await ask(`/v1/jobs/${jobs.data[0]?.id ?? ""}/cancel`, {});
-    await expect.poll(() => page.getByText("cancelled: 1").count(), { timeout: 10_000 }).toBe(1);
-    expect(reads).toEqual([]);
+    await expect.poll(() => page.getByRole("link", { name: /^cancelled 1 / }).count(), { timeout: 10_000 }).toBe(1);
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Resume" }).waitFor();
     expect((await ask<Schemas["Sweep"]>(`/v1/sweeps/${id}`)).state).toBe("paused");
@@ -234,19 +198,18 @@ describe("sweeps", () => {
     expect([raised.state, raised.budget?.max_cost_usd, raised.budget?.max_requests]).toEqual(["paused", 12.5, null]);
     await page.getByRole("button", { name: "Cancel…" }).click();
     await page.getByRole("button", { name: "Cancel the sweep" }).click();
-    await expect.poll(() => page.getByText("cancelled: 2").count(), { timeout: 10_000 }).toBe(1);
+    await expect.poll(() => page.getByRole("link", { name: /^cancelled 2 / }).count(), { timeout: 10_000 }).toBe(1);
+    await expect.poll(() => page.getByText("live", { exact: true }).count(), { timeout: 10_000 }).toBe(0);
     await context.close();
   });
 });
 
-it("a link on another site opens a page", async () => {
-  const context = await browser.newContext();
-  const page = await context.newPage();
-  await page.route("http://elsewhere.example/", (route) =>
-    route.fulfill({ contentType: "text/html", body: `<a href="${URL_OF_SERVICE}/tasks">here</a>` }),
-  );
-  await page.goto("http://elsewhere.example/");
-  await page.getByText("here").click();
-  await page.getByRole("heading", { name: "Tasks", level: 1 }).waitFor();
+it("the method has the versions in use", async () => {
+  const { page, context } = await visit("/method");
+  const used = await ask<Schemas["Versions"]>("/v1/versions");
+  const shown = await textsOf(page, 'table[aria-label="Versions in use"]');
+  const simulators = used.simulators.map(({ version }) => version);
+  const wanted = [used.buildarena, used.feedback, String(used.scorers), ...simulators];
+  expect(shown.map((cells) => cells.at(-1))).toEqual(wanted);
   await context.close();
 });

@@ -1,6 +1,6 @@
 import { AxeBuilder } from "@axe-core/playwright";
-import { chromium, type Browser, type BrowserContext, type Page } from "playwright-core";
-import { expect } from "vitest";
+import { chromium, type BrowserContext, type Page } from "playwright-core";
+import { afterAll, expect } from "vitest";
 
 export const URL_OF_SERVICE = process.env.BUILDARENA_WEB_URL ?? "";
 /** Whether every page is looked at in every look. */
@@ -25,9 +25,9 @@ export const ATTACH = (base: number, face: number): Record<string, string> => ({
 /** How a browser is started. */
 export const LAUNCH = { executablePath: CHROMIUM, args: ARGUMENTS };
 
-export function launched(): Promise<Browser> {
-  return chromium.launch(LAUNCH);
-}
+/** The browser of a file of tests, ended with it. */
+export const browser = await chromium.launch(LAUNCH);
+afterAll(() => browser.close());
 
 /** Expects that a page has no serious fault of accessibility. */
 export async function expectNoSeriousFault(page: Page): Promise<void> {
@@ -65,7 +65,6 @@ export interface Visit {
 
 /** Opens a page for somebody new and waits until it has read what it shows. */
 export async function visit(
-  browser: Browser,
   path: string,
   {
     url = URL_OF_SERVICE,
@@ -85,8 +84,8 @@ export async function visit(
   return { page, context, faults };
 }
 
-export async function opened(browser: Browser, path: string, width = 1280): Promise<Page> {
-  return (await visit(browser, path, { width })).page;
+export async function opened(path: string, width = 1280): Promise<Page> {
+  return (await visit(path, { width })).page;
 }
 
 /** Calls a tool in an agent's session; tries again while the service does not answer. */

@@ -1,17 +1,9 @@
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { launched } from "./browser";
+import { describe, expect, it } from "vitest";
+import { browser } from "./browser";
 
 /** A service that asks for keys; without one there is nothing to test here. */
 const GUARDED = process.env.BUILDARENA_WEB_GUARDED_URL ?? "";
 const ADMIN = process.env.BUILDARENA_WEB_ADMIN_KEY ?? "";
-
-let browser: Browser;
-
-beforeAll(async () => {
-  browser = await launched();
-});
-afterAll(() => browser.close());
 
 describe.skipIf(GUARDED === "")("with keys required", () => {
   it("a key stays for other tabs where its holder says so, and goes everywhere when it is forgotten", async () => {
@@ -20,7 +12,7 @@ describe.skipIf(GUARDED === "")("with keys required", () => {
     const page = await context.newPage();
     await page.goto(`${GUARDED}/sweeps`);
     const alert = page.getByRole("alert");
-    await alert.getByRole("checkbox", { name: /stay in this browser/ }).check();
+    await alert.getByRole("checkbox", { name: "Remember on this device" }).check();
     await alert.getByLabel("API key").fill(secret);
     await page.getByRole("button", { name: "Use", exact: true }).click();
     await page.getByText("Nobody has submitted a sweep").waitFor();

@@ -1,6 +1,6 @@
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { act, ATTACH, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
+import type { Page } from "playwright-core";
+import { describe, expect, it } from "vitest";
+import { act, ATTACH, opened, openSession, URL_OF_SERVICE } from "./browser";
 
 const PLAYED = process.env.BUILDARENA_WEB_PLAYED ?? "";
 const WORKERS = pids(process.env.BUILDARENA_WEB_WORKERS);
@@ -18,8 +18,8 @@ function kill(processes: readonly number[]): void {
 }
 
 /** The page of a job that is watched from here on; a reload would be noticed. */
-async function watched(browser: Browser, job: string): Promise<Page> {
-  const page = await opened(browser, `/jobs/${job}`);
+async function watched(job: string): Promise<Page> {
+  const page = await opened(`/jobs/${job}`);
   await page.locator("[data-live=live]").waitFor();
   await page.evaluate(() => Object.assign(window, { kept: true }));
   return page;
@@ -57,17 +57,11 @@ async function turnsShown(page: Page): Promise<number[]> {
 }
 
 describe.skipIf(PLAYED === "")("a session under way", () => {
-  let browser: Browser;
-  beforeAll(async () => {
-    browser = await launched();
-  });
-  afterAll(() => browser.close());
-
   it("goes on before the reader's eyes when its worker is killed; no turn is lost or doubled", async () => {
-    const page = await watched(browser, PLAYED);
+    const page = await watched(PLAYED);
     await steps(page, 4);
     kill(WORKERS);
-    await page.getByText("success", { exact: true }).first().waitFor({ timeout: 50_000 });
+    await page.getByText("succeeded", { exact: true }).first().waitFor({ timeout: 50_000 });
     const answer = await fetch(`${URL_OF_SERVICE}/v1/jobs/${PLAYED}/transcript`);
     const kept = ((await answer.json()) as { turns: { index: number }[] }).turns.map((turn) => turn.index);
     await page.getByText(`${kept.length} turns`, { exact: true }).waitFor();
@@ -78,7 +72,7 @@ describe.skipIf(PLAYED === "")("a session under way", () => {
 
   it("shows each turn soon, also over a service that dies; no turn is lost or doubled", async () => {
     const session = await openSession("watched");
-    const page = await watched(browser, session);
+    const page = await watched(session);
     const waits: number[] = [];
     const total = 36;
     const before = 31;

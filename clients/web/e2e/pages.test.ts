@@ -1,124 +1,118 @@
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { ALL_LOOKS, expectNoSeriousFault, launched, URL_OF_SERVICE, type Visit, visit } from "./browser";
+import { beforeAll, describe, expect, it } from "vitest";
+import type { components } from "../src/api/contract";
+import {
+  act,
+  ask,
+  expectNoSeriousFault,
+  openSession,
+  recolour,
+  settled,
+  URL_OF_SERVICE,
+  visit,
+  browser,
+} from "./browser";
+import { expectNumbers, numbersOf } from "./numbers";
+import { expectAllReached } from "./walking";
 
-let browser: Browser;
-let sweep = "";
-let built = "";
+type Schemas = components["schemas"];
 
-async function json(path: string): Promise<Record<string, { id: string }[]>> {
-  return (await (await fetch(URL_OF_SERVICE + path)).json()) as Record<string, { id: string }[]>;
-}
+const ids = { sweep: "", second: "", job: "", other: "", session: "" };
 
 beforeAll(async () => {
-  browser = await launched();
-  sweep = (await json("/v1/sweeps")).data?.[0]?.id ?? "";
-  built = (await json("/v1/jobs?model=builtin/expert&outcome=success")).data?.[0]?.id ?? "";
+  const { data: jobs } = await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/expert&outcome=success");
+  ids.job = jobs[0]?.id ?? "";
+  ids.other = (await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/idle")).data[0]?.id ?? "";
+  ids.sweep = (await ask<Schemas["SweepList"]>("/v1/sweeps")).data[0]?.id ?? "";
+  // Another track: the same models in another workflow.
+  const again = { tasks: ["support-1"], models: ["builtin/expert", "builtin/idle"], seeds: [0], simulator: "mujoco" };
+  const sent = { ...again, name: "second track", workflow: "builder" };
+  ids.second = (await ask<Schemas["SweepAccepted"]>("/v1/sweeps", sent)).id;
+  ids.session = await openSession("walker", 77, { kind: "human" });
+  await act(ids.session, "start", {});
 });
-afterAll(() => browser.close());
-
-function open(path: string, width = 1280, scheme: "light" | "dark" = "light"): Promise<Visit> {
-  return visit(browser, path, { width, scheme });
-}
 
 const PAGES: readonly (readonly [string, () => string])[] = [
-  ["leaderboard", () => "/"],
-  ["method", () => "/method"],
+  ["board", () => "/"],
   ["sweeps", () => "/sweeps"],
-  ["sweep", () => `/sweeps/${sweep}`],
+  ["sweep", () => `/sweeps/${ids.sweep}`],
+  ["new sweep", () => "/sweeps/new"],
   ["jobs", () => "/jobs"],
-  ["job", () => `/jobs/${built}`],
-  ["trial", () => `/jobs/${built}?view=trial`],
+  ["job", () => `/jobs/${ids.job}`],
+  ["building of a job", () => `/jobs/${ids.job}?view=building`],
+  ["measurements of a job", () => `/jobs/${ids.job}?view=measurements`],
+  ["frame of a trial", () => `/embed/job/${ids.job}`],
+  ["two jobs", () => `/compare?a=${ids.job}&b=${ids.other}`],
+  ["two models", () => "/compare?models=builtin%2Fexpert,builtin%2Fidle"],
   ["tasks", () => "/tasks"],
   ["task", () => "/tasks/support-1"],
   ["model", () => "/models/builtin/expert"],
+  ["method", () => "/method"],
+  ["beginning of building", () => "/build"],
+  ["build room", () => `/build?session=${ids.session}`],
+  ["address that nobody has", () => "/nowhere"],
 ];
 
-const LOOKS = [
-  [1280, "light"],
-  [390, "dark"],
-] as const;
-
-// Every page in one look, alternately; in both in the nightly tests.
-describe.each(PAGES.map((page, index) => [...page, index] as const))("the page of the %s", (_, path, index) => {
-  it.each(LOOKS.filter((__, look) => ALL_LOOKS || look === index % 2))(
-    "at %d px, %s, has no serious fault",
-    async (width, scheme) => {
-      const { page, faults, context } = await open(path(), width, scheme);
-      await expectNoSeriousFault(page);
-      expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth)).toBe(true);
-      expect(faults).toEqual([]);
-      await context.close();
-    },
-  );
-});
-
-describe("the leaderboard", () => {
-  it("keeps its switches in the address, and reads them from it", async () => {
-    const { page, context } = await open("/");
-    await page.getByRole("switch", { name: "Baselines" }).click({ force: true });
-    await page.waitForURL(/baselines=no/);
-    await page.reload();
-    await page.locator("h1").waitFor();
-    expect(await page.getByRole("switch", { name: "Baselines" }).isChecked()).toBe(false);
-    await context.close();
-  });
-
-  it("opens the jobs behind a cell", async () => {
-    const { page, context } = await open("/");
-    await page.locator("a.heat-cell").first().click();
-    await page.waitForURL(/\/jobs\?.*task=/);
-    await page.getByRole("region", { name: /jobs, scrolls/ }).waitFor();
+describe.each(PAGES)("the page: %s", (name, path) => {
+  it("has no serious fault in either mode and size, and every control is reached by the keyboard", async () => {
+    const { page, context, faults } = await visit(path());
+    await page.waitForTimeout(300);
+    await expectAllReached(page);
+    for (const width of [1280, 390]) {
+      await page.setViewportSize({ width, height: 900 });
+      for (const colorScheme of ["light", "dark"] as const) {
+        await recolour(page, colorScheme);
+        await expectNoSeriousFault(page);
+      }
+      expect(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `${width}`).toBe(true);
+    }
+    expect(name === "address that nobody has" ? [] : faults).toEqual([]);
     await context.close();
   });
 });
 
-it("leads in three clicks to a bridge that builds itself and breaks under its cargo", async () => {
-  const { page, context } = await open("/");
-  await page.locator("a.heat-cell").first().click();
-  await page.waitForURL(/\/jobs\?.*task=/);
-  await page.locator("main a[href*='/jobs/job_']").first().click();
-  await page.getByRole("button", { name: "Build it step by step" }).click();
-  const steps = Number(await page.locator("[data-steps]").getAttribute("data-steps"));
-  await page.waitForFunction(() => Number(document.querySelector("[data-step]")?.getAttribute("data-step")) < 3);
-  await page.waitForURL(/view=trial/, { timeout: 600 * steps + 10_000 });
-  const time = page.getByText(/^\d+\.\d \/ \d+ s$/);
-  await expect
-    .poll(async () => Number.parseFloat((await time.textContent()) ?? ""), { timeout: 15_000 })
-    .toBeGreaterThan(0);
-  await page.getByText(/joints? broke/).waitFor();
+it("numbers of a page are the service's on two tracks", async () => {
+  const ended = async (): Promise<boolean> => {
+    const { progress } = await ask<Schemas["Sweep"]>(`/v1/sweeps/${ids.second}`);
+    return progress.done === progress.total;
+  };
+  await expect.poll(ended, { timeout: 45_000, interval: 500 }).toBe(true);
+  const { data: jobs } = await ask<Schemas["JobList"]>("/v1/jobs?model=builtin/expert&outcome=success");
+  const tracks = [...new Set(jobs.map((job) => job.track))];
+  expect(tracks.length).toBeGreaterThanOrEqual(2);
+  const { page, context } = await visit("/");
+  for (const track of tracks.slice(0, 2)) {
+    for (const numbers of await numbersOf(track, ask)) {
+      await page.goto(URL_OF_SERVICE + numbers.path);
+      await settled(page);
+      await expectNumbers(page, numbers);
+    }
+  }
   await context.close();
-});
+}, 120_000);
 
-describe("a job", () => {
-  it("draws its machine and plays its trial", async () => {
-    const { page, context } = await open(`/jobs/${built}?view=trial`);
-    const canvas = page.locator("canvas");
-    await canvas.waitFor();
-    const before = await page.getByText(/^\d+\.\d \/ \d+ s$/).textContent();
-    await page.getByRole("button", { name: "Play" }).click();
-    await expect.poll(() => page.getByText(/^\d+\.\d \/ \d+ s$/).textContent(), { timeout: 20_000 }).not.toBe(before);
-    await context.close();
-  });
-
-  it("that nobody has is told in words", async () => {
-    const context = await browser.newContext();
-    const page = await context.newPage();
-    await page.goto(`${URL_OF_SERVICE}/jobs/job_none`);
-    await expect.poll(() => page.getByRole("alert").textContent()).toContain("There is no such thing");
-    await context.close();
-  });
-});
-
-it("loads at most 350 kB of script on the first page, and no 3D", async () => {
-  const context = await browser.newContext();
+it("loads at most 350 kB of script on the first page, and no 3D; its table begins near the top", async () => {
+  const context = await browser.newContext({ viewport: { width: 1440, height: 900 } });
   const page = await context.newPage();
   const sizes: number[] = [];
   page.on("response", (response) => {
     if (response.url().endsWith(".js")) sizes.push(Number(response.headers()["content-length"] ?? 0));
   });
   await page.goto(URL_OF_SERVICE);
-  await page.locator("figure, .plot svg").first().waitFor();
+  const table = page.getByRole("table", { name: "Overall" });
+  await table.waitFor();
   expect(sizes.reduce((sum, size) => sum + size, 0)).toBeLessThan(350_000);
+  expect((await table.boundingBox())?.y ?? Infinity).toBeLessThanOrEqual(220);
+  await context.close();
+});
+
+it("what is not there is told in words and has a way on, and the places leave room on a phone", async () => {
+  const { page, context } = await visit("/tasks");
+  await page.goto(`${URL_OF_SERVICE}/jobs/job_0`);
+  const alert = page.getByRole("alert").filter({ hasText: "Not found" });
+  await alert.getByRole("link", { name: "all jobs" }).click();
+  await page.getByRole("heading", { name: "Jobs", level: 1 }).waitFor();
+  await page.setViewportSize({ width: 390, height: 844 });
+  const header = await page.locator("header").first().boundingBox();
+  expect(header?.height ?? Infinity).toBeLessThan(110);
   await context.close();
 });

@@ -1,19 +1,12 @@
-import type { Browser } from "playwright-core";
-import { afterAll, beforeAll, expect, it } from "vitest";
-import { expectNoSeriousFault, launched, settled, URL_OF_SERVICE, visit } from "./browser";
-
-let browser: Browser;
-beforeAll(async () => {
-  browser = await launched();
-});
-afterAll(() => browser.close());
+import { expect, it } from "vitest";
+import { expectNoSeriousFault, settled, URL_OF_SERVICE, visit, browser } from "./browser";
 
 it("leads on from an address that there is not", async () => {
   const context = await browser.newContext();
   const page = await context.newPage();
   const answer = await page.goto(`${URL_OF_SERVICE}/nonsense/here`);
   expect(answer?.status()).toBe(404);
-  await page.getByRole("heading", { name: "There is no such page" }).waitFor();
+  await page.getByRole("heading", { name: "Not found" }).waitFor();
   await expectNoSeriousFault(page);
   await page.getByRole("main").getByRole("link", { name: "all tasks" }).click();
   await page.getByRole("heading", { name: "Tasks" }).waitFor();
@@ -21,13 +14,13 @@ it("leads on from an address that there is not", async () => {
 });
 
 it("stays while the service is away, and comes back by itself", async () => {
-  const { page, context } = await visit(browser, "/");
+  const { page, context } = await visit("/");
   // The scripts of all pages, when there is nothing else to do.
   const last = (): Promise<boolean> =>
     page.evaluate(() => performance.getEntriesByType("resource").some(({ name }) => name.includes("SweepsPage-")));
   await expect.poll(last, { timeout: 25_000 }).toBe(true);
   await context.route("**/*", (route) => route.abort());
-  await page.getByRole("navigation").getByRole("link", { name: "Sweeps", exact: true }).click();
+  await page.getByRole("navigation").getByRole("link", { name: "Runs", exact: true }).click();
   await page
     .getByText(/no answer came/)
     .first()

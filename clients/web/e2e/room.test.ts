@@ -1,7 +1,7 @@
 import { readFileSync } from "node:fs";
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, describe, expect, it } from "vitest";
-import { act, ATTACH, expectNoSeriousFault, launched, opened, openSession, URL_OF_SERVICE } from "./browser";
+import type { Page } from "playwright-core";
+import { describe, expect, it } from "vitest";
+import { act, ATTACH, expectNoSeriousFault, opened, openSession, URL_OF_SERVICE } from "./browser";
 
 /** Poses of blocks by id, as (x, y, z, w, x, y, z), and those of refused blocks. */
 interface Expected {
@@ -11,12 +11,6 @@ interface Expected {
 
 const FILE = process.env.BUILDARENA_WEB_MACHINES ?? "";
 const sessions: Expected[] = FILE === "" ? [] : (JSON.parse(readFileSync(FILE, "utf8")) as Expected[]);
-
-let browser: Browser;
-beforeAll(async () => {
-  browser = await launched();
-});
-afterAll(() => browser.close());
 
 /** Walks through all steps of a job's page and says where its scene graph is not what is expected. */
 async function walked(page: Page, expected: Expected): Promise<string[]> {
@@ -111,7 +105,7 @@ describe.skipIf(sessions.length === 0)("random machines", () => {
   it.each(sessions.map((one, index) => [index, one] as const))(
     "of session %d stand where the geometry library says, step by step",
     async (_, expected) => {
-      const page = await opened(browser, `/jobs/${expected.job}?step=0`, 390);
+      const page = await opened(`/jobs/${expected.job}?step=0`, 390);
       await page.locator("canvas").waitFor();
       await page.waitForFunction(() => "scene" in (document.querySelector("canvas") ?? {}));
       // What is drawn is small: poses are read, and software draws slowly.
@@ -128,7 +122,7 @@ describe.skipIf(sessions.length === 0)("random machines", () => {
     const session = await openSession("chooser");
     await act(session, "start", {});
     await act(session, "attach_block_to", ATTACH(1, 4));
-    const page = await opened(browser, `/jobs/${session}?part=2`);
+    const page = await opened(`/jobs/${session}?part=2`);
     await page.getByRole("button", { name: "Step 2 made it." }).waitFor();
     expect(await page.locator(".turn[data-chosen]").getAttribute("data-turn")).toBe("1");
     await page.locator('[data-turn="0"]').getByRole("button", { name: "step 1" }).click();
@@ -147,11 +141,11 @@ describe.skipIf(sessions.length === 0)("random machines", () => {
 
 describe.skipIf(sessions.length === 0)("two jobs", () => {
   it("stand side by side, seen by cameras that turn together", async () => {
-    const { jobs } = (await (
+    const { data: jobs } = (await (
       await fetch(`${URL_OF_SERVICE}/v1/jobs?task=support-1&state=done&outcome=success`)
-    ).json()) as { jobs: { id: string }[] };
+    ).json()) as { data: { id: string }[] };
     const [a, b] = [jobs[0]?.id ?? "", jobs[1]?.id ?? ""];
-    const page = await opened(browser, `/compare?a=${a}&b=${b}`);
+    const page = await opened(`/compare?a=${a}&b=${b}`);
     await page.locator("[data-trial=b] canvas").waitFor();
     await expectNoSeriousFault(page);
     const eyes = (): Promise<number[][]> =>
@@ -175,10 +169,10 @@ describe.skipIf(sessions.length === 0)("two jobs", () => {
 
 describe.skipIf(sessions.length === 0)("a moment of a trial", () => {
   it("is sent as an address, as a picture and as a film", async () => {
-    const { jobs } = (await (
+    const { data: jobs } = (await (
       await fetch(`${URL_OF_SERVICE}/v1/jobs?task=support-1&state=done&outcome=success`)
-    ).json()) as { jobs: { id: string }[] };
-    const page = await opened(browser, `/jobs/${jobs[0]?.id ?? ""}?view=trial`);
+    ).json()) as { data: { id: string }[] };
+    const page = await opened(`/jobs/${jobs[0]?.id ?? ""}`);
     await page.locator(".stage-3d canvas").waitFor();
     const slider = page.getByRole("slider", { name: /Time of the trial/ });
     await slider.focus();

@@ -14,7 +14,7 @@ let port = 0;
 
 async function sweeps(): Promise<number> {
   const answer = await fetch(`${URL_OF_SERVICE}/v1/sweeps`);
-  return ((await answer.json()) as unknown[]).length;
+  return ((await answer.json()) as { data: unknown[] }).data.length;
 }
 
 async function page(host: string): Promise<Page> {
@@ -72,34 +72,7 @@ describe("a page of somebody else", () => {
     await hostile.context().close();
   });
 
-  it.each(["text/plain", "application/x-www-form-urlencoded", "multipart/form-data"])(
-    "that sends a form as %s changes nothing",
-    async (type) => {
-      const before = await sweeps();
-      const hostile = await page("localhost");
-      const answered = hostile.waitForResponse((answer) => answer.url().startsWith(URL_OF_SERVICE));
-      await hostile.evaluate(
-        ([action, encoding, text]) => {
-          const form = document.createElement("form");
-          form.method = "POST";
-          form.action = action;
-          form.enctype = encoding;
-          const field = document.createElement("input");
-          field.name = `${text.slice(0, -1)},"x":"`;
-          field.value = '"}';
-          form.append(field);
-          document.body.append(form);
-          form.submit();
-        },
-        [`${URL_OF_SERVICE}/v1/sweeps`, type, SWEEP] as const,
-      );
-      expect((await answered).status()).toBe(403);
-      expect(await sweeps()).toBe(before);
-      await hostile.context().close();
-    },
-  );
-
-  it("frames no page, and sees nothing of one that it opens", async () => {
+  it("frames no page", async () => {
     const hostile = await page("localhost");
     await hostile.evaluate((url) => {
       const frame = document.createElement("iframe");
@@ -110,21 +83,6 @@ describe("a page of somebody else", () => {
     const [, framed] = hostile.frames();
     await framed?.waitForLoadState();
     expect(await framed?.locator("h1").count()).toBe(0);
-    const [opened] = await Promise.all([
-      hostile.context().waitForEvent("page"),
-      hostile.evaluate((url) => {
-        (window as unknown as { other: Window | null }).other = window.open(url);
-      }, `${URL_OF_SERVICE}/jobs`),
-    ]);
-    await opened.locator("h1").waitFor();
-    const seen = await hostile.evaluate(() => {
-      try {
-        return String((window as unknown as { other: Window | null }).other?.document.title);
-      } catch (error) {
-        return String(error);
-      }
-    });
-    expect(seen).toMatch(/SecurityError|undefined/);
     await hostile.context().close();
   });
 

@@ -1,19 +1,13 @@
-import type { Browser, Page } from "playwright-core";
-import { afterAll, beforeAll, expect, it } from "vitest";
-import { act, ask, expectNoSeriousFault, launched, openSession, settled, visit } from "./browser";
-
-let browser: Browser;
-beforeAll(async () => {
-  browser = await launched();
-});
-afterAll(() => browser.close());
+import type { Page } from "playwright-core";
+import { expect, it } from "vitest";
+import { act, ask, expectNoSeriousFault, openSession, settled, visit } from "./browser";
 
 const parts = (page: Page): Promise<number> => page.getByRole("listbox", { name: "Parts" }).getByRole("option").count();
 
 it("takes back, does again, mirrors and tries without counting", async () => {
   const session = await openSession("toy", 0, { kind: "human" });
   await act(session, "start", {});
-  const { page, context, faults } = await visit(browser, `/build?session=${session}`);
+  const { page, context, faults } = await visit(`/build?session=${session}`);
   const choose = async (part: RegExp, face: RegExp): Promise<void> => {
     await page.getByRole("listbox", { name: "Parts" }).getByRole("option", { name: part }).click();
     await page
@@ -43,7 +37,7 @@ it("begins with another's machine", async () => {
   await act(built, "attach_block_to", { base_block: "1", face: "A", new_block: "Small Wooden Block" });
   await act(built, "attach_block_to", { base_block: "1", face: "A", new_block: "Small Wooden Block" });
   await ask(`/v1/sessions/${built}/submit`, {});
-  const { page, context, faults } = await visit(browser, `/build?task=support-1&remix=${built}`);
+  const { page, context, faults } = await visit(`/build?task=support-1&remix=${built}`);
   await page.getByText("The session begins with the machine of").waitFor();
   await page.getByLabel("Your name on the board").fill("remixer");
   await page.getByRole("button", { name: "Begin" }).click();
@@ -55,7 +49,7 @@ it("begins with another's machine", async () => {
 });
 
 it("begins with a template of the task's", async () => {
-  const { page, context, faults } = await visit(browser, "/build?task=transport-1");
+  const { page, context, faults } = await visit("/build?task=transport-1");
   await page.getByLabel("Your name on the board").fill("templated");
   await page.getByRole("combobox", { name: "Begin with" }).click();
   await page.getByRole("option", { name: /^Car chassis/ }).click();

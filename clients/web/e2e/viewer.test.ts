@@ -1,8 +1,8 @@
 import { pathToFileURL } from "node:url";
 import { join } from "node:path";
-import type { Browser, Frame, Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
-import { launched } from "./browser";
+import type { Frame, Page } from "playwright-core";
+import { expect, test } from "vitest";
+import { browser } from "./browser";
 
 // Pages that notebooks made: tests/cli/notebooks writes them into this folder.
 const FOLDER = process.env.BUILDARENA_VIEWER_PAGES ?? "";
@@ -14,12 +14,6 @@ interface Drawn {
     ) => void;
   };
 }
-
-let browser: Browser;
-beforeAll(async () => {
-  browser = await launched();
-});
-afterAll(() => browser.close());
 
 interface Opened {
   page: Page;

@@ -9,10 +9,10 @@ const LOADED_STEPS = 240;
 const SCHEMES = ["light", "dark"];
 
 const ask = async (path) => (await fetch(url + path)).json();
-const first = async (path) => (await ask(path)).jobs?.[0]?.id;
+const first = async (path) => (await ask(path)).data?.[0]?.id;
 
 async function pages() {
-  const [newest] = (await ask("/v1/sweeps")).sweeps;
+  const [newest] = (await ask("/v1/sweeps")).data;
   const built =
     (await first("/v1/jobs?task=support-1&outcome=success&model=builtin/expert")) ??
     (await first("/v1/jobs?outcome=success"));
@@ -24,7 +24,8 @@ async function pages() {
     "sweeps-new": "/sweeps/new",
     jobs: "/jobs",
     job: `/jobs/${built}`,
-    trial: `/jobs/${built}?view=trial`,
+    building: `/jobs/${built}?view=building`,
+    failed: `/jobs/${failed}`,
     compare: `/compare?a=${built}&b=${failed}`,
     tasks: "/tasks",
     task: "/tasks/support-1",
@@ -65,11 +66,11 @@ async function all(browser, wanted) {
 
 /** The two that the README shows: the board, and a bridge under its load. */
 async function shown(browser) {
-  const { board, trial } = await pages();
+  const { board, job } = await pages();
   const front = await opened(browser, board, 1280, "light", 800);
   await front.page.screenshot({ path: join(folder, "board.png") });
   await front.context.close();
-  const bridge = await opened(browser, trial, 1280, "light", 800);
+  const bridge = await opened(browser, job, 1280, "light", 800);
   const canvas = bridge.page.locator("canvas").first();
   await canvas.waitFor({ timeout: 30_000 });
   // Late enough that the load shows, and before most bridges give way.

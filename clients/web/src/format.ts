@@ -68,6 +68,16 @@ export function places(low: number | null, high: number | null): string {
   return low === high ? String(low) : `${low}–${high}`;
 }
 
+/** "1 run", "2 runs": a number with its word. */
+export function counted(value: number, one: string, many = `${one}s`): string {
+  return `${count(value)} ${value === 1 ? one : many}`;
+}
+
+/** A name as the title of something: "My own". */
+export function titled(name: string): string {
+  return words(name).replace(/^./, (first) => first.toUpperCase());
+}
+
 export function words(name: string): string {
   return name.replaceAll("_", " ");
 }
@@ -80,9 +90,14 @@ const STATES: Readonly<Record<string, string>> = {
   "simulate running": "in their trial",
   "simulate on_hold": "on hold before their trial",
   budget_exhausted: "stopped: budget used up",
+  success: "succeeded",
+  unsuccessful: "failed its trial",
+  construction_failed: "didn’t finish building",
+  limit: "hit a limit",
+  errored: "hit an error (not counted)",
 };
 
-/** What a state is called where people read it; the command line has the same. */
+/** What a state or an outcome is called where people read it. */
 export function stateWords(name: string): string {
   return STATES[name] ?? words(name);
 }

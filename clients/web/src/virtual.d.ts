@@ -7,3 +7,8 @@ declare module "virtual:modules" {
   const modules: { name: string; kind: string; center?: Vector; body?: Solid[] }[];
   export default modules;
 }
+
+declare module "*.md?raw" {
+  const text: string;
+  export default text;
+}

@@ -1,12 +1,9 @@
-export type Figure = "success" | "indicator";
-
 /** What the address of the board says; everything else follows from it. */
 export interface BoardSearch {
   track?: string;
   task?: string[];
-  /** Categories of tasks; without, models are ranked over the paper's nine. */
+  /** Categories of tasks; without, of all. */
   category?: string[];
-  figure?: Figure;
   baselines?: "no";
 }
 
@@ -19,17 +16,12 @@ function list(value: unknown): string[] | undefined {
   return entries.length > 0 ? entries : undefined;
 }
 
-function oneOf<Choice extends string>(value: unknown, ...choices: Choice[]): Choice | undefined {
-  return choices.find((choice) => choice === value);
-}
-
 /** Reads an address as far as it makes sense; strangers' addresses are input too. */
 export function readSearch(raw: Record<string, unknown>): BoardSearch {
   return {
     track: text(raw.track),
     task: list(raw.task),
     category: list(raw.category),
-    figure: oneOf(raw.figure, "success", "indicator"),
-    baselines: oneOf(raw.baselines, "no"),
+    baselines: raw.baselines === "no" ? "no" : undefined,
   };
 }

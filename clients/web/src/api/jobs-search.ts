@@ -27,11 +27,13 @@ export function readJobsSearch(raw: Record<string, unknown>): JobsSearch {
   };
 }
 
-/** What the address of a job says: how far it is built, which part is chosen, or that the trial is shown. */
+const VIEWS = ["transcript", "building", "measurements", "files"] as const;
+
+/** What the address of a job says: how far it is built, which part is chosen, what is shown below the machine. */
 export interface JobSearch {
   step?: number;
   part?: string;
-  view?: "trial";
+  view?: (typeof VIEWS)[number];
   /** Seconds of the trial that is shown. */
   t?: number;
   /** The number of the rollout that is shown. */
@@ -48,7 +50,7 @@ export function readJobSearch(raw: Record<string, unknown>): JobSearch {
   return {
     step: step >= 0 && Number.isSafeInteger(step) ? step : undefined,
     part: typeof part === "string" && part.length < 100 ? part : undefined,
-    view: raw.view === "trial" ? "trial" : undefined,
+    view: VIEWS.find((view) => view === raw.view),
     t: typeof raw.t === "number" && raw.t >= 0 && Number.isFinite(raw.t) ? raw.t : undefined,
     rollout: typeof raw.rollout === "number" && Number.isSafeInteger(raw.rollout) ? raw.rollout : undefined,
     turn: typeof raw.turn === "number" && Number.isSafeInteger(raw.turn) && raw.turn >= 0 ? raw.turn : undefined,

@@ -56,14 +56,10 @@ function holds(job: Job, words: URLSearchParams, categories: Categories): boolea
     const wanted = words.get(name);
     if (wanted !== null && read(job) !== wanted) return false;
   }
-  const [flag, text, prefix] = [words.get("flag"), words.get("text"), words.get("id_prefix")];
-  if (flag !== null && !(job.flags ?? []).includes(flag)) return false;
+  const [flag, text] = [words.get("flag"), words.get("text")];
+  if (flag !== null && !job.flags.includes(flag)) return false;
   const wanted = words.getAll("category");
   if (wanted.length > 0 && !wanted.some((name) => categories.get(name)?.has(job.task))) return false;
-  const [least, most] = [words.get("min_indicator"), words.get("max_indicator")];
-  if (least !== null && (job.indicator === null || job.indicator < Number(least))) return false;
-  if (most !== null && (job.indicator === null || job.indicator > Number(most))) return false;
-  if (prefix !== null && !job.id.startsWith(prefix)) return false;
   return (
     text === null ||
     [job.id, job.task, job.model, job.reason, job.detail].some((one) => one?.toLowerCase().includes(text.toLowerCase()))
@@ -87,7 +83,7 @@ export function summed(rows: Rows, words: URLSearchParams, categories: Categorie
     const key = JSON.stringify([state, outcome, reason]);
     const ending = endings.get(key) ?? { state, outcome, reason, jobs: 0 };
     endings.set(key, { ...ending, jobs: ending.jobs + 1 });
-    for (const flag of own ?? []) flags.set(flag, (flags.get(flag) ?? 0) + 1);
+    for (const flag of own) flags.set(flag, (flags.get(flag) ?? 0) + 1);
   }
   return {
     jobs: jobs.length,

@@ -52,7 +52,7 @@ function problem(status: number, title: string, detail: string): Response {
 }
 
 function found(name: string | null | undefined, why: string): Promise<Response> | Response {
-  if (name === null) return problem(404, "There is no such thing", "The service had none when this site was written.");
+  if (name === null) return problem(404, "Not found", "The service had none when this site was written.");
   return name === undefined ? problem(410, "Not on this site", why) : file(name);
 }
 

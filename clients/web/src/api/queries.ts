@@ -6,12 +6,11 @@ import { readSite } from "./kept";
 import { every, isSite } from "./site";
 
 export type Board = Schema<"Board">;
-export type Figures = Schema<"Figures">;
 export type Caller = Schema<"Caller">;
 export type Trouble = Schema<"Trouble">;
 export type Row = Schema<"BoardRow">;
 export type TaskBoard = Schema<"TaskBoard">;
-export type OverallRow = Schema<"OverallRow">;
+export type OverallRow = Schema<"OverallRow"> & { success_low?: number | null; success_high?: number | null };
 export type Sweep = Schema<"Sweep">;
 export type Forecast = Schema<"Forecast">;
 export type JobSummary = Schema<"JobSummary">;
@@ -35,27 +34,22 @@ const rowsOf = async <Row>(asked: Promise<{ data: Row[] }>): Promise<Row[]> => (
 
 const LIVE_MS = 5_000;
 
-export function boardQuery(search: BoardSearch): Record<string, string | string[]> {
+/** What a board counts: what its address says, or the jobs of a sweep. */
+type Counted = BoardSearch & { sweep?: string };
+
+export function boardQuery(search: Counted): Record<string, string | string[]> {
   const query: Record<string, string | string[]> = {};
   if (search.track !== undefined) query.track = search.track;
   if (search.task !== undefined && search.task.length > 0) query.task = search.task;
   if (search.category !== undefined && search.category.length > 0) query.category = search.category;
+  if (search.sweep !== undefined) query.sweep = search.sweep;
   return query;
 }
 
-export const board = (search: BoardSearch) =>
+export const board = (search: Counted) =>
   queryOptions({
     queryKey: ["board", boardQuery(search)],
     queryFn: () => taken(client.GET("/v1/leaderboard", { params: { query: boardQuery(search) } })),
-    placeholderData: keepPreviousData,
-    refetchInterval: every(4 * LIVE_MS),
-  });
-
-/** What the board's drawings are made of: the same that reports are drawn from. */
-export const figures = (search: BoardSearch) =>
-  queryOptions({
-    queryKey: ["figures", boardQuery(search)],
-    queryFn: () => taken(client.GET("/v1/leaderboard/figures", { params: { query: boardQuery(search) } })),
     placeholderData: keepPreviousData,
     refetchInterval: every(4 * LIVE_MS),
   });
@@ -108,19 +102,6 @@ export const sweepTroubles = (id: string) =>
     queryFn: () => rowsOf(taken(client.GET("/v1/sweeps/{sweep_id}/troubles", { params: { path: { sweep_id: id } } }))),
   });
 
-/** Jobs that faults ended: they are in no average until they are retried. */
-export const deadLetters = (id: string) =>
-  queryOptions({
-    queryKey: ["sweep-jobs", id, "errored"],
-    refetchInterval: every(3 * LIVE_MS),
-    queryFn: () =>
-      taken(
-        client.GET("/v1/jobs", {
-          params: { query: { sweep: [id], outcome: ["errored"], sort: "finished", limit: 100 } },
-        }),
-      ),
-  });
-
 /** What a list of jobs comes to. */
 export const jobSummary = (filters: JobFilters) =>
   queryOptions({
@@ -128,6 +109,13 @@ export const jobSummary = (filters: JobFilters) =>
     queryFn: () => taken(client.GET("/v1/jobs/summary", { params: { query: asQuery(filters) } })),
     placeholderData: keepPreviousData,
     refetchInterval: every(2 * LIVE_MS),
+  });
+
+/** The first jobs of a list. */
+export const someJobs = (filters: JobFilters) =>
+  queryOptions({
+    queryKey: ["some-jobs", filters],
+    queryFn: () => rowsOf(taken(client.GET("/v1/jobs", { params: { query: asQuery(filters) } }))),
   });
 
 /** Jobs of one page, as many as the service gives. */

@@ -27,7 +27,7 @@ export function Gallery({ jobs, unit, by }: { jobs: readonly Job[]; unit?: strin
           </Text>
           <Group gap={6} mt={4}>
             <OutcomeBadge value={job.outcome ?? job.state} size="sm" />
-            {(job.flags ?? []).map((flag) => (
+            {job.flags.map((flag) => (
               <Badge
                 key={flag}
                 size="sm"

@@ -3,7 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import type { JobsSearch } from "../api/jobs-search";
 import { jobSummary, type JobSummary } from "../api/queries";
-import { count, percent, words } from "../format";
+import { count, counted, percent, stateWords, words } from "../format";
 import { OUTCOME_COLOURS } from "../theme";
 
 const SHOWN = 12;
@@ -21,7 +21,7 @@ export function kindsOf(summary: JobSummary, search: JobsSearch): Kind[] {
   return summary.endings
     .map(({ state, outcome, reason, jobs }) => {
       const name = outcome ?? state;
-      const kind = reason === null ? words(name) : `${words(name)}: ${words(reason)}`;
+      const kind = reason === null ? stateWords(name) : `${stateWords(name)}: ${words(reason)}`;
       const narrowed: JobsSearch = {
         ...search,
         ...(outcome === null ? { state } : { outcome }),
@@ -55,7 +55,7 @@ export function JobsSummary({ search }: { search: JobsSearch }) {
       <Group gap="xs">
         <Text size="sm" fw={600}>
           {found.all_counted ? "" : "more than "}
-          {count(found.jobs)} {found.jobs === 1 ? "job" : "jobs"}:
+          {counted(found.jobs, "run")}:
         </Text>
         {kinds.slice(0, SHOWN).map((kind) => (
           <Link

@@ -76,7 +76,7 @@ export function JobsTable({ jobs: listed, onEnd, sorting: asked, onSort }: Liste
               State
             </SortHead>
             <SortHead name="indicator" figures {...head}>
-              Indicator
+              Result
             </SortHead>
             <SortHead name="cost" figures {...head}>
               Cost
@@ -122,9 +122,9 @@ const JobRow = memo(function JobRow({ job, index }: { job: Job; index: number })
               {words(job.reason)}
             </Text>
           )}
-          {(job.flags ?? []).length > 0 && (
+          {job.flags.length > 0 && (
             <Badge size="sm" color="yellow" variant="outline" tt="none" styles={{ root: { color: "inherit" } }}>
-              {(job.flags ?? []).length} flag{(job.flags ?? []).length > 1 ? "s" : ""}
+              {job.flags.length} flag{job.flags.length > 1 ? "s" : ""}
             </Badge>
           )}
         </Group>

@@ -56,7 +56,7 @@ export function KeyField() {
         </Group>
         <Checkbox
           size="xs"
-          label="Let it stay in this browser, for all tabs and later visits: on a device of your own only"
+          label="Remember on this device"
           checked={stays}
           onChange={(event) => {
             setStays(event.currentTarget.checked);

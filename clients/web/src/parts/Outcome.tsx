@@ -10,7 +10,7 @@ import {
   IconX,
   type Icon,
 } from "@tabler/icons-react";
-import { words } from "../format";
+import { stateWords } from "../format";
 import { OUTCOME_COLOURS } from "../theme";
 
 const ICONS: Readonly<Record<string, Icon>> = {
@@ -37,7 +37,7 @@ export function OutcomeBadge({ value, size = "md" }: { value: string; size?: "sm
       leftSection={<Mark size={13} aria-hidden />}
       styles={{ root: { color: "var(--mantine-color-text)" } }}
     >
-      {words(value)}
+      {stateWords(value)}
     </Badge>
   );
 }

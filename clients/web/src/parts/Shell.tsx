@@ -11,10 +11,8 @@ import {
   useMantineColorScheme,
 } from "@mantine/core";
 import { IconKey, IconMoon, IconSun } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
 import { Link, Outlet, useRouterState } from "@tanstack/react-router";
 import { useEffect } from "react";
-import { site } from "../api/queries";
 import { beside, isSite } from "../api/site";
 import { KeyField, useKey } from "./KeyField";
 import { ProblemNote } from "./Problem";
@@ -22,27 +20,17 @@ import { SiteNote } from "./SiteNote";
 
 const PLACES = [
   { to: "/", label: "Leaderboard" },
-  { to: "/sweeps", label: "Sweeps" },
-  { to: "/jobs", label: "Jobs" },
   { to: "/tasks", label: "Tasks" },
-  { to: "/compare", label: "Compare" },
+  { to: "/sweeps", label: "Runs" },
   { to: "/build", label: "Build" },
+  { to: "/method", label: "Method" },
 ] as const;
 
-/** Places that a published site has; all others need a running service. */
-const PUBLISHED: ReadonlySet<string> = new Set(["/", "/sweeps", "/jobs", "/tasks", "/compare"]);
-
-/** Where one can go; a published site may be of a track, and hold no sweeps. */
-function usePlaces() {
-  const { data } = useQuery(site());
-  if (!isSite) return PLACES;
-  const withSweeps = (data?.sweeps.length ?? 0) > 0;
-  return PLACES.filter(({ to }) => PUBLISHED.has(to) && (to !== "/sweeps" || withSweeps));
-}
+/** Where one can go: nobody builds on a published site. */
+const places = PLACES.filter(({ to }) => !isSite || to !== "/build");
 
 /** The frame of every page: where one is, where one can go, light or dark, the key. */
 export function Shell() {
-  const places = usePlaces();
   const path = useRouterState({ select: (state) => state.location.pathname });
   useEffect(() => {
     const name = path
@@ -77,12 +65,7 @@ export function Shell() {
         bg="var(--mantine-color-body)"
       >
         <Container size="var(--page-width)" py={10}>
-          <Group
-            justify="space-between"
-            align={isSite ? "start" : undefined}
-            gap="xs"
-            wrap={isSite ? "nowrap" : "wrap"}
-          >
+          <Group justify="space-between" gap="xs">
             <Group gap="md" className="site-places">
               <Link className="quiet" to="/" aria-label="BuildArena, start">
                 <Group gap={8} wrap="nowrap">
@@ -107,17 +90,7 @@ export function Shell() {
               </Group>
             </Group>
             <Group gap={6}>
-              <Anchor component={Link} to="/method" size="sm" c="inherit">
-                Method
-              </Anchor>
-              {!isSite && (
-                <>
-                  <Anchor href={beside("docs")} size="sm" c="inherit">
-                    API
-                  </Anchor>
-                  <KeyButton />
-                </>
-              )}
+              {!isSite && <KeyButton />}
               <SchemeButton />
             </Group>
           </Group>
@@ -126,7 +99,15 @@ export function Shell() {
       <Container component="main" id="main" tabIndex={-1} size="var(--page-width)" py="lg" style={{ outline: "none" }}>
         <Outlet />
       </Container>
-      {isSite && <SiteNote />}
+      {isSite ? (
+        <SiteNote />
+      ) : (
+        <Container component="footer" size="var(--page-width)" py="lg">
+          <Anchor href={beside("docs")} size="sm" c="inherit">
+            API documentation
+          </Anchor>
+        </Container>
+      )}
     </>
   );
 }
@@ -174,7 +155,7 @@ function SchemeButton() {
 export function Missing() {
   return (
     <>
-      <Title order={1}>There is no such page</Title>
+      <Title order={1}>Not found</Title>
       <Text mt="sm">
         <Link to="/">The leaderboard</Link>, <Link to="/jobs">all jobs</Link>, <Link to="/tasks">all tasks</Link>
       </Text>
@@ -186,10 +167,10 @@ export function Missing() {
 export function NeedsService() {
   return (
     <>
-      <Title order={1}>This needs a running service</Title>
+      <Title order={1}>Not part of the published site</Title>
       <Text mt="sm">
-        A published site shows what was done; it builds and tries nothing. Go on with{" "}
-        <Link to="/">the leaderboard</Link>, <Link to="/jobs">all jobs</Link> or <Link to="/tasks">all tasks</Link>.
+        Building and starting runs need a running service. <Link to="/">The leaderboard</Link>,{" "}
+        <Link to="/jobs">all jobs</Link>, <Link to="/tasks">all tasks</Link>
       </Text>
     </>
   );

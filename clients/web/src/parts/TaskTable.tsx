@@ -1,59 +1,63 @@
 import { Badge, Group, Table, Text } from "@mantine/core";
 import { Link } from "@tanstack/react-router";
-import type { Row, TaskBoard } from "../api/queries";
-import { SCORE, sharedRanks } from "./ranks";
-import { jobsBehind } from "./jobs-behind";
-import { count, dollars, measured, number, percent, places, successes } from "../format";
+import type { Row } from "../api/queries";
+import { counted, dollars, number, percent, places, successes, words } from "../format";
 import { Interval } from "./Interval";
+import { jobsBehind } from "./jobs-behind";
 import { SortHead, useSorting } from "./SortHead";
 import type { Values } from "./sorting";
 
-const VALUES: Values<Row> = {
-  model: (row) => row.model,
-  rank: (row) => row.rank,
-  success: (row) => row.success_rate,
-  indicator: (row) => row.indicator_mean,
-  score: (row) => row.score,
-  best: (row) => row.indicator_best,
-  parts: (row) => row.parts_mean,
-  cost: (row) => row.cost_per_success_usd,
-  refused: (row) => row.refused_action_rate,
+/** What a score is, for whoever points at its heading. */
+export const SCORE =
+  "The result beside the built-in expert's on a log scale: 0 nothing, 1 as much as the expert, 2 three times as much";
+
+/** What a model did on a task, under the name of either. */
+export interface Shown {
+  label: string;
+  row: Row;
+  /** What the task measures, with its unit. */
+  measure: string;
+}
+
+const VALUES: Values<Shown> = {
+  label: ({ label }) => label,
+  rank: ({ row }) => row.rank,
+  success: ({ row }) => row.success_rate,
+  result: ({ row }) => row.indicator_mean,
+  score: ({ row }) => row.score,
+  best: ({ row }) => row.indicator_best,
+  cost: ({ row }) => row.cost_usd_mean,
+  refused: ({ row }) => row.refused_action_rate,
 };
 
-/** All models on one task, the best first. */
-export function TaskTable({ task }: { task: TaskBoard }) {
-  const ties = sharedRanks(task.rows);
-  const { rows, head } = useSorting(task.rows, VALUES);
-  const several = new Set(task.rows.map((row) => row.model)).size < task.rows.length;
+/** Models on one task, or one model on its tasks. */
+export function TaskTable({ name, of, shown }: { name: string; of: "Model" | "Task"; shown: readonly Shown[] }) {
+  const { rows, head } = useSorting(shown, VALUES);
   return (
-    <Table.ScrollContainer minWidth={820} type="native">
-      <Table highlightOnHover className="sticky-first" aria-label={`Models on ${task.task}`}>
+    <div className="tall" tabIndex={0} role="region" aria-label={`${name}, scrolls`}>
+      <Table stickyHeader highlightOnHover miw={820} aria-label={name}>
         <Table.Thead>
           <Table.Tr>
-            <SortHead name="model" {...head}>
-              Model
-            </SortHead>
-            <SortHead name="rank" figures {...head}>
+            <SortHead name="rank" {...head}>
               Rank
             </SortHead>
-            <Table.Th className="figures">Place</Table.Th>
-            <SortHead name="success" figures {...head}>
+            <SortHead name="label" {...head}>
+              {of}
+            </SortHead>
+            <SortHead name="success" {...head}>
               Success, 95 % interval
             </SortHead>
-            <SortHead name="indicator" figures {...head}>
-              {measured(task.indicator, task.unit)}
+            <SortHead name="result" figures {...head}>
+              Result
             </SortHead>
             <SortHead name="score" figures title={SCORE} {...head}>
-              Score
+              vs. expert
             </SortHead>
             <SortHead name="best" figures {...head}>
               Best
             </SortHead>
-            <SortHead name="parts" figures {...head}>
-              Parts
-            </SortHead>
             <SortHead name="cost" figures {...head}>
-              $ a success
+              $ per run
             </SortHead>
             <SortHead name="refused" figures {...head}>
               Refused
@@ -61,17 +65,12 @@ export function TaskTable({ task }: { task: TaskBoard }) {
           </Table.Tr>
         </Table.Thead>
         <Table.Tbody>
-          {rows.map((row) => (
-            <TaskRow
-              key={`${row.model} ${row.configuration}`}
-              row={row}
-              tied={row.rank !== null && ties.has(row.rank)}
-              several={several}
-            />
+          {rows.map((one) => (
+            <TaskRow key={`${one.label} ${one.row.configuration}`} {...one} />
           ))}
         </Table.Tbody>
       </Table>
-    </Table.ScrollContainer>
+    </div>
   );
 }
 
@@ -86,15 +85,15 @@ function Proof({ row }: { row: Row }) {
   return parts.length > 0 && <small className="dimmed">{parts.join(", ")}</small>;
 }
 
-function TaskRow({ row, tied, several }: { row: Row; tied: boolean; several: boolean }) {
+function TaskRow({ label, row, measure }: Shown) {
   const success = `${successes(row.successes)} of ${row.counted}`;
   return (
-    <Table.Tr>
+    <Table.Tr className={row.baseline ? "reference" : undefined}>
+      <Table.Td className="rank">{row.baseline ? "ref." : places(row.rank_low, row.rank_high)}</Table.Td>
       <Table.Td>
         <Group gap={6} wrap="nowrap">
           <Link className="quiet" to="/jobs" search={jobsBehind(row)}>
-            {row.model}
-            {several && <small> ({row.configuration.slice(0, 8)})</small>}
+            {label}
           </Link>
           {row.flagged > 0 && (
             <Badge size="sm" color="yellow" variant="outline" tt="none" styles={{ root: { color: "inherit" } }}>
@@ -104,53 +103,45 @@ function TaskRow({ row, tied, several }: { row: Row; tied: boolean; several: boo
           <Proof row={row} />
         </Group>
       </Table.Td>
-      <Table.Td className="figures">
-        {row.rank ?? "–"}
-        {tied && <small className="dimmed"> tied</small>}
-      </Table.Td>
-      <Table.Td className="figures">{places(row.rank_low, row.rank_high)}</Table.Td>
       <Table.Td>
-        <Group gap={8} wrap="nowrap">
+        <Group gap={8} wrap="nowrap" title={`${percent(row.success_low)} to ${percent(row.success_high)}`}>
           <Interval
             low={row.success_low}
             high={row.success_high}
             value={row.success_rate}
             from={0}
             to={1}
-            label={`success ${success}`}
+            label={`success ${success}, ${percent(row.success_low)} to ${percent(row.success_high)}`}
           />
-          <Text size="sm" className="figures" style={{ whiteSpace: "nowrap" }}>
-            {percent(row.success_rate)} ({success})
-            <Text span size="xs" className="dimmed" display="block">
-              {percent(row.success_low)} to {percent(row.success_high)}
-            </Text>
-          </Text>
+          <span className="figures">
+            {percent(row.success_rate)} <small className="dimmed">{success}</small>
+          </span>
         </Group>
       </Table.Td>
       <Table.Td className="figures">
         {row.censored > 0 && row.indicator_mean !== null ? "≥ " : ""}
-        {number(row.indicator_mean)}
+        {number(row.indicator_mean)}{" "}
         <Text size="xs" className="dimmed">
-          {row.indicator_low === null
-            ? row.too_few_data
-              ? "too few data"
-              : ""
-            : `${number(row.indicator_low)} to ${number(row.indicator_high)}`}
+          {row.too_few_data ? `${measure}; too few data` : measure}
+          {row.indicator_low !== null && `, ${number(row.indicator_low)} to ${number(row.indicator_high)}`}
         </Text>
       </Table.Td>
-      <Table.Td className="figures">
-        {number(row.score, 2)}
-        <Text size="xs" className="dimmed">
-          {row.score_low !== null && `${number(row.score_low, 2)} to ${number(row.score_high, 2)}`}
-        </Text>
-      </Table.Td>
+      <Table.Td className="figures">{number(row.score, 2)}</Table.Td>
       <Table.Td className="figures">
         {row.censored > 0 && row.indicator_best !== null ? "≥ " : ""}
         {number(row.indicator_best)}
       </Table.Td>
-      <Table.Td className="figures">{count(row.parts_mean)}</Table.Td>
-      <Table.Td className="figures">{dollars(row.cost_per_success_usd)}</Table.Td>
+      <Table.Td className="figures">{dollars(row.cost_usd_mean)}</Table.Td>
       <Table.Td className="figures">{percent(row.refused_action_rate)}</Table.Td>
     </Table.Tr>
   );
+}
+
+/** Why a model's actions are refused, in a line. */
+export function refusalsOf(rows: readonly Row[]): string {
+  const sums = new Map<string, number>();
+  for (const { refusals } of rows)
+    for (const [name, n] of Object.entries(refusals)) sums.set(name, (sums.get(name) ?? 0) + n);
+  const parts = [...sums].sort((a, b) => b[1] - a[1]).map(([name, n]) => `${words(name)} ${n}`);
+  return parts.length === 0 ? "" : `${counted(sums.size, "kind")} of refused actions: ${parts.join(", ")}`;
 }

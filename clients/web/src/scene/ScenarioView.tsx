@@ -25,7 +25,7 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
   const height = cargoHeight(scenario);
   return (
     <Stack gap="xs">
-      <Stage bounds={bounds} height={320} label={described(scenario)}>
+      <Stage bounds={bounds} height={320} label="The course: the red cube marks the machine’s place">
         <Surroundings scenario={scenario} />
         {scenario.cargo !== null && (
           <mesh
@@ -40,7 +40,7 @@ export default function ScenarioView({ scenario }: { scenario: Scenario }) {
           <meshLambertMaterial color="#cc5c45" transparent opacity={0.6} />
         </mesh>
       </Stage>
-      <Text size="sm">{described(scenario)}</Text>
+      <Text size="sm">The trial lasts {scenario.duration_s} seconds; the red cube marks the machine’s place.</Text>
     </Stack>
   );
 }
@@ -52,41 +52,4 @@ function cargoHeight(scenario: Scenario): number {
 
 function cargoPlace({ at, size }: NonNullable<Scenario["cargo"]>, height: number): [number, number, number] {
   return at == null ? [0, 0, height] : [at[0], at[1], at[2] + size[2] / 2];
-}
-
-const cargoOf = ({ size, shape }: NonNullable<Scenario["cargo"]>): string =>
-  shape === "ball" ? `A ball of ${size[0]}` : `A cargo of ${size.join(" x ")}`;
-
-const counted = (count: number, thing: string): string => `${count} ${thing}${count === 1 ? "" : "s"}`;
-
-function released({ height = 0, velocity = [0, 0, 0] }: Scenario["placement"]): string {
-  return `The machine is let go ${height} units up, at ${Math.hypot(...velocity)} units a second.`;
-}
-
-function signs({ gates = [], marks = [], line = null }: Scenario): string {
-  const shown = [
-    ...(gates.length > 0 ? [counted(gates.length, "gate")] : []),
-    ...(marks.length > 0 ? [counted(marks.length, "mark")] : []),
-    ...(line === null ? [] : ["a line"]),
-  ];
-  return shown.length === 0 ? "" : `There are ${shown.join(" and ")}, which nothing can touch. `;
-}
-
-/** A scenario in a few sentences. */
-export function described(scenario: Scenario): string {
-  const place =
-    scenario.placement.kind === "span"
-      ? `The machine is released above a gap ${scenario.placement.gap ?? "?"} units wide.`
-      : scenario.placement.kind === "released"
-        ? released(scenario.placement)
-        : "The machine stands on the ground at the origin.";
-  const cargo =
-    scenario.cargo === null
-      ? "There is no cargo."
-      : scenario.cargo.at == null
-        ? `${cargoOf(scenario.cargo)} units is dropped onto it and grows to ${scenario.cargo.final_mass} mass units.`
-        : `${cargoOf(scenario.cargo)} units and ${scenario.cargo.final_mass} mass units stands at (${scenario.cargo.at.join(", ")}).`;
-  const ground =
-    scenario.planet == null ? "" : `The ground is a planet of radius ${scenario.planet.radius} straight below it. `;
-  return `${place} ${ground}${cargo} ${signs(scenario)}The trial lasts ${scenario.duration_s} seconds; the red cube marks the machine's place.`;
 }

@@ -28,7 +28,8 @@ let drawing: Drawing | null = null;
 
 interface StageProps {
   bounds: Box3;
-  height: number;
+  /** Pixels; without, it is 16 by 9 as wide as its place. */
+  height?: number;
   label: string;
   /** Names what is looked at: the camera stays where it is as long as that stays. */
   subject?: string;
@@ -45,7 +46,12 @@ export function Stage({ bounds, height, label, subject = "", lock, children }: S
     return <p>This browser draws no 3D (WebGL 2 is off).</p>;
   }
   return (
-    <div className="stage-3d" style={{ height }} role="img" aria-label={label}>
+    <div
+      className={height === undefined ? "stage-3d stage-wide" : "stage-3d"}
+      style={{ height }}
+      role="img"
+      aria-label={label}
+    >
       <Canvas
         frameloop="demand"
         dpr={drawing === "software" ? 1 : [1, 2]}

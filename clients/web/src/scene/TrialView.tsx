@@ -1,8 +1,7 @@
-import { Alert, Button, Group, Stack, Switch, Text } from "@mantine/core";
+import { Alert, Button, Code, Group, Stack, Switch, Text } from "@mantine/core";
 import { useMemo, useRef, useState } from "react";
+import { counted } from "../format";
 import { useClock, type Clock } from "./clock";
-import { Curves } from "./Curves";
-import { curvesOf } from "./curves";
 import { Film } from "./Film";
 import { seenAlong } from "./flight";
 import { Legend } from "./Legend";
@@ -10,7 +9,6 @@ import { loadsAt, mostLoaded, mostOf } from "./loads";
 import { CameraLock } from "./lock";
 import { readScene, type MachineScene } from "./machine";
 import type { Moment } from "./moment";
-import { PilotingView } from "./PilotingView";
 import { startBounds } from "./playing";
 import { Share } from "./Share";
 import { Stage } from "./Stage";
@@ -22,8 +20,6 @@ interface TrialProps {
   scene: MachineScene;
   trial: Trial;
   scenario: Scenario;
-  /** Whether it plays from the start, as the reader asked for before. */
-  begun?: boolean;
   /** When and from where it is seen at first. */
   moment?: Moment;
   /** The part that is pointed out. */
@@ -38,10 +34,10 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
   const props = { ...others, trial: seenAlong(recorded, others.scenario) };
   const end = props.trial.times.at(-1) ?? 0;
   const { moment, addressOf } = props;
-  const clock = useClock(end, props.begun, moment?.time);
+  const clock = useClock(end, moment?.time);
   const [lock] = useState(() => new CameraLock(moment?.look));
   const stage = useRef<HTMLDivElement>(null);
-  const [loads, setLoads] = useState(true);
+  const [loads, setLoads] = useState(false);
   const [follow, setFollow] = useState(true);
   return (
     <Stack gap="xs">
@@ -80,29 +76,17 @@ export default function TrialView({ trial: recorded, ...others }: TrialProps) {
       )}
       {loads && <Legend whole={props.trial.loads === null} />}
       <Broken breaks={props.trial.breaks} seek={clock.seek} />
-      <TrialCurves trial={props.trial} clock={clock} />
-      {props.trial.piloting !== null && (
-        <PilotingView
-          piloting={props.trial.piloting}
-          times={props.trial.times}
-          program={props.scene.controller}
-          clock={clock}
-        />
+      {props.scene.controller !== "" && (
+        <details>
+          <Text component="summary" size="sm">
+            Program
+          </Text>
+          <Code block style={{ maxHeight: 400, overflow: "auto" }}>
+            {props.scene.controller}
+          </Code>
+        </details>
       )}
     </Stack>
-  );
-}
-
-export function TrialCurves({ trial, clock }: { trial: Trial; clock: Clock }) {
-  const curves = useMemo(() => curvesOf(trial), [trial]);
-  return (
-    <Curves
-      curves={curves}
-      times={trial.times}
-      now={clock.shown}
-      breaks={trial.breaks.map((found) => found.time_s)}
-      seek={clock.seek}
-    />
   );
 }
 
@@ -114,7 +98,7 @@ export function TrialScene({
   clock,
   loads,
   follow,
-  height = 420,
+  height,
   lock,
   moment,
   part,
@@ -140,11 +124,9 @@ export function TrialScene({
           onChoose={onPart}
         />
       </Stage>
-      {loads && (
+      {loads && most !== null && (
         <Text size="xs" className="figures">
-          {most === null
-            ? "No joint bears anything."
-            : `Most loaded: ${most.kind} ${most.joint}, ${(100 * most.ratio).toFixed(0)} % of its strength.`}
+          {most.joint} bears {(100 * most.ratio).toFixed(0)} % of its strength{most.ratio > 1 ? ": overloaded" : ""}.
         </Text>
       )}
     </>
@@ -184,7 +166,7 @@ const NAMED = 8;
 function Broken({ breaks, seek }: { breaks: readonly Break[]; seek: (time: number) => void }) {
   if (breaks.length === 0) return null;
   return (
-    <Alert color="red" py="xs" title={`${breaks.length} joint${breaks.length > 1 ? "s" : ""} broke`}>
+    <Alert color="red" py="xs" title={`${counted(breaks.length, "joint")} broke`}>
       <Group gap={6}>
         {breaks.slice(0, NAMED).map((found, index) => (
           <Button

@@ -16,10 +16,10 @@ export interface Clock {
 }
 
 /** The time of a trial, which plays, stops and can be set; it stands still until it is asked to play. */
-export function useClock(end: number, begun = false, first = 0): Clock {
+export function useClock(end: number, first = 0): Clock {
   const time = useRef(Math.min(end, first));
   const [shown, setShown] = useState(Math.min(end, first));
-  const [playing, setPlaying] = useState(begun);
+  const [playing, setPlaying] = useState(false);
   const [speed, setSpeed] = useState("1");
   useEffect(() => {
     if (!playing) return;

@@ -27,7 +27,6 @@ function around(): Trial {
     peaks: [],
     loads: null,
     breaks: [],
-    piloting: null,
     engine: "mujoco",
     engineVersion: "3",
   };

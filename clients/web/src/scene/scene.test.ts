@@ -105,7 +105,6 @@ const TRIAL: Trial = {
   ],
   loads: Float32Array.of(0, 0, 1.25, 0.25, 0, 0.5),
   breaks: [],
-  piloting: null,
   engine: "e",
   engineVersion: "1",
 };

@@ -15,16 +15,6 @@ export interface Break {
   ratio: number;
 }
 
-/** What a program sensed, and how far it asked for actions, at each instant. */
-export interface Piloting {
-  senseNames: readonly string[];
-  /** T x S; no numbers at the last instant. */
-  senses: Float32Array;
-  actionNames: readonly string[];
-  /** T x A, 0 to 1. */
-  answers: Float32Array;
-}
-
 /** A ball's size is its diameter three times. */
 export type CargoShape = "box" | "ball";
 
@@ -47,8 +37,6 @@ export interface Trial {
   /** T x J shares of strength, in the order of the peaks; null in older trajectories. */
   loads: Float32Array | null;
   breaks: readonly Break[];
-  /** Null where keys were pressed, or nothing. */
-  piloting: Piloting | null;
   engine: string;
   engineVersion: string;
 }
@@ -59,8 +47,6 @@ interface Facts {
   cargo_shape?: CargoShape;
   joint_peaks: JointPeak[];
   breaks: Break[];
-  sense_names?: string[];
-  action_names?: string[];
   engine: string;
   engine_version: string;
 }
@@ -115,15 +101,6 @@ export function readTrial(file: ArrayBuffer): Trial {
     peaks: facts.joint_peaks,
     loads: flat(table, "joint_loads"),
     breaks: facts.breaks,
-    piloting:
-      facts.sense_names === undefined
-        ? null
-        : {
-            senseNames: facts.sense_names,
-            senses: flat(table, "senses") ?? NONE,
-            actionNames: facts.action_names ?? [],
-            answers: flat(table, "answers") ?? NONE,
-          },
     engine: facts.engine,
     engineVersion: facts.engine_version,
   };

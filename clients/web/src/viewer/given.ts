@@ -59,8 +59,6 @@ export function trialOf(given: GivenTrial): Trial {
     peaks: given.joint_peaks.map((peak) => ({ ...peak, ratio: peak.ratio ?? Infinity })),
     loads: given.joint_loads === null ? null : floats(given.joint_loads),
     breaks: given.breaks,
-    // The viewer draws no curves.
-    piloting: null,
     engine: given.engine,
     engineVersion: given.engine_version,
   };

@@ -1,107 +1,106 @@
-import { Anchor, Group, Stack, Text, Title } from "@mantine/core";
+import { Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link } from "@tanstack/react-router";
-import { lazy, memo, Suspense, useDeferredValue, useMemo } from "react";
-import { board, type Board } from "../../api/queries";
-import { Later } from "../../parts/Later";
-import { Section } from "../../parts/Section";
-import { Answered, Empty, Loading } from "../../parts/States";
-import { Controls } from "./Controls";
+import type { BoardSearch } from "../../api/board-search";
+import { board as boardQuery, jobSummary, tasks as tasksQuery, type Board, type JobFilters } from "../../api/queries";
+import { isSite } from "../../api/site";
+import { counted } from "../../format";
+import { Fold } from "../../parts/Fold";
+import { Answered, Empty } from "../../parts/States";
+import { scoped } from "../compare/search";
+import { entriesOf, namesOf } from "./entries";
 import { Exports } from "./Exports";
+import { Filters } from "./Filters";
 import { HeatMap } from "./HeatMap";
 import { Overall } from "./Overall";
-import { rankedOver, scopeOf } from "./scope";
-import { ScopeChips } from "./ScopeChips";
-import { Verdict } from "./Verdict";
-import type { BoardSearch } from "../../api/board-search";
+import { scopeOf, scopesOf } from "./scope";
 
-const BoardPlots = lazy(() => import("./BoardPlots"));
 const route = getRouteApi("/");
 
-/** The leaderboard of one track. */
+/** The leaderboard of one track: a sentence, the table, and the rest on demand. */
 export default function BoardPage() {
   const search = route.useSearch();
-  const query = useQuery(board(search));
-  const scope = scopeOf(search);
+  const query = useQuery(boardQuery(search));
+  const tasks = useQuery(tasksQuery()).data ?? [];
+  const scope = scopeOf(search, scopesOf(tasks));
   return (
-    <Stack gap="lg">
+    <Stack gap="sm">
       <div>
-        <Title order={1}>{scope.key === "" ? "Leaderboard" : `Leaderboard: ${scope.label}`}</Title>
-        <Text size="sm" className="dimmed">
-          Who builds machines that work? Each model builds every task several times; a simulator tries each machine.
-        </Text>
+        <Title order={1}>
+          {scope.key === "" ? "Which model builds machines that work?" : `Leaderboard: ${scope.label}`}
+        </Title>
+        {query.data !== undefined && <Verdict board={query.data} search={search} />}
       </div>
-      <ScopeChips search={search} />
+      <Filters search={search} tasks={tasks} board={query.data} />
       <Answered query={query} rows={12}>
-        {(found) => <Unhurried found={found} search={search} />}
+        {(found) =>
+          found.track === null || found.overall.length === 0 ? (
+            <Empty title="No run has ended yet">
+              Choose other tasks or another protocol, or start one: <code>buildarena sweep run</code>
+            </Empty>
+          ) : (
+            <Found board={found} track={found.track} search={search} />
+          )
+        }
       </Answered>
     </Stack>
   );
 }
 
-/** So few cells are made at once: each step of a board costs a paint. */
-const FEW_CELLS = 60;
-
-const isSmall = (board: Board): boolean => board.overall.length * board.tasks.length <= FEW_CELLS;
-
-/** A board, made bit by bit: its thousands of cells would hold up what is pressed meanwhile. */
-function Unhurried({ found, search }: { found: Board; search: BoardSearch }) {
-  const now = useMemo(() => ({ found, search }), [found, search]);
-  const later = useDeferredValue<typeof now | null>(now, isSmall(found) ? now : null);
-  return later === null ? <Loading rows={12} /> : <Found {...later} />;
+/** Who is best, and whether it is real: by the same tests as the table beneath. */
+function Verdict({ board, search }: { board: Board; search: BoardSearch }) {
+  const open = useOpenJobs(board.track, search);
+  return (
+    <Text role="status">
+      {board.verdict?.sentence}
+      {open !== null && open.jobs > 0 && (
+        <>
+          {" "}
+          <Link to="/jobs" search={open.filters}>
+            {counted(open.jobs, "run")}
+          </Link>{" "}
+          still going.
+        </>
+      )}
+    </Text>
+  );
 }
 
-const Found = memo(function Found({ found, search }: { found: Board; search: BoardSearch }) {
-  if (found.track === null) {
-    return (
-      <Empty title="No job has ended yet">
-        Submit one with <code>buildarena sweep run</code>, or watch those that run on the{" "}
-        <Anchor component={Link} to="/sweeps" inherit>
-          sweeps page
-        </Anchor>
-        .
-      </Empty>
-    );
-  }
-  const now = isSmall(found);
+/** Jobs of the board that are still to come: waiting, or under way. */
+function useOpenJobs(track: string | null, search: BoardSearch): { jobs: number; filters: JobFilters } | null {
+  const filters: JobFilters = {
+    track: track ?? undefined,
+    category: search.category,
+    task: search.task?.length === 1 ? search.task[0] : undefined,
+  };
+  const enabled = !isSite && track !== null;
+  const waiting = useQuery({ ...jobSummary({ ...filters, state: "queued" }), enabled }).data;
+  const running = useQuery({ ...jobSummary({ ...filters, state: "running" }), enabled }).data;
+  if (!enabled || waiting === undefined || running === undefined) return null;
+  const state = running.jobs > waiting.jobs ? "running" : "queued";
+  return { jobs: waiting.jobs + running.jobs, filters: { ...filters, state } };
+}
+
+function Found({ board, track, search }: { board: Board; track: string; search: BoardSearch }) {
+  const entries = entriesOf(board, search.baselines !== "no");
+  const names = namesOf(board);
+  const [first, second] = entries.flatMap(({ key }) => names.get(key) ?? []);
+  const scope = isSite ? { track } : { ...scoped(search), track };
   return (
     <>
-      <Verdict board={found} search={search} />
-      <Later rows={10} now={now}>
-        <Controls board={found} search={search} />
-        <Later rows={8} now={now}>
-          <Section title="Overall" aside={<Exports track={found.track} search={search} />}>
-            {found.overall.length === 0 ? (
-              <Empty title="No job of these tasks has ended on this track">
-                Choose other tasks above, or another track.
-              </Empty>
-            ) : (
-              <>
-                <Text size="sm" className="dimmed" mb="xs">
-                  {rankedOver(found.ranked, found.tasks.length)}
-                </Text>
-                <Overall board={found} search={search} />
-              </>
-            )}
-          </Section>
-          <Later rows={8} now={now}>
-            <Section title="Model by task">
-              <HeatMap board={found} search={search} />
-            </Section>
-            <Later rows={8} now={now}>
-              <Suspense fallback={<Loading rows={8} />}>
-                <BoardPlots board={found} search={search} />
-              </Suspense>
-            </Later>
-          </Later>
-        </Later>
-      </Later>
-      <Group>
-        <Text size="xs" className="dimmed">
-          Intervals hold at 95 %. Places are given with the interval that holds them; models whose trials do not show
-          which is better are tied and share a rank. <Link to="/method">How ranks and intervals come about</Link>
-        </Text>
+      <Overall board={board} entries={entries} />
+      <Group gap="md">
+        {first !== undefined && second !== undefined && (
+          <Link to="/compare" search={{ models: `${first},${second}`, ...scope }}>
+            Compare models
+          </Link>
+        )}
+        <Link to="/method">Method</Link>
+        <Exports track={track} search={search} />
       </Group>
+      <Fold title="More: success on each task">
+        <HeatMap board={board} entries={entries} />
+      </Fold>
     </>
   );
-});
+}

@@ -36,7 +36,7 @@ export function Exports({ track, search }: { track: string; search: BoardSearch 
       <Menu position="bottom-end">
         <Menu.Target>
           <Button variant="default" size="xs" leftSection={<IconDownload size={15} aria-hidden />}>
-            Export
+            Download
           </Button>
         </Menu.Target>
         <Menu.Dropdown>

@@ -13,12 +13,3 @@ export function shade(share: number): Shade {
   const mixed = LIGHT_FROM.map((from, i) => Math.round(from + ((LIGHT_TO[i] ?? from) - from) * clamped));
   return { background: `rgb(${mixed.join(" ")})`, color: "#15202b" };
 }
-
-/** A figure as a share of the best in its column; logarithmic, as loads range over magnitudes. */
-export function shareOf(value: number | null, values: readonly (number | null)[]): number | null {
-  if (value === null) return null;
-  const known = values.filter((one): one is number => one !== null);
-  const most = Math.max(...known);
-  if (most <= 0) return 0;
-  return Math.log1p(Math.max(0, value)) / Math.log1p(most);
-}

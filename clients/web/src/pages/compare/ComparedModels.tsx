@@ -1,10 +1,9 @@
-import { Stack, Table, Text } from "@mantine/core";
+import { List, Stack, Table, Text } from "@mantine/core";
 import { queryOptions, useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
-import { client, taken, type Schema } from "../../api/client";
+import { client, taken } from "../../api/client";
 import { boardQuery, jobPages, type Job } from "../../api/queries";
-import { number, successes, words } from "../../format";
-import { OutcomeBadge } from "../../parts/Outcome";
+import { stateWords, successes, trackLabel } from "../../format";
 import { Section } from "../../parts/Section";
 import { SortHead, useSorting } from "../../parts/SortHead";
 import type { Values } from "../../parts/sorting";
@@ -80,11 +79,6 @@ export function ComparedModels({ first, second, scope }: { first: string; second
   );
 }
 
-function p(value: number | null | undefined): string {
-  if (value === null || value === undefined) return "–";
-  return value < 0.001 ? "< 0.001" : value.toFixed(3);
-}
-
 /** "+40", for a difference of shares in percentage points. */
 function points(share: number): string {
   return `${share > 0 ? "+" : share < 0 ? "−" : ""}${Math.abs(100 * share).toFixed(0)}`;
@@ -95,15 +89,13 @@ const VALUES: Values<Comparison["tasks"][number]> = {
   first: (row) => row.successes[0] / row.counted_jobs[0],
   second: (row) => row.successes[1] / row.counted_jobs[1],
   difference: (row) => row.difference,
-  success: (row) => row.success_p,
-  indicator: (row) => row.indicator_p,
 };
 
 function Duels({ found }: { found: Comparison }) {
   const { rows, head } = useSorting(found.tasks, VALUES);
   return (
     <div style={{ overflowX: "auto" }} tabIndex={0} role="region" aria-label="Both models task by task, scrolls">
-      <Table miw={760} className="figures">
+      <Table miw={560} className="figures">
         <Table.Thead>
           <Table.Tr>
             <SortHead name="task" {...head}>
@@ -117,12 +109,6 @@ function Duels({ found }: { found: Comparison }) {
             </SortHead>
             <SortHead name="difference" figures {...head}>
               Difference, percentage points
-            </SortHead>
-            <SortHead name="success" {...head}>
-              Success, paired test
-            </SortHead>
-            <SortHead name="indicator" {...head}>
-              Indicator, paired test
             </SortHead>
           </Table.Tr>
         </Table.Thead>
@@ -142,30 +128,15 @@ function Duels({ found }: { found: Comparison }) {
               <Table.Td className="figures">
                 {points(task.difference)} (95 %: {points(task.ci_low)} to {points(task.ci_high)})
               </Table.Td>
-              <Table.Td>
-                <Tested test={task.success} adjusted={task.success_p} />
-              </Table.Td>
-              <Table.Td>
-                <Tested test={task.indicator} adjusted={task.indicator_p} />
-              </Table.Td>
             </Table.Tr>
           ))}
         </Table.Tbody>
       </Table>
       <Text size="xs" className="dimmed" mt="xs">
-        First minus second. Paired on shared seeds; p adjusted over all tests of this table (Holm). Track: {found.track}
-        .
+        First minus second, on {found.track === null ? "no protocol" : trackLabel(found.track)}. The sentence counts
+        tests that are paired on shared seeds, adjusted together (Holm).
       </Text>
     </div>
-  );
-}
-
-function Tested({ test, adjusted }: { test: Schema<"PairedTest"> | null; adjusted: number | null }) {
-  if (test === null) return <Text size="sm">no shared seeds</Text>;
-  return (
-    <Text size="sm">
-      p = {p(adjusted)}, {test.pairs} pairs ({test.method})
-    </Text>
   );
 }
 
@@ -173,45 +144,25 @@ function Cases({ found }: { found: Comparison }) {
   const query = useQuery(cases(found));
   return (
     <Answered query={query}>
-      {(pairs) =>
-        pairs.length === 0 ? (
-          <Text size="sm">On every shared seed both succeeded or both failed.</Text>
-        ) : (
-          <div
-            style={{ overflow: "auto", maxHeight: 480 }}
-            tabIndex={0}
-            role="region"
-            aria-label="Cases where they differ, scrolls"
-          >
-            <Table miw={620}>
-              <Table.Thead>
-                <Table.Tr>
-                  <Table.Th>Cases where they differ</Table.Th>
-                  <Table.Th>{found.first}</Table.Th>
-                  <Table.Th>{found.second}</Table.Th>
-                </Table.Tr>
-              </Table.Thead>
-              <Table.Tbody>
-                {pairs.map(([a, b]) => (
-                  <Table.Tr key={a.id}>
-                    <Table.Td>
-                      <Link to="/compare" search={{ a: a.id, b: b.id }}>
-                        {a.task}, seed {a.seed}
-                      </Link>
-                    </Table.Td>
-                    {[a, b].map((job) => (
-                      <Table.Td key={job.id}>
-                        <OutcomeBadge value={job.outcome ?? job.state} size="sm" /> {number(job.indicator)}{" "}
-                        <span className="dimmed">{job.reason === null ? "" : words(job.reason)}</span>
-                      </Table.Td>
-                    ))}
-                  </Table.Tr>
-                ))}
-              </Table.Tbody>
-            </Table>
-          </div>
-        )
-      }
+      {(pairs) => (
+        <div>
+          <Text size="sm" fw={600}>
+            {pairs.length === 0
+              ? "On every shared seed both succeeded or both failed."
+              : "Where they differ, side by side:"}
+          </Text>
+          <List size="sm">
+            {pairs.map(([a, b]) => (
+              <List.Item key={a.id}>
+                <Link to="/compare" search={{ a: a.id, b: b.id }}>
+                  {a.task}, seed {a.seed}
+                </Link>
+                : {stateWords(a.outcome ?? a.state)} against {stateWords(b.outcome ?? b.state)}
+              </List.Item>
+            ))}
+          </List>
+        </div>
+      )}
     </Answered>
   );
 }

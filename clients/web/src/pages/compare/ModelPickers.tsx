@@ -18,19 +18,29 @@ export function ModelPickers({ search }: { search: CompareSearch }) {
   const scopes = scopesOf(useQuery(tasksQuery()).data ?? []);
   const names = found === undefined ? [] : [...namesOf(found).values()];
   const [first = "", second = ""] = given;
-  const model = (label: string, place: 0 | 1) => (
+  const select = (
+    label: string,
+    data: readonly { value: string; label: string }[],
+    value: string | null,
+    onChange: (to: string) => void,
+  ) => (
     <Select
       label={label}
-      data={[...new Set([...names, ...given.filter((name) => name !== "")])]}
-      value={given[place] === "" ? null : (given[place] ?? null)}
+      data={[...data]}
+      value={value}
       placeholder="choose"
       searchable
+      allowDeselect={false}
       w={{ base: "100%", sm: 250 }}
-      onChange={(name) => {
-        setGiven(place === 0 ? [name ?? "", second] : [first, name ?? ""]);
+      onChange={(to) => {
+        onChange(to ?? "");
       }}
     />
   );
+  const models = [...new Set([...names, ...given.filter((name) => name !== "")])].map((value) => ({
+    value,
+    label: value,
+  }));
   return (
     <form
       onSubmit={(event) => {
@@ -39,32 +49,29 @@ export function ModelPickers({ search }: { search: CompareSearch }) {
       }}
     >
       <Group align="end">
-        {model("First model", 0)}
-        {model("Second model", 1)}
-        <Select
-          label="Track"
-          data={(found?.tracks ?? []).map((track) => ({ value: track, label: trackLabel(track) }))}
-          value={scope.track ?? found?.track ?? null}
-          allowDeselect={false}
-          w={{ base: "100%", sm: 300 }}
-          onChange={(track) => {
-            setScope({ ...scope, track: track ?? undefined });
-          }}
-        />
-        {!isSite && (
-          <Select
-            label="Tasks"
-            data={scopes.map(({ key, label }) => ({ value: key, label }))}
-            value={scopeOf(scope).key}
-            allowDeselect={false}
-            w={180}
-            onChange={(key) => {
-              const categories = scopes.find((one) => one.key === key)?.categories ?? [];
-              const category = categories.length === 0 ? undefined : [...categories];
-              setScope({ ...scope, category, task: undefined });
-            }}
-          />
+        {select("First model", models, first || null, (to) => {
+          setGiven([to, second]);
+        })}
+        {select("Second model", models, second || null, (to) => {
+          setGiven([first, to]);
+        })}
+        {select(
+          "Protocol",
+          (found?.tracks ?? []).map((track) => ({ value: track, label: trackLabel(track) })),
+          scope.track ?? found?.track ?? null,
+          (track) => {
+            setScope({ ...scope, track });
+          },
         )}
+        {!isSite &&
+          select(
+            "Tasks",
+            scopes.map(({ key, label }) => ({ value: key, label })),
+            scopeOf(scope, scopes).key,
+            (key) => {
+              setScope({ ...scope, category: key === "" ? undefined : [key], task: undefined });
+            },
+          )}
         <Button type="submit" variant="default" disabled={first === "" || second === "" || first === second}>
           Compare models
         </Button>

@@ -12,14 +12,14 @@ import { CameraLock } from "../../scene/lock";
 import { TimeLine } from "../../scene/TimeLine";
 import type { Trial } from "../../scene/trial";
 import { seenAlong } from "../../scene/flight";
-import { TrialCurves, TrialScene } from "../../scene/TrialView";
+import { TrialScene } from "../../scene/TrialView";
 import { rolloutsOf, scene as sceneQuery, trial as trialQuery, type Scene } from "../job/queries";
 
 type Jobs = readonly [JobDetail, JobDetail];
 
 /** Two trials by one clock, seen by cameras that turn together. */
 export default function Trials({ jobs }: { jobs: Jobs }) {
-  const [a, b] = jobs.map((job) => rolloutsOf(job.artifacts).at(-1) ?? 0) as [number, number];
+  const [a, b] = jobs.map((job) => rolloutsOf(job.artifacts)[0] ?? 0) as [number, number];
   const [firstScene, secondScene] = useQueries({ queries: [sceneQuery(jobs[0].id, a), sceneQuery(jobs[1].id, b)] });
   const [first, second] = useQueries({
     queries: [
@@ -53,7 +53,7 @@ function InStep({ jobs, scenes, trials }: Both) {
   const lock = useMemo(() => new CameraLock(), []);
   const end = Math.max(...trials.map((trial) => trial.times.at(-1) ?? 0));
   const clock = useClock(end);
-  const [loads, setLoads] = useState(true);
+  const [loads, setLoads] = useState(false);
   return (
     <Stack gap="xs">
       <SimpleGrid cols={{ base: 1, sm: 2 }}>
@@ -98,11 +98,6 @@ function InStep({ jobs, scenes, trials }: Both) {
         />
         {loads && <Legend whole={trials.some((trial) => trial.loads === null)} />}
       </Group>
-      <SimpleGrid cols={{ base: 1, sm: 2 }}>
-        {trials.map((trial, side) => (
-          <TrialCurves key={side} trial={trial} clock={clock} />
-        ))}
-      </SimpleGrid>
     </Stack>
   );
 }

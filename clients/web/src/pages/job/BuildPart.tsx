@@ -17,11 +17,8 @@ import { callLine } from "./transcript";
 const BuildScene = lazy(() => import("../../scene/BuildScene"));
 const STEP_MS = 450;
 
-/**
- * The machine after a step, with what leads from step to step: buttons, slider, arrow keys, play.
- * `onBuilt` is called when it was played to its end.
- */
-export function BuildPart({ build, onBuilt }: { build: Build; onBuilt?: () => void }) {
+/** The machine after a step, with what leads from step to step: buttons, slider, arrow keys, play. */
+export function BuildPart({ build }: { build: Build }) {
   const { step, at, steps } = build;
   const chapter = build.replay?.chapters[step?.chapter ?? 0];
   const onKeys = (event: KeyboardEvent): void => {
@@ -46,7 +43,7 @@ export function BuildPart({ build, onBuilt }: { build: Build; onBuilt?: () => vo
           label={`The machine after step ${at + 1} of ${steps.length}: ${build.parts.size} parts`}
         />
       </Suspense>
-      <Buttons build={build} onBuilt={onBuilt} />
+      <Buttons build={build} />
       <Chapters build={build} />
       <Told build={build} />
       <ChosenPart build={build} />
@@ -62,24 +59,20 @@ export function BuildPart({ build, onBuilt }: { build: Build; onBuilt?: () => vo
   );
 }
 
-function Buttons({ build, onBuilt }: { build: Build; onBuilt?: () => void }) {
+function Buttons({ build }: { build: Build }) {
   const { at, steps, go } = build;
   const last = steps.length - 1;
   const [playing, setPlaying] = useState(false);
   useEffect(() => {
     if (!playing) return;
     const timer = setTimeout(() => {
-      if (at < last) {
-        go(at + 1);
-        return;
-      }
-      setPlaying(false);
-      onBuilt?.();
+      if (at < last) go(at + 1);
+      else setPlaying(false);
     }, STEP_MS);
     return () => {
       clearTimeout(timer);
     };
-  }, [playing, at, last, go, onBuilt]);
+  }, [playing, at, last, go]);
   const button = (label: string, icon: React.ReactNode, to: number) => (
     <ActionIcon
       variant="default"

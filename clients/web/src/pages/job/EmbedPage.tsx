@@ -2,7 +2,7 @@ import { Anchor, Group, Text } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, useRouter } from "@tanstack/react-router";
 import { job as jobQuery } from "../../api/queries";
-import { number, words } from "../../format";
+import { number, stateWords } from "../../format";
 import { Answered, Empty } from "../../parts/States";
 import { rolloutsOf } from "./queries";
 import { TrialPart } from "./TrialPart";
@@ -15,11 +15,7 @@ export default function EmbedPage() {
   const search = route.useSearch();
   const router = useRouter();
   const query = useQuery(jobQuery(id));
-  const { href } = router.buildLocation({
-    to: "/jobs/$id",
-    params: { id },
-    search: { ...search, view: "trial" as const },
-  });
+  const { href } = router.buildLocation({ to: "/jobs/$id", params: { id }, search });
   return (
     <Answered query={query} rows={8}>
       {(job) => {
@@ -28,7 +24,7 @@ export default function EmbedPage() {
           <>
             <Group justify="space-between" gap="xs" mb="xs">
               <Text size="sm" component="h1" fw={600}>
-                {job.task} by {job.model}: {words(job.outcome ?? job.state)}
+                {job.task} by {job.model}: {stateWords(job.outcome ?? job.state)}
                 {job.indicator !== null && `, ${number(job.indicator, 2)}`}
               </Text>
               <Anchor href={router.history.createHref(href)} target="_blank" rel="noreferrer" size="sm">

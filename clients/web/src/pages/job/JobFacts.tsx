@@ -1,137 +1,117 @@
-import { Alert, Badge, Group, Paper, SimpleGrid, Stack, Text, Title } from "@mantine/core";
+import { Alert, Group, Stack, Table, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { board, task as taskQuery, type JobDetail } from "../../api/queries";
-import { compact, count, dollars, duration, number, secondsBetween, trackLabel, words } from "../../format";
+import { isSite } from "../../api/site";
+import { compact, count, counted, dollars, number, trackLabel, words } from "../../format";
 import { Ago } from "../../parts/Ago";
 import { OutcomeBadge } from "../../parts/Outcome";
+import { transcript as transcriptQuery } from "./queries";
+import { timesOf } from "./times";
 import { Verify } from "./Verify";
 
-/** Which job this is, and how it ended. */
+/** Which run this is, how it ended and why, and what it took. */
 export function JobHead({ job }: { job: JobDetail }) {
+  const task = useQuery(taskQuery(job.task, job.task_version)).data;
   return (
-    <Group justify="space-between" align="start">
-      <div>
-        <Group gap="sm">
-          <Title order={1}>
-            <Link className="quiet" to="/tasks/$name" params={{ name: job.task }}>
-              {job.task}
-            </Link>{" "}
-            by{" "}
-            <Link className="quiet" to="/models/$" params={{ _splat: job.model }}>
-              {job.model}
-            </Link>
-          </Title>
-          <OutcomeBadge value={job.outcome ?? job.state} size="lg" />
-        </Group>
-        <Text size="sm" className="dimmed">
-          <span style={{ fontFamily: "monospace", overflowWrap: "anywhere" }}>{job.id}</span> · seed {job.seed} ·{" "}
-          {trackLabel(job.track)} ·{" "}
-          {job.finished_at === null ? (
-            <>
-              submitted <Ago time={job.created_at} />
-            </>
-          ) : (
-            <>
-              ended <Ago time={job.finished_at} />
-            </>
-          )}
+    <Stack gap={6}>
+      <Title order={1}>
+        <Link className="quiet" to="/tasks/$name" params={{ name: job.task }}>
+          {task?.title ?? job.task}
+        </Link>
+        {" · "}
+        <Link className="quiet" to="/models/$" params={{ _splat: job.model }}>
+          {job.model}
+        </Link>
+      </Title>
+      <Group gap="sm">
+        <OutcomeBadge value={job.outcome ?? job.state} size="lg" />
+        <Text component="div" style={{ flex: 1, minWidth: 260 }}>
+          {sentenceOf(job)} <FirstMistake job={job} />
         </Text>
-        {job.reason !== null && (
-          <Text size="sm" mt={4}>
-            {words(job.reason)}
-            {job.detail === null ? "" : `: ${job.detail}`}
-          </Text>
+        {job.artifacts.machine !== undefined && !isSite && (
+          <Link to="/build" search={{ task: job.task, remix: job.id }}>
+            Remix it
+          </Link>
         )}
-      </div>
-      <Verify job={job} />
-    </Group>
-  );
-}
-
-/** Its score, with what it was judged by, and what it used. */
-export function JobFacts({ job }: { job: JobDetail }) {
-  const task = useQuery(taskQuery(job.task, job.task_version));
-  const unit = task.data?.unit === "1" ? "" : (task.data?.unit ?? "");
-  const metrics = Object.entries(job.metrics ?? {}).filter(
-    ([, value]) => typeof value === "number" || typeof value === "boolean",
-  );
-  return (
-    <Paper withBorder p="md" component="section" aria-label="Score and usage">
-      <SimpleGrid cols={{ base: 2, sm: 3, md: 6 }} spacing="sm">
-        <Fact
-          name={words(task.data?.indicator ?? "indicator")}
-          value={`${job.censored ? "≥ " : ""}${number(job.indicator)}`}
-          note={unit}
-          strong
-        />
-        <Fact name="Actions" value={count(job.actions)} note={`${count(job.refused_actions)} refused`} />
-        <Fact name="Model requests" value={count(job.usage.requests)} note="" />
-        <Fact
-          name="Tokens"
-          value={job.usage.input_tokens === null ? "–" : `${compact(job.usage.input_tokens)} in`}
-          note={job.usage.output_tokens === null ? "" : `${compact(job.usage.output_tokens)} out`}
-        />
-        <Fact name="Cost" value={dollars(job.usage.cost_usd)} note="" />
-        <Fact
-          name="Took"
-          value={duration(secondsBetween(job.started_at, job.finished_at))}
-          note={`${job.attempts.length} attempts`}
-        />
-      </SimpleGrid>
-      {metrics.length > 0 && (
-        <Group gap="md" mt="sm">
-          {metrics.map(([name, value]) => (
-            <Text key={name} size="sm">
-              <span className="dimmed">{words(name)}</span>{" "}
-              <span className="figures">
-                {typeof value === "number" ? number(value, Number.isInteger(value) ? 0 : 2) : String(value)}
-              </span>
-            </Text>
-          ))}
-        </Group>
-      )}
+      </Group>
+      <Text size="sm" className="dimmed">
+        {job.indicator !== null &&
+          `${words(task?.indicator ?? "result")} ${job.censored ? "≥ " : ""}${number(job.indicator)} · `}
+        {counted(job.usage.requests ?? 0, "request")} · {dollars(job.usage.cost_usd)} · {timesOf(job)} · {job.task},
+        seed {job.seed} · {trackLabel(job.track)} · {job.finished_at === null ? "submitted " : "ended "}
+        <Ago time={job.finished_at ?? job.created_at} />
+      </Text>
       <Flags job={job} />
-    </Paper>
-  );
-}
-
-function Flags({ job }: { job: JobDetail }) {
-  const flags = job.flags ?? [];
-  const query = useQuery({ ...board({ track: job.track }), enabled: flags.length > 0 });
-  if (flags.length === 0) return null;
-  const meanings = new Map((query.data?.flags ?? []).map((flag) => [flag.name, flag]));
-  return (
-    <Stack gap="xs" mt="sm">
-      {flags.map((name) => (
-        <Alert key={name} color={meanings.get(name)?.disqualifying ? "red" : "yellow"} py="xs">
-          <Group gap="xs">
-            <Badge variant="outline" color="gray" tt="none" styles={{ root: { color: "inherit" } }}>
-              {words(name)}
-            </Badge>
-            <Text size="sm">
-              {meanings.get(name)?.meaning ?? ""}
-              {meanings.get(name)?.disqualifying ? " It counts as a failure." : ""}
-            </Text>
-          </Group>
-        </Alert>
-      ))}
     </Stack>
   );
 }
 
-function Fact({ name, value, note, strong }: { name: string; value: string; note: string; strong?: boolean }) {
+/** Why it ended so, in a sentence; the scorer's own where there is one. */
+function sentenceOf({ explanation, reason, detail }: JobDetail): string {
+  if (explanation !== null) return explanation;
+  return [reason === null ? null : words(reason), detail].filter((part) => part !== null).join(": ");
+}
+
+/** Where a run that failed was first refused something. */
+function FirstMistake({ job }: { job: JobDetail }) {
+  const turns = useQuery({ ...transcriptQuery(job.id), enabled: job.success === false }).data?.turns ?? [];
+  const first = turns.find((turn) => turn.actions.some((action) => !action.ok));
+  if (job.success !== false || first === undefined) return null;
   return (
-    <div>
-      <Text size="xs" className="dimmed">
-        {name}
-      </Text>
-      <Text fw={650} size={strong ? "xl" : "lg"} className="figures">
-        {value}
-      </Text>
-      <Text size="xs" className="dimmed">
-        {note}
-      </Text>
-    </div>
+    <>
+      The first of {counted(job.refused_actions, "refused action")} is in{" "}
+      <Link to="/jobs/$id" params={{ id: job.id }} search={{ turn: first.index }}>
+        turn {first.index}
+      </Link>
+      .
+    </>
   );
+}
+
+/** Everything that was measured, and used. */
+export function Measurements({ job }: { job: JobDetail }) {
+  const task = useQuery(taskQuery(job.task, job.task_version)).data;
+  const metrics = Object.entries(job.metrics).flatMap(([name, value]): [string, string][] => {
+    if (typeof value === "boolean") return [[words(name), value ? "yes" : "no"]];
+    return typeof value === "number" ? [[words(name), number(value, Number.isInteger(value) ? 0 : 2)]] : [];
+  });
+  const { usage } = job;
+  const rows: [string, string][] = [
+    [words(task?.indicator ?? "result"), `${job.censored ? "≥ " : ""}${number(job.indicator)}`],
+    ...metrics,
+    ["actions", `${count(job.actions)}, ${count(job.refused_actions)} refused`],
+    ["model requests", count(usage.requests)],
+    ["tokens", `${compact(usage.input_tokens)} in, ${compact(usage.output_tokens)} out`],
+    ["cost", dollars(usage.cost_usd)],
+  ];
+  return (
+    <Stack align="start">
+      <Table fz="sm" maw={560} aria-label="Measurements">
+        <Table.Tbody>
+          {rows.map(([name, value]) => (
+            <Table.Tr key={name}>
+              <Table.Th scope="row" fw={500}>
+                {name}
+              </Table.Th>
+              <Table.Td className="figures">{value}</Table.Td>
+            </Table.Tr>
+          ))}
+        </Table.Tbody>
+      </Table>
+      <Verify job={job} />
+    </Stack>
+  );
+}
+
+function Flags({ job }: { job: JobDetail }) {
+  const flags = job.flags;
+  const query = useQuery({ ...board({ track: job.track }), enabled: flags.length > 0 });
+  const meanings = new Map((query.data?.flags ?? []).map((flag) => [flag.name, flag]));
+  return flags.map((name) => (
+    <Alert key={name} color={meanings.get(name)?.disqualifying ? "red" : "yellow"} py="xs" title={words(name)}>
+      {meanings.get(name)?.meaning}
+      {meanings.get(name)?.disqualifying && " It counts as a failure."}
+    </Alert>
+  ));
 }

@@ -1,18 +1,16 @@
-import { Badge, Button, Group, Stack, Tabs } from "@mantine/core";
+import { Badge, Button, Stack, Tabs } from "@mantine/core";
 import { IconDownload } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
-import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
+import { getRouteApi, useNavigate } from "@tanstack/react-router";
 import { useState } from "react";
 import { download } from "../../api/client";
 import type { StreamState } from "../../api/events";
 import type { JobSearch } from "../../api/jobs-search";
 import { job as jobQuery, type JobDetail } from "../../api/queries";
 import { ProblemNote } from "../../parts/Problem";
-import { isSite } from "../../api/site";
-import { Section } from "../../parts/Section";
 import { Answered, Empty } from "../../parts/States";
 import { BuildPart } from "./BuildPart";
-import { JobFacts, JobHead } from "./JobFacts";
+import { JobHead, Measurements } from "./JobFacts";
 import { JobFiles } from "./JobFiles";
 import { useLive } from "./live";
 import { prompts as promptsQuery, replay as replayQuery, rolloutsOf, transcript as transcriptQuery } from "./queries";
@@ -22,7 +20,7 @@ import { TranscriptView } from "./TranscriptView";
 
 const route = getRouteApi("/jobs/$id");
 
-/** How a machine came about, how its trial went, and what was made of it. */
+/** How a run ended, its machine, and how that came about. */
 export default function JobPage() {
   const { id } = route.useParams();
   const query = useQuery(jobQuery(id));
@@ -30,12 +28,10 @@ export default function JobPage() {
   return (
     <Answered query={query} rows={12}>
       {(job) => (
-        <Stack gap="lg">
+        <Stack gap="md">
           <JobHead job={job} />
           <Live state={state} />
-          <JobFacts job={job} />
           <Room job={job} />
-          <JobFiles job={job} />
         </Stack>
       )}
     </Answered>
@@ -65,105 +61,96 @@ function Live({ state }: { state: StreamState | "ended" }) {
   );
 }
 
-/** Transcript and machine, in step. */
+/** The trial, or the machine as far as it is built; below it everything else, in tabs. */
 function Room({ job }: { job: JobDetail }) {
   const search = route.useSearch();
   const navigate = useNavigate({ from: "/jobs/$id" });
   const transcript = useQuery(transcriptQuery(job.id));
   const prompts = useQuery(promptsQuery(job.id));
   const replay = useQuery(replayQuery(job.id));
-  const build = useBuild(replay.data ?? null, transcript.data?.turns, search, (change) => {
-    void navigate({ search: (before) => ({ ...before, ...change }), replace: true, resetScroll: false });
-  });
-  const trials = rolloutsOf(job.artifacts);
-  const ended = job.state === "done";
-  const [begun, setBegun] = useState(false);
   const change = (to: JobSearch): Promise<void> =>
     navigate({ search: (before) => ({ ...before, ...to }), replace: true, resetScroll: false });
-  const show = (view: "trial" | undefined, playing: boolean): void => {
-    setBegun(playing);
-    void navigate({ search: (before) => ({ ...before, view }), replace: true, resetScroll: false });
-  };
+  const trials = rolloutsOf(job.artifacts);
+  const tried = trials.length > 0;
+  const build = useBuild(replay.data ?? null, transcript.data?.turns, search, (to) => {
+    void change(tried ? { ...to, view: "building" } : to);
+  });
+  const ended = job.state === "done";
+  const view = search.view ?? (tried && search.step !== undefined ? "building" : "transcript");
+  const built = (
+    <Answered query={replay} rows={10}>
+      {(found) =>
+        found === null || build.steps.length === 0 ? (
+          <Empty title={ended ? "Nothing was built" : "Nothing is built yet"}>
+            {job.detail ??
+              (ended ? "No action reached a machine." : "The first action shows here as soon as it is taken.")}
+          </Empty>
+        ) : (
+          <BuildPart build={build} />
+        )
+      }
+    </Answered>
+  );
   return (
-    <div className="job-room">
-      <Section title="Machine" aside={job.artifacts.machine === undefined ? null : <GlbButton job={job} />}>
-        <Tabs
-          value={search.view ?? "built"}
-          keepMounted={false}
-          onChange={(value) => {
-            show(value === "trial" ? "trial" : undefined, false);
-          }}
-        >
-          <Tabs.List mb="sm">
-            <Tabs.Tab value="built">How it was built</Tabs.Tab>
-            <Tabs.Tab value="trial" disabled={trials.length === 0}>
-              The trial
-            </Tabs.Tab>
-          </Tabs.List>
-          <Tabs.Panel value="built">
-            <Answered query={replay} rows={10}>
-              {(found) =>
-                found === null || build.steps.length === 0 ? (
-                  <Empty title={ended ? "Nothing was built" : "Nothing is built yet"}>
-                    {job.detail ??
-                      (ended ? "No action reached a machine." : "The first action shows here as soon as it is taken.")}
-                  </Empty>
-                ) : (
-                  <BuildPart
-                    build={build}
-                    onBuilt={
-                      ended && trials.length > 0
-                        ? () => {
-                            show("trial", true);
-                          }
-                        : undefined
-                    }
-                  />
-                )
-              }
-            </Answered>
-          </Tabs.Panel>
-          <Tabs.Panel value="trial">
-            <TrialPart job={job} numbers={trials} begun={begun} seen={search} change={change} />
-          </Tabs.Panel>
-        </Tabs>
-      </Section>
-      <Section title="Transcript">
-        <Answered query={transcript}>
-          {(found) =>
-            found === null || found.turns.length === 0 ? (
-              <Empty title={ended ? "This job has no transcript" : "No turn was taken yet"} />
-            ) : (
-              <TranscriptView turns={found.turns} prompts={prompts.data} build={build} chosen={search.turn} />
-            )
-          }
-        </Answered>
-      </Section>
-    </div>
+    <>
+      <section aria-label="Machine">
+        {tried ? <TrialPart job={job} numbers={trials} seen={search} change={change} /> : built}
+      </section>
+      <Tabs
+        value={view === "building" && !tried ? "transcript" : view}
+        keepMounted={false}
+        onChange={(to) => {
+          void change({ view: (to ?? undefined) as JobSearch["view"], step: undefined });
+        }}
+      >
+        <Tabs.List mb="sm">
+          <Tabs.Tab value="transcript">Transcript</Tabs.Tab>
+          {tried && <Tabs.Tab value="building">Building</Tabs.Tab>}
+          <Tabs.Tab value="measurements">Measurements</Tabs.Tab>
+          <Tabs.Tab value="files">Files</Tabs.Tab>
+        </Tabs.List>
+        <Tabs.Panel value="transcript">
+          <Answered query={transcript}>
+            {(found) =>
+              found === null || found.turns.length === 0 ? (
+                <Empty title={ended ? "This run has no transcript" : "No turn was taken yet"} />
+              ) : (
+                <TranscriptView turns={found.turns} prompts={prompts.data} build={build} chosen={search.turn} />
+              )
+            }
+          </Answered>
+        </Tabs.Panel>
+        <Tabs.Panel value="building">{built}</Tabs.Panel>
+        <Tabs.Panel value="measurements">
+          <Measurements job={job} />
+        </Tabs.Panel>
+        <Tabs.Panel value="files">
+          <Stack align="start">
+            {job.artifacts.machine !== undefined && <GlbButton id={job.id} />}
+            <JobFiles job={job} />
+          </Stack>
+        </Tabs.Panel>
+      </Tabs>
+    </>
   );
 }
 
-function GlbButton({ job }: { job: JobDetail }) {
+function GlbButton({ id }: { id: string }) {
   const [error, setError] = useState<unknown>(null);
   return (
-    <Group gap="xs">
+    <>
       {error !== null && <ProblemNote error={error} />}
-      {!isSite && (
-        <Link to="/build" search={{ task: job.task, remix: job.id }}>
-          Remix it
-        </Link>
-      )}
       <Button
         size="compact-sm"
         variant="default"
         leftSection={<IconDownload size={14} aria-hidden />}
         onClick={() => {
           setError(null);
-          download(`/v1/jobs/${encodeURIComponent(job.id)}/machine.glb`, `${job.id}.glb`).catch(setError);
+          download(`/v1/jobs/${encodeURIComponent(id)}/machine.glb`, `${id}.glb`).catch(setError);
         }}
       >
         GLB
       </Button>
-    </Group>
+    </>
   );
 }

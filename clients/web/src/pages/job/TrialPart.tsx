@@ -10,32 +10,28 @@ import { scene as sceneQuery, trial as trialQuery } from "./queries";
 
 const TrialView = lazy(() => import("../../scene/TrialView"));
 
-/** The trial of one of a job's rollouts. */
-export function TrialPart({
-  job,
-  numbers,
-  begun = false,
-  seen,
-  change,
-}: {
+interface TrialPartProps {
   job: JobDetail;
+  /** The trials there are: the first is the scored one. */
   numbers: readonly number[];
-  begun?: boolean;
   /** What the page's address says of it; without, it has none, and no moment of it can be sent. */
   seen?: JobSearch;
   change?: (to: JobSearch) => Promise<void>;
-}) {
+}
+
+/** The scored trial of a job, or one of those in varied worlds. */
+export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
   const [own, setOwn] = useState<JobSearch>({});
   const search = seen ?? own;
   const asked = search.rollout !== undefined && numbers.includes(search.rollout) ? search.rollout : undefined;
-  const number = asked ?? numbers.at(-1) ?? 0;
-  const addressOf = async ({ time, look }: Moment): Promise<string> => {
-    await change?.({ view: "trial", t: Number(time.toFixed(2)), rollout: number, camera: writtenLook(look) });
-    return window.location.href;
+  const number = asked ?? numbers[0] ?? 0;
+  const set = (to: JobSearch): void => {
+    if (change === undefined) setOwn((before) => ({ ...before, ...to }));
+    else void change(to);
   };
-  const choose = (part: string | undefined): void => {
-    if (change === undefined) setOwn((before) => ({ ...before, part }));
-    else void change({ part });
+  const addressOf = async ({ time, look }: Moment): Promise<string> => {
+    await change?.({ t: Number(time.toFixed(2)), rollout: number, camera: writtenLook(look) });
+    return window.location.href;
   };
   const [scene, trial] = useQueries({
     queries: [sceneQuery(job.id, number), trialQuery(job.id, number, job.artifacts[`trajectory-${number}`])],
@@ -46,17 +42,19 @@ export function TrialPart({
       {numbers.length > 1 && (
         <SegmentedControl
           size="xs"
-          aria-label="Rollout"
+          style={{ alignSelf: "start" }}
+          aria-label="Which trial"
           value={String(number)}
           onChange={(value) => {
-            const to = { rollout: Number(value), t: undefined, camera: undefined };
-            if (change === undefined) setOwn(to);
-            else void change(to);
+            set({ rollout: Number(value), t: undefined, camera: undefined });
           }}
-          data={numbers.map((one) => ({ value: String(one), label: `Rollout ${one}` }))}
+          data={numbers.map((one, place) => ({
+            value: String(one),
+            label: place === 0 ? "Trial" : `Varied world ${place}`,
+          }))}
         />
       )}
-      {error !== null && (
+      {error !== null ? (
         <ProblemNote
           error={error}
           retry={() => {
@@ -64,25 +62,24 @@ export function TrialPart({
             void trial.refetch();
           }}
         />
-      )}
-      {error === null && (scene.data === undefined || trial.data === undefined) && <Loading rows={10} />}
-      {scene.data !== undefined && trial.data !== undefined && (
+      ) : scene.data === undefined || trial.data === undefined ? (
+        <Loading rows={10} />
+      ) : scene.data.machine === null ? (
+        <Empty title="The trial had no machine" />
+      ) : (
         <Suspense fallback={<Loading rows={10} />}>
-          {scene.data.machine === null ? (
-            <Empty title="The trial had no machine" />
-          ) : (
-            <TrialView
-              key={number}
-              scene={scene.data.machine}
-              trial={trial.data}
-              scenario={scene.data.scenario}
-              begun={begun}
-              part={search.part}
-              onPart={choose}
-              moment={{ time: search.t ?? 0, look: readLook(search.camera) }}
-              addressOf={change === undefined ? undefined : addressOf}
-            />
-          )}
+          <TrialView
+            key={number}
+            scene={scene.data.machine}
+            trial={trial.data}
+            scenario={scene.data.scenario}
+            part={search.part}
+            onPart={(part) => {
+              set({ part });
+            }}
+            moment={{ time: search.t ?? 0, look: readLook(search.camera) }}
+            addressOf={change === undefined ? undefined : addressOf}
+          />
         </Suspense>
       )}
     </Stack>

@@ -140,8 +140,8 @@ describe("live turns", () => {
 describe("addresses", () => {
   it.each([
     [
-      { step: 3, part: 7, view: "trial" },
-      { step: 3, part: "7", view: "trial" },
+      { step: 3, part: 7, view: "files" },
+      { step: 3, part: "7", view: "files" },
     ],
     [{ step: -1, part: "x".repeat(200), view: "x" }, {}],
     [{ step: "3", part: null }, {}],

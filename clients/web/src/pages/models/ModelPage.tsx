@@ -1,25 +1,21 @@
 import { Badge, Group, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
-import { lazy, Suspense } from "react";
-import { client, taken } from "../../api/client";
-import { board, figures, type Board, type Figures, type OverallRow } from "../../api/queries";
-import { count, dollars, duration, number, percent, places, secondsBetween } from "../../format";
+import { board, someJobs, type Board } from "../../api/queries";
+import { count, dollars, duration, measured, number, percent, places, secondsBetween } from "../../format";
 import { Fact } from "../../parts/Fact";
-import { DataTable } from "../../parts/DataTable";
-import { JobsSummary } from "../../parts/JobsSummary";
 import { Gallery } from "../../parts/Gallery";
+import { JobsSummary } from "../../parts/JobsSummary";
 import { Section } from "../../parts/Section";
-import { Answered, Empty, Loading } from "../../parts/States";
-import { TaskTable } from "../../parts/TaskTable";
+import { Answered, Empty } from "../../parts/States";
+import { refusalsOf, TaskTable } from "../../parts/TaskTable";
 import { TrackSelect } from "../../parts/TrackSelect";
-import { entriesOf, keyOf, type Entry } from "../board/entries";
+import { entriesOf, keyOf } from "../board/entries";
 import { oneOfEach } from "../tasks/Machines";
 
-const Drawings = lazy(() => import("./Drawings"));
 const route = getRouteApi("/models/$");
 
-/** One model over tasks and dimensions. */
+/** One model: where it stands, its best machines, and how it does on each task, the weakest first. */
 export default function ModelPage() {
   const { _splat: name = "" } = route.useParams();
   const { track } = route.useSearch();
@@ -43,69 +39,65 @@ export default function ModelPage() {
 }
 
 function Profile({ board: found, name }: { board: Board; name: string }) {
-  const drawn = useQuery(figures({ track: found.track ?? undefined }));
-  const tasks = found.tasks
-    .map((task) => ({ ...task, rows: task.rows.filter((row) => row.model === name) }))
-    .filter((task) => task.rows.length > 0);
-  if (tasks.length === 0) {
+  const track = found.track ?? undefined;
+  const shown = found.tasks.flatMap((task) =>
+    task.rows
+      .filter((row) => row.model === name)
+      .map((row) => ({ label: task.task, row, measure: measured(task.indicator, task.unit) })),
+  );
+  const weakest = shown.sort((a, b) => (a.row.success_rate ?? 0) - (b.row.success_rate ?? 0));
+  if (weakest.length === 0) {
     return (
-      <Empty title="No job of this model has ended on this track">
+      <Empty title="No run of this model has ended on this track">
         <Link to="/jobs" search={{ model: name }}>
           Its jobs
         </Link>
       </Empty>
     );
   }
-  const entries = entriesOf(found, true).filter((entry) => entry.model === name);
   return (
     <>
-      {entries.map((entry) => (
-        <Standing key={entry.key} entry={entry} row={found.overall.find((row) => keyOf(row) === entry.key)} />
-      ))}
-      <Answered query={drawn} rows={8}>
-        {(shown: Figures) => (
-          <Suspense fallback={<Loading rows={8} />}>
-            <Drawings figures={shown} entries={entries} />
-          </Suspense>
-        )}
-      </Answered>
-      <Best name={name} track={found.track ?? undefined} />
+      {entriesOf(found, true)
+        .filter((entry) => entry.model === name)
+        .map(({ key, label, baseline }) => (
+          <Standing key={key} board={found} of={key} label={label} baseline={baseline} />
+        ))}
+      <Best name={name} track={track} />
       <Section title="Task by task">
-        <JobsSummary search={{ model: name, track: found.track ?? undefined, state: "done" }} />
-        <Stack gap="lg" mt="md">
-          {tasks.map((task) => (
-            <div key={task.task}>
-              <Link className="quiet" to="/tasks/$name" params={{ name: task.task }}>
-                <Title order={3} size="h5" mb={4}>
-                  {task.task}
-                </Title>
-              </Link>
-              <TaskTable task={task} />
-            </div>
-          ))}
+        <Stack gap="sm">
+          <JobsSummary search={{ model: name, track, state: "done" }} />
+          <TaskTable name={`${name} on each task`} of="Task" shown={weakest} />
+          <Text size="sm">{refusalsOf(weakest.map(({ row }) => row))}</Text>
         </Stack>
-        <Effort tasks={tasks} />
       </Section>
     </>
   );
 }
 
-function Standing({ entry, row }: { entry: Entry; row: OverallRow | undefined }) {
+interface Standing {
+  board: Board;
+  of: string;
+  label: string;
+  baseline: boolean;
+}
+
+function Standing({ board: found, of, label, baseline }: Standing) {
+  const row = found.overall.find((one) => keyOf(one) === of);
   if (row === undefined) return null;
   const facts: readonly [string, string][] = [
-    ["Rank", row.rank === null ? "–" : String(row.rank)],
-    ["Place, 95 % interval", places(row.rank_low, row.rank_high)],
-    ["Mean rank", number(row.mean_rank, 2)],
-    ["Success, mean of tasks", percent(row.success_rate_mean, 1)],
-    ["Dollars a job", dollars(row.cost_usd_mean)],
-    ["Output tokens a job", count(row.output_tokens_mean)],
-    ["Trials", count(row.counted)],
+    ["Rank", baseline ? "–" : places(row.rank_low, row.rank_high)],
+    ["Success", percent(row.success_rate_mean, 1)],
+    ["vs. expert", number(row.score_mean, 2)],
+    ["$ per run", dollars(row.cost_usd_mean)],
+    ["Output tokens per run", count(row.output_tokens_mean)],
+    ["Runs", count(row.counted)],
   ];
+  const run = found.tasks.length - row.missing.length;
   return (
     <Section
-      title={entry.label === entry.model ? "Overall" : entry.label}
+      title={label}
       aside={
-        entry.baseline && (
+        baseline && (
           <Badge variant="outline" color="gray" tt="none" styles={{ root: { color: "inherit" } }}>
             baseline
           </Badge>
@@ -119,78 +111,21 @@ function Standing({ entry, row }: { entry: Entry; row: OverallRow | undefined })
       </Group>
       {row.missing.length > 0 && (
         <Text size="sm" className="dimmed">
-          Not ranked: no counted job on {row.missing.join(", ")}.
+          {run} of {found.tasks.length} tasks run. Not yet: {row.missing.join(", ")}.
         </Text>
       )}
     </Section>
   );
 }
 
-/** What a job of the model takes, task by task. */
-function Effort({ tasks }: { tasks: Board["tasks"] }) {
-  const rows = tasks.flatMap((task) =>
-    task.rows.map((row) => [
-      task.task,
-      count(row.requests_mean),
-      count(row.input_tokens_mean),
-      count(row.output_tokens_mean),
-      dollars(row.cost_usd_mean),
-      percent(row.refused_action_rate, 1),
-    ]),
-  );
-  return (
-    <DataTable
-      name="Effort a job"
-      title="What a job takes: requests, tokens, dollars"
-      columns={["Task", "Requests", "Tokens in", "Tokens out", "$ a job", "Refused"]}
-      rows={rows}
-    />
-  );
-}
-
 const LOOKED_AT = 60;
 const SHOWN = 8;
 
-/** The model's best machines, at most one a task; and how long its last jobs took. */
+/** The model's best machines, at most one a task; and how long its last runs took. */
 function Best({ name, track }: { name: string; track: string | undefined }) {
-  const query = useQuery({
-    queryKey: ["best", name, track],
-    queryFn: async () =>
-      (
-        await taken(
-          client.GET("/v1/jobs", {
-            params: {
-              query: {
-                model: [name],
-                track: track === undefined ? track : [track],
-                outcome: ["success"],
-                sort: "indicator",
-                limit: LOOKED_AT,
-              },
-            },
-          }),
-        )
-      ).data,
-  });
-  const last = useQuery({
-    queryKey: ["latency", name, track],
-    queryFn: async () =>
-      (
-        await taken(
-          client.GET("/v1/jobs", {
-            params: {
-              query: {
-                model: [name],
-                track: track === undefined ? track : [track],
-                state: ["done"],
-                sort: "finished",
-                limit: LOOKED_AT,
-              },
-            },
-          }),
-        )
-      ).data,
-  });
+  const of = { model: name, track, limit: LOOKED_AT };
+  const query = useQuery(someJobs({ ...of, outcome: "success", sort: "indicator" }));
+  const last = useQuery(someJobs({ ...of, state: "done", sort: "finished" }));
   const took = (last.data ?? [])
     .flatMap((job) => secondsBetween(job.started_at, job.finished_at) ?? [])
     .sort((a, b) => a - b);
@@ -207,8 +142,7 @@ function Best({ name, track }: { name: string; track: string | undefined }) {
       </Answered>
       {took.length > 0 && (
         <Text size="sm" mt="sm">
-          Latency: its last {count(took.length)} jobs took {duration(took[Math.floor(took.length / 2)])} in the middle,{" "}
-          {duration(took.at(-1))} at most, from start to end, simulation included.
+          Median time per run: {duration(took[Math.floor(took.length / 2)])}
         </Text>
       )}
     </Section>

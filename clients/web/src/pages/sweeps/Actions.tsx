@@ -8,9 +8,15 @@ import { headline } from "../../api/problem";
 import { sweep as sweepQuery, type Sweep } from "../../api/queries";
 import { mayChange, useCaller } from "../../parts/may";
 import { BudgetForm } from "./BudgetForm";
-import { possible } from "./live";
 
 type Act = "pause" | "resume" | "cancel" | "retry";
+
+/** What can be done with a sweep in its state. */
+function possible(state: Sweep["state"]): readonly Act[] {
+  if (state === "active") return ["pause", "cancel"];
+  if (state === "paused" || state === "budget_exhausted") return ["resume", "cancel"];
+  return [];
+}
 
 async function act(id: string, what: Act): Promise<Sweep> {
   const params = { params: { path: { sweep_id: id } } };
@@ -28,7 +34,7 @@ export function Actions({ sweep }: { sweep: Sweep }) {
     mutationFn: (what: Act) => act(sweep.id, what),
     onSuccess: (view) => {
       queries.setQueryData(sweepQuery(sweep.id).queryKey, view);
-      void queries.invalidateQueries({ queryKey: ["sweep-jobs", sweep.id] });
+      void queries.invalidateQueries({ queryKey: ["jobs"] });
     },
     onError: (error) => {
       notifications.show({ color: "red", title: headline(error), message: error.message });

@@ -68,7 +68,7 @@ function Fields({ sweep, done }: { sweep: Sweep; done: () => void }) {
     onSuccess: (view) => {
       queries.setQueryData(sweepQuery(sweep.id).queryKey, view);
       void queries.invalidateQueries({ queryKey: sweepForecast(sweep.id).queryKey });
-      void queries.invalidateQueries({ queryKey: ["sweep-jobs", sweep.id] });
+      void queries.invalidateQueries({ queryKey: ["jobs"] });
       done();
     },
   });

@@ -1,4 +1,4 @@
-import { Badge, Group, Stack, Text, Title } from "@mantine/core";
+import { SimpleGrid, Stack, Text, Title } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { lazy, Suspense } from "react";
@@ -11,12 +11,14 @@ import { Answered, Empty, Loading } from "../../parts/States";
 import { TaskTable } from "../../parts/TaskTable";
 import { TrackSelect } from "../../parts/TrackSelect";
 import type { Scenario } from "../../scene/Surroundings";
+import { entriesOf, keyOf } from "../board/entries";
+import { goalOf } from "./goal";
 import { Machines } from "./Machines";
 
 const ScenarioView = lazy(() => import("../../scene/ScenarioView"));
 const route = getRouteApi("/tasks/$name");
 
-/** A task: what must be built, how it is tried, and how models do. */
+/** A task: its goal and its course, the best machines, how models do. */
 export default function TaskPage() {
   const { name } = route.useParams();
   const query = useQuery(taskQuery(name));
@@ -26,40 +28,30 @@ export default function TaskPage() {
         <Stack gap="lg">
           <div>
             <Title order={1}>{task.title}</Title>
-            <Group gap={6} mt={4}>
-              <Badge variant="light" color="gray" tt="none">
-                {task.category}, level {task.level}
-              </Badge>
-              {task.custom && (
-                <Badge variant="outline" color="grape" tt="none" styles={{ root: { color: "inherit" } }}>
-                  custom
-                </Badge>
-              )}
-              <Text size="sm" className="dimmed">
-                {task.name} · version {task.version} · ranked by {measured(task.indicator, task.unit)}
-                {task.ceiling == null ? "" : `, at most ${number(task.ceiling)}`} ·{" "}
-                <Link to="/jobs" search={{ task: task.name }}>
-                  jobs
-                </Link>
-              </Text>
-            </Group>
+            <Text>{goalOf(task.statement)}</Text>
+            <Text size="sm" className="dimmed">
+              {task.category_title}, level {task.level}
+              {task.custom && ", custom"} · {task.name} · version {task.version} · ranked by{" "}
+              {measured(task.indicator, task.unit)}
+              {task.ceiling == null ? "" : `, at most ${number(task.ceiling)}`} ·{" "}
+              <Link to="/jobs" search={{ task: task.name }}>
+                jobs
+              </Link>
+            </Text>
           </div>
+          <Machines task={task} outcome="success" />
+          <SimpleGrid cols={{ base: 1, md: 2 }} spacing="lg">
+            <Section title="Course">
+              <Suspense fallback={<Loading rows={8} />}>
+                <ScenarioView scenario={task.document.scenario as Scenario} />
+              </Suspense>
+            </Section>
+            <Section title="Statement">
+              <Markdown text={task.statement} />
+            </Section>
+          </SimpleGrid>
           <Standings task={task} />
-          <Group align="start" gap="lg" wrap="wrap">
-            <div style={{ flex: "1 1 380px", minWidth: 0 }}>
-              <Section title="Statement">
-                <Markdown text={task.statement} />
-              </Section>
-            </div>
-            <div style={{ flex: "1 1 380px", minWidth: 0 }}>
-              <Section title="Scenario">
-                <Suspense fallback={<Loading rows={8} />}>
-                  <ScenarioView scenario={task.document.scenario as Scenario} />
-                </Suspense>
-              </Section>
-            </div>
-          </Group>
-          <Machines task={task} />
+          <Machines task={task} outcome="unsuccessful" />
         </Stack>
       )}
     </Answered>
@@ -68,35 +60,43 @@ export default function TaskPage() {
 
 function Standings({ task }: { task: TaskDetail }) {
   const { track } = route.useSearch();
+  const navigate = useNavigate({ from: "/tasks/$name" });
   const query = useQuery(board({ task: [task.name], track }));
   return (
     <Answered query={query}>
       {(found) => {
         const ranked = found.tasks.find((one) => one.task === task.name);
+        const labels = new Map(entriesOf(found, true).map(({ key, label }) => [key, label]));
         return (
-          <Section title="Models" aside={<Tracks known={found.tracks} chosen={found.track} />}>
+          <Section
+            title="Models"
+            aside={
+              <TrackSelect
+                known={found.tracks}
+                chosen={found.track}
+                onTrack={(to) => void navigate({ search: { track: to }, replace: true, resetScroll: false })}
+              />
+            }
+          >
             {ranked === undefined || ranked.rows.length === 0 ? (
-              <Empty title="No job of this task has ended on this track" />
+              <Empty title="No run of this task has ended on this track" />
             ) : (
               <Stack gap="sm">
                 <JobsSummary search={{ task: task.name, track: found.track ?? undefined, state: "done" }} />
-                <TaskTable task={ranked} />
+                <TaskTable
+                  name={`Models on ${task.name}`}
+                  of="Model"
+                  shown={ranked.rows.map((row) => ({
+                    row,
+                    label: labels.get(keyOf(row)) ?? row.model,
+                    measure: measured(ranked.indicator, ranked.unit),
+                  }))}
+                />
               </Stack>
             )}
           </Section>
         );
       }}
     </Answered>
-  );
-}
-
-function Tracks({ known, chosen }: { known: readonly string[]; chosen: string | null }) {
-  const navigate = useNavigate({ from: "/tasks/$name" });
-  return (
-    <TrackSelect
-      known={known}
-      chosen={chosen}
-      onTrack={(track) => void navigate({ search: { track }, replace: true, resetScroll: false })}
-    />
   );
 }

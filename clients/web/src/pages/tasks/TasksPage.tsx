@@ -2,7 +2,7 @@ import { Badge, Card, Group, SimpleGrid, Stack, Text, Title } from "@mantine/cor
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "@tanstack/react-router";
 import { tasks, type Task } from "../../api/queries";
-import { measured, words } from "../../format";
+import { measured } from "../../format";
 import { Answered } from "../../parts/States";
 import { goalOf } from "./goal";
 
@@ -14,14 +14,14 @@ export default function TasksPage() {
       <Title order={1}>Tasks</Title>
       <Answered query={query}>
         {(found) =>
-          [...new Set(found.map((task) => task.category))].map((category) => (
+          [...new Set(found.map((task) => task.category_title))].map((category) => (
             <section key={category} aria-label={category}>
-              <Title order={2} mb="sm" tt="capitalize">
-                {words(category)}
+              <Title order={2} mb="sm">
+                {category}
               </Title>
               <SimpleGrid cols={{ base: 1, sm: 2, md: 3 }}>
                 {found
-                  .filter((task) => task.category === category)
+                  .filter((task) => task.category_title === category)
                   .map((task) => (
                     <TaskCard key={task.name} task={task} />
                   ))}

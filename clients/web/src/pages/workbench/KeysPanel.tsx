@@ -104,37 +104,11 @@ function Presses({ hand, view, duration }: { hand: Hand; view: SessionView; dura
   const [time, setTime] = useState<string | number>(0);
   const [hold, setHold] = useState<string | number>(duration);
   const chosen = key ?? bound[0] ?? "UpArrow";
-  const end = Math.max(duration, ...presses.map((press) => press.time_s + press.hold_for_s));
-  const rows = [...new Set(presses.map((press) => press.key))];
   return (
     <Stack gap={6}>
       <Text size="sm" fw={600}>
         When keys are held, over {number(duration, 0)} seconds
       </Text>
-      {rows.map((row) => (
-        <div key={row} className="press-row">
-          <span>{row}</span>
-          <div
-            className="press-track"
-            role="img"
-            aria-label={`${row} is held ${presses
-              .filter((press) => press.key === row)
-              .map((press) => `from ${press.time_s} to ${press.time_s + press.hold_for_s} s`)
-              .join(", ")}`}
-          >
-            {presses.map(
-              (press, index) =>
-                press.key === row && (
-                  <span
-                    key={index}
-                    className="press"
-                    style={{ left: `${(100 * press.time_s) / end}%`, width: `${(100 * press.hold_for_s) / end}%` }}
-                  />
-                ),
-            )}
-          </div>
-        </div>
-      ))}
       {presses.map((press, index) => (
         <Group key={index} gap="xs" wrap="nowrap" justify="space-between">
           <Text size="sm" className="figures">

@@ -1,11 +1,6 @@
 import { Button, Group, Stack, Text, Textarea } from "@mantine/core";
-import { IconPlayerPlay } from "@tabler/icons-react";
-import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
-import { ProblemNote } from "../../parts/Problem";
-import { SimulatorSelect, useSimulator } from "../../parts/SimulatorSelect";
-import { triedAsItStands, type Hand, type SessionView } from "./session";
-import { Tried } from "./Tried";
+import type { Hand, SessionView } from "./session";
 
 const SET = "set_controller";
 const EXAMPLE = `function control(t, sense)
@@ -16,7 +11,7 @@ end`;
 export const takesPrograms = (view: SessionView) => view.tools.some((tool) => tool.name === SET);
 
 /** The program that acts in place of keys: written, asked without a trial, tried. */
-export function ProgramPanel({ hand, view }: { hand: Hand; view: SessionView }) {
+export function ProgramPanel({ hand }: { hand: Hand }) {
   const stored = hand.bench.controller;
   const [text, setText] = useState<string>();
   const written = text ?? stored;
@@ -63,38 +58,6 @@ export function ProgramPanel({ hand, view }: { hand: Hand; view: SessionView }) 
           </Text>
         )}
       </Group>
-      <LiveTrial view={view} />
-    </Stack>
-  );
-}
-
-function LiveTrial({ view }: { view: SessionView }) {
-  const choice = useSimulator();
-  const trying = useMutation({
-    mutationFn: () => triedAsItStands(view, choice.value),
-  });
-  return (
-    <Stack gap="xs" role="region" aria-label="Live trial">
-      <Group gap="xs" align="end">
-        <SimulatorSelect choice={choice} />
-        <Button
-          size="xs"
-          variant="light"
-          leftSection={<IconPlayerPlay size={14} aria-hidden />}
-          loading={trying.isPending}
-          disabled={view.machines.length === 0}
-          onClick={() => {
-            trying.mutate();
-          }}
-        >
-          Try it as it stands
-        </Button>
-      </Group>
-      <Text size="xs" className="dimmed">
-        In the task&apos;s exact world, on no leaderboard; the session goes on.
-      </Text>
-      {trying.isError && <ProblemNote error={trying.error} />}
-      {trying.data !== undefined && <Tried key={trying.data.id} id={trying.data.id} />}
     </Stack>
   );
 }

@@ -1,7 +1,6 @@
 import { Alert, Anchor, Button, Group, NumberInput, Select, Stack, Text, TextInput, Title } from "@mantine/core";
 import { IconHammer } from "@tabler/icons-react";
 import { useMutation, useQuery } from "@tanstack/react-query";
-import { SimulatorSelect, useSimulator } from "../../parts/SimulatorSelect";
 import { getRouteApi, Link, useNavigate } from "@tanstack/react-router";
 import { useState, type SubmitEvent } from "react";
 import { client, taken } from "../../api/client";
@@ -25,7 +24,6 @@ export function StartForm() {
   const last = useLastSession();
   const [task, setTask] = useState(search.task ?? FIRST);
   const [name, setName] = useState(() => localStorage.getItem(NAME) ?? "");
-  const simulator = useSimulator();
   const offered = search.remix === undefined ? templatesFor(task) : [];
   const [wanted, setWanted] = useState("");
   const template = offered.find(({ name }) => name === wanted);
@@ -38,7 +36,7 @@ export function StartForm() {
             task,
             agent: name.trim(),
             seed: Number(seed),
-            simulator: simulator.value,
+            simulator: "pybullet",
             data_sheets: true,
             kind: "human",
           },
@@ -126,15 +124,13 @@ export function StartForm() {
                   w={{ base: "100%", xs: 260 }}
                 />
               )}
-              <SimulatorSelect choice={simulator} />
               <NumberInput label="Seed" min={0} allowDecimal={false} value={seed} onChange={setSeed} w={100} />
               <Button type="submit" leftSection={<IconHammer size={16} aria-hidden />} loading={opening.isPending}>
                 Begin
               </Button>
             </Group>
             <Text size="xs" className="dimmed">
-              Letters, digits, dots, dashes and underscores. One machine a name, task and seed; the same choice again
-              opens the session you left.
+              Letters, digits, dots, dashes and underscores. Come back any time: the same name continues.
             </Text>
             {opening.isError && <ProblemNote error={opening.error} />}
           </Stack>

@@ -20,7 +20,7 @@ import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { lazy, Suspense, useEffect, useState } from "react";
 import { client, taken } from "../../api/client";
 import { task as taskQuery } from "../../api/queries";
-import { bytes, count, number, words } from "../../format";
+import { bytes, count, counted, number, words } from "../../format";
 import { Choices } from "../../parts/Choices";
 import { Markdown } from "../../parts/Markdown";
 import { ProblemNote } from "../../parts/Problem";
@@ -155,7 +155,7 @@ export function Workroom({ view }: { view: SessionView }) {
               <KeysPanel hand={hand} view={view} duration={document.scenario?.duration_s ?? DURATION_S} />
             </Tabs.Panel>
             <Tabs.Panel value="program" pt="sm">
-              <ProgramPanel key={hand.machine} hand={hand} view={view} />
+              <ProgramPanel key={hand.machine} hand={hand} />
             </Tabs.Panel>
             <Tabs.Panel value="tools" pt="sm">
               <ToolsPanel hand={hand} view={view} />
@@ -174,7 +174,7 @@ function PartsList({ hand }: { hand: Hand }) {
   return (
     <Stack gap={6}>
       <Text size="sm" fw={600}>
-        {bench.parts.length} parts, mass {number(bench.mass, 2)}
+        {counted(bench.parts.length, "part")}, mass {number(bench.mass, 2)}
         {bench.detached.length > 0 && (
           <Badge color="orange" ml={8} tt="none" variant="outline" styles={{ root: { color: "inherit" } }}>
             not joined: {bench.detached.join(", ")}

@@ -1,7 +1,6 @@
 import { expect, it } from "vitest";
 import { after, inverseOf, NO_HISTORY, redone, undone } from "./history";
 import { mirrored } from "./mirror";
-import { missing } from "./Result";
 import { stepsOf } from "./remix";
 import type { BenchPart } from "./session";
 
@@ -61,10 +60,4 @@ it("repeats how a machine came about, its parts first and without what was refus
     ["tower", "start"],
     ["assembly", "add_machine"],
   ]);
-});
-
-it("says how much is missing", () => {
-  expect(missing({ min_distance: 10 }, "distance", 6.4)).toBe(10);
-  expect(missing({ min_distance: 10 }, "distance", 12)).toBeNull();
-  expect(missing({ name: "lift" }, "height", 1)).toBeNull();
 });
