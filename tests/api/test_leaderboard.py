@@ -200,6 +200,25 @@ def test_a_board_of_some_sweeps_holds_their_jobs_alone(api, played) -> None:
     assert sum(sum(row["outcomes"].values()) for row in figures["failures"]) == 4
 
 
+def test_without_a_track_the_standard_one_is_shown_or_the_one_with_most_ended_jobs(
+    api, context, played
+) -> None:
+    first, *others = played(2, tasks=("support-1",))
+    change(context, first, track="another/track")
+    for id_ in others:
+        change(context, id_, track="most/track")
+    (sweep,) = api.get("/v1/sweeps").json()["data"]
+    assert board(api)["track"] == "most/track"
+
+    standard = context.store.jobs.get(played(1, tasks=("lift-1",))[0]).track
+    pair = {"first": "builtin/expert", "second": "builtin/random"}
+    for route, asked in (("", {}), ("/compare", pair), ("/figures", {})):
+        found = api.get(f"/v1/leaderboard{route}", params=asked).json()
+        assert found["track"] == standard
+    assert f"% Track: {standard}" in api.get("/v1/leaderboard/export?format=latex").text
+    assert board(api, sweep=sweep["id"])["track"] == "most/track"
+
+
 def test_figures_are_those_of_the_trials(api, context) -> None:
     spec = {"tasks": ["support-1"], "models": ["builtin/idle", MODELS[1]], "seeds": [0, 1]}
     assert api.post("/v1/sweeps", json=spec).status_code == 201

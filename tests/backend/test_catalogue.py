@@ -15,7 +15,7 @@ from buildarena_backend.catalog.prices import free_models
 from buildarena_backend.catalog.prompt_packs import PromptPacks, builtin_folder, read_pack
 from buildarena_backend.catalog.specs import ClosedLoop, JobSpec, SweepSpec
 from buildarena_backend.catalog.tasks import TaskCatalog, TaskChangedError
-from buildarena_backend.catalog.tracks import make_track
+from buildarena_backend.catalog.tracks import default_track, make_track
 from buildarena_backend.catalog.workflows import workflow_sources
 from buildarena_backend.errors import PermanentError, StartupError, SubmissionError, UnknownIdError
 from buildarena_backend.replays.from_turns import replay_of_turns
@@ -79,6 +79,16 @@ def test_a_changed_sentence_changes_the_packs_hash_and_the_track(tmp_path: Path)
     loop = ClosedLoop(rounds=5, analyst=True)
     varied = make_track(five_role, "pybullet", pack, version="2", one_shot=True, closed_loop=loop)
     assert varied.id.startswith("five-role+one-shot+data-sheets+5-rounds-analyst/pybullet-")
+
+
+def test_a_board_shows_the_standard_track_or_the_one_with_most_ended_jobs() -> None:
+    for ended, shown in (
+        ({}, None),
+        ({"a": 900, "standard": 1}, "standard"),
+        ({"a": 1, "b": 2}, "b"),
+        ({"c": 2, "b": 2, "a": 1}, "b"),
+    ):
+        assert default_track(ended, "standard") == shown
 
 
 def test_a_malformed_pack_is_named(tmp_path: Path) -> None:

@@ -53,9 +53,12 @@ def test_boards_comparisons_and_exports_count_disqualified_trials_as_failures(
     assert "flags: 6 does_not_span, 6 never_fell" in overview
     assert "  never_fell: The bridge carried everything" in overview
     assert "not_driven" not in overview
+    track = answer["track"]
+    assert printed(url, "compare", "openai/gpt-5", "xai/grok-4").startswith(f"Track {track}\n")
     unknown = run_cli(url, "compare", "openai/gpt-5", "x/y")
     assert (unknown.returncode, "builtin/random@" in unknown.stderr) == (1, True)
-    printed(url, "export", "--out", str(tmp_path / "board.tex"))
+    exported = run_cli(url, "export", "--out", str(tmp_path / "board.tex"))
+    assert (exported.returncode, exported.stderr) == (0, f"Track {track}\n")
     assert r"\textbf{$\geq$1500.0}" in (tmp_path / "board.tex").read_text()
     for name, says in (("board.xls", "must end in .csv"), ("no/board.csv", "can't be written")):
         refused = run_cli(url, "export", "--out", str(tmp_path / name))

@@ -32,7 +32,14 @@ TaskName = Annotated[str, typer.Argument(help="Task name.")]
 ModelName = Annotated[str, typer.Argument(help="Model name.")]
 TasksOption = Annotated[list[str] | None, typer.Option("--task", help="Only these tasks.")]
 ModelsOption = Annotated[list[str] | None, typer.Option("--model", help="Only these models.")]
-TrackOption = Annotated[str | None, typer.Option("--track", help="Track; default: the first.")]
+TrackOption = Annotated[
+    str | None,
+    typer.Option(
+        "--track",
+        help="Track; default: the standard one if jobs of it have ended, otherwise the one with "
+        "the most ended jobs.",
+    ),
+]
 AfterOption = Annotated[str | None, typer.Option("--after", help="Cursor of the previous page.")]
 AllOption = Annotated[bool, typer.Option("--all", help="Every page.")]
 

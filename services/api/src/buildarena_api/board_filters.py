@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 from fastapi import Depends, Query
 
-from buildarena_api.dependencies import ServicesDep, Track
+from buildarena_api.dependencies import Services, ServicesDep, Track
 from buildarena_api.http.problems import unknown
 from buildarena_api.leaderboard.cache import Question
+from buildarena_backend.catalog.tracks import default_track
 from buildarena_benchmark import builtin_tasks, paper_tasks
 from buildarena_benchmark.leaderboard import BoardQuery
 
+DEFAULT_TRACK = (
+    "Default: the standard track (what a sweep gets that names only tasks and models) once jobs of "
+    "it have ended, otherwise the one with the most ended jobs"
+)
 MAX_SWEEPS = 50
 """Sweeps that one board is made of at most."""
 
@@ -37,7 +43,7 @@ class Selection:
 def select_board(
     services: ServicesDep,
     *,
-    track: Annotated[Track | None, Query(description="Default: the first with ended jobs")] = None,
+    track: Annotated[Track | None, Query(description=DEFAULT_TRACK)] = None,
     task: Annotated[list[str] | None, Query(description="Only these tasks")] = None,
     category: Annotated[
         list[str] | None,
@@ -62,9 +68,8 @@ def select_board(
     context, boards = services.context, services.boards
     sweeps = frozenset(sweep) if sweep else None
     members = sum(context.store.sweeps.size(id_) for id_ in sorted(sweeps or ()))
-    tracks = boards.tracks(sweeps)
-    if track is not None and track not in tracks:
-        raise unknown("track", track, tracks)
+    ended = boards.tracks(sweeps)
+    track = track_or_default(services, track, ended)
     tasks = boards.tasks()
     for name in task or ():
         if name not in tasks:
@@ -86,14 +91,31 @@ def select_board(
         models=boards.known_models(model) if model else None,
         overall=_ranked_over(task, category),
     )
-    track = track or (tracks[0] if tracks else None)
     question = Question(
         track=track or "",
         query=query,
         sweeps=sweeps,
         members=members,
     )
-    return Selection(track=track, tracks=tracks, query=query, question=question)
+    return Selection(track=track, tracks=[*ended], query=query, question=question)
+
+
+def track_or_default(services: Services, asked: str | None, ended: Mapping[str, int]) -> str | None:
+    """The track that is asked for, or the one that is meant where none is named.
+
+    Args:
+        services: What serves the request.
+        asked: The track's name, if there is one.
+        ended: How many jobs of each track have ended.
+
+    Raises:
+        ProblemError: No job of such a track has ended.
+    """
+    if asked is None:
+        return default_track(ended, services.submissions.standard_track())
+    if asked not in ended:
+        raise unknown("track", asked, list(ended))
+    return asked
 
 
 def _ranked_over(task: list[str] | None, category: list[str] | None) -> frozenset[str] | None:

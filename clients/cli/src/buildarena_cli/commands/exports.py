@@ -17,7 +17,7 @@ from buildarena_cli.options import (
     TrackOption,
     UrlOption,
 )
-from buildarena_cli.terminal.output import say
+from buildarena_cli.terminal.output import say, warn
 
 FORMATS: Final = {".csv": "csv", ".parquet": "parquet", ".tex": "latex"}
 SweepsOption = Annotated[
@@ -72,15 +72,18 @@ def export(
     )
 
 
-def _board(out: Path, url: str, **asked: Any) -> None:
+def _board(out: Path, url: str, *, track: str | None, **asked: Any) -> None:
     kind = FORMATS.get(out.suffix)
     if kind is None:
         raise CommandError(f"{out}: the name must end in {', '.join(FORMATS)}")
-    body = Client(url).get_bytes("/v1/leaderboard/export", format=kind, **asked)
+    client = Client(url)
+    track = track or client.get("/v1/leaderboard", **asked)["track"]
+    body = client.get_bytes("/v1/leaderboard/export", format=kind, track=track, **asked)
     try:
         out.write_bytes(body)
     except OSError as error:
         raise CommandError(f"{out} can't be written: {error.strerror}") from error
+    warn(f"Track {track}" if track else "No jobs have ended yet.")
     say(f"{out}: {len(body):,} bytes")
 
 

@@ -35,7 +35,8 @@ def leaderboard(
     category: CategoryOption = None,
     model: ModelsOption = None,
     track: Annotated[
-        str | None, typer.Option("--track", help="Only this track; as JSON the first without.")
+        str | None,
+        typer.Option("--track", help="Only this track; as JSON the default one without."),
     ] = None,
     url: UrlOption = DEFAULT_URL,
     as_json: JsonOption = False,
@@ -105,6 +106,7 @@ def compare(
     if as_json:
         print_json(answer)
         return
+    say(f"Track {answer['track']}")
     rows = []
     for row in answer["tasks"]:
         (won_1, won_2), (of_1, of_2) = row["successes"], row["counted_jobs"]

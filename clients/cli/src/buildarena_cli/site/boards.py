@@ -52,7 +52,7 @@ class Collected:
             scopes.append(list(PAPER))
         parts: list[dict[str, Any]] = [{}, *({"task": name} for name in tasks)]
         parts += [{"category": scope} for scope in scopes]
-        # Pages ask without a track first, and get that of the scope or the first.
+        # Pages ask without a track first, and get that of the scope or the default.
         for track, part in itertools.product((None, *self._scope.tracks), parts):
             asked = {"track": track, **part}
             self.answers[question(BOARD, asked)] = self._board(asked)
@@ -81,29 +81,24 @@ class Collected:
     def _comparisons(self) -> None:
         path = f"{BOARD}/compare"
         for track in (None, *self._scope.tracks):
-            models = sorted(
-                {
-                    job["model"]
-                    for job in self._scope.ended
-                    if job["track"] == (track or self._scope.tracks[0])
-                }
-            )
+            board = self._board_of(track)
+            shown = board.get("track")
+            models = sorted({job["model"] for job in self._scope.ended if job["track"] == shown})
             if len(models) > MAX_COMPARED:
                 self.left_out.append(
-                    f"Comparisons of models on {track or 'the first track'} are left out: "
+                    f"Comparisons of models on {track or 'the default track'} are left out: "
                     f"there are {len(models)} models."
                 )
                 continue
-            on_board = self._models_on(track)
+            on_board = {row["model"] for task in board.get("tasks", ()) for row in task["rows"]}
             for first, second in itertools.permutations(filter(on_board.__contains__, models), 2):
                 asked = {"first": first, "second": second, "track": track}
                 self.answers[question(path, asked)] = self._held(path, asked)
 
-    def _models_on(self, track: str | None) -> set[str]:
-        """Models that a board compares: those with a job that counts."""
+    def _board_of(self, track: str | None) -> dict[str, Any]:
+        """A track's board; without one the default track's. Empty where there was no answer."""
         board = self.answers[question(BOARD, {"track": track})]
-        tasks = [] if board is None else json.loads(board.content)["tasks"]
-        return {row["model"] for task in tasks for row in task["rows"]}
+        return {} if board is None else json.loads(board.content)
 
     def _tasks(self) -> None:
         versions = {(job["task"], job["task_version"]) for job in self._scope.jobs}

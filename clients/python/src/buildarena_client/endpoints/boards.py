@@ -23,7 +23,7 @@ class Boards(Sender):
         """One track's leaderboard, on each task and overall.
 
         Args:
-            filters: Which jobs count; the first track with ended jobs by default.
+            filters: Which jobs count; the standard track by default, or that with most ended jobs.
         """
         return cast("Board", await self.get("/v1/leaderboard", **filters))
 
@@ -55,7 +55,7 @@ class Boards(Sender):
 
         Args:
             model: Whose.
-            track: On which track; the first by default.
+            track: On which track; the default one of `leaderboard` without.
             tasks: On which tasks; all by default.
             sample: How many; all by default.
             seed: Of the sample.

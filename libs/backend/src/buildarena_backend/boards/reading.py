@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Row, select
+from sqlalchemy import Row, func, select
 
 from buildarena_backend.boards.cells import BoardCells
 from buildarena_backend.boards.trials import TRIAL_COLUMNS, TrialFilter, read_trials
@@ -59,11 +59,13 @@ class Boards:
         with self._database.statement() as connection:
             return [row.id for row in connection.execute(query)]
 
-    def any_of(self, wanted: TrialFilter) -> bool:
-        """Whether there is such a job."""
-        query = select(jobs.c.id).where(*wanted.conditions()).limit(1)
+    def by_track(self, wanted: TrialFilter) -> dict[str, int]:
+        """How many such jobs each track has, by the tracks' names."""
+        columns = jobs.c.track, func.count()
+        query = select(*columns).where(*wanted.conditions()).group_by(jobs.c.track)
         with self._database.statement() as connection:
-            return connection.execute(query).first() is not None
+            found = connection.execute(query).all()
+        return {track: count for track, count in sorted(found)}
 
     def of_sweep(
         self, sweep_id: str, *, after: str = "", limit: int | None = None

@@ -135,6 +135,18 @@ def external_track(
     )
 
 
+def default_track(ended: Mapping[str, int], standard: str) -> str | None:
+    """The track that a board shows when none is named; None where no job has ended.
+
+    Args:
+        ended: How many jobs of each track have ended.
+        standard: The track of a sweep that names nothing but tasks and models.
+    """
+    if standard in ended:
+        return standard
+    return min(ended, key=lambda track: (-ended[track], track), default=None)
+
+
 def file_track(simulator: str, version: str) -> Track:
     """The track of machines that were brought as files; it has no leaderboard.
 

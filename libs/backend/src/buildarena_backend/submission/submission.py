@@ -189,6 +189,10 @@ class Submissions:
         self._context.store.lifecycle.set_budget(sweep_id, budget.as_limits())
         self._context.queues.wake(CONSTRUCT_QUEUE)
 
+    def standard_track(self) -> str:
+        """The track of a sweep that names nothing but tasks and models."""
+        return self._track(Variant(), on_demand=False).id
+
     def estimate(self, spec: SweepSpec) -> SweepEstimate:
         """What a sweep would use, without storing anything.
 

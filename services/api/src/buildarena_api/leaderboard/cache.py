@@ -124,20 +124,20 @@ class BoardCache:
             MAX_CACHED_ANSWERS
         )
 
-    def tracks(self, sweeps: frozenset[str] | None = None) -> list[str]:
-        """Tracks with ended jobs.
+    def tracks(self, sweeps: frozenset[str] | None = None) -> dict[str, int]:
+        """How many jobs have ended in each track that has any, by the tracks' names.
 
         Args:
-            sweeps: Only tracks with a job of one of these; all by default.
+            sweeps: Only jobs of these; all by default.
         """
         with self._lock:
             self._refresh()
-            found = sorted(track for track, records in self._records.items() if records)
-        if sweeps is None:
-            return found
-        return [
-            track for track in found if self._boards.any_of(TrialFilter(track=track, sweeps=sweeps))
-        ]
+            found = {
+                track: sum(record.jobs for record in records.values())
+                for track, records in sorted(self._records.items())
+                if records
+            }
+        return found if sweeps is None else self._boards.by_track(TrialFilter(sweeps=sweeps))
 
     def known_models(self, names: Iterable[str]) -> frozenset[str]:
         """Those of some models that have an ended job, as of the last question."""

@@ -152,7 +152,7 @@ def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Res
 
 def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:
     if kind == "latex":
-        return _latex(ranked).encode()
+        return _latex(ranked, as_view(ranked).track).encode()
     rows = _flat(as_view(ranked))
     return _csv(rows) if kind == "csv" else _parquet(rows)
 
@@ -211,7 +211,7 @@ def _kind(name: str) -> type:
     return next((choice for choice in choices if choice in (int, float, bool)), str)
 
 
-def _latex(ranked: RankedBoard) -> str:
+def _latex(ranked: RankedBoard, track: str | None) -> str:
     """Our two tables and the paper's two; other tasks in tables of their own."""
     cells = {board.task: [row.cell for row in board.rows] for board in ranked.tasks}
     ours = {task: row for task, row in cells.items() if task in paper_tasks()}
@@ -221,6 +221,7 @@ def _latex(ranked: RankedBoard) -> str:
     return "\n".join(
         [
             "% Needs the packages booktabs and multirow.",
+            f"% Track: {track or 'none, as no job has ended'}",
             "% Measured: performance",
             performance_table(ours),
             "% Measured: cost",

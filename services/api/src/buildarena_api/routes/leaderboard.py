@@ -11,10 +11,10 @@ from fastapi import APIRouter, Query, Request
 from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.access import CallerDep
-from buildarena_api.board_filters import SelectionDep
+from buildarena_api.board_filters import DEFAULT_TRACK, SelectionDep, track_or_default
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.etags import conditional
-from buildarena_api.http.problems import unknown
+from buildarena_api.http.problems import ErrorCode, invalid, unknown
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.views import Board, board_view
@@ -72,7 +72,7 @@ class VerifyRequest(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    track: str | None = None
+    track: Annotated[str | None, Field(description=DEFAULT_TRACK)] = None
     model: str
     tasks: list[str] | None = None
     sample: Annotated[int | None, Field(ge=1, le=10_000, description="Default: all")] = None
@@ -149,7 +149,7 @@ def compare(
     if selection.track is not None:
         every = services.boards.inside(selection.question)
         sides = [
-            services.boards.trials(selection.question, _usual(every, field, name))
+            services.boards.trials(selection.question, _usual(every, selection.track, field, name))
             for field, name in (("first", first), ("second", second))
         ]
         found = compare_models(*sides)
@@ -162,7 +162,9 @@ def compare(
     )
 
 
-def _usual(every: Mapping[CellId, CellRecord], field: str, name: str) -> list[CellId]:
+def _usual(
+    every: Mapping[CellId, CellRecord], track: str | None, field: str, name: str
+) -> list[CellId]:
     """The cells of a model's configuration with the most jobs, of those that are meant."""
     model, _, wanted = name.partition("@")
     jobs: Counter[str] = Counter()
@@ -171,7 +173,12 @@ def _usual(every: Mapping[CellId, CellRecord], field: str, name: str) -> list[Ce
             jobs[id_.configuration] += cell.jobs
     if not jobs:
         choices = sorted({f"{cell.model}@{id_.configuration[:8]}" for id_, cell in every.items()})
-        raise unknown(field, name, choices)
+        raise invalid(
+            field,
+            f"there is no model {name!r} on the track {track}",
+            choices=choices,
+            code=ErrorCode.UNKNOWN_NAME,
+        )
     usual = max(sorted(jobs), key=jobs.__getitem__)
     return [id_ for id_ in every if id_.configuration == usual]
 
@@ -184,10 +191,7 @@ def verify(
 
     Imported results count when they were verified.
     """
-    tracks = services.boards.tracks()
-    if body.track is not None and body.track not in tracks:
-        raise unknown("track", body.track, tracks)
-    track = body.track or (tracks[0] if tracks else None)
+    track = track_or_default(services, body.track, services.boards.tracks())
     query = BoardQuery(tasks=frozenset(body.tasks) if body.tasks else None)
     question = Question(track=track or "", query=query)
     every = services.boards.inside(question)
