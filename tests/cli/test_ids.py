@@ -12,7 +12,7 @@ from support.servers.wrong_server import answer, wrong_server
 
 from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_cli.client import Client
-from buildarena_cli.commands.job_files import file_name
+from buildarena_cli.commands.jobs import file_name
 from buildarena_cli.errors import CommandError
 from buildarena_cli.ids import checked_id
 from buildarena_cli.mcp_server import make_server

@@ -19,7 +19,7 @@ from buildarena_backend.accounts.budgets import BudgetLimits
 from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.verify.report import Report
-from buildarena_worker.verify.runner import AT_ONCE, VerificationRunner
+from buildarena_worker.wiring import AT_ONCE, VerificationRunner
 
 SESSIONS = 16
 

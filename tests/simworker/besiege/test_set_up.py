@@ -12,9 +12,9 @@ from support.game.game_rig import Rig
 from support.game.steam_library import library
 
 from buildarena_simworker.besiege.errors import NotSetUpError
-from buildarena_simworker.besiege.log_sources import LogFile
 from buildarena_simworker.besiege.process import GameProcess
 from buildarena_simworker.besiege.screen.calibration import POSITIONS, Calibration, load_calibration
+from buildarena_simworker.besiege.screen.window import LogFile
 from buildarena_simworker.besiege.settings import BesiegeSettings
 from buildarena_simworker.besiege.traces import Traces
 

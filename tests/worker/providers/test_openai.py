@@ -12,7 +12,7 @@ from buildarena_backend.catalog.models import ModelEntry, load_registry
 from buildarena_geometry import ToolDefinition
 from buildarena_worker.providers.failures import ProviderError
 from buildarena_worker.providers.openai.answer import AnswerReader
-from buildarena_worker.providers.openai.request import function_tool, request_body
+from buildarena_worker.providers.openai.sender import function_tool, request_body
 from buildarena_worker.session.dialogue import OBJECTION
 from buildarena_worker.session.messages import Message, Request, ToolCall
 from buildarena_worker.workflow.analyst import BREAKS, TRAJECTORY, TRANSCRIPT

@@ -4,25 +4,62 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from sqlalchemy import Text, literal_column, or_, select
+
 from buildarena_backend.accounts.budgets import Budgets
 from buildarena_backend.accounts.keys import ApiKeys
 from buildarena_backend.catalog.stored_tasks import Tasks
 from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import jobs
 from buildarena_backend.events import Events
 from buildarena_backend.jobs.jobs import Jobs
 from buildarena_backend.journal.external_calls import ExternalCalls
 from buildarena_backend.journal.journal import Journal
 from buildarena_backend.journal.rollouts import Rollouts
 from buildarena_backend.journal.turns import Turns
+from buildarena_backend.leases.claiming import WAITING_QUEUES
 from buildarena_backend.leases.leases import Leases
+from buildarena_backend.leases.lost_leases import ANY_LOST
 from buildarena_backend.leases.runner_leases import RunnerLeases
-from buildarena_backend.leases.waiting import WaitingJobs
 from buildarena_backend.results.results import Results
 from buildarena_backend.results.verifications import Verifications
+from buildarena_backend.states import JobState
 from buildarena_backend.sweeps.lifecycle import SweepLifecycle
 from buildarena_backend.sweeps.sweeps import Sweeps
 from buildarena_backend.telemetry.metrics import Metrics
 from buildarena_backend.workers import Workers
+
+# The order is that of the index of waiting jobs, of which the first is enough.
+_ANY_WAITING = (
+    select(jobs.c.queue)
+    .where(jobs.c.state == literal_column(f"'{JobState.QUEUED}'", Text))
+    .order_by(jobs.c.queue)
+    .limit(1)
+    .scalar_subquery()
+    .is_not(None)
+)
+
+
+class WaitingJobs:
+    """Jobs that wait in queues, for whoever wakes workers.
+
+    Args:
+        database: Where the jobs are.
+    """
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def queues(self, most: int) -> dict[str, int]:
+        """Queues that jobs wait in now, with how many, counted up to a number."""
+        with self._database.statement() as connection:
+            rows = connection.execute(WAITING_QUEUES, {"most": most})
+            return {row.name: row.jobs for row in rows if row.jobs}
+
+    def is_quiet(self) -> bool:
+        """Whether no job waits, and no lease ran out: one statement, for those who ask often."""
+        with self._database.statement() as connection:
+            return not connection.execute(select(or_(ANY_LOST, _ANY_WAITING))).scalar()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,16 +2,91 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from threading import Semaphore
+
+import structlog
+from sqlalchemy.exc import OperationalError
+
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prompt_packs import PromptPacks
+from buildarena_backend.errors import ArtifactStoreError
 from buildarena_backend.process.context import Context
+from buildarena_backend.results.verifications import Verifications
+from buildarena_backend.states import Verdict
 from buildarena_worker.construct import ConstructHandler
 from buildarena_worker.providers.clients import ModelClients
 from buildarena_worker.session.concurrency_gate import ConcurrencyGate
 from buildarena_worker.sessions import Sessions
-from buildarena_worker.verify.runner import VerificationRunner
+from buildarena_worker.verify.report import Report, broken_off
 from buildarena_worker.verify.verifier import Verifier
 from buildarena_worker.workflow import Workflows
+
+AT_ONCE = 2
+"""Verifications of one process at once, however many wait."""
+
+log = structlog.get_logger(__name__)
+
+
+class VerificationRunner:
+    """Does the verifications that messages speak of, in threads of its own.
+
+    Messages arrive in the threads of sessions: they only wake it, and take no session's place.
+
+    Args:
+        verifications: What was asked for.
+        verifier: Does them.
+    """
+
+    def __init__(self, verifications: Verifications, verifier: Verifier) -> None:
+        self._verifications = verifications
+        self._verifier = verifier
+        self._threads = ThreadPoolExecutor(AT_ONCE, thread_name_prefix="verifying")
+        self._places = Semaphore(AT_ONCE)
+        self._stopping = False
+
+    def wake(self) -> None:
+        """Has waiting verifications done, unless as many as may be are being done."""
+        if not self._stopping and self._places.acquire(blocking=False):
+            self._threads.submit(self._process_all)
+
+    def stop(self) -> None:
+        """Begins no further verification."""
+        self._stopping = True
+
+    def process_one(self) -> bool:
+        """Does the verification that waits longest; False when none waits."""
+        claimed = self._verifications.claim_next()
+        if claimed is None:
+            return False
+        try:
+            report = self._verifier.verify(claimed.job_id)
+        except (ArtifactStoreError, OperationalError) as error:
+            # Not the job's fault: another worker does it when this one's claim is too old.
+            log.warning("verification_put_off", job=claimed.job_id, error=str(error))
+            return False
+        except Exception as error:
+            log.exception("verification_failed", job=claimed.job_id)
+            report = Report([broken_off(f"it broke off: {error}")])
+        if report.verdict == Verdict.REFUTED:
+            log.error("refuted", job=claimed.job_id, verification=claimed.id)
+        self._verifications.finish(
+            claimed.id,
+            report.as_document(),
+            verdict=report.verdict,
+            refuted_trials=report.refuted_trials,
+        )
+        return True
+
+    def _process_all(self) -> None:
+        try:
+            while not self._stopping and self.process_one():
+                pass
+        except Exception:
+            # The reaper notifies again.
+            log.exception("verifications_unreadable")
+        finally:
+            self._places.release()
 
 
 def construct_handler(context: Context, registry: ModelRegistry) -> ConstructHandler:

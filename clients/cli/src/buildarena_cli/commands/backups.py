@@ -139,7 +139,7 @@ def _chosen(place: BackupPlace, name: str | None) -> str:
 
 
 def _check(place: BackupPlace, name: str | None, *, as_json: bool) -> None:
-    from buildarena_cli.backups.checking import check_backup
+    from buildarena_cli.backups.restoring import check_backup
 
     chosen = _chosen(place, name)
     problems, manifest = check_backup(place, chosen), place.manifest(chosen)

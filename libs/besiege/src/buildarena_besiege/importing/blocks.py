@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
 from buildarena_besiege.errors import MachineFileError
-from buildarena_besiege.game_keys import is_game_key
 from buildarena_besiege.importing.xml_file import (
     FileBlock,
     FileEntry,
@@ -22,6 +22,27 @@ from buildarena_geometry.keys import KEYS
 from buildarena_geometry.modules.module import Catalogue, Module
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import ORIGIN, Vector
+
+_KEY: Final = re.compile(
+    r"""
+    [A-Z] | Alpha\d | Keypad\d | F([1-9]|1[0-5]) | (Up|Down|Right|Left)Arrow
+    | Keypad(Period|Divide|Multiply|Minus|Plus|Enter|Equals)
+    | (Right|Left)(Shift|Control|Alt|Meta|Command|Apple|Windows|Paren|Bracket|Curly)
+    | Backspace | Delete | Tab | Clear | Return | Pause | Escape | Space | Insert | Home | End
+    | Page(Up|Down) | Numlock | CapsLock | ScrollLock | AltGr | Help | Print | SysReq | Break | Menu
+    | Exclaim | DoubleQuote | Hash | Dollar | Percent | Ampersand | Quote | Asterisk | Plus | Comma
+    | Minus | Period | Slash | Colon | Semicolon | Less | Equals | Greater | Question | At
+    | Backslash | Caret | Underscore | BackQuote | Pipe | Tilde | None
+    | M[0-6] | Mouse[0-6] | Joystick([1-9]|1[0-6])?Button1?\d
+    """,
+    re.ASCII | re.VERBOSE,
+)
+
+
+def is_game_key(name: str) -> bool:
+    """Whether the game has a key, or a button of mouse or joystick, of this name."""
+    return _KEY.fullmatch(name) is not None
+
 
 CARGO_LEFT_OUT: Final = "a cargo is the task's: left out"
 _SCRIPTING: Final = ("bmt-lua_module", "bmt-lua_ref_key")

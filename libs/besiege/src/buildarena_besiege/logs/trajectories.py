@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from buildarena_besiege.keys import cannons
+from buildarena_besiege.errors import LogIncompleteError, MachineNotPlayableError
+from buildarena_besiege.exporting.pilot import pilot_of
+from buildarena_besiege.keys import UPDATES_PER_S, cannons
 from buildarena_besiege.logs.game_log import GameLog
-from buildarena_besiege.logs.late_start import proved_start
 from buildarena_besiege.logs.log_samples import (
     filled,
     first_seen,
@@ -28,15 +29,17 @@ from buildarena_besiege.logs.orientation import (
     placed_quaternions,
     turned,
 )
-from buildarena_besiege.logs.piloted import piloted_again
 from buildarena_besiege.placement import global_pose
+from buildarena_besiege.starts import game_start
 from buildarena_besiege.tracking import tracked_blocks
 from buildarena_geometry import Machine
 from buildarena_geometry.besiege_components import besiege_turn
 from buildarena_geometry.poses import Pose
 from buildarena_geometry.rotations import Quaternion
 from buildarena_simulation import Scenario
-from buildarena_simulation.constants import SAMPLE_RATE_HZ
+from buildarena_simulation.constants import GRAVITY, SAMPLE_RATE_HZ
+from buildarena_simulation.controllers.pilot import ProgramPilot
+from buildarena_simulation.errors import MachineNotSimulable
 from buildarena_simulation.trajectory import (
     Piloting,
     Setting,
@@ -44,6 +47,118 @@ from buildarena_simulation.trajectory import (
     rounded_positions,
     rounded_quaternions,
 )
+
+ALIKE: Final = 1.001e-6
+"""By how much an answer in the log may miss that of the program here: its last decimal."""
+
+_TICK_UPDATES: Final = UPDATES_PER_S // SAMPLE_RATE_HZ
+
+
+def piloted_again(log: GameLog, machine: Machine, scenario: Scenario) -> ProgramPilot | None:
+    """A machine's program after it was asked again what it was asked in the game.
+
+    Args:
+        log: The run's log.
+        machine: The machine that was played.
+        scenario: What it was put through.
+
+    Returns:
+        None where no program acted.
+
+    Raises:
+        ControllerFailed: The program failed in the game, and does so here.
+        LogIncompleteError: A tick is missing, or the program answers otherwise here.
+    """
+    ticks = _ticks(log)
+    if not machine.controller or not ticks:
+        return None
+    pilot = pilot_of(machine, scenario)
+    sense_count, order = len(pilot.sense_names), sorted(pilot.channels.names)
+    failed = {line.update for line in log.lines if line.kind == "f"}
+    for tick in range(scenario.sample_count - 1):
+        update, time_s = max(tick * _TICK_UPDATES, 1), tick / SAMPLE_RATE_HZ
+        figures = ticks.get(update)
+        whole = sense_count + (0 if update in failed else len(order))
+        if figures is None or len(figures) != whole:
+            raise LogIncompleteError(
+                f"The log does not tell all that the program sensed and answered at {time_s:.2f} s."
+            )
+        levels = pilot.answered_to(figures[:sense_count], time_s)
+        answers = zip(order, figures[sense_count:], strict=False)
+        if update in failed or any(abs(levels.get(key, 0.0) - n) > ALIKE for key, n in answers):
+            raise LogIncompleteError(
+                f"At {time_s:.2f} s the program answered otherwise in the game than it does here."
+            )
+    return pilot
+
+
+def _ticks(log: GameLog) -> dict[int, list[float]]:
+    """The figures of each update all of whose lines are there, in their order."""
+    figures: dict[int, list[float]] = {}
+    parts: dict[int, list[int]] = {}
+    for line in log.lines:
+        if line.kind == "p":
+            figures.setdefault(line.update, []).extend(line.figures)
+            parts.setdefault(line.update, [line.parts]).append(line.part)
+    return {
+        update: figures[update]
+        for update, (count, *seen) in parts.items()
+        if seen == list(range(1, count + 1))
+    }
+
+
+SLACK: Final = 0.5
+"""How far from where it should start a block may be at the first sample, besides what it may have
+fallen; units."""
+
+
+def proved_start(
+    machine: Machine,
+    scenario: Scenario,
+    tracked: tuple[str, ...],
+    first: Sequence[tuple[int, NDArray[np.float64]] | None],
+) -> NDArray[np.bool_]:
+    """(N,) of which reported blocks the first sample proves where they were at the start.
+
+    Nothing falls faster than freely: a first sample that is no farther from the start than that
+    can only be of a trial that began there.
+
+    Args:
+        machine: What was played.
+        scenario: What it was put through.
+        tracked: The reported blocks, the cargo apart.
+        first: For each reported block, the cargo last, the late first sample and its position in
+            Besiege's components; None where it is not late.
+    """
+    proved = np.zeros(len(first), dtype=bool)
+    if all(sample is None for sample in first):
+        return proved
+    try:
+        roots = _start_roots(machine, scenario, tracked)
+    except (MachineNotPlayableError, MachineNotSimulable):
+        return proved
+    for column, sample in enumerate(first):
+        if sample is not None:
+            time_s = sample[0] / SAMPLE_RATE_HZ
+            reach = SLACK + GRAVITY * time_s**2 / 2
+            proved[column] = float(np.linalg.norm(sample[1] - roots[column])) <= reach
+    return proved
+
+
+def _start_roots(
+    machine: Machine, scenario: Scenario, tracked: tuple[str, ...]
+) -> NDArray[np.float64]:
+    """(N, 3) where the reported blocks' roots are at the start, Besiege's components."""
+    start = game_start(machine, scenario)
+    roots = [
+        start.rotation @ np.array(machine.blocks[block].world_from_block.xyz) + start.position
+        for block in tracked
+    ]
+    if scenario.cargo is not None and start.cargo is not None:
+        under = np.array([0.0, 0.0, scenario.cargo.size[2] / 2])
+        roots.append(np.asarray(start.cargo.position) - under)
+    return np.array(roots).reshape(-1, 3)[:, [0, 2, 1]]
+
 
 ENGINE: Final = "besiege"
 READING_VERSION: Final = "1"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from hashlib import sha256
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
 
@@ -30,8 +30,44 @@ from buildarena_api.schemas import (
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
-from buildarena_backend.trials.explanations import explain_job
+from buildarena_benchmark import Score
+from buildarena_benchmark.outcomes import SIMULATED, Outcome
+from buildarena_benchmark.scores import explain
+
+_ENDED: Final = {
+    Outcome.CONSTRUCTION_FAILED: "The machine was not finished",
+    Outcome.LIMIT: "The session reached one of the job's limits",
+    Outcome.ERRORED: "The service failed, so the job counts nowhere",
+    Outcome.CANCELLED: "The job was cancelled",
+}
+
+
+def explain_job(job: Job, tasks: TaskCatalog) -> str | None:
+    """Return what happened and by how much it missed; None while the job has not ended.
+
+    Args:
+        job: The job.
+        tasks: Gives the version of the task that it was submitted for.
+    """
+    if job.outcome is None:
+        return None
+    outcome = Outcome(job.outcome)
+    if outcome not in SIMULATED:
+        why = job.detail or (job.reason or "").replace("_", " ")
+        return f"{_ENDED[outcome]}{': ' if why else ''}{why.rstrip('.')}."
+    task = tasks.exact(job.task, job.task_version)
+    if task is None or job.indicator is None:
+        return None
+    found = Score(
+        success=bool(job.success),
+        indicator=job.indicator,
+        metrics=dict(job.metrics or {}),
+        flags=tuple(job.flags or ()),
+    )
+    return explain(task, found)
 
 
 def _kind(request: Request) -> Kind:

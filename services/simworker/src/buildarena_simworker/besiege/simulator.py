@@ -19,14 +19,42 @@ from buildarena_backend.trials.simulator import (
     TrialResult,
 )
 from buildarena_backend.trials.trials import refused
-from buildarena_besiege import GameRun, MachineNotPlayableError, prepare_run
-from buildarena_simulation import MachineNotSimulable
+from buildarena_besiege import GameRun, LogIncompleteError, MachineNotPlayableError, prepare_run
+from buildarena_geometry import Machine
+from buildarena_simulation import MachineNotSimulable, Trajectory
 from buildarena_simworker.besiege.desktop import Desktop
 from buildarena_simworker.besiege.errors import NeedsPersonError, NotSetUpError
-from buildarena_simworker.besiege.placing import require_placed
 from buildarena_simworker.besiege.play import LAGGING, Played, RunFailedError, play
 from buildarena_simworker.besiege.set_up import make_desktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
+
+FALLEN_S: Final = 0.1
+"""Until then a machine has fallen by less than 0.2 units."""
+HIGHEST_START: Final = 1.5
+"""How far above its place on the ground a machine may be shown at first, units."""
+
+
+def require_placed(trajectory: Trajectory, machine: Machine, run: GameRun) -> Trajectory:
+    """Gives the trajectory back if its machine was on the ground at the start where it should be.
+
+    The button that puts a machine on the ground shows nothing that could be checked; a machine
+    that it missed starts several units higher, and would be scored for its fall.
+
+    Raises:
+        LogIncompleteError: It was not.
+    """
+    if not run.set_ground or not len(trajectory.block_ids):
+        return trajectory
+    lowest = float(machine.bounds[0][2])
+    block = machine.blocks[trajectory.block_ids[0]]
+    height = float(trajectory.positions[0, 0, 2])
+    above = height - (block.center_xyz[2] - lowest)
+    if above > HIGHEST_START:
+        raise LogIncompleteError(
+            f"the machine started {above:.1f} units above the ground: it was not put down"
+        )
+    return trajectory
+
 
 PERSON_WAIT_S: Final = 60.0
 """How long a job waits that needs something which only a person can do, such as open a level."""

@@ -7,6 +7,7 @@ the pixels near what was clicked, the log.
 from __future__ import annotations
 
 from contextlib import suppress
+from pathlib import Path
 from typing import Final
 
 from PIL.Image import Image
@@ -25,7 +26,6 @@ from buildarena_simworker.besiege.errors import (
 )
 from buildarena_simworker.besiege.game_lock import GameLock, screen_name
 from buildarena_simworker.besiege.installed import installed
-from buildarena_simworker.besiege.log_sources import LogFile
 from buildarena_simworker.besiege.process import GameProcess
 from buildarena_simworker.besiege.screen.actions import ScreenActions
 from buildarena_simworker.besiege.screen.calibration import Calibration
@@ -38,6 +38,49 @@ from buildarena_simworker.besiege.screen.view import View
 from buildarena_simworker.besiege.screen.window_types import Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
 from buildarena_simworker.besiege.traces import Traces
+
+
+class LogFile:
+    """A file to which the game, or a mod, appends its log.
+
+    Args:
+        file: The file; it may not be there yet, and may be begun anew.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._read = 0
+        self._rest = b""
+
+    def skip(self) -> None:
+        """Leaves out what is there already."""
+        self._read = self._size()
+        self._rest = b""
+
+    def read(self) -> str:
+        """The whole lines that were added since the last call."""
+        size = self._size()
+        if size < self._read:
+            self.skip_to_start()
+        if size == self._read:
+            return ""
+        with self._file.open("rb") as file:
+            file.seek(self._read)
+            data = file.read()
+        self._read += len(data)
+        whole, newline, self._rest = (self._rest + data).rpartition(b"\n")
+        return (whole + newline).decode("utf-8", "replace")
+
+    def skip_to_start(self) -> None:
+        """Reads the file from its beginning again."""
+        self._read, self._rest = 0, b""
+
+    def _size(self) -> int:
+        try:
+            return self._file.stat().st_size
+        except OSError:
+            return 0
+
 
 LIKE_EMPTY: Final = 0.35
 """A window is empty again when it differs from an empty one by less than this share of what a
