@@ -1,13 +1,13 @@
 """Boards equal boards that are made from every ended job in the plain way, whatever changes."""
 
 import random
-from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
 from datetime import UTC, datetime, timedelta
 
 import pytest
 from sqlalchemy import delete, insert, select, text, update
 from starlette.testclient import TestClient
+from support.boards.plain_boards import plain_board
 from support.jobs import execute
 from support.servers.live_api import api_client
 from support.statements import statements_of
@@ -18,17 +18,7 @@ from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.database.tables import jobs, sweep_jobs, sweeps
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.leaderboard import (
-    Board,
     BoardQuery,
-    CellHead,
-    CellKey,
-    EndedJob,
-    choose_cells,
-    ranked_board,
-    summarise,
-)
-from buildarena_benchmark.leaderboard import (
-    TestCache as ComparedTests,
 )
 
 TRACKS = ("first/track-1", "second/track-1")
@@ -127,39 +117,6 @@ def random_query(rng: random.Random) -> dict[str, object]:
         "sweep": "sweep_some",
     }
     return found | {name: value for name, value in further.items() if rng.random() < 0.3}
-
-
-def plain_board(
-    trials: Iterable[EndedJob],
-    query: BoardQuery,
-    versions: Mapping[str, str],
-    weights: Mapping[str, Mapping[str, int]],
-    *,
-    inside: Callable[[EndedJob], bool] = lambda _: True,
-) -> Board:
-    """The board of a track's trials."""
-    cells: dict[CellKey, list[EndedJob]] = {}
-    for trial in trials:
-        key = (trial.task, trial.task_version, trial.configuration)
-        cells.setdefault(key, []).append(trial)
-    heads = [
-        CellHead(
-            key=key,
-            model=found[0].model,
-            newest=max((t.finished_at for t in found if t.finished_at), default=None),
-        )
-        for key, found in cells.items()
-    ]
-    chosen = choose_cells(heads, versions, query)
-    held = {key: [t for t in found if query.holds(t) and inside(t)] for key, found in cells.items()}
-    return ranked_board(
-        chosen,
-        lambda key: summarise(held[key]) if held[key] else None,
-        {task: sum(len(held[key]) for key in keys) for task, keys in chosen.outdated.items()},
-        overall=query.overall,
-        weights=weights,
-        tests=ComparedTests(),
-    )
 
 
 def expected(context, params: dict[str, object]) -> bytes | None:

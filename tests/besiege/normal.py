@@ -12,8 +12,9 @@ from typing import Any, Final
 from buildarena_besiege.errors import MachineNotPlayableError
 from buildarena_besiege.exporting.entries import Entry, Value
 from buildarena_besiege.exporting.machine_file import BSG_VERSION, BlockRecord, global_entries
+from buildarena_besiege.keys import bound_presses
 from buildarena_besiege.names import CARGO_ID
-from buildarena_besiege.run import prepared_machine, refusal_of
+from buildarena_besiege.run import prepared_machine
 from buildarena_geometry import Machine
 from buildarena_geometry.rotations import Quaternion
 from buildarena_simulation import Scenario
@@ -112,3 +113,18 @@ def _value(value: Value) -> Any:
 def _xyzw(rotation: Quaternion) -> list[float]:
     w, x, y, z = rotation
     return [x, y, z, w]
+
+
+def refusal_of(machine: Machine, scenario: Scenario) -> str | None:
+    """Why the published runner would not play a machine in a scenario; None if it would.
+
+    The game takes such machines; there is nothing to see.
+    """
+    if scenario.control.mode == "agent":
+        if not any(block.module.actions for block in machine.blocks.values()):
+            return "no control file"
+        if not machine.state.keys_in_use():
+            return "no key bound"
+        if not bound_presses(machine.control_sequence, machine):
+            return "no control sequence"
+    return "only a starting block" if machine.part_count == 1 else None

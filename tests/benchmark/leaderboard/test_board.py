@@ -4,14 +4,13 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from support.boards.plain_boards import plain_board
 
 from buildarena_benchmark import flags
 from buildarena_benchmark.leaderboard import (
+    Board,
     BoardQuery,
     EndedJob,
-    TrackBoard,
     compare_models,
     counted_trials,
     summarise,
@@ -49,11 +48,9 @@ def trials(task: str, model: str, successes: int, of: int, **values: object) -> 
     ]
 
 
-def board_of(*groups: list[EndedJob]) -> TrackBoard:
-    board = TrackBoard({"lift-1": "v2", "support-1": "v2"}, WEIGHTS)
-    for trial in (trial for group in groups for trial in group):
-        board.put(trial)
-    return board
+def board_of(*groups: list[EndedJob], query: BoardQuery = ALL) -> Board:
+    every = [trial for group in groups for trial in group]
+    return plain_board(every, query, {"lift-1": "v2", "support-1": "v2"}, WEIGHTS)
 
 
 def test_a_cell_of_a_hand_worked_case() -> None:
@@ -110,17 +107,17 @@ def test_who_cheats_does_not_gain_by_it() -> None:
     """Neither by far-off figures nor by having few trials that count."""
     cheat = trials("lift-1", "a", 60, 64, flags=("not_driven",), indicator=1e6)
     board = board_of(cheat, trials("lift-1", "b", 5, 64), trials("lift-1", "c", 30, 64))
-    assert [row.cell.model for row in board.board(ALL).tasks[0].rows] == ["c", "b", "a"]
+    assert [row.cell.model for row in board.tasks[0].rows] == ["c", "b", "a"]
 
 
 def test_errored_jobs_alone_and_no_jobs_give_no_numbers() -> None:
-    answer = board_of(trials("lift-1", "a", 0, 3, outcome="errored", success=False)).board(ALL)
+    answer = board_of(trials("lift-1", "a", 0, 3, outcome="errored", success=False))
     (row,) = answer.tasks[0].rows
     assert (row.rank, row.cell.success_rate, row.cell.indicator_mean) == (None, None, None)
     assert (row.cell.trials, row.cell.errored, row.cell.success_rate_of_ended) == (0, 3, 0.0)
     (overall,) = answer.overall
     assert (overall.rank, overall.success_rate_mean, overall.dimensions) == (None, None, {})
-    empty = board_of().board(ALL)
+    empty = board_of()
     assert (list(empty.tasks), empty.overall) == ([], [])
 
 
@@ -133,7 +130,7 @@ def test_zero_successes_have_an_interval_and_no_cost_per_success() -> None:
 
 def test_models_alike_share_a_rank_and_better_ones_do_not() -> None:
     board = board_of(*(trials("lift-1", m, n, 64) for m, n in (("a", 60), ("b", 30), ("c", 29))))
-    rows = board.board(ALL).tasks[0].rows
+    rows = board.tasks[0].rows
     assert [(row.cell.model, row.rank) for row in rows] == [("a", 1), ("b", 2), ("c", 2)]
     assert [(row.rank_low, row.rank_high) for row in rows] == [(1, 1), (2, 3), (2, 3)]
 
@@ -142,13 +139,13 @@ def test_claims_of_all_tasks_of_a_board_are_one_family() -> None:
     found = trials("lift-1", "a", 39, 64) + trials("lift-1", "b", 25, 64)
     alike = [trials(f"own-{n}", model, 30, 64) for n in range(3) for model in "ab"]
     for groups, ranks in (([], [1, 2]), (alike, [1, 1])):
-        (lift,) = (t for t in board_of(found, *groups).board(ALL).tasks if t.task == "lift-1")
+        (lift,) = (t for t in board_of(found, *groups).tasks if t.task == "lift-1")
         assert [row.rank for row in lift.rows] == ranks
 
 
 def test_a_model_with_a_missing_task_is_shown_but_not_ranked() -> None:
     both = trials("lift-1", "a", 3, 9) + trials("support-1", "a", 3, 9)
-    ranked, unranked = board_of(both, trials("lift-1", "b", 9, 9)).board(ALL).overall
+    ranked, unranked = board_of(both, trials("lift-1", "b", 9, 9)).overall
     assert (ranked.model, ranked.rank, ranked.missing) == ("a", 1, [])
     assert (unranked.model, unranked.rank, unranked.missing) == ("b", None, ["support-1"])
 
@@ -156,7 +153,7 @@ def test_a_model_with_a_missing_task_is_shown_but_not_ranked() -> None:
 def test_difficulty_dimensions_weigh_the_tasks() -> None:
     first = trials("lift-1", "a", 9, 9) + trials("support-1", "a", 0, 9)
     second = trials("lift-1", "b", 0, 9) + trials("support-1", "b", 9, 9)
-    scores = {row.model: row.dimensions for row in board_of(first, second).board(ALL).overall}
+    scores = {row.model: row.dimensions for row in board_of(first, second).overall}
     assert scores["a"] == pytest.approx({"precision": 0.75, "ambiguity": 0.5})
     assert scores["b"] == pytest.approx({"precision": 0.25, "ambiguity": 0.5})
 
@@ -168,7 +165,7 @@ def test_the_cost_front_holds_the_better_and_the_cheaper_that_ever_succeed() -> 
         trials("lift-1", "neither", 2, 9, cost_usd=3.0),
         trials("lift-1", "idle", 0, 9, cost_usd=0.0),
     )
-    front = {row.model for row in board.board(ALL).overall if row.pareto}
+    front = {row.model for row in board.overall if row.pareto}
     assert front == {"good", "cheap"}
 
 
@@ -176,32 +173,26 @@ def test_only_the_current_version_of_a_task_counts() -> None:
     old = [
         replace(t, task_version="v1", job_id=f"old-{t.job_id}") for t in trials("lift-1", "a", 9, 9)
     ]
-    task = board_of(old, trials("lift-1", "a", 1, 4)).board(ALL).tasks[0]
+    task = board_of(old, trials("lift-1", "a", 1, 4)).tasks[0]
     assert (task.version, task.outdated, task.rows[0].cell.trials) == ("v2", 9, 4)
     own = trials("own", "a", 1, 3)
     newer = [
         replace(t, task_version="v0", job_id=f"n-{t.job_id}", finished_at=START + timedelta(days=9))
         for t in own
     ]
-    assert board_of(own, newer).board(ALL).tasks[0].version == "v0"
+    assert board_of(own, newer).tasks[0].version == "v0"
 
 
-def test_queries_choose_tasks_models_and_time() -> None:
+def test_queries_choose_tasks_and_models() -> None:
     lifts = trials("lift-1", "a", 3, 9) + trials("lift-1", "b", 3, 9)
-    board = board_of(lifts, trials("support-1", "a", 3, 9))
-    some = board.board(BoardQuery(tasks=frozenset({"lift-1"}), models=frozenset({"b"})))
+    query = BoardQuery(tasks=frozenset({"lift-1"}), models=frozenset({"b"}))
+    some = board_of(lifts, trials("support-1", "a", 3, 9), query=query)
     assert [(t.task, [r.cell.model for r in t.rows]) for t in some.tasks] == [("lift-1", ["b"])]
-    early = board.board(BoardQuery(until=START + timedelta(hours=3)))
-    assert {row.cell.trials for task in early.tasks for row in task.rows} == {3}
-    late = board.board(BoardQuery(since=START + timedelta(hours=7), until=START + timedelta(99)))
-    assert {row.cell.successes for task in late.tasks for row in task.rows} == {0}
-    assert board.board(BoardQuery(since=START + timedelta(99))).tasks == []
 
 
 def test_the_ranking_is_over_the_asked_tasks_that_are_there_or_over_what_there_is() -> None:
-    found = board_of(
-        trials("lift-1", "a", 3, 4), trials("support-1", "a", 1, 4), trials("own-1", "a", 2, 4)
-    )
+    found = [*trials("lift-1", "a", 3, 4), *trials("support-1", "a", 1, 4)]
+    found += trials("own-1", "a", 2, 4)
     everything = ["lift-1", "own-1", "support-1"]
     for asked, chosen, ranked in (
         (["support-1", "lift-1"], {}, ["lift-1", "support-1"]),
@@ -209,38 +200,10 @@ def test_the_ranking_is_over_the_asked_tasks_that_are_there_or_over_what_there_i
         (["hover-4"], {}, everything),
         (["lift-1"], {"tasks": frozenset({"own-1"})}, ["own-1"]),
     ):
-        board = found.board(BoardQuery(overall=frozenset(asked), **chosen))
+        board = board_of(found, query=BoardQuery(overall=frozenset(asked), **chosen))
         assert sorted(board.ranked) == ranked
         (row,) = board.overall
         assert (row.rank, row.rank_low, row.rank_high, row.pareto) == (1, 1, 1, True)
-
-
-CHANGES = st.lists(
-    st.tuples(st.sampled_from(["put", "take", "score"]), st.integers(0, 29)), max_size=40
-)
-
-
-@settings(suppress_health_check=[HealthCheck.too_slow], deadline=None, max_examples=30)
-@given(CHANGES, st.randoms(use_true_random=False))
-def test_a_board_kept_up_to_date_equals_one_made_anew(steps, rng) -> None:
-    lifts = trials("lift-1", "a", 4, 10) + trials("lift-1", "b", 6, 10)
-    pool = lifts + trials("support-1", "a", 1, 10)
-    kept: dict[str, EndedJob] = {}
-    board = board_of()
-    for what, number in steps:
-        trial = pool[number]
-        if what == "score":
-            trial = replace(trial, success=not trial.success, indicator=trial.indicator + 1)
-        if what == "take":
-            assert board.remove(trial.job_id) == (kept.pop(trial.job_id, None) is not None)
-        else:
-            assert board.put(trial) == (kept.get(trial.job_id) != trial)
-            kept[trial.job_id] = trial
-        board.board(ALL)
-    shuffled = list(kept.values())
-    rng.shuffle(shuffled)
-    assert board.board(ALL) == board_of(shuffled).board(ALL)
-    assert len(board) == len(kept)
 
 
 def test_a_duel_pairs_shared_seeds_and_adjusts_for_the_tasks() -> None:

@@ -11,7 +11,6 @@ from scipy.stats import hypergeom
 from buildarena_benchmark.statistics import (
     PairTests,
     Sample,
-    agreement,
     cost_per_success,
     holm,
     pair_tests,
@@ -66,21 +65,6 @@ def test_holm_rejects_what_the_stepwise_procedure_rejects(p_values, error) -> No
     assert {i for i, p in enumerate(adjusted) if p <= error * (1 - 1e-9)} <= expected
     assert expected <= {i for i, p in enumerate(adjusted) if p <= error * 1.000001}
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-
-
-def test_agreement_of_a_hand_worked_case() -> None:
-    # 20 yes/yes, 5 yes/no, 10 no/yes, 15 no/no: 0.70 agree, 0.50 by chance
-    pairs = [(1, 1)] * 20 + [(1, 0)] * 5 + [(0, 1)] * 10 + [(0, 0)] * 15
-    first = [(bool(a), float(i)) for i, (a, _) in enumerate(pairs)]
-    second = [(bool(b), 2.0 * i + 1) for i, (_, b) in enumerate(pairs)]
-    found = agreement(first, second)
-    assert (found.same_verdict, found.kappa) == (pytest.approx(0.7), pytest.approx(0.4))
-    assert found.rank_correlation == pytest.approx(1.0)
-    found = agreement([(False, 0.0)] * 3, [(False, 0.0)] * 3)  # where nothing varies
-    assert (found.same_verdict, found.kappa, found.rank_correlation) == (1.0, None, None)
-    assert agreement([], []) is None
-    with pytest.raises(ValueError, match="cannot be paired"):
-        agreement([(True, 1.0)], [])
 
 
 def test_token_bins_of_a_hand_worked_case() -> None:

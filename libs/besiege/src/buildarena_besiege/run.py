@@ -233,21 +233,6 @@ def prepared_machine(
     )
 
 
-def refusal_of(machine: Machine, scenario: Scenario) -> str | None:
-    """Why the published runner would not play a machine in a scenario; None if it would.
-
-    The game takes such machines; there is nothing to see.
-    """
-    if scenario.control.mode == "agent":
-        if not any(block.module.actions for block in machine.blocks.values()):
-            return "no control file"
-        if not machine.state.keys_in_use():
-            return "no key bound"
-        if not bound_presses(machine.control_sequence, machine):
-            return "no control sequence"
-    return "only a starting block" if machine.part_count == 1 else None
-
-
 def marked(run_id: str) -> str:
     """What every line of a run's log begins with: any id, made safe for a line of fields."""
     return f"ba,{quote(run_id, safe='', errors='replace')}"

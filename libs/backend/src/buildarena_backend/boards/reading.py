@@ -61,11 +61,15 @@ class Boards:
 
     def by_track(self, wanted: TrialFilter) -> dict[str, int]:
         """How many such jobs each track has, by the tracks' names."""
-        columns = jobs.c.track, func.count()
-        query = select(*columns).where(*wanted.conditions()).group_by(jobs.c.track)
+        query = (
+            select(jobs.c.track, func.count().label("ended"))
+            .where(*wanted.conditions())
+            .group_by(jobs.c.track)
+            .order_by(jobs.c.track)
+        )
         with self._database.statement() as connection:
-            found = connection.execute(query).all()
-        return {track: count for track, count in sorted(found)}
+            found = connection.execute(query)
+            return {row.track: row.ended for row in found}
 
     def of_sweep(
         self, sweep_id: str, *, after: str = "", limit: int | None = None

@@ -25,7 +25,6 @@ MAX_OPEN = 200
 """Verifications that one owner may have waiting or running."""
 OWNER_LOCK = 0x766572  # "ver"
 QUEUED = VerificationState.QUEUED
-NOTIFY_AGAIN_AFTER = timedelta(seconds=10)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,6 @@ from buildarena_benchmark.leaderboard.board import (
     CellKey,
     ChosenCells,
     TaskBoard,
-    TrackBoard,
     choose_cells,
     ranked_board,
 )
@@ -28,10 +27,8 @@ from buildarena_benchmark.leaderboard.latex import cost_table, performance_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
 from buildarena_benchmark.leaderboard.plot_data import (
     FailureRow,
-    cost_bins,
     cost_bins_of,
     failure_row,
-    failure_rows,
 )
 from buildarena_benchmark.leaderboard.published import (
     PublishedRow,
@@ -69,16 +66,13 @@ __all__ = [
     "TaskComparison",
     "TestCache",
     "Total",
-    "TrackBoard",
     "Verdict",
     "choose_cells",
     "compare_models",
-    "cost_bins",
     "cost_bins_of",
     "cost_table",
     "counted_trials",
     "failure_row",
-    "failure_rows",
     "performance_table",
     "plain_table",
     "published_rows",

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from buildarena_benchmark.leaderboard.cells import Cell, summarise
-from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
+from buildarena_benchmark.leaderboard.cells import Cell
 from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows
 from buildarena_benchmark.leaderboard.standings import Standing, TestCache, standings
 
@@ -22,27 +21,12 @@ class BoardQuery:
     Attributes:
         tasks: Task names.
         models: Model names.
-        since: Only jobs that ended then or later.
-        until: Only jobs that ended before.
         overall: Tasks of the overall ranking, if they are on the board.
     """
 
     tasks: frozenset[str] | None = None
     models: frozenset[str] | None = None
-    since: datetime | None = None
-    until: datetime | None = None
     overall: frozenset[str] | None = None
-
-    def holds(self, trial: EndedJob) -> bool:
-        """Whether a trial ended in the time that was asked for."""
-        if self.since is None and self.until is None:
-            return True
-        ended = trial.finished_at
-        if ended is None:
-            return False
-        return (self.since is None or ended >= self.since) and (
-            self.until is None or ended < self.until
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -186,76 +170,6 @@ def ranked_board(
         overall=overall_rows(filled, ranks.overall, weights),
         ranked=tuple(filled),
     )
-
-
-class TrackBoard:
-    """The board of trials that are all in memory, as a report's are. Not safe for threads.
-
-    Args:
-        versions: Current version of each known task; of another task the newest one counts.
-        weights: Difficulty weights by task.
-    """
-
-    def __init__(self, versions: Mapping[str, str], weights: Weights) -> None:
-        self._versions = versions
-        self._weights = weights
-        self._cells: dict[CellKey, dict[str, EndedJob]] = {}
-        self._places: dict[str, CellKey] = {}
-        self._tests = TestCache()
-
-    def put(self, trial: EndedJob) -> bool:
-        """Adds or replaces a trial; returns whether anything changed."""
-        key = (trial.task, trial.task_version, trial.configuration)
-        place = self._places.get(trial.job_id)
-        if place is not None and self._cells[place][trial.job_id] == trial:
-            return False
-        self.remove(trial.job_id)
-        self._places[trial.job_id] = key
-        self._cells.setdefault(key, {})[trial.job_id] = trial
-        return True
-
-    def remove(self, job_id: str) -> bool:
-        """Takes a trial out; returns whether it was there."""
-        key = self._places.pop(job_id, None)
-        if key is None:
-            return False
-        del self._cells[key][job_id]
-        if not self._cells[key]:
-            del self._cells[key]
-        return True
-
-    def __len__(self) -> int:
-        return len(self._places)
-
-    def board(self, query: BoardQuery) -> Board:
-        """Summarises and ranks what the query asks for."""
-        heads = [self._head(key, trials.values()) for key, trials in self._cells.items()]
-        chosen = choose_cells(heads, self._versions, query)
-
-        def summary(key: CellKey) -> Cell | None:
-            inside = self._inside(key, query)
-            return summarise(inside) if inside else None
-
-        outdated = {
-            task: sum(len(self._inside(key, query)) for key in keys)
-            for task, keys in chosen.outdated.items()
-        }
-        return ranked_board(
-            chosen,
-            summary,
-            outdated,
-            overall=query.overall,
-            weights=self._weights,
-            tests=self._tests,
-        )
-
-    def _inside(self, key: CellKey, query: BoardQuery) -> list[EndedJob]:
-        return [trial for trial in self._cells[key].values() if query.holds(trial)]
-
-    @staticmethod
-    def _head(key: CellKey, trials: Collection[EndedJob]) -> CellHead:
-        newest = max((t.finished_at for t in trials if t.finished_at), default=None)
-        return CellHead(key=key, model=next(iter(trials)).model, newest=newest)
 
 
 def _newest(heads: Sequence[CellHead]) -> float:

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from buildarena_benchmark.leaderboard.cells import counted_tallies
-from buildarena_benchmark.leaderboard.ended_jobs import EndedJob
-from buildarena_benchmark.leaderboard.tallies import Tally, tallied
+from buildarena_benchmark.leaderboard.tallies import Tally
 from buildarena_benchmark.statistics import TokenBin, token_bins
 
 
@@ -34,14 +33,6 @@ class FailureRow:
     refused_actions: int = 0
 
 
-def failure_rows(trials: Iterable[EndedJob]) -> list[FailureRow]:
-    """A row for each model configuration, in the order of their first jobs."""
-    rows: dict[tuple[str, str], list[EndedJob]] = {}
-    for trial in trials:
-        rows.setdefault((trial.model, trial.configuration), []).append(trial)
-    return [failure_row(*key, tallied(jobs)) for key, jobs in rows.items()]
-
-
 def failure_row(model: str, configuration: str, tallies: Iterable[Tally]) -> FailureRow:
     """The row of one model configuration, from the tallies of all its cells."""
     row = FailureRow(model=model, configuration=configuration)
@@ -54,26 +45,15 @@ def failure_row(model: str, configuration: str, tallies: Iterable[Tally]) -> Fai
     return row
 
 
-def cost_bins(
-    trials: Sequence[EndedJob], *, categories: Mapping[str, str]
+def cost_bins_of(
+    tallies: Mapping[str, Iterable[Tally]], *, categories: Mapping[str, str]
 ) -> dict[str, list[TokenBin]]:
     """Performance relative to the best job of the task, in bins of output tokens, by category.
 
     Args:
-        trials: Ended jobs; those without known output tokens are left out.
+        tallies: Of each task; jobs without known output tokens are left out.
         categories: The category of each task; one without is a category by itself.
     """
-    by_task: dict[str, list[EndedJob]] = {}
-    for trial in trials:
-        by_task.setdefault(trial.task, []).append(trial)
-    tallies = {task: tallied(jobs) for task, jobs in by_task.items()}
-    return cost_bins_of(tallies, categories=categories)
-
-
-def cost_bins_of(
-    tallies: Mapping[str, Iterable[Tally]], *, categories: Mapping[str, str]
-) -> dict[str, list[TokenBin]]:
-    """The same from the tallies of each task."""
     pairs_by_category: dict[str, list[NDArray[np.float64]]] = {}
     for task, task_tallies in tallies.items():
         counted = counted_tallies(task_tallies)

@@ -5,7 +5,6 @@ the answer is None, never NaN. Everything random takes a seed and is reproducibl
 """
 
 from buildarena_benchmark.statistics.absolute import expert_scores
-from buildarena_benchmark.statistics.agreement import Agreement, agreement
 from buildarena_benchmark.statistics.comparisons import (
     PairedTest,
     holm,
@@ -40,7 +39,6 @@ from buildarena_benchmark.statistics.ranking import (
 __all__ = [
     "ERROR",
     "MIN_SUCCESSES",
-    "Agreement",
     "BoardPower",
     "PairTests",
     "PairedTest",
@@ -48,7 +46,6 @@ __all__ = [
     "Sample",
     "TokenBin",
     "adjusted",
-    "agreement",
     "board_power",
     "combined",
     "cost_per_success",

@@ -13,8 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field
 from buildarena_api.access import CallerDep
 from buildarena_api.board_filters import DEFAULT_TRACK, SelectionDep, track_or_default
 from buildarena_api.dependencies import ContextDep, ServicesDep
+from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import conditional
-from buildarena_api.http.problems import ErrorCode, invalid, unknown
+from buildarena_api.http.problems import invalid, unknown
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.views import Board, board_view

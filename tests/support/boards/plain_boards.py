@@ -1,0 +1,50 @@
+"""Boards made of every ended job in the plain way."""
+
+from collections.abc import Callable, Iterable, Mapping
+
+from buildarena_benchmark.leaderboard import (
+    Board,
+    BoardQuery,
+    CellHead,
+    CellKey,
+    EndedJob,
+    choose_cells,
+    ranked_board,
+    summarise,
+)
+from buildarena_benchmark.leaderboard import (
+    TestCache as ComparedTests,
+)
+
+
+def plain_board(
+    trials: Iterable[EndedJob],
+    query: BoardQuery,
+    versions: Mapping[str, str],
+    weights: Mapping[str, Mapping[str, int]],
+    *,
+    inside: Callable[[EndedJob], bool] = lambda _: True,
+) -> Board:
+    """The board of a track's trials."""
+    cells: dict[CellKey, list[EndedJob]] = {}
+    for trial in trials:
+        key = (trial.task, trial.task_version, trial.configuration)
+        cells.setdefault(key, []).append(trial)
+    heads = [
+        CellHead(
+            key=key,
+            model=found[0].model,
+            newest=max((t.finished_at for t in found if t.finished_at), default=None),
+        )
+        for key, found in cells.items()
+    ]
+    chosen = choose_cells(heads, versions, query)
+    held = {key: [t for t in found if inside(t)] for key, found in cells.items()}
+    return ranked_board(
+        chosen,
+        lambda key: summarise(held[key]) if held[key] else None,
+        {task: sum(len(held[key]) for key in keys) for task, keys in chosen.outdated.items()},
+        overall=query.overall,
+        weights=weights,
+        tests=ComparedTests(),
+    )
