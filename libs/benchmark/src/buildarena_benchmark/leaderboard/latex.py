@@ -7,20 +7,47 @@ marks its own: where two are best, none is second.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from typing import Final, Protocol
 
-from buildarena_benchmark.leaderboard.columns import (
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Column:
+    """A figure of our cells and of the paper's rows.
+
+    Attributes:
+        name: The attribute that holds it.
+        latex: What the paper's tables call it.
+        power: Power of ten that it is divided by.
+        more: Whether more is better.
+    """
+
+    name: str
+    latex: str
+    power: int = 0
+    more: bool = False
+
+    def value(self, row: object) -> float | None:
+        """The figure of a row; None if the row, or the row's figure, does not exist."""
+        value: float | None = getattr(row, self.name, None)
+        return value
+
+    def is_bound(self, row: object) -> bool:
+        """Whether the figure is at least what it says: a mean over bridges that carried all."""
+        return self is INDICATOR and bool(getattr(row, "censored", 0))
+
+
+INDICATOR: Final = Column(name="indicator_mean", latex="Indicator↑", more=True)
+PERFORMANCE: Final = (
+    Column(name="parts_mean", latex="Number of Parts", more=True),
+    Column(name="success_rate", latex=r"Success Rate (\%)↑", power=-2, more=True),
     INDICATOR,
-    INPUT_TOKENS,
-    OUTPUT_TOKENS,
-    PARTS,
-    REQUESTS,
-    SUCCESS,
-    Column,
 )
-
-PERFORMANCE = (PARTS, SUCCESS, INDICATOR)
-COST = (INPUT_TOKENS, OUTPUT_TOKENS, REQUESTS)
+COST: Final = (
+    Column(name="input_tokens_mean", latex=r"\# Input Tokens ($\times 10^3$)↓", power=3),
+    Column(name="output_tokens_mean", latex=r"\# Output Tokens ($\times 10^3$)↓", power=3),
+    Column(name="requests_mean", latex=r"\# LLM Requests↓"),
+)
 LEVELS = (1, 2, 3)
 
 
@@ -52,7 +79,7 @@ def plain_table(cells: Cells) -> str:
     lines = [
         r"\begin{tabular}{ll" + "c" * len(columns) + "}",
         r"\toprule",
-        f"Task & Model & {' & '.join(str(column.latex) for column in columns)} \\\\",
+        f"Task & Model & {' & '.join(column.latex for column in columns)} \\\\",
     ]
     for task, rows in cells.items():
         lines += [r"\midrule", rf"\multirow{{{len(rows)}}}{{*}}{{{_escaped(task)}}}"]

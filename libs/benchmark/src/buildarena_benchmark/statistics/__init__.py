@@ -4,14 +4,18 @@ Rates are fractions in [0, 1]. Where a figure does not exist (nothing was tried,
 the answer is None, never NaN. Everything random takes a seed and is reproducible.
 """
 
-from buildarena_benchmark.statistics.absolute import expert_scores
 from buildarena_benchmark.statistics.comparisons import (
     PairedTest,
     holm,
     paired_indicators,
     paired_successes,
 )
-from buildarena_benchmark.statistics.economy import TokenBin, cost_per_success, token_bins
+from buildarena_benchmark.statistics.economy import (
+    TokenBin,
+    cost_per_success,
+    expert_scores,
+    token_bins,
+)
 from buildarena_benchmark.statistics.means import MIN_SUCCESSES, mean_interval
 from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
 from buildarena_benchmark.statistics.power import (
