@@ -4,7 +4,7 @@ WEB := clients/web
 WEB_PARTS := $(WEB)/node_modules/.installed
 WEB_SOURCES := $(shell find $(WEB)/src $(WEB)/public $(WEB)/scripts -type f -not -name contract.ts 2>/dev/null) \
 	$(addprefix $(WEB)/,index.html vite.config.ts vite.viewer.config.ts tsconfig.json postcss.config.cjs) \
-	$(CONTRACT) docs/sweep.schema.json libs/geometry/src/buildarena_geometry/modules/modules.yaml \
+	$(CONTRACT) libs/geometry/src/buildarena_geometry/modules/modules.yaml \
 	libs/geometry/src/buildarena_geometry/modules/extended.yaml
 
 web: $(WEB_STAMP) ## Builds the dashboard's pages, which the API serves at /
