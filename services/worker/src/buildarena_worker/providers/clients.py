@@ -28,7 +28,8 @@ class ModelClients:
     def __init__(self, registry: ModelRegistry, throttle_url: str | None = None) -> None:
         self._registry = registry
         self._throttle_url = throttle_url
-        self._clients: dict[str, tuple[object, ModelClient]] = {}
+        self._clients: dict[str, ModelClient] = {}
+        self._made_for: dict[str, tuple[ModelEntry, ProviderEntry]] = {}
         self._lock = threading.Lock()
 
     def for_config(self, model_config: Mapping[str, Any]) -> ModelClient:
@@ -45,11 +46,11 @@ class ModelClients:
             )
         provider = self._registry.provider_of(entry)
         with self._lock:
-            made_for, client = self._clients.get(name, (None, None))
-            if client is None or made_for != (entry, provider):
-                client = self._make(entry, provider)
-                self._clients[name] = (entry, provider), client
-            return client
+            if self._made_for.get(name) != (entry, provider):
+                # Sessions that began with another entry keep the client of then.
+                self._clients[name] = self._make(entry, provider)
+                self._made_for[name] = entry, provider
+            return self._clients[name]
 
     def _make(self, entry: ModelEntry, provider: ProviderEntry) -> ModelClient:
         if provider.protocol == BUILTIN_PROTOCOL:
