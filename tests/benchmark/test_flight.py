@@ -13,6 +13,68 @@ from buildarena_benchmark.tasks.space.orbits import swept
 from buildarena_geometry import Machine
 from buildarena_simulation import Trajectory
 
+
+def climb(
+    machine: Machine,
+    *,
+    steps: tuple[tuple[float, float], ...] = (
+        (0, 0.5),
+        (3, 8),
+        (9, 8),
+        (12, 14),
+        (18, 14),
+        (21, 11),
+    ),
+    drift: float = 0.0,
+    tilt_deg: float = 0.0,
+    borne: object = 5.0,
+    ground: object = 0.0,
+) -> Trajectory:
+    """A machine that goes from height to height, which are given with their times, and stays."""
+    start = next(iter(machine.blocks.values())).center[2]
+
+    def moved(t: np.ndarray) -> np.ndarray:
+        height = np.interp(t, *zip(*steps, strict=True))
+        return np.column_stack([drift * t, np.zeros_like(t), height - start])
+
+    trial = make_trajectory(
+        machine,
+        30.0,
+        moved=moved,
+        cargo=lambda t: moved(t) + np.array([0, 0, 2]),
+        cargo_mass=lambda t: np.full_like(t, 5.0),
+    )
+    half = np.radians(tilt_deg) / 2 * (trial.time_s > 1.0)
+    quaternions = np.zeros_like(trial.quaternions)
+    quaternions[:, :, 0], quaternions[:, :, 1] = np.cos(half)[:, None], np.sin(half)[:, None]
+    return with_bearing(replace(trial, quaternions=quaternions), cargo=borne, ground=ground)
+
+
+def test_which_heights_are_held(tasks, car, subtests) -> None:
+    task = tasks["flight-3"]
+    for name, how, flags in (
+        ("in order", {}, None),
+        ("far above all of them", {"steps": ((0, 0.5), (3, 30), (30, 30))}, ()),
+        ("through them", {"steps": ((0, 0.5), (30, 20))}, ()),
+        ("in another order", {"steps": ((0, 0.5), (3, 14), (12, 14), (15, 8), (30, 8))}, ()),
+        ("tilted", {"tilt_deg": 21.0}, ()),
+        ("hardly tilted", {"tilt_deg": 19.0}, None),
+        ("drifts off", {"drift": 0.6}, ()),
+        ("without its cargo", {"borne": 0.0}, ("not_carried",)),
+        ("half of it hangs on something else", {"borne": 3.5}, ("not_carried",)),
+        ("a tower, or an anchor", {"ground": 3.0}, ("not_airborne",)),
+        ("grazes", {"ground": 0.05}, None),
+        (
+            "began up there",
+            {"steps": ((0, 7), (9, 8), (12, 14), (18, 14), (21, 11))},
+            ("not_risen",),
+        ),
+    ):
+        with subtests.test(name=name):
+            result = score(task, car, climb(car, **how))
+            assert (result.success, result.flags) == (flags is None, flags or ())
+
+
 # Glide
 
 

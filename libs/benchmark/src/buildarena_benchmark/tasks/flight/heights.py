@@ -74,7 +74,7 @@ def judge(
 
     Each height counts with one stretch of time within its band, up to a longest, after that of the
     height before; of all such choices the best. In it the machine is nearly upright and near where
-    it started, bears its cargo, touches nothing, and has risen as a whole, as for `hover`.
+    it started, bears its cargo, touches nothing, and has risen as a whole.
 
     Args:
         scoring: Heights and thresholds.
