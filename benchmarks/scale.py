@@ -149,7 +149,6 @@ def measure_boards(settings: dict[str, str], database: Database, times: int) -> 
             changed.append(ask(client, "/v1/leaderboard"))
         other = {
             "other_track": ask(client, "/v1/leaderboard", track=TRACKS[1]),
-            "figures": ask(client, "/v1/leaderboard/figures"),
             "sweep": ask(client, "/v1/leaderboard", sweep="sweep_ended0"),
         }
         return {

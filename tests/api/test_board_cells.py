@@ -137,7 +137,6 @@ def expected(context, params: dict[str, object]) -> bytes | None:
         own,
         query,
         {task.name: task.version for task in tasks},
-        {task.name: task.difficulty for task in tasks if task.difficulty},
         inside=lambda t: members is None or t.job_id in members,
     )
     facts = {"track": params["track"], "tracks": tracks}

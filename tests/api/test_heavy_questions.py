@@ -22,7 +22,7 @@ from buildarena_backend.catalog.specs import SweepSpec
 
 MAX_WAITING = 64
 BOARDS = (
-    *("/v1/leaderboard", "/v1/leaderboard/figures"),
+    "/v1/leaderboard",
     *("/v1/jobs?text=x", "/v1/jobs?flag=invented", "/v1/jobs/summary"),
     "/v1/leaderboard/compare?first=builtin/idle&second=builtin/idle",
 )
@@ -54,7 +54,7 @@ def board(context, submissions) -> None:
 @pytest.mark.ci
 @pytest.mark.usefixtures("board")
 def test_a_light_question_is_answered_while_heavy_ones_wait_and_are_refused(context) -> None:
-    path = "/v1/leaderboard/figures"
+    path = "/v1/leaderboard"
     with (
         changed(context, **WITH_KEYS) as own,
         live_api(own) as url,
@@ -216,7 +216,7 @@ def test_invented_names_fill_no_cache_and_cost_few_statements(api, context) -> N
     first = api.get("/v1/leaderboard")
     pair = {"first": "builtin/idle", "second": "builtin/idle"}
     with statements_of(context.store.database.engine) as statements:
-        for (name, status), kind in product(INVENTED.items(), ("", "/figures", "/compare")):
+        for (name, status), kind in product(INVENTED.items(), ("", "/compare")):
             names, costs = pair if kind == "/compare" else {}, []
             wanted = 422 if (name, kind) == ("model", "/compare") else status
             for number in range(3):
@@ -236,7 +236,7 @@ def test_invented_names_fill_no_cache_and_cost_few_statements(api, context) -> N
                 assert answer.json()["errors"][0]["choices"]
                 costs.append(len(statements))
             assert min(costs) <= 6, costs
-    # All invented models are one question of a board and one of its figures.
-    assert len(cache) <= 3
+    # All invented models are one question of a board.
+    assert len(cache) <= 2
     again = api.get("/v1/leaderboard", headers={"If-None-Match": first.headers["etag"]})
     assert again.status_code == 304

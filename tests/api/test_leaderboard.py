@@ -1,4 +1,4 @@
-"""Leaderboards, their figures, exports and history: ended jobs as people and programs read them."""
+"""Leaderboards, their exports and history: ended jobs as people and programs read them."""
 
 import csv
 import io
@@ -7,15 +7,11 @@ from urllib.parse import quote
 import pyarrow.parquet as pq
 import pytest
 from sqlalchemy import text, update
-from support.jobs import claim, execute, finish, journal_entry
+from support.jobs import claim, execute, finish
 from support.servers.live_api import api_client, changed
 
 from buildarena_api.routes.tasks import EXAMPLE
-from buildarena_backend.boards.trials import TrialFilter
 from buildarena_backend.database.tables import jobs
-from buildarena_backend.journal.journal import Usage
-from buildarena_benchmark.leaderboard import failure_row
-from buildarena_benchmark.leaderboard.tallies import tallied
 
 MODELS = ["builtin/expert", "builtin/random"]
 YAML = {"Content-Type": "application/yaml"}
@@ -68,9 +64,6 @@ def test_an_empty_board_is_empty_in_every_form(api) -> None:
     assert {"does_not_span", "not_driven", "unstable"} <= {f["name"] for f in answer.pop("flags")}
     lists = {"tracks": [], "tasks": [], "overall": [], "ranked": []}
     assert answer == {"track": None, "verdict": None, **lists}
-    found = api.get("/v1/leaderboard/figures").json()
-    assert found["track"] is None
-    assert found["failures"] == found["cost"] == found["front"] == found["dimensions"] == []
     assert len(api.get("/v1/leaderboard/export").text.splitlines()) == 1
     assert "NaN" not in api.get("/v1/leaderboard/export?format=latex").text
 
@@ -124,7 +117,7 @@ def test_filters_that_name_nothing_are_refused_with_the_choices(api) -> None:
         (error,) = answer.json()["errors"]
         assert (answer.status_code, error["field"]) == (422, field)
         assert choice is None or choice in error["choices"]
-    for route in ("", "/figures", "/export"):
+    for route in ("", "/export"):
         answer = api.get(f"/v1/leaderboard{route}?sweep=sweep_{'0' * 20}")
         assert (answer.status_code, "sweep_" in answer.json()["detail"]) == (404, True)
 
@@ -161,14 +154,13 @@ def test_throws_stand_by_their_distance(api, context) -> None:
 
 def test_a_reader_who_has_the_answer_gets_none_until_something_changes(api, context, played):
     ids = played(1)
-    for path in ("/v1/leaderboard", "/v1/leaderboard/figures"):
-        first = api.get(path)
-        tag = {"If-None-Match": first.headers["etag"]}
-        assert api.get(path, headers=tag).status_code == 304
-        change(context, ids.pop(), indicator=55.0, success=False, outcome="limit")
-        again = api.get(path, headers=tag)
-        assert again.status_code == 200
-        assert again.headers["etag"] != first.headers["etag"]
+    first = api.get("/v1/leaderboard")
+    tag = {"If-None-Match": first.headers["etag"]}
+    assert api.get("/v1/leaderboard", headers=tag).status_code == 304
+    change(context, ids.pop(), indicator=55.0, success=False, outcome="limit")
+    again = api.get("/v1/leaderboard", headers=tag)
+    assert again.status_code == 200
+    assert again.headers["etag"] != first.headers["etag"]
 
 
 def test_all_or_a_sample_of_a_models_results_are_verified(api, context, played) -> None:
@@ -197,8 +189,6 @@ def test_a_board_of_some_sweeps_holds_their_jobs_alone(api, played) -> None:
     assert [row["counted"] for row in found["overall"]] == [2, 2]
     assert board(api, sweep=[shared, own]) == found
     assert board(api, sweep=own)["track"] is None, "nothing of the other one has ended"
-    figures = api.get("/v1/leaderboard/figures", params={"sweep": shared}).json()
-    assert sum(sum(row["outcomes"].values()) for row in figures["failures"]) == 4
 
 
 def test_without_a_track_the_standard_one_is_shown_or_the_one_with_most_ended_jobs(
@@ -213,42 +203,11 @@ def test_without_a_track_the_standard_one_is_shown_or_the_one_with_most_ended_jo
 
     standard = context.store.jobs.get(played(1, tasks=("lift-1",))[0]).track
     pair = {"first": "builtin/expert", "second": "builtin/random"}
-    for route, asked in (("", {}), ("/compare", pair), ("/figures", {})):
+    for route, asked in (("", {}), ("/compare", pair)):
         found = api.get(f"/v1/leaderboard{route}", params=asked).json()
         assert found["track"] == standard
     assert f"% Track: {standard}" in api.get("/v1/leaderboard/export?format=latex").text
     assert board(api, sweep=sweep["id"])["track"] == "most/track"
-
-
-def test_figures_are_those_of_the_trials(api, context) -> None:
-    spec = {"tasks": ["support-1"], "models": ["builtin/idle", MODELS[1]], "seeds": [0, 1]}
-    assert api.post("/v1/sweeps", json=spec).status_code == 201
-    for outcome, indicator, tokens, more in (
-        ("success", 100.0, 50, {}),
-        ("construction_failed", 0.0, 10, {"reason": "objection"}),
-        ("success", 50.0, 1000, {"flags": ("unstable",)}),
-        ("unsuccessful", 25.0, 400, {}),
-    ):
-        lease = claim(context)
-        usage = Usage(requests=1, output_tokens=tokens, cost_usd=1)
-        context.store.journal.append(lease, journal_entry(usage=usage))
-        counts = {"actions": 10, "refused_actions": 3, "refusals": {"overlap": 3}}
-        finish(context, lease, outcome, indicator, columns=counts, **more)
-    found = api.get("/v1/leaderboard/figures").json()
-    trials = context.store.results.boards.trials(TrialFilter())
-    told = {row["model"]: (row["outcomes"], row["actions"]) for row in found["failures"]}
-    for model, counted in told.items():
-        own = tallied([trial for trial in trials if trial.model == model])
-        row = failure_row(model, "any", own)
-        assert counted == (row.outcomes, row.actions)
-    assert any("construction_failed: objection" in outcomes for outcomes, _ in told.values())
-    (cost,) = found["cost"]
-    assert sum(one["counted"] for one in cost["bins"]) == len(trials) == 4
-    overall = board(api)["overall"]
-    for name in ("mean_rank", "cost_usd_mean", "success_rate_mean", "pareto"):
-        assert [row[name] for row in found["front"]] == [row[name] for row in overall]
-    ranked = [row["model"] for row in overall if row["rank"] is not None]
-    assert [row["model"] for row in found["dimensions"]] == ranked
 
 
 def test_own_tasks_stand_beside_built_in_ones_and_versions_do_not_mix(api, context, played) -> None:

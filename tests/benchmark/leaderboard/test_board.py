@@ -20,10 +20,6 @@ from buildarena_benchmark.statistics import holm
 
 START = datetime(2026, 1, 1, tzinfo=UTC)
 ALL = BoardQuery()
-WEIGHTS = {
-    "lift-1": {"precision": 3, "ambiguity": 1},
-    "support-1": {"precision": 1, "ambiguity": 1},
-}
 
 
 def trials(task: str, model: str, successes: int, of: int, **values: object) -> list[EndedJob]:
@@ -50,7 +46,7 @@ def trials(task: str, model: str, successes: int, of: int, **values: object) -> 
 
 def board_of(*groups: list[EndedJob], query: BoardQuery = ALL) -> Board:
     every = [trial for group in groups for trial in group]
-    return plain_board(every, query, {"lift-1": "v2", "support-1": "v2"}, WEIGHTS)
+    return plain_board(every, query, {"lift-1": "v2", "support-1": "v2"})
 
 
 def test_a_cell_of_a_hand_worked_case() -> None:
@@ -116,7 +112,7 @@ def test_errored_jobs_alone_and_no_jobs_give_no_numbers() -> None:
     assert (row.rank, row.cell.success_rate, row.cell.indicator_mean) == (None, None, None)
     assert (row.cell.trials, row.cell.errored, row.cell.success_rate_of_ended) == (0, 3, 0.0)
     (overall,) = answer.overall
-    assert (overall.rank, overall.success_rate_mean, overall.dimensions) == (None, None, {})
+    assert (overall.rank, overall.success_rate_mean) == (None, None)
     empty = board_of()
     assert (list(empty.tasks), empty.overall) == ([], [])
 
@@ -148,14 +144,6 @@ def test_a_model_with_a_missing_task_is_shown_but_not_ranked() -> None:
     ranked, unranked = board_of(both, trials("lift-1", "b", 9, 9)).overall
     assert (ranked.model, ranked.rank, ranked.missing) == ("a", 1, [])
     assert (unranked.model, unranked.rank, unranked.missing) == ("b", None, ["support-1"])
-
-
-def test_difficulty_dimensions_weigh_the_tasks() -> None:
-    first = trials("lift-1", "a", 9, 9) + trials("support-1", "a", 0, 9)
-    second = trials("lift-1", "b", 0, 9) + trials("support-1", "b", 9, 9)
-    scores = {row.model: row.dimensions for row in board_of(first, second).overall}
-    assert scores["a"] == pytest.approx({"precision": 0.75, "ambiguity": 0.5})
-    assert scores["b"] == pytest.approx({"precision": 0.25, "ambiguity": 0.5})
 
 
 def test_the_cost_front_holds_the_better_and_the_cheaper_that_ever_succeed() -> None:

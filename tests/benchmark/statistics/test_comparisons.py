@@ -17,7 +17,6 @@ from buildarena_benchmark.statistics import (
     paired_indicators,
     paired_successes,
     permutation,
-    token_bins,
 )
 
 
@@ -65,15 +64,6 @@ def test_holm_rejects_what_the_stepwise_procedure_rejects(p_values, error) -> No
     assert {i for i, p in enumerate(adjusted) if p <= error * (1 - 1e-9)} <= expected
     assert expected <= {i for i, p in enumerate(adjusted) if p <= error * 1.000001}
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-
-
-def test_token_bins_of_a_hand_worked_case() -> None:
-    tokens = np.array([10.0, 20.0, 100.0, 500.0, 1000.0])
-    first, second = token_bins(tokens, np.array([1.0, 0.0, 4.0, 2.0, 0.0]), bins=2)
-    assert (first.low, first.high, first.trials) == (10, 100, 2)
-    assert (second.low, second.high, second.trials) == (100, 1000, 3)
-    assert first.mean == pytest.approx(0.125)
-    assert (second.mean, second.median) == (pytest.approx(0.5), pytest.approx(0.5))
 
 
 def test_the_cost_of_a_success_includes_the_failures() -> None:

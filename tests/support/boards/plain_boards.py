@@ -21,7 +21,6 @@ def plain_board(
     trials: Iterable[EndedJob],
     query: BoardQuery,
     versions: Mapping[str, str],
-    weights: Mapping[str, Mapping[str, int]],
     *,
     inside: Callable[[EndedJob], bool] = lambda _: True,
 ) -> Board:
@@ -45,6 +44,5 @@ def plain_board(
         lambda key: summarise(held[key]) if held[key] else None,
         {task: sum(len(held[key]) for key in keys) for task, keys in chosen.outdated.items()},
         overall=query.overall,
-        weights=weights,
         tests=ComparedTests(),
     )

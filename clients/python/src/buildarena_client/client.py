@@ -171,7 +171,6 @@ class Client:
 
     leaderboard = _call(Api.leaderboard)
     compare = _call(Api.compare)
-    figures = _call(Api.figures)
     verify_leaderboard = _call(Api.verify_leaderboard)
     export_leaderboard = _call(Api.export_leaderboard)
 

@@ -56,9 +56,6 @@ class Collected:
         for track, part in itertools.product((None, *self._scope.tracks), parts):
             asked = {"track": track, **part}
             self.answers[question(BOARD, asked)] = self._board(asked)
-            self.answers[question(f"{BOARD}/figures", asked)] = self._held(
-                f"{BOARD}/figures", asked
-            )
             for form, ending in EXPORTS.items():
                 if track is not None:
                     exported = {**asked, "format": form}

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
         Board,
         BoardFilters,
         Comparison,
-        Figures,
         VerifyAccepted,
     )
 
@@ -37,10 +36,6 @@ class Boards(Sender):
         """
         answer = await self.get("/v1/leaderboard/compare", first=first, second=second, **filters)
         return cast("Comparison", answer)
-
-    async def figures(self, **filters: Unpack[BoardFilters]) -> Figures:
-        """What a leaderboard's figures are drawn from."""
-        return cast("Figures", await self.get("/v1/leaderboard/figures", **filters))
 
     async def verify_leaderboard(
         self,

@@ -126,15 +126,15 @@ class TaskCatalog:
 
         Raises:
             NameTakenError: The name is another key's.
-            TaskChangedError: The version is there with another title, category, level, indicator
-                or difficulty.
+            TaskChangedError: The version is there with another title, category, level or
+                indicator.
         """
         added = self._tasks.add(
             name=task.name, version=task.version, document=text, owner=owner, force=force
         )
         stored = self.exact(task.name, task.version)
         if stored is not None and stored != task:
-            fields = ("title", "category", "level", "indicator", "difficulty")
+            fields = ("title", "category", "level", "indicator")
             changed = [name for name in fields if getattr(stored, name) != getattr(task, name)]
             raise TaskChangedError(
                 f"version {task.version} of {task.name} exists with another "

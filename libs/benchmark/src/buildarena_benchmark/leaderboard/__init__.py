@@ -25,11 +25,6 @@ from buildarena_benchmark.leaderboard.ended_jobs import (
 )
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
 from buildarena_benchmark.leaderboard.overall import OverallRow
-from buildarena_benchmark.leaderboard.plot_data import (
-    FailureRow,
-    cost_bins_of,
-    failure_row,
-)
 from buildarena_benchmark.leaderboard.published import (
     PublishedRow,
     published_rows,
@@ -58,7 +53,6 @@ __all__ = [
     "ChosenCells",
     "Comparison",
     "EndedJob",
-    "FailureRow",
     "OverallRow",
     "PublishedRow",
     "Tally",
@@ -69,10 +63,8 @@ __all__ = [
     "Verdict",
     "choose_cells",
     "compare_models",
-    "cost_bins_of",
     "cost_table",
     "counted_trials",
-    "failure_row",
     "performance_table",
     "plain_table",
     "published_rows",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from buildarena_benchmark.leaderboard.cells import Cell
-from buildarena_benchmark.leaderboard.overall import OverallRow, Weights, overall_rows
+from buildarena_benchmark.leaderboard.overall import OverallRow, overall_rows
 from buildarena_benchmark.leaderboard.standings import Standing, TestCache, standings
 
 CellKey = tuple[str, str, str]
@@ -132,7 +132,6 @@ def ranked_board(
     outdated: Mapping[str, int],
     *,
     overall: frozenset[str] | None,
-    weights: Weights,
     tests: TestCache,
 ) -> Board:
     """Ranks chosen cells.
@@ -143,7 +142,6 @@ def ranked_board(
         outdated: Ended jobs of other versions, by task.
         overall: Tasks that the overall ranking is over; None means all, as it does where none of
             these is on the board.
-        weights: Difficulty weights by task.
         tests: What was tested before.
     """
     cells: dict[str, dict[str, Cell]] = {}
@@ -167,7 +165,7 @@ def ranked_board(
     filled = {task: row for task, row in cells.items() if task in scope}
     return Board(
         tasks=boards,
-        overall=overall_rows(filled, ranks.overall, weights),
+        overall=overall_rows(filled, ranks.overall),
         ranked=tuple(filled),
     )
 

@@ -1,4 +1,4 @@
-"""The ranking over several tasks, with difficulty dimensions and the cost front."""
+"""The ranking over several tasks, with the cost front."""
 
 from __future__ import annotations
 
@@ -6,15 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from buildarena_benchmark.leaderboard.cells import Cell
 from buildarena_benchmark.leaderboard.standings import Standing
-from buildarena_benchmark.statistics import mean_ranks
-
-Weights = Mapping[str, Mapping[str, int]]
-"""Weight of each difficulty dimension, by task."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +31,6 @@ class OverallRow:
         output_tokens_mean: Mean of the tasks' mean output tokens.
         pareto: Whether it succeeded at all and no other ranked configuration is both better and
             cheaper.
-        dimensions: Score from 0 to 1 by difficulty dimension; empty when it is not ranked.
     """
 
     model: str
@@ -54,25 +46,20 @@ class OverallRow:
     cost_usd_mean: float | None
     output_tokens_mean: float | None
     pareto: bool
-    dimensions: Mapping[str, float]
 
 
 def overall_rows(
-    cells: Mapping[str, Mapping[str, Cell]], standing: Standing | None, weights: Weights
+    cells: Mapping[str, Mapping[str, Cell]], standing: Standing | None
 ) -> list[OverallRow]:
     """Configurations over tasks, the best first, unranked ones last.
 
     Args:
         cells: Cells by task and configuration.
         standing: The ranks of the complete ones; None when none is complete.
-        weights: Difficulty weights of the tasks that have some.
     """
     tasks = [task for task, row in cells.items() if any(cell.trials for cell in row.values())]
     names = sorted({name for row in cells.values() for name in row})
-    complete, dimensions = list(standing.names) if standing else [], None
-    if standing:
-        table = [[cells[task][name] for name in complete] for task in tasks]
-        dimensions = dimension_scores(table, [weights.get(task, {}) for task in tasks])
+    complete = list(standing.names) if standing else []
     rows = []
     for name in names:
         own = [cells[task][name] for task in cells if name in cells[task]]
@@ -93,48 +80,10 @@ def overall_rows(
                 cost_usd_mean=_mean([cell.cost_usd_mean for cell in own]),
                 output_tokens_mean=_mean([cell.output_tokens_mean for cell in own]),
                 pareto=False,
-                dimensions=dimensions[place] if dimensions and place is not None else {},
             )
         )
     rows = [_with_pareto(row, rows) for row in rows]
     return sorted(rows, key=_order)
-
-
-def dimension_scores(
-    table: Sequence[Sequence[Cell]], weights: Sequence[Mapping[str, int]]
-) -> list[dict[str, float]]:
-    """Scores of configurations along the difficulty dimensions.
-
-    On each task a configuration scores (M - r) / (M - 1) for its mean rank r of M, so 1 for the
-    best in everything and 0 for the worst; a dimension's score is the mean over tasks, weighted
-    by how much the task asks of it. A single configuration has none to be compared with and
-    scores 1.
-
-    Args:
-        table: M cells for each of T tasks.
-        weights: Weights by dimension for each task; tasks without weights are left out.
-
-    Source:
-        Caption and text on the radar figure of the BuildArena paper; weights: the task files.
-    """
-    models = len(table[0])
-    scores = np.ones((len(table), models))
-    for number, row in enumerate(table):
-        if models > 1:
-            scores[number] = (models - _single_task_ranks(row)) / (models - 1)
-    names = dict.fromkeys(name for task in weights for name in task)
-    by_model: list[dict[str, float]] = [{} for _ in range(models)]
-    for name in names:
-        weight = np.array([task.get(name, 0) for task in weights], float)
-        for model in range(models):
-            by_model[model][name] = float(weight @ scores[:, model] / weight.sum())
-    return by_model
-
-
-def _single_task_ranks(row: Sequence[Cell]) -> NDArray[np.float64]:
-    success = np.array([[cell.success_rate or 0.0 for cell in row]])
-    indicator = np.array([[cell.indicator_mean or 0.0 for cell in row]])
-    return mean_ranks(success, indicator)
 
 
 def _counts(cell: Cell | None) -> bool:

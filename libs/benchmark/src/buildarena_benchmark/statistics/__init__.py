@@ -11,10 +11,8 @@ from buildarena_benchmark.statistics.comparisons import (
     paired_successes,
 )
 from buildarena_benchmark.statistics.economy import (
-    TokenBin,
     cost_per_success,
     expert_scores,
-    token_bins,
 )
 from buildarena_benchmark.statistics.means import MIN_SUCCESSES, mean_interval
 from buildarena_benchmark.statistics.permutation import PairTests, Sample, pair_tests
@@ -48,7 +46,6 @@ __all__ = [
     "PairedTest",
     "Ranking",
     "Sample",
-    "TokenBin",
     "adjusted",
     "board_power",
     "combined",
@@ -66,7 +63,6 @@ __all__ = [
     "pass_at_k",
     "pass_hat_k",
     "rank_models",
-    "token_bins",
     "trials_needed",
     "wilson_interval",
 ]

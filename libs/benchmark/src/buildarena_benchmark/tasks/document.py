@@ -68,7 +68,6 @@ def _known_set(chosen: str) -> str:
     return chosen
 
 
-Weight = Annotated[int, Field(ge=1, le=3)]
 Text = Annotated[str, AfterValidator(_plain)]
 Word = Annotated[str, Field(pattern=r"^[\w .,/²³·%°-]+$", min_length=1, max_length=60)]
 """Text for tables, plots and TeX: without characters that have a meaning there."""
@@ -196,17 +195,6 @@ class Indicator(Document):
         return "" if self.unit == "1" else f" {self.unit}"
 
 
-class Difficulty(Document):
-    """Weight of each difficulty dimension, 1 (low) to 3 (high)."""
-
-    quantification: Weight
-    robustness: Weight
-    magnitude: Weight
-    compositionality: Weight
-    precision: Weight
-    ambiguity: Weight
-
-
 class TaskDocument(Document):
     """A task file; see `Task` for what the fields mean."""
 
@@ -221,7 +209,6 @@ class TaskDocument(Document):
     unknowns: Annotated[Unknowns | None, Field(exclude_if=lambda value: value is None)] = None
     scoring: scoring_type()  # type: ignore[valid-type]  # known when the registry is read
     indicator: Indicator
-    difficulty: Difficulty | None = None
 
     @field_validator("scenario")
     @classmethod

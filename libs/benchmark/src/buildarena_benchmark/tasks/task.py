@@ -4,7 +4,6 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any, Final, Literal, Self
 
 from buildarena_benchmark.families.given import Beginning, given_machine
@@ -35,7 +34,6 @@ class Task:
         scenario: What a machine is put through.
         scoring: The scorer's name and thresholds.
         indicator: The figure the task is ranked by.
-        difficulty: Weight of each difficulty dimension, 1 to 3; empty if not stated.
         given: What builders begin with; None where they begin with nothing.
         unknowns: Numbers of the scenario that are drawn and not told; None where all are told.
         seed: What draws them; always 0 where nothing is drawn.
@@ -51,7 +49,6 @@ class Task:
     scenario: Scenario
     scoring: Scoring
     indicator: Indicator
-    difficulty: Mapping[str, int]
     beginning: Beginning | None = None
     unknowns: Unknowns | None = None
     seed: int = 0
@@ -114,13 +111,11 @@ class Task:
                 for part in ("beginning", "unknowns")
                 if getattr(self, part) is not None
             },
-            "difficulty": dict(self.difficulty) or None,
         }
 
 
 def task_of(document: TaskDocument) -> Task:
     """The task a validated document describes."""
-    weights = document.difficulty.model_dump() if document.difficulty else {}
     return Task(
         name=document.name,
         version=_version_of(document),
@@ -132,7 +127,6 @@ def task_of(document: TaskDocument) -> Task:
         scenario=document.scenario,
         scoring=document.scoring,
         indicator=document.indicator,
-        difficulty=MappingProxyType(weights),
         beginning=document.beginning,
         unknowns=document.unknowns,
     )

@@ -71,7 +71,6 @@ class Shown:
     question: Question
     chosen: ChosenCells
     records: Mapping[CellKey, CellRecord]
-    weights: Mapping[str, Mapping[str, int]]
     tests: TestCache
 
     def board(self) -> Board:
@@ -85,7 +84,6 @@ class Shown:
             self._cell,
             outdated,
             overall=self.question.query.overall,
-            weights=self.weights,
             tests=self.tests,
         )
 
@@ -202,12 +200,10 @@ class BoardCache:
         versions = {name: task.version for name, task in self._tasks.items()}
         chosen = choose_cells(heads, versions, question.query)
         wanted = (*chosen.shown.values(), *chosen.outdated.values())
-        tasks = self._tasks.items()
         return Shown(
             question=question,
             chosen=chosen,
             records={key: records[key] for keys in wanted for key in keys},
-            weights={name: task.difficulty for name, task in tasks if task.difficulty},
             tests=self._tests,
         )
 

@@ -17,7 +17,6 @@ from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import conditional
 from buildarena_api.http.problems import invalid, unknown
 from buildarena_api.leaderboard.cache import Question
-from buildarena_api.leaderboard.plot_data import Figures, figures_view
 from buildarena_api.leaderboard.views import Board, board_view
 from buildarena_api.routes.verifications import request_verifications
 from buildarena_backend.boards.tallying import CellRecord
@@ -112,25 +111,6 @@ def leaderboard(
                 registry=services.registry,
                 catalogue=services.context.tasks,
             )
-            .model_dump_json()
-            .encode()
-        ),
-    )
-    return conditional(request, answer, "application/json")
-
-
-@router.get("/leaderboard/figures", response_model=Figures)
-def figures(services: ServicesDep, selection: SelectionDep, request: Request) -> Any:
-    """What the figures of a board are drawn from; reports are drawn from the same."""
-    track = selection.track
-    if track is None:
-        return Figures(track=None, dimensions=[], failures=[], cost=[], front=[])
-    tasks = services.boards.tasks()
-    answer = services.boards.answer(
-        selection.question,
-        "figures",
-        lambda shown: (
-            figures_view(track, shown.board(), shown.inside(), tasks=tasks)
             .model_dump_json()
             .encode()
         ),

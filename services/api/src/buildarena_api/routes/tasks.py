@@ -60,7 +60,6 @@ class TaskView(BaseModel):
     ceiling: float | None = Field(
         description="The greatest indicator there is; null where only what can be built bounds it"
     )
-    difficulty: dict[str, int] = Field(description="Weight of each difficulty dimension, if any")
     custom: bool = Field(description="Whether somebody uploaded it")
     created_at: datetime | None = Field(description="When this version was; null for built-in ones")
 
@@ -159,7 +158,6 @@ def _fields(entry: CatalogueEntry) -> dict[str, Any]:
         "indicator": task.indicator.name,
         "unit": task.indicator.unit,
         "ceiling": task.ceiling,
-        "difficulty": dict(task.difficulty),
         "custom": entry.custom,
         "created_at": entry.created_at,
     }
