@@ -47,7 +47,7 @@ Around = Callable[[TrialRequest, Callable[[], TrialResult]], TrialResult]
 BUILDARENA = str(Path(sys.executable).parent / "buildarena")
 QUEUE = "simulate.mujoco"
 FEW_BLOCKS = "constraints: {max_blocks: 30}\n"
-SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 160").replace("short", "seconds")
+SECONDS = SHORT.replace("duration_s: 0.4", "duration_s: 400").replace("short", "seconds")
 ENDLESS = SHORT.replace("duration_s: 0.4", "duration_s: 600").replace("short", "endless")
 UNNEEDED = {"celery", "kombu", "sqlalchemy", "redis", "psycopg", "obstore", "alembic", "fastapi"}
 
