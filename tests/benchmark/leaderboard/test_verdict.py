@@ -29,7 +29,6 @@ def row(model: str, rank: int | None, high: int = 1, rate: float = 0.5, **values
         "cost_usd_mean": None,
         "output_tokens_mean": None,
         "pareto": False,
-        
     }
     return OverallRow(model=model, rank=rank, **{**usual, **values})
 
