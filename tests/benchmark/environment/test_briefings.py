@@ -126,6 +126,13 @@ def test_every_scorer_says_what_happened_whatever_it_could_measure():
             assert ": 0.25 1." not in text, "a ratio has no unit"
 
 
+def test_a_trial_that_blew_up_is_told_by_its_flag_whatever_its_metrics_are():
+    figures = dict.fromkeys(("distance", "rms_acceleration", "rise", "landed", "way", "touched"))
+    blown = replace(FAILED, metrics=figures, flags=("unstable",))
+    for given in builtin_tasks().values():
+        assert explain(given, blown) == meaning("unstable")
+
+
 def test_a_success_that_a_flag_disqualifies_is_none():
     flagged = replace(FAILED, success=True, flags=("start_too_high",))
     text = score_text(builtin_tasks()["lift-2"], flagged)

@@ -79,10 +79,11 @@ def explain(task: "Task", found: Score) -> str:
         found: The trial's score.
 
     Returns:
-        One sentence that names the figure which decided, and one for each flag.
+        One sentence that names the figure which decided, and one for each flag. Of a trial that
+        blew up or was not measured there is no such figure.
     """
     said = [meaning(flag) for flag in found.flags]
-    if FORCES_NOT_MEASURED.name not in found.flags:
+    if not {FORCES_NOT_MEASURED.name, UNSTABLE.name} & set(found.flags):
         said.insert(0, known_scorers()[task.scorer].explain(task.scoring, task.scenario, found))
     return " ".join(said)
 

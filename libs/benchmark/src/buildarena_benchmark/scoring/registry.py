@@ -18,6 +18,8 @@ from buildarena_benchmark.categories import categories
 from buildarena_benchmark.scoring.scorer import REFUTED, UNSTABLE, Flag, Scorer
 
 GROUP: Final = "buildarena.scorers"
+_NO_SCORERS: Final = {"registry", "expert"}
+"""Modules that are no scorers, and that need the scorers to be known."""
 
 
 @cache
@@ -63,6 +65,3 @@ def scoring_type() -> Any:
     """What a task file may say under `scoring`: the union of all scorers' parameters, by name."""
     union = reduce(or_, (scorer.parameters for scorer in known_scorers().values()))
     return Annotated[union, Field(discriminator="name")]
-
-
-_NO_SCORERS: Final = {"registry", "expert"}

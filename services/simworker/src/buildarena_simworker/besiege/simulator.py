@@ -28,8 +28,6 @@ from buildarena_simworker.besiege.play import LAGGING, Played, RunFailedError, p
 from buildarena_simworker.besiege.set_up import make_desktop
 from buildarena_simworker.besiege.settings import BesiegeSettings
 
-FALLEN_S: Final = 0.1
-"""Until then a machine has fallen by less than 0.2 units."""
 HIGHEST_START: Final = 1.5
 """How far above its place on the ground a machine may be shown at first, units."""
 

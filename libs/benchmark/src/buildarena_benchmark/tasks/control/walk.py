@@ -95,7 +95,7 @@ def judge(
     links = links_of(machine, trajectory)
     touches = touching(scenario, machine, trajectory, links)
 
-    on_feet = walked(machine, trajectory, links, touches, axis=_NORTH, since=0)
+    on_feet = walked(machine, trajectory, links, touches)
     along = partial(_walk, path, length=scoring.min_distance)
     distance, success, end = along(on_feet, upright & whole, lane=scoring.lane)
     _, with_losses, _ = along(on_feet, upright, lane=scoring.lane)

@@ -17,6 +17,7 @@ from buildarena_simulation import Scenario, Trajectory
 from buildarena_simulation.scenario import TerrainBox
 from buildarena_simulation.terrain import shape_of
 
+_NORTH: Final = 1
 TOUCHES: Final = 0.05
 """What is no higher above ground or terrain touches it, units: engines let bodies sink in by 0.02,
 and a tilted face is looked at every half unit."""
@@ -104,11 +105,8 @@ def walked(
     trajectory: "Trajectory",
     links: NDArray[np.intp],
     touches: Mask,
-    *,
-    axis: int,
-    since: int,
 ) -> Series:
-    """How far a machine has walked along an axis since a sample, (T - since,), units.
+    """Return how far north a machine has walked, (T,), units.
 
     The least of how far the starting block came, how far its hindmost point did, and how far each
     foot was carried: each link that has touched anything until then.
@@ -118,14 +116,12 @@ def walked(
         trajectory: The trial.
         links: (N,) as `links_of` says.
         touches: (T, L) as `touching` says.
-        axis: 0 east, 1 north.
-        since: The sample.
     """
-    start = trajectory.positions[since:, starting_block(machine, trajectory), axis]
-    low, _ = extents(machine, trajectory, axis=axis)
-    rear = low[since:].min(axis=1)
-    carried = np.cumsum(stepped(trajectory, links, touches, axis), axis=0)[since:]
-    is_foot = np.maximum.accumulate(touches, axis=0)[since:]
+    start = trajectory.positions[:, starting_block(machine, trajectory), _NORTH]
+    low, _ = extents(machine, trajectory, axis=_NORTH)
+    rear = low.min(axis=1)
+    carried = np.cumsum(stepped(trajectory, links, touches, _NORTH), axis=0)
+    is_foot = np.maximum.accumulate(touches, axis=0)
     feet = np.where(is_foot, carried - carried[0], np.inf).min(axis=1)
     return np.asarray(np.minimum(np.minimum(start - start[0], rear - rear[0]), feet))
 

@@ -252,7 +252,7 @@ def explain(scoring: TransportScoring, scenario: Scenario, found: Finding) -> st
     """Return what happened; see `Scorer`."""
     told = found.metrics
     if not told.get("driven"):
-        return f"It did not drive: {told.get('wheels', 0)} powered wheels were told to turn."
+        return f"It did not drive: no key turned its {told.get('wheels', 0)} powered wheels."
     what = "The cargo" if scoring.subject == "cargo" else "The vehicle"
     if scoring.back and not found.success:
         reached = (
