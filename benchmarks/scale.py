@@ -55,8 +55,8 @@ FILTERS: dict[str, dict[str, Any]] = {
     "model": {"model": "made-up/model-3"},
     "cell": {"task": "lift-1", "model": "made-up/model-3", "track": TRACKS[0]},
     "track": {"track": TRACKS[1]},
-    "indicator_min": {"indicator_min": 900},
-    "indicator_max": {"indicator_max": -1},
+    "min_indicator": {"min_indicator": 900},
+    "max_indicator": {"max_indicator": -1},
     "sweep": {"sweep": "sweep_ended0"},
     "id_prefix": {"id_prefix": "job_ab12"},
     "rare text": {"text": "zzzz"},
@@ -211,7 +211,7 @@ def measure_sweep(client: httpx.Client, jobs: int) -> dict[str, Any]:
     start = time.perf_counter()
     answer = client.post("/v1/sweeps", json=spec)
     took = time.perf_counter() - start
-    if answer.status_code != 202:
+    if answer.status_code != 201:
         raise RuntimeError(answer.text[:500])
     return {"jobs_of_large_sweep": answer.json()["jobs"], "sweep_of_100000_s": round(took, 1)}
 
