@@ -133,7 +133,7 @@ SELECT 'job_' || substr(md5(:kind || n), 1, 20), name, version,
         THEN 'construction_failed' WHEN other > 0.99 THEN 'errored' ELSE 'unsuccessful' END,
     CASE WHEN ended AND NOT won AND other < 0.1 THEN 'objection'
         WHEN ended AND NOT won AND other > 0.99 THEN 'lost_worker' END,
-    CASE WHEN ended THEN won END,
+    CASE WHEN ended THEN won::int END,
     CASE WHEN won THEN -100 * ln(1 - other) WHEN ended AND other >= 0.1 THEN 5 * other
         WHEN ended THEN 0 END,
     CASE WHEN ended THEN jsonb_build_object('parts', 5 + (85 * luck)::int, 'mass', 10.5) END,

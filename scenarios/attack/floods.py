@@ -115,7 +115,7 @@ def score_all(tenants: Tenants) -> None:
     with database.transaction() as connection:
         connection.execute(
             text(
-                "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = false,"
+                "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = 0,"
                 " indicator = 0, metrics = '{}', finished_at = now()"
             )
         )

@@ -73,7 +73,7 @@ WRONG = {
         "(SELECT count(*) FROM journal WHERE payer = budgets.id)"
     ),
 }
-SCORE = JobScore(outcome=Outcome.UNSUCCESSFUL, success=False, indicator=0.0)
+SCORE = JobScore(outcome=Outcome.UNSUCCESSFUL, success=0.0, indicator=0.0)
 NEED = Need(cost_usd=0, tokens=10)
 
 

@@ -61,7 +61,7 @@ def random_job(rng: random.Random, number: int) -> dict[str, object]:
         "state": "done",
         "outcome": outcome,
         "reason": rng.choice(("objection", None)) if outcome != "success" else None,
-        "success": outcome == "success" if rng.random() < 0.9 else None,
+        "success": rng.choice((0.25, 1.0)) * (outcome == "success") if rng.random() < 0.9 else None,
         "indicator": rng.choice((None, 0.0, 5.0, rng.expovariate(0.01), -rng.random())),
         "metrics": rng.choice((None, {}, {"parts": rng.randrange(90)})),
         "flags": rng.choice(FLAGS),

@@ -130,7 +130,7 @@ def test_equal_verifications_are_one_and_open_ones_are_bounded(
     greedy, other, third = as_key(), as_key(), as_key()
     execute(
         context,
-        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = false,"
+        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = 0,"
         " indicator = 0, metrics = '{}', finished_at = now()",
     )
     ids = [job.id for job in context.store.jobs.page(limit=20, sweep_id=sweep_id)]

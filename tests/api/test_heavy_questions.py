@@ -46,7 +46,7 @@ def board(context, submissions) -> None:
     submissions.submit_sweep(SweepSpec(tasks=["lift-1"], models=["builtin/idle"], samples=2))
     execute(
         context,
-        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = false,"
+        "UPDATE jobs SET state = 'done', outcome = 'unsuccessful', success = 0,"
         " indicator = 0, metrics = '{}', finished_at = now()",
     )
 

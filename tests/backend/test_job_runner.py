@@ -17,7 +17,7 @@ from buildarena_backend.process.job_runner import SLICE_S, JobRunner
 from buildarena_backend.process.owner_slots import OwnerSlots
 from buildarena_backend.results.results import JobScore
 
-SCORE = JobScore(outcome="unsuccessful", success=False, indicator=1.0)
+SCORE = JobScore(outcome="unsuccessful", success=0.0, indicator=1.0)
 SPEC = JobSpec(task="support-1", model="builtin/idle")
 SWEEP = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
 

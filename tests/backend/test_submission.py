@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -13,11 +14,13 @@ from buildarena_backend.agents.workbench import MAX_BYTES, MAX_DEPTH, check_argu
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import JobSpec, SweepSpec
 from buildarena_backend.errors import SubmissionError
+from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.external_calls import ExternalCall
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
+from buildarena_backend.states import JobState
 from buildarena_backend.submission.submission import Submissions
-from buildarena_backend.trials.scoring import best_rollout
+from buildarena_backend.trials.scoring import best_rollout, rollout_score
 from buildarena_benchmark import builtin_tasks
 
 MODELS = ["builtin/expert", "builtin/idle"]
@@ -129,6 +132,36 @@ def test_of_rollouts_an_honest_success_comes_first_then_the_larger_indicator() -
             for n, (s, i, f) in enumerate(rollouts)
         ]
         assert best_rollout(made, builtin_tasks()["transport-1"]).number == best, rollouts
+
+
+def test_a_jobs_score_is_the_mean_over_its_worlds_of_which_the_exact_one_is_one(subtests) -> None:
+    task, engine = builtin_tasks()["transport-1"], "mujoco"
+    values = dict.fromkeys(field.name for field in fields(Job)) | {"state": JobState.DONE}
+    job = Job(**values | {"model_config": {}, "track_config": {}, "seed": 0, "task": task.name})
+    empty = dict.fromkeys(field.name for field in fields(RolloutRecord)) | {"engine": engine}
+    empty["finished_at"] = datetime(2026, 1, 1, tzinfo=UTC)
+    flagged = ("no_wheels",)
+    for worlds, outcome, success, indicator in [
+        ([(True, 20.0, ())], "success", 1.0, 20.0),
+        ([(False, 20.0, ())], "unsuccessful", 0.0, 0.0),
+        ([(False, 9.0, ()), (True, 20.0, ()), (True, 40.0, ())], "success", 2 / 3, 20.0),
+        ([(True, 30.0, ()), (False, 9.0, ()), (False, 9.0, ())], "unsuccessful", 1 / 3, 10.0),
+        ([(True, 30.0, ()), (True, 90.0, flagged)], "success", 0.5, 15.0),
+        ([(True, 30.0, flagged), (True, 30.0, ())], "success", 0.5, 15.0),
+    ]:
+        made = [
+            RolloutRecord(
+                **empty
+                | {"number": n, "success": s, "indicator": i, "flags": f}
+                | {"final": True, "seed": n or None}
+            )
+            for n, (s, i, f) in enumerate(worlds)
+        ]
+        test = replace(made[0], number=9, final=False, seed=7, indicator=1e6)
+        with subtests.test(worlds=worlds):
+            found = rollout_score(job, task, [test, *made])
+            assert (found.outcome, found.success) == (outcome, success)
+            assert found.indicator == pytest.approx(indicator)
 
 
 REFUSED = {"arguments": {"n": [1, "ü"]}, "ok": False, "reason": "block_presence", "feedback": "No."}

@@ -29,7 +29,7 @@ def sweep(context, submissions) -> None:
     with context.store.database.transaction() as connection:
         for job in connection.execute(select(jobs)).all():
             load, flags = SCORES[job.model]
-            score = {"success": True, "indicator": load, "flags": flags, "metrics": {"parts": 9}}
+            score = {"success": 1.0, "indicator": load, "flags": flags, "metrics": {"parts": 9}}
             connection.execute(
                 update(jobs)
                 .where(jobs.c.id == job.id)

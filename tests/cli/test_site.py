@@ -221,7 +221,7 @@ def row(id_: str, **change: object) -> dict[str, object]:
     usual = {
         **dict.fromkeys(("task", "task_version", "configuration", "track"), "x"),
         "state": "done",
-        "success": True,
+        "success": 1.0,
         "indicator": 1.0,
         "seed": 0,
         "flags": [],
@@ -231,7 +231,7 @@ def row(id_: str, **change: object) -> dict[str, object]:
 
 def test_the_best_of_a_cell_are_kept() -> None:
     rows = [
-        row("failed", success=False, indicator=9.0),
+        row("failed", success=0.0, indicator=9.0),
         row("flagged", indicator=8.0, flags=["cheat"]),
         row("noted", indicator=7.0, flags=["never_fell"]),
         row("later", indicator=7.0, seed=3),

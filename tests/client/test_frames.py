@@ -41,7 +41,7 @@ JOB = {
 DONE = {
     **JOB,
     "id": "job_2",
-    "success": True,
+    "success": 1.0,
     "indicator": 4,
     "flags": ["unstable", "odd"],
     "metrics": {"load": 3, "span": True, "name": "x", "peaks": [1, 2]},
@@ -55,7 +55,7 @@ TIME = datetime(2026, 3, 1, 10, 0, 0, 250_000, tzinfo=UTC)
 TYPES = {
     "id": ("string", pl.String),
     "seed": ("int64", pl.Int64),
-    "success": ("boolean", pl.Boolean),
+    "success": ("float64", pl.Float64),
     "indicator": ("float64", pl.Float64),
     "created_at": ("datetime64[us, UTC]", pl.Datetime("us", "UTC")),
     "usage.cost_usd": ("float64", pl.Float64),

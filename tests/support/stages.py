@@ -117,7 +117,8 @@ def verdict(context: Context, job_id: str) -> str | None:
 
 
 _RESTORED = """
-UPDATE jobs SET indicator = kept.indicator, input_tokens = kept.input_tokens, metrics = kept.metrics
+UPDATE jobs SET success = kept.success, indicator = kept.indicator,
+    input_tokens = kept.input_tokens, metrics = kept.metrics
 FROM kept_jobs AS kept WHERE kept.id = jobs.id;
 DELETE FROM rollouts; INSERT INTO rollouts SELECT * FROM kept_rollouts;
 DELETE FROM journal; INSERT INTO journal SELECT * FROM kept_journal;

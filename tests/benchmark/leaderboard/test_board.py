@@ -90,12 +90,12 @@ def test_what_a_flag_does(subtests) -> None:
     assert flags.is_disqualified(("never_fell", "does_not_span"))
 
 
-def test_a_job_in_varied_worlds_counts_by_what_it_did_in_these() -> None:
+def test_a_job_counts_by_the_share_of_its_worlds_and_its_mean_over_them() -> None:
     found = trials("throw-1", "a", 2, 4)
-    found[0] = replace(found[0], robustness=1.0, robust_indicator=50.0)
+    found[0] = replace(found[0], success=0.5, indicator=50.0)
     cell = summarise(found)
     assert (cell.indicator_mean, cell.indicator_best) == ((50.0 + 11.0) / 4, 50.0)
-    assert cell.score is not None
+    assert (cell.score is None, cell.successes) == (False, 1.5)
     assert [t.indicator for t in counted_trials(found)] == [50.0, 11.0, 0.0, 0.0]
 
 

@@ -98,15 +98,16 @@ def job_trial(job_id: str, url: str | None = None) -> Trial:
         if name not in job["artifacts"]:
             ended = job["reason"] or job["outcome"] or job["state"]
             raise ClientError(f"{job_id} has no trial: {ended}")
+        exact = job["worlds"][0]
         task = client.task(job["task"], version=job["task_version"])
         return Trial(
             task=parse_task(json.dumps(task["document"]), origin=f"task {job['task']}"),
             machine=_machine(client, job_id, job),
             score=Score(
-                success=bool(job["success"]),
-                indicator=job["indicator"] or 0.0,
+                success=exact["success"],
+                indicator=exact["indicator"],
                 metrics=job["metrics"],
-                flags=tuple(job["flags"]),
+                flags=tuple(exact["flags"]),
             ),
             trajectory=read_trajectory(client.artifact(job_id, name)),
         )

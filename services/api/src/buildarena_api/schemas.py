@@ -69,8 +69,10 @@ class JobView(_Answer):
     outcome: Outcome | None = Field(description="How it ended; null until it has")
     reason: str | None = Field(description="Class of the failure, if any")
     detail: str | None
-    success: bool | None
-    indicator: float | None = Field(description="The task's performance indicator")
+    success: float | None = Field(description="Share of its worlds that it passed, 0 to 1")
+    indicator: float | None = Field(
+        description="The task's indicator, as a mean over its worlds; 0 where it failed"
+    )
     censored: bool = Field(description="Whether the indicator is at least what it says")
     metrics: dict[str, Any]
     flags: Flags = Field(description="Remarks on the score; the board says what of")
@@ -105,12 +107,24 @@ class JobView(_Answer):
         )
 
 
+class WorldView(BaseModel):
+    """One trial that a job is scored by: in the exact world, or in a varied one."""
+
+    rollout: int = Field(description="Number of its trajectory and scene")
+    exact: bool = Field(description="Whether it is the world that builders know")
+    success: bool = Field(description="Whether it passed, and no flag disqualifies it")
+    indicator: float = Field(description="The task's indicator, whether it passed or not")
+    flags: list[str]
+    explanation: str = Field(description="What happened and by how much it missed")
+
+
 class JobDetail(JobView):
     """A job with its manifest, attempts and artifacts."""
 
     explanation: str | None = Field(
         description="What happened and by how much it missed, in words; null until it has ended"
     )
+    worlds: list[WorldView] = Field(description="What the score is the mean of; the exact first")
     manifest: dict[str, Any] | None = Field(description="Versions of what can change the score")
     attempts: list[AttemptView]
     artifacts: dict[str, str] = Field(description="SHA-256 of each artifact by name")

@@ -119,6 +119,10 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
     say(f"outcome   {ended}" + (f" ({job['reason']})" if job["reason"] else ""))
     if job.get("explanation"):
         say(f"why       {job['explanation']}")
+    worlds = job.get("worlds", ())
+    for world in worlds if len(worlds) > 1 else ():
+        passed = "passed" if world["success"] else "failed"
+        say(f"world     {world['rollout']} {passed} {number(world['indicator'], 3)}")
     if job["flags"]:
         say(f"flags     {', '.join(job['flags'])}")
     say(f"indicator {number(job['indicator'], 3, at_least=job['censored'])}")

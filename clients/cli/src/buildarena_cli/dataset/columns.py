@@ -44,7 +44,7 @@ JOBS: Final[Sequence[Column]] = (
     Column("model", _TEXT, "What built: a model, a baseline, `agent/NAME` or `human/NAME`."),
     Column("seed", _WHOLE, "Seed of the session; trials of one machine are alike."),
     Column("outcome", _TEXT, "How the job ended; `errored` and `cancelled` ones have no score."),
-    Column("success", _YES, "Whether the task was solved, whatever the flags say."),
+    Column("success", _REAL, "Share of its worlds that the machine passed, 0 to 1."),
     Column("indicator", _REAL, "The task's figure: load, distance, height or thrust to weight."),
     Column("task_version", _TEXT, "Hash of everything in the task that can change a score."),
     Column("task_title", _TEXT, "The task's title."),

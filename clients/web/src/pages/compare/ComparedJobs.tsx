@@ -26,7 +26,7 @@ export function ComparedJobs({ ids }: { ids: readonly [string, string] }) {
   const jobs = [first.data, second.data] as const;
   return (
     <Stack gap="xs">
-      {jobs.some((job) => rolloutsOf(job.artifacts).length === 0) ? (
+      {jobs.some((job) => rolloutsOf(job).length === 0) ? (
         <Empty title="One of both had no trial">Only machines that were tried can be seen side by side.</Empty>
       ) : (
         <Suspense fallback={<Loading rows={10} />}>

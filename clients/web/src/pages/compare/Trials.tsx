@@ -19,7 +19,7 @@ type Jobs = readonly [JobDetail, JobDetail];
 
 /** Two trials by one clock, seen by cameras that turn together. */
 export default function Trials({ jobs }: { jobs: Jobs }) {
-  const [a, b] = jobs.map((job) => rolloutsOf(job.artifacts)[0] ?? 0) as [number, number];
+  const [a, b] = jobs.map((job) => rolloutsOf(job)[0] ?? 0) as [number, number];
   const [firstScene, secondScene] = useQueries({ queries: [sceneQuery(jobs[0].id, a), sceneQuery(jobs[1].id, b)] });
   const [first, second] = useQueries({
     queries: [

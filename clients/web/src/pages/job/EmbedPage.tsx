@@ -19,7 +19,7 @@ export default function EmbedPage() {
   return (
     <Answered query={query} rows={8}>
       {(job) => {
-        const trials = rolloutsOf(job.artifacts);
+        const trials = rolloutsOf(job);
         return (
           <>
             <Group justify="space-between" gap="xs" mb="xs">

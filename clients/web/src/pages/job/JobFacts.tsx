@@ -55,9 +55,9 @@ function sentenceOf({ explanation, reason, detail }: JobDetail): string {
 
 /** Where a run that failed was first refused something. */
 function FirstMistake({ job }: { job: JobDetail }) {
-  const turns = useQuery({ ...transcriptQuery(job.id), enabled: job.success === false }).data?.turns ?? [];
+  const turns = useQuery({ ...transcriptQuery(job.id), enabled: job.success === 0 }).data?.turns ?? [];
   const first = turns.find((turn) => turn.actions.some((action) => !action.ok));
-  if (job.success !== false || first === undefined) return null;
+  if (job.success !== 0 || first === undefined) return null;
   return (
     <>
       The first of {counted(job.refused_actions, "refused action")} is in{" "}

@@ -70,7 +70,7 @@ function Room({ job }: { job: JobDetail }) {
   const replay = useQuery(replayQuery(job.id));
   const change = (to: JobSearch): Promise<void> =>
     navigate({ search: (before) => ({ ...before, ...to }), replace: true, resetScroll: false });
-  const trials = rolloutsOf(job.artifacts);
+  const trials = rolloutsOf(job);
   const tried = trials.length > 0;
   const build = useBuild(replay.data ?? null, transcript.data?.turns, search, (to) => {
     void change(tried ? { ...to, view: "building" } : to);

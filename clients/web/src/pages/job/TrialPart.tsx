@@ -19,6 +19,13 @@ interface TrialPartProps {
   change?: (to: JobSearch) => Promise<void>;
 }
 
+/** Which world a trial is of, with its verdict where it counts. */
+function labelOf(job: JobDetail, number: number, place: number): string {
+  const world = job.worlds.find((one) => one.rollout === number);
+  if (world === undefined) return `Test trial ${number + 1}`;
+  return `${world.success ? "✓" : "✗"} ${world.exact ? "Exact world" : `Varied world ${place}`}`;
+}
+
 /** The scored trial of a job, or one of those in varied worlds. */
 export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
   const [own, setOwn] = useState<JobSearch>({});
@@ -48,10 +55,7 @@ export function TrialPart({ job, numbers, seen, change }: TrialPartProps) {
           onChange={(value) => {
             set({ rollout: Number(value), t: undefined, camera: undefined });
           }}
-          data={numbers.map((one, place) => ({
-            value: String(one),
-            label: place === 0 ? "Trial" : `Varied world ${place}`,
-          }))}
+          data={numbers.map((one, place) => ({ value: String(one), label: labelOf(job, one, place) }))}
         />
       )}
       {error !== null ? (

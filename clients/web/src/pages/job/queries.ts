@@ -1,5 +1,6 @@
 import { queryOptions } from "@tanstack/react-query";
 import { bytesOf, jsonOf, type Schema } from "../../api/client";
+import type { JobDetail } from "../../api/queries";
 import { ApiError } from "../../api/problem";
 import type { MachineScene } from "../../scene/machine";
 import type { Scenario } from "../../scene/Surroundings";
@@ -66,10 +67,12 @@ export const trial = (id: string, number: number, hash: string | undefined) =>
     },
   });
 
-/** The numbers of a job's rollouts that left a trajectory, in order. */
-export function rolloutsOf(artifacts: Readonly<Record<string, string>>): number[] {
-  return Object.keys(artifacts)
+/** The numbers of a job's trials that left a trajectory: those that score it first, then test trials. */
+export function rolloutsOf({ artifacts, worlds }: Pick<JobDetail, "artifacts" | "worlds">): number[] {
+  const kept = Object.keys(artifacts)
     .flatMap((name) => /^trajectory-(\d+)$/.exec(name)?.[1] ?? [])
     .map(Number)
     .sort((a, b) => a - b);
+  const scored = worlds.map((world) => world.rollout).filter((number) => kept.includes(number));
+  return [...scored, ...kept.filter((number) => !scored.includes(number))];
 }

@@ -12,11 +12,11 @@ export function Result({ job }: { job: JobDetail }) {
   const figures = Object.entries(job.metrics).filter(
     ([, value]) => typeof value === "number" || typeof value === "boolean",
   );
-  const trials = rolloutsOf(job.artifacts);
+  const trials = rolloutsOf(job);
   return (
     <Stack gap="sm" data-outcome={job.outcome ?? ""}>
       <Text fz="xl" fw={700} className="figures">
-        {job.success === true ? "✓ success" : "✗ no success"}
+        {job.outcome === "success" ? "✓ success" : "✗ no success"}
         {job.indicator !== null &&
           `: ${words(task.data?.indicator ?? "indicator")} ${job.censored ? "≥ " : ""}${number(job.indicator)} ${unit}`}
       </Text>

@@ -13,7 +13,7 @@ from buildarena_backend.journal.rollouts import RolloutRecord, RolloutRequest
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import Stage, simulate_queue
-from buildarena_benchmark import Score, Task, broken_constraint
+from buildarena_benchmark import Task, broken_constraint
 from buildarena_benchmark.environment.trials.trials import score_text
 from buildarena_geometry import Machine
 from buildarena_geometry.machine_files import machine_bytes
@@ -104,16 +104,10 @@ def trials_of(context: Context, job_id: str, task: Task) -> list[TriedOnce]:
 def _told(context: Context, task: Task, record: RolloutRecord) -> TriedOnce:
     if record.finished_at is None:
         return TriedOnce(number=record.number + 1, result=None, trace=())
-    measured = Score(
-        success=bool(record.success),
-        indicator=record.indicator or 0.0,
-        metrics=record.metrics or {},
-        flags=tuple(record.flags or ()),
-    )
     digest = record.trajectory_hash
     trajectory = None if digest is None else read_trajectory(context.artifacts.get(digest))
     return TriedOnce(
         number=record.number + 1,
-        result=score_text(task, measured, trajectory),
+        result=score_text(task, record.score, trajectory),
         trace=record.trace or (),
     )

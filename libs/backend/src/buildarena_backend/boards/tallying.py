@@ -38,8 +38,6 @@ from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.states import EXTERNAL_PROVIDER
 from buildarena_benchmark.leaderboard import (
-    ROBUST_INDICATOR,
-    ROBUSTNESS,
     UNKNOWN_TOKENS,
     Cell,
     CellName,
@@ -126,7 +124,6 @@ _GROUPS: Final = [
     *_CELL,
     jobs.c.outcome,
     jobs.c.reason,
-    func.coalesce(jobs.c.success, False).label("success"),
     func.coalesce(
         func.nullif(jobs.c.flags, literal_column("'null'::jsonb")), literal_column("'[]'::jsonb")
     ).label("flags"),
@@ -140,20 +137,14 @@ def _bytes_of(sent: Any) -> Any:
     return func.string_agg(sent, cast(literal(b"", LargeBinary), LargeBinary), type_=LargeBinary)
 
 
-_SUCCESS: Final = func.coalesce(jobs.c.success, False)
-_SHARE: Final = func.coalesce(
-    jobs.c.metrics[ROBUSTNESS].as_float(), case((_SUCCESS, 1.0), else_=0.0)
-)
-_GAINED: Final = func.coalesce(
-    jobs.c.metrics[ROBUST_INDICATOR].as_float(), case((_SUCCESS, jobs.c.indicator), else_=0.0), 0.0
-)
-"""As `EndedJob.share` and `EndedJob.gained`."""
+_GAINED: Final = func.coalesce(case((jobs.c.success > 0, jobs.c.indicator), else_=0.0), 0.0)
+"""As `EndedJob.gained`."""
 _OBJECT: Final = func.jsonb_typeof(jobs.c.refusals) == "object"
 _EACH: Final = [
     func.min(jobs.c.id).label("sample"),
     func.count().label("number"),
-    _bytes_of(func.float8send(_SHARE)).label("shares"),
-    _bytes_of(func.float8send(_GAINED)).label("gained"),
+    _bytes_of(func.float8send(func.coalesce(jobs.c.success, 0.0))).label("shares"),
+    _bytes_of(func.float8send(_GAINED)).label("indicators"),
     _bytes_of(func.float8send(cast(jobs.c.cost_usd, Double))).label("costs"),
     _bytes_of(func.int8send(jobs.c.output_tokens)).label("output_tokens"),
     func.max(func.coalesce(jobs.c.finished_at, jobs.c.created_at)).label("newest"),
@@ -193,12 +184,11 @@ def _tally_of(row: Row[Any]) -> Tally:
     return Tally(
         outcome=row.outcome,
         reason=row.reason,
-        success=row.success,
         flags=tuple(row.flags),
         by_runner=row.by_runner,
         unverified=row.unverified,
         shares=_numbers(row.shares, ">f8"),
-        indicators=_numbers(row.gained, ">f8"),
+        indicators=_numbers(row.indicators, ">f8"),
         costs_usd=_numbers(row.costs, ">f8") if known else np.full(row.number, np.nan),
         output_tokens=_numbers(row.output_tokens, ">i8")
         if known

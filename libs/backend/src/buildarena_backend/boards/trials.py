@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, Connection, Integer, cast, exists, func
 from buildarena_backend.database.rows import bound_texts
 from buildarena_backend.database.tables import jobs, sweep_jobs
 from buildarena_backend.states import EXTERNAL_PROVIDER, FILE_PROVIDER, Audit, JobState
-from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS, EndedJob
+from buildarena_benchmark.leaderboard import EndedJob
 
 CHUNK: Final = 5000
 """Rows that are in memory twice at a time while all are read."""
@@ -114,8 +114,6 @@ TRIAL_COLUMNS: Final = [
     (jobs.c.model_config["provider"].as_string() == EXTERNAL_PROVIDER).label("external"),
     jobs.c.limits,
     cast(jobs.c.metrics["parts"], Integer).label("parts"),
-    jobs.c.metrics[ROBUSTNESS].as_float().label("robustness"),
-    jobs.c.metrics[ROBUST_INDICATOR].as_float().label("robust_indicator"),
 ]
 
 
@@ -138,10 +136,8 @@ def read_trials(connection: Connection, query: Any) -> Iterator[EndedJob]:
             seed=row.seed,
             outcome=sys.intern(row.outcome),
             reason=None if row.reason is None else sys.intern(row.reason),
-            success=bool(row.success),
+            success=row.success or 0.0,
             indicator=row.indicator or 0.0,
-            robustness=row.robustness,
-            robust_indicator=row.robust_indicator,
             parts=row.parts,
             flags=tuple(row.flags or ()),
             refusals=row.refusals or {},

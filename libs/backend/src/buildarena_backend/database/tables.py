@@ -81,7 +81,7 @@ jobs = Table(
     Column("lease_token", BigInteger, nullable=False, server_default=text("0")),
     time_column("available_at", now=True),
     # What it scored.
-    Column("success", Boolean),
+    Column("success", Double),
     Column("indicator", Double),
     Column("metrics", JSONB),
     Column("flags", JSONB),

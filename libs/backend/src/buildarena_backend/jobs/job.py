@@ -118,7 +118,7 @@ class Job:
     faults: int
     lease_owner: str | None
     lease_token: int
-    success: bool | None
+    success: float | None
     indicator: float | None
     metrics: Mapping[str, Any] | None
     flags: Sequence[str] | None

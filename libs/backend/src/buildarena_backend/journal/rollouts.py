@@ -13,6 +13,8 @@ from buildarena_backend import events
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import value_of
 from buildarena_backend.database.tables import rollouts
+from buildarena_benchmark import Score
+from buildarena_benchmark.flags import is_disqualified
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,6 +70,21 @@ class RolloutRecord:
     audited: bool = False
     created_at: datetime
     finished_at: datetime | None
+
+    @property
+    def score(self) -> Score:
+        """The score of this one trial; of one that was not simulated yet, that of nothing."""
+        return Score(
+            success=bool(self.success),
+            indicator=self.indicator or 0.0,
+            metrics=self.metrics or {},
+            flags=tuple(self.flags or ()),
+        )
+
+    @property
+    def counts(self) -> bool:
+        """Whether this trial is a success that no flag disqualifies."""
+        return bool(self.success) and not is_disqualified(self.flags or ())
 
 
 # Made once, because making them takes longer than running them.

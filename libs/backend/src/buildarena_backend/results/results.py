@@ -24,8 +24,8 @@ class JobScore:
 
     Attributes:
         outcome: One of the scored outcomes.
-        success: Whether the task's criterion was met.
-        indicator: The task's performance indicator.
+        success: Share of its worlds in which the machine met the task's criterion, 0 to 1.
+        indicator: The task's figure, as a mean over its worlds; 0 where it failed.
         metrics: Secondary metrics by name.
         flags: Remarks on the score; see `buildarena_benchmark.flags`.
         reason: Class of the failure, if it failed before it was simulated.
@@ -34,7 +34,7 @@ class JobScore:
     """
 
     outcome: Outcome
-    success: bool
+    success: float
     indicator: float
     metrics: Mapping[str, Any] = field(default_factory=dict)
     flags: Sequence[str] = ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Final
 
 from buildarena_backend import __version__
 from buildarena_backend.catalog.tasks import TaskCatalog
@@ -16,12 +16,13 @@ from buildarena_backend.states import Outcome
 from buildarena_backend.trials.simulator import BESIEGE
 from buildarena_benchmark import Task, failed_score
 from buildarena_benchmark.families.unknowns import drawn_numbers
-from buildarena_benchmark.flags import is_disqualified
-from buildarena_benchmark.leaderboard import ROBUST_INDICATOR, ROBUSTNESS
 from buildarena_benchmark.scores import AFTER_S
 from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
+
+PASSED_FROM: Final = 0.5
+"""Share of its worlds that a machine passes, at least, if its job is a success."""
 
 
 def task_of(job: Job, catalogue: TaskCatalog) -> Task:
@@ -67,7 +68,7 @@ def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
     return max(
         done,
         key=lambda r: (
-            bool(r.success) and not is_disqualified(r.flags or ()),
+            r.counts,
             bool(r.success),
             r.indicator or 0.0,
             -r.number,
@@ -76,47 +77,41 @@ def best_rollout(records: Sequence[RolloutRecord], task: Task) -> RolloutRecord:
 
 
 def varied_rollouts(records: Sequence[RolloutRecord]) -> Sequence[RolloutRecord]:
-    """Those in varied worlds, done or not."""
-    return [record for record in records if record.seed is not None]
+    """Return those in varied worlds, done or not; test trials are none of them."""
+    return [record for record in records if record.final and record.seed is not None]
+
+
+def scored_worlds(task: Task, records: Sequence[RolloutRecord]) -> list[RolloutRecord]:
+    """Return the trials that a job is scored by: the best in the exact world, then varied ones."""
+    if not has_counted(records, task):
+        return []
+    done = [record for record in varied_rollouts(records) if record.finished_at is not None]
+    return [best_rollout(records, task), *done]
 
 
 def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> JobScore:
-    """The score of a job.
+    """Return the score of a job: the mean over its worlds, of which the exact one is one.
+
+    A world in which the machine fails, or succeeds in a way that disqualifies, counts as 0. The
+    job is a success if the machine passes at least half of its worlds.
 
     Args:
         job: The job.
         task: Its task, as the job has it.
         records: All its rollouts: those in varied worlds are of the best one's machine.
     """
-    record = best_rollout(records, task)
-    success = bool(record.success)
+    best, *_varied = worlds = scored_worlds(task, records)
+    gained = [world.score.indicator for world in worlds if world.counts]
+    share = len(gained) / len(worlds)
+    passed = {} if len(worlds) == 1 else {"worlds": len(worlds), "worlds_passed": len(gained)}
     return JobScore(
-        outcome=Outcome.SUCCESS if success else Outcome.UNSUCCESSFUL,
-        success=success,
-        indicator=float(record.indicator or 0.0),
-        metrics={**(record.metrics or {}), **_robustness(varied_rollouts(records))},
-        flags=record.flags or (),
-        manifest=job_manifest(job, task, record),
+        outcome=Outcome.SUCCESS if share >= PASSED_FROM else Outcome.UNSUCCESSFUL,
+        success=share,
+        indicator=math.fsum(gained) / len(worlds),
+        metrics={**(best.metrics or {}), **passed},
+        flags=best.flags or (),
+        manifest=job_manifest(job, task, best),
     )
-
-
-def _robustness(varied: Sequence[RolloutRecord]) -> Mapping[str, float]:
-    """What a machine did in varied worlds, as metrics of its job; empty without any.
-
-    In a world in which it fails, or succeeds in a way that disqualifies, it has done nothing.
-    """
-    if not varied:
-        return {}
-    gained = [
-        float(record.indicator or 0.0)
-        for record in varied
-        if record.success and not is_disqualified(record.flags or ())
-    ]
-    return {
-        "worlds": len(varied),
-        ROBUSTNESS: len(gained) / len(varied),
-        ROBUST_INDICATOR: math.fsum(gained) / len(varied),
-    }
 
 
 def failure_score(
@@ -135,7 +130,7 @@ def failure_score(
     failed = failed_score(task, machine)
     return JobScore(
         outcome=outcome,
-        success=failed.success,
+        success=float(failed.success),
         indicator=failed.indicator,
         metrics=failed.metrics,
         flags=failed.flags,

@@ -19,8 +19,6 @@ from buildarena_benchmark.leaderboard.cells import (
 )
 from buildarena_benchmark.leaderboard.comparisons import Comparison, TaskComparison, compare_models
 from buildarena_benchmark.leaderboard.ended_jobs import (
-    ROBUST_INDICATOR,
-    ROBUSTNESS,
     EndedJob,
 )
 from buildarena_benchmark.leaderboard.latex import cost_table, performance_table, plain_table
@@ -40,8 +38,6 @@ from buildarena_benchmark.leaderboard.verdict import Verdict, verdict_of
 from buildarena_benchmark.outcomes import SCORED
 
 __all__ = [
-    "ROBUSTNESS",
-    "ROBUST_INDICATOR",
     "SCORED",
     "UNKNOWN_TOKENS",
     "Board",

@@ -126,8 +126,7 @@ def counted_trials(trials: Iterable[EndedJob]) -> list[EndedJob]:
         if not trial.scored:
             continue
         if is_disqualified(trial.flags):
-            failed = replace(trial, robustness=None, robust_indicator=None)
-            counted.append(replace(failed, success=False, indicator=0.0))
+            counted.append(replace(trial, success=0.0, indicator=0.0))
         else:
             counted.append(replace(trial, indicator=trial.gained))
     return counted
@@ -201,7 +200,7 @@ def summarise_tallies(name: CellName, all_tallies: Sequence[Tally]) -> Cell:
         score_high=score_ends[1] if score_ends else None,
         too_few_data=bool(counted) and indicator_ends is None,
         indicator_best=float(figures[:, 1].max()) if number else None,
-        censored=_number(t for t in counted if t.success and is_censored(t.flags)),
+        censored=sum(int((t.shares > 0).sum()) for t in counted if is_censored(t.flags)),
         parts_mean=_mean_total(tally.parts for tally in counted),
         requests_mean=_mean_total(tally.requests for tally in counted),
         input_tokens_mean=_mean_total(tally.input_tokens for tally in counted),
@@ -228,7 +227,6 @@ def counted_tallies(tallies: Iterable[Tally]) -> list[Tally]:
     A disqualified trial stays, as a failure with an indicator of 0: were it left out, a
     model would lose nothing by trying to cheat, and one whose machines blow up would gain. So does
     every failure: tasks say when a trial succeeds, and what fails has done nothing that counts.
-    A job that was tried in varied worlds counts by what it did in these.
     """
     counted = []
     for tally in tallies:
@@ -236,7 +234,7 @@ def counted_tallies(tallies: Iterable[Tally]) -> list[Tally]:
             continue
         if is_disqualified(tally.flags):
             nothing = np.zeros(tally.number)
-            counted.append(replace(tally, success=False, indicators=nothing, shares=nothing))
+            counted.append(replace(tally, indicators=nothing, shares=nothing))
         else:
             counted.append(tally)
     return counted

@@ -93,7 +93,7 @@ def _compare_task(
 ) -> TaskComparison:
     seeds_1, seeds_2 = ({trial.seed: trial for trial in side} for side in (first, second))
     shared = sorted(seeds_1.keys() & seeds_2.keys())
-    counts = tuple((math.fsum(t.share for t in side), len(side)) for side in (first, second))
+    counts = tuple((math.fsum(t.success for t in side), len(side)) for side in (first, second))
     low, high = difference_interval(counts[0], counts[1])
     pairs = [(seeds_1[seed], seeds_2[seed]) for seed in shared]
     return TaskComparison(
@@ -103,7 +103,7 @@ def _compare_task(
         difference=counts[0][0] / counts[0][1] - counts[1][0] / counts[1][1],
         low=low,
         high=high,
-        success=paired_successes([a.share for a, _ in pairs], [b.share for _, b in pairs]),
+        success=paired_successes([a.success for a, _ in pairs], [b.success for _, b in pairs]),
         indicator=paired_indicators(
             [a.indicator for a, _ in pairs], [b.indicator for _, b in pairs]
         ),

@@ -10,10 +10,6 @@ from typing import Any, Final
 
 from buildarena_benchmark.outcomes import SCORED
 
-ROBUSTNESS: Final = "robustness"
-"""Metric of a job that was tried in varied worlds: the share of them in which it succeeded."""
-ROBUST_INDICATOR: Final = "robust_indicator"
-"""Metric of such a job: its mean indicator in them, 0 where it failed."""
 _NOTHING: Final[Mapping[str, Any]] = MappingProxyType({})
 
 
@@ -32,10 +28,8 @@ class EndedJob:
         seed: Seed; models tried with the same one can be compared in pairs.
         outcome: How the job ended.
         reason: Class of its failure, if any.
-        success: Whether it met the task's criterion in the exact world.
-        indicator: The task's performance indicator there.
-        robustness: Share of varied worlds in which it succeeded; None where it was tried in none.
-        robust_indicator: Mean indicator in varied worlds, 0 where it failed; None without any.
+        success: Share of its worlds in which it met the task's criterion, 0 to 1.
+        indicator: Mean of the task's indicator over its worlds, 0 where it failed.
         parts: Parts of its machine, if there was one.
         flags: Remarks on its score; see `buildarena_benchmark.flags`.
         refusals: Refused actions by refusal class.
@@ -54,10 +48,8 @@ class EndedJob:
     task: str
     model: str
     outcome: str
-    success: bool
+    success: float
     indicator: float
-    robustness: float | None = None
-    robust_indicator: float | None = None
     seed: int = 0
     track: str = ""
     task_version: str = ""
@@ -78,16 +70,9 @@ class EndedJob:
     unverified: bool = False
 
     @property
-    def share(self) -> float:
-        """What its success is worth, 0 to 1: in varied worlds where there are any."""
-        return float(self.success) if self.robustness is None else self.robustness
-
-    @property
     def gained(self) -> float:
-        """What its indicator is worth: nothing where it failed, whatever it measures."""
-        if self.robust_indicator is None:
-            return self.indicator if self.success else 0.0
-        return self.robust_indicator
+        """Its indicator; 0 for a failure, whatever the trial measured."""
+        return self.indicator if self.success else 0.0
 
     @property
     def scored(self) -> bool:

@@ -41,13 +41,11 @@ class Tally:
     Attributes:
         outcome: How they ended.
         reason: Class of their failure, if any.
-        success: Whether they met the task's criterion in the exact world.
         flags: Remarks on their scores.
         by_runner: Whether runners ran trials of theirs.
         unverified: Whether they wait for their verification, or were refuted.
-        shares: (N,) float64, 0 to 1, what each trial's success is worth: in varied worlds where
-            there were any.
-        indicators: (N,) float64, what each trial's indicator is worth, as `EndedJob.gained`.
+        shares: (N,) float64, 0 to 1, share of its worlds that each trial passed.
+        indicators: (N,) float64, mean indicator of each trial over its worlds.
         costs_usd: (N,) float64, of each trial; not a number where unknown.
         output_tokens: (N,) int64, of each trial; -1 where unknown.
         requests: Model requests.
@@ -61,7 +59,6 @@ class Tally:
 
     outcome: str
     reason: str | None
-    success: bool
     flags: tuple[str, ...]
     by_runner: bool
     unverified: bool
@@ -94,7 +91,7 @@ def total_of(values: Integers) -> Total:
     return Total(known=len(known), sum=int(known.sum()))
 
 
-Kind = tuple[str, str | None, bool, tuple[str, ...], bool, bool]
+Kind = tuple[str, str | None, tuple[str, ...], bool, bool]
 """What trials of one tally share: outcome to flags, by_runner, unverified."""
 
 
@@ -110,7 +107,6 @@ def _kind(trial: EndedJob) -> Kind:
     return (
         trial.outcome,
         trial.reason,
-        trial.success,
         trial.flags,
         trial.by_runner,
         trial.unverified,
@@ -118,18 +114,17 @@ def _kind(trial: EndedJob) -> Kind:
 
 
 def _tally(kind: Kind, trials: list[EndedJob]) -> Tally:
-    outcome, reason, success, flags, by_runner, unverified = kind
+    outcome, reason, flags, by_runner, unverified = kind
     refusals: Counter[str] = Counter()
     for trial in trials:
         refusals.update(trial.refusals)
     return Tally(
         outcome=outcome,
         reason=reason,
-        success=success,
         flags=flags,
         by_runner=by_runner,
         unverified=unverified,
-        shares=np.array([trial.share for trial in trials], np.float64),
+        shares=np.array([trial.success for trial in trials], np.float64),
         indicators=np.array([trial.gained for trial in trials], np.float64),
         costs_usd=np.array(
             [np.nan if t.cost_usd is None else t.cost_usd for t in trials], np.float64

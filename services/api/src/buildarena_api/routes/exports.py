@@ -63,14 +63,8 @@ class JobResult(BaseModel):
     seed: int
     outcome: Outcome
     reason: str | None
-    success: bool
-    indicator: float
-    robustness: float | None = Field(
-        description="Share of varied worlds in which it succeeded; null where it was tried in none"
-    )
-    robust_indicator: float | None = Field(
-        description="Mean indicator in varied worlds, 0 where it failed; null without any"
-    )
+    success: float = Field(description="Share of its worlds that its machine passed, 0 to 1")
+    indicator: float = Field(description="Mean over its worlds, 0 where it failed")
     parts: int | None
     flags: list[str]
     refusals: dict[str, int]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Sequence
 from hashlib import sha256
 from typing import Annotated, Any, Final, Literal
 
@@ -26,14 +27,15 @@ from buildarena_api.schemas import (
     JobSummaryView,
     JobView,
     PromptView,
+    WorldView,
 )
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
-from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
-from buildarena_benchmark import Score
+from buildarena_backend.process.context import Context
+from buildarena_backend.trials.scoring import drawn_for, scored_worlds
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
 from buildarena_benchmark.scores import explain
 
@@ -45,29 +47,38 @@ _ENDED: Final = {
 }
 
 
-def explain_job(job: Job, tasks: TaskCatalog) -> str | None:
-    """Return what happened and by how much it missed; None while the job has not ended.
-
-    Args:
-        job: The job.
-        tasks: Gives the version of the task that it was submitted for.
-    """
+def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
+    """Return what happened and by how much it missed; None while the job has not ended."""
     if job.outcome is None:
         return None
     outcome = Outcome(job.outcome)
     if outcome not in SIMULATED:
         why = job.detail or (job.reason or "").replace("_", " ")
         return f"{_ENDED[outcome]}{': ' if why else ''}{why.rstrip('.')}."
-    task = tasks.exact(job.task, job.task_version)
-    if task is None or job.indicator is None:
+    if not worlds:
         return None
-    found = Score(
-        success=bool(job.success),
-        indicator=job.indicator,
-        metrics=dict(job.metrics or {}),
-        flags=tuple(job.flags or ()),
-    )
-    return explain(task, found)
+    if len(worlds) == 1:
+        return worlds[0].explanation
+    passed = sum(world.success for world in worlds)
+    return f"It passed {passed} of {len(worlds)} worlds. In the exact one: {worlds[0].explanation}"
+
+
+def _worlds(job: Job, context: Context) -> list[WorldView]:
+    task = context.tasks.exact(job.task, job.task_version)
+    if task is None or job.outcome not in SIMULATED:
+        return []
+    drawn = drawn_for(job, task)
+    return [
+        WorldView(
+            rollout=record.number,
+            exact=record.seed is None,
+            success=record.counts,
+            indicator=record.score.indicator,
+            flags=list(record.score.flags),
+            explanation=explain(drawn, record.score),
+        )
+        for record in scored_worlds(drawn, context.store.rollouts.read(job.id))
+    ]
 
 
 def _kind(request: Request) -> Kind:
@@ -143,10 +154,12 @@ def summarise_jobs(
 def show_job(job_id: str, context: ContextDep) -> JobDetail:
     """Shows a job with its manifest, attempts and artifacts."""
     job = context.store.jobs.get(job_id)
+    worlds = _worlds(job, context)
     known = job.usage_is_known
     return JobDetail(
         **JobView.of(job).model_dump(),
-        explanation=explain_job(job, context.tasks),
+        explanation=explain_job(job, worlds),
+        worlds=worlds,
         manifest=None if job.manifest is None else dict(job.manifest),
         attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
         artifacts=context.store.jobs.artifacts(job_id),

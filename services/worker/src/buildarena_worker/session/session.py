@@ -9,7 +9,7 @@ from typing import Any
 from buildarena_backend.catalog.prompt_packs import PromptPack
 from buildarena_backend.journal.rollouts import RolloutRecord
 from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript
-from buildarena_benchmark import Score, Task, broken_constraint
+from buildarena_benchmark import Task, broken_constraint
 from buildarena_benchmark.environment.briefing import catalogue_told
 from buildarena_benchmark.environment.given import acting
 from buildarena_benchmark.environment.trials.trials import score_text
@@ -145,13 +145,7 @@ class Session:
 
     def told(self, record: RolloutRecord, trajectory: Trajectory | None) -> str:
         """A rollout's result in words, made from its score and its trajectory, if it has one."""
-        measured = Score(
-            success=bool(record.success),
-            indicator=record.indicator or 0.0,
-            metrics=record.metrics or {},
-            flags=tuple(record.flags or ()),
-        )
-        text = score_text(self.task, measured, trajectory)
+        text = score_text(self.task, record.score, trajectory)
         refused = (record.versions or {}).get("refused")
         return text if refused is None else f"{text} It was not tried to the end: {refused}."
 
