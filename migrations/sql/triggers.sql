@@ -14,7 +14,7 @@ CREATE FUNCTION log_board_change() RETURNS trigger
     LANGUAGE plpgsql
     AS $$
 DECLARE
-    scored CONSTANT text[] := ARRAY['success', 'unsuccessful', 'construction_failed', 'limit'];
+    scored CONSTANT text[] := ARRAY['success', 'unsuccessful', 'construction_failed'];
     old_score jsonb;
     new_score jsonb;
     job jobs%ROWTYPE;

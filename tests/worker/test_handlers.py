@@ -10,6 +10,7 @@ from support.stages import assert_verified, tampered, work
 
 from buildarena_backend.agents import submission
 from buildarena_backend.agents.sessions import ExternalSessions
+from buildarena_backend.catalog import tracks
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import Budget, JobSpec, SweepSpec
 from buildarena_backend.jobs.job import Job
@@ -76,6 +77,14 @@ def test_a_limit_keeps_what_was_built(context, run) -> None:
     assert (job.outcome, job.reason, job.requests) == ("limit", "max_requests", 20)
     assert job.metrics["parts"] > 5
     assert "machine" in context.store.jobs.artifacts(job.id)
+    assert_verified(context, job.id)
+
+
+def test_a_job_that_reaches_the_protocols_own_limit_has_failed(context, run, monkeypatch) -> None:
+    monkeypatch.setattr(tracks, "STANDARD_MAX_REQUESTS", 20)
+    job = run()
+    found = (job.outcome, job.reason, job.requests, job.success)
+    assert found == ("construction_failed", "max_requests", 20, 0)
     assert_verified(context, job.id)
 
 

@@ -11,7 +11,7 @@ class Outcome(StrEnum):
         SUCCESS: The machine met the task's criterion.
         UNSUCCESSFUL: It was simulated and did not.
         CONSTRUCTION_FAILED: The session ended without a machine that may be simulated.
-        LIMIT: The session reached one of the job's limits.
+        LIMIT: The session reached a limit that its owner set below the protocol's: never scored.
         ERRORED: Infrastructure failed: never scored.
         CANCELLED: Somebody ended it: never scored.
     """
@@ -26,5 +26,5 @@ class Outcome(StrEnum):
 
 SIMULATED: Final = frozenset({Outcome.SUCCESS, Outcome.UNSUCCESSFUL})
 """Outcomes of machines that were finished and tried."""
-SCORED: Final = SIMULATED | {Outcome.CONSTRUCTION_FAILED, Outcome.LIMIT}
-"""Outcomes that count in the averages; faults and cancelled jobs never do."""
+SCORED: Final = SIMULATED | {Outcome.CONSTRUCTION_FAILED}
+"""Outcomes that count in the averages."""

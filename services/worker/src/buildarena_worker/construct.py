@@ -10,6 +10,7 @@ from buildarena_backend.accounts.budgets import Shortage
 from buildarena_backend.artifacts.storing import ArtifactInfo, ArtifactStore
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.prices import free_models, price_usd
+from buildarena_backend.catalog.tracks import session_limits
 from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRequest
@@ -111,7 +112,7 @@ class ConstructHandler:
         return JournalHost(
             entries=[] if lease.first else self.store.journal.read(job.id),
             rollouts=[] if lease.first else self.store.rollouts.read(job.id),
-            limits=job.limits,
+            limits=session_limits(job.limits),
             load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
             requester=Requester(
                 client=self.clients.for_config(job.model_config),
@@ -134,7 +135,9 @@ class ConstructHandler:
             case Failed(reason=reason, detail=detail):
                 self._fail(lease, session, Outcome.CONSTRUCTION_FAILED, reason, detail)
             case LimitReached(limit=limit, detail=detail):
-                self._fail(lease, session, Outcome.LIMIT, limit, detail)
+                is_own = limit in lease.job.limits
+                outcome = Outcome.LIMIT if is_own else Outcome.CONSTRUCTION_FAILED
+                self._fail(lease, session, outcome, limit, detail)
             case BudgetExhausted(shortage=shortage):
                 self._hand_back(lease, shortage)
             case Drained():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from decimal import Decimal
-from typing import Annotated
+from typing import Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, ValidationInfo, field_validator
 
@@ -45,16 +45,25 @@ class Decoding(BaseModel):
     max_tokens: Annotated[StrictInt | None, Field(ge=1, le=1_000_000)] = None
 
 
+STANDARD_MAX_REQUESTS: Final = 1500
+STANDARD_MAX_COST_USD: Final = 10
+"""Limits of each job's session on every track. A strong model never meets them."""
+
+
 class Limits(BaseModel):
-    """What one job's session may use; a session that reaches one ends as ``limit``."""
+    """Limits of one job's session, below those of the standard protocol.
+
+    A job that reaches one ends as ``limit`` and counts nowhere; one that reaches the protocol's own
+    has failed.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    max_requests: Annotated[StrictInt | None, Field(ge=1)] = None
+    max_requests: Annotated[StrictInt | None, Field(ge=1, le=STANDARD_MAX_REQUESTS)] = None
     max_tokens: Annotated[
         StrictInt | None, Field(ge=1, description="Input and output together")
     ] = None
-    max_cost_usd: Annotated[Number | None, Field(gt=0)] = None
+    max_cost_usd: Annotated[Number | None, Field(gt=0, le=STANDARD_MAX_COST_USD)] = None
     max_duration_s: Annotated[Number | None, Field(gt=0)] = None
 
 

@@ -7,7 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from buildarena_backend.catalog.prompt_packs import PromptPack
-from buildarena_backend.catalog.specs import ClosedLoop
+from buildarena_backend.catalog.specs import (
+    STANDARD_MAX_COST_USD,
+    STANDARD_MAX_REQUESTS,
+    ClosedLoop,
+)
 from buildarena_backend.catalog.workflows import WorkflowSource
 from buildarena_geometry import FEEDBACK_VERSION
 
@@ -101,6 +105,16 @@ def worlds_of(config: Mapping[str, Any]) -> int:
         config: What `Track.as_config` gave.
     """
     return int(config.get("worlds", 0))
+
+
+def session_limits(own: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return all limits of a job's session, by name.
+
+    Args:
+        own: Those that its owner set, below those of the protocol.
+    """
+    standard = {"max_requests": STANDARD_MAX_REQUESTS, "max_cost_usd": STANDARD_MAX_COST_USD}
+    return {**standard, **own}
 
 
 def external_track(

@@ -41,7 +41,7 @@ from buildarena_benchmark.scores import explain
 
 _ENDED: Final = {
     Outcome.CONSTRUCTION_FAILED: "The machine was not finished",
-    Outcome.LIMIT: "The session reached one of the job's limits",
+    Outcome.LIMIT: "The session reached a limit that its owner set, so the job counts nowhere",
     Outcome.ERRORED: "The service failed, so the job counts nowhere",
     Outcome.CANCELLED: "The job was cancelled",
 }

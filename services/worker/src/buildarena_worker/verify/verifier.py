@@ -12,6 +12,7 @@ from buildarena_backend.catalog.tracks import (
     EXTERNAL_WORKFLOW,
     FILE_WORKFLOW,
     has_data_sheets,
+    session_limits,
     worlds_of,
 )
 from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError, PermanentError
@@ -146,7 +147,7 @@ class Verifier:
         host = JournalHost(
             entries=self.store.journal.read(job.id),
             rollouts=stored.records,
-            limits=job.limits,
+            limits=session_limits(job.limits),
             load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
         )
         session = self.sessions.begin(job, host)
