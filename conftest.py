@@ -181,7 +181,8 @@ def play() -> Player:
 @pytest.fixture
 def submissions(context: Context) -> Submissions:
     """Submits with the built-in registry."""
-    from buildarena_backend.catalog.models import load_registry
+    from support.paid_models import REGISTRY
+
     from buildarena_backend.submission.submission import Submissions
 
-    return Submissions(context, load_registry())
+    return Submissions(context, REGISTRY)

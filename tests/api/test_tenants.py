@@ -11,8 +11,8 @@ from support.stages import work
 from buildarena_api.routes.tasks import EXAMPLE
 from buildarena_backend.process.context import Context
 
-JOB = {"task": "support-1", "model": "builtin/idle"}
-SWEEP = {"tasks": ["support-1"], "models": ["builtin/idle"], "seeds": [0]}
+JOB = {"task": "support-1", "model": "paid/idle"}
+SWEEP = {"tasks": ["support-1"], "models": ["paid/idle"], "seeds": [0]}
 SESSION = {"task": "support-1", "agent": "mason", "seed": 0}
 
 
@@ -131,12 +131,12 @@ def test_a_lease_ends_when_its_job_goes_to_somebody_who_waits(a, b, context) -> 
 
 
 def test_a_sweep_that_ran_out_of_budget_wants_its_jobs(a, b, context) -> None:
-    theirs = sweep_of(b, budget={"max_requests": 1}, models=["builtin/idle", "builtin/expert"])
+    theirs = sweep_of(b, budget={"max_requests": 1}, models=["paid/idle", "paid/expert"])
     work(context)
     assert b.get(f"/v1/sweeps/{theirs}")["state"] == "budget_exhausted"
-    mine = sweep_of(a, models=["builtin/expert"])
+    mine = sweep_of(a, models=["paid/expert"])
     a.post(f"/v1/sweeps/{mine}/cancel")
-    left = b.get(f"/v1/jobs?sweep={theirs}&model=builtin/expert")["data"]
+    left = b.get(f"/v1/jobs?sweep={theirs}&model=paid/expert")["data"]
     assert [(job["state"], job["key_id"]) for job in left] == [("on_hold", b.id)]
 
 

@@ -19,7 +19,7 @@ from buildarena_backend.results.results import JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=0.0, indicator=1.0)
 SPEC = JobSpec(task="support-1", model="builtin/idle")
-SWEEP = SweepSpec(tasks=["support-1"], models=["builtin/idle"], samples=3)
+SWEEP = SweepSpec(tasks=["support-1"], models=["paid/idle"], samples=3)
 
 
 @pytest.fixture

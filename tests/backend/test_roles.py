@@ -8,6 +8,7 @@ import pytest
 from sqlalchemy import make_url, text
 from sqlalchemy.exc import IntegrityError, ProgrammingError
 from starlette.testclient import TestClient
+from support.paid_models import REGISTRY
 from support.servers.run_servers import execute
 from support.stages import work
 
@@ -160,8 +161,8 @@ def test_no_process_does_what_is_not_its_work(contexts) -> None:
 
 def test_a_worker_stops_a_sweep_whose_budget_is_used_up(contexts) -> None:
     api = contexts["api"]
-    spec = SweepSpec(**SWEEP, samples=1, budget={"max_requests": 1})
-    sweep = Submissions(api, load_registry()).submit_sweep(spec).sweep.id
+    spec = SweepSpec(**SWEEP | {"models": ["paid/expert"]}, samples=1, budget={"max_requests": 1})
+    sweep = Submissions(api, REGISTRY).submit_sweep(spec).sweep.id
     work(contexts["construct"], queues=(CONSTRUCT_QUEUE,))
     assert api.store.sweeps.get(sweep).state == "budget_exhausted"
 

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from sqlalchemy import text
+from support.paid_models import REGISTRY
 
-from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.process.context import Context
 from buildarena_backend.process.job_runner import JobRunner
@@ -73,7 +73,7 @@ def work(
     keeper = LeaseKeeper(context.store.leases, lambda: None)
     keeper.start()
     handlers = {
-        "construct": construct_handler(context, load_registry()),
+        "construct": construct_handler(context, REGISTRY),
         **{
             simulate_queue(found.name): simulate_handler(
                 context, Remembering(found.make(context.settings))

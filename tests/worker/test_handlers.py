@@ -8,6 +8,7 @@ import pytest
 from support.jobs import execute
 from support.stages import assert_verified, tampered, work
 
+from buildarena_backend.accounts.budgets import BudgetLimits
 from buildarena_backend.agents import submission
 from buildarena_backend.agents.sessions import ExternalSessions
 from buildarena_backend.catalog import tracks
@@ -162,7 +163,7 @@ def test_a_machine_that_was_refused_is_verified_as_refused(context) -> None:
     assert_verified(context, job)
 
 
-PAYLOAD = {"tasks": ["lift-1"], "models": ["builtin/expert"], "simulator": "mujoco"}
+PAYLOAD = {"tasks": ["lift-1"], "models": ["paid/expert"], "simulator": "mujoco"}
 
 
 def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions) -> None:
@@ -187,6 +188,24 @@ def test_a_sweep_stops_at_its_budget_and_goes_on_with_more(context, submissions)
     journaled = sum(len(context.store.journal.read(job.id)) for job in jobs)
     assert context.store.budgets.get(sweep_id).spent_requests == journaled
     assert journaled == sum(job.requests for job in jobs)
+
+
+def test_built_in_models_use_up_no_budget_and_go_on_without_one(context, submissions) -> None:
+    spec = SweepSpec(
+        **PAYLOAD | {"models": ["builtin/expert", "paid/expert"]},
+        seeds=[0, 1],
+        budget=Budget(max_requests=5),
+    )
+    sweep_id = submissions.submit_sweep(spec).sweep.id
+    work(context)
+    assert context.store.sweeps.get(sweep_id).state == "budget_exhausted"
+    progress = context.store.sweeps.progress(sweep_id)
+    assert (progress.outcomes, progress.requests) == ({"success": 2}, 5)
+    assert context.store.budgets.get(sweep_id).spent_requests == 5
+    later = {"max_requests": 10_000, "max_cost_usd": None, "max_tokens": None}
+    with context.store.database.transaction() as connection:
+        context.store.budgets.set(sweep_id, BudgetLimits(**later), connection=connection)
+    assert context.store.budgets.get(sweep_id).spent_requests == 5
 
 
 def test_a_small_token_budget_stops_before_the_first_request(context, submissions) -> None:

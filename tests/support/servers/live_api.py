@@ -18,10 +18,10 @@ from fastapi import FastAPI
 from fastapi.dependencies import models
 from fastapi.routing import _IncludedRouter
 from starlette.testclient import TestClient
+from support.paid_models import REGISTRY
 
 from buildarena_api.app import create_app
 from buildarena_api.http.door import server_config
-from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.process.context import Context, open_context
 from buildarena_cli.local.server import free_port
 
@@ -37,7 +37,7 @@ TICK_S = 0.01
 
 def app_of(context: Context) -> FastAPI:
     """The application, with routes that may have been used before."""
-    app = create_app(context, load_registry())
+    app = create_app(context, REGISTRY)
     routes = app.router.routes
     own = [number for number, route in enumerate(routes) if isinstance(route, _IncludedRouter)]
     if not ROUTES:

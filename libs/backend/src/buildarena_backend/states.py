@@ -13,6 +13,7 @@ from typing import Final
 from buildarena_benchmark.outcomes import Outcome
 
 __all__ = [
+    "BUILTIN_PROVIDER",
     "CONSTRUCT_QUEUE",
     "EXTERNAL_PROVIDER",
     "EXTERNAL_QUEUE",
@@ -37,6 +38,8 @@ __all__ = [
 
 CONSTRUCT_QUEUE: Final = "construct"
 VERIFY_QUEUE: Final = "verify"
+BUILTIN_PROVIDER: Final = "builtin"
+"""Provider of the built-in models: they cost nothing, so no budget counts what they do."""
 EXTERNAL_PROVIDER: Final = "external"
 """Provider in the configuration of external agents: nobody counts their requests and tokens."""
 FILE_PROVIDER: Final = "file"

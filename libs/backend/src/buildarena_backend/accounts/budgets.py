@@ -16,7 +16,7 @@ from typing import Any
 from sqlalchemy import Connection, and_, func, literal, or_, select, update
 from sqlalchemy.dialects.postgresql import insert
 
-from buildarena_backend.database.account_tables import MAX_USD, budgets, reservations
+from buildarena_backend.database.account_tables import MAX_USD, PAYS, budgets, reservations
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import jobs, journal, sweep_jobs
 from buildarena_backend.errors import StaleLeaseError
@@ -154,7 +154,7 @@ class Budgets:
         # Locked in the order of their ids, so that two jobs never wait for each other.
         locked = (
             select(budgets)
-            .join(jobs, _PAYS)
+            .join(jobs, PAYS)
             .where(jobs.c.id == job_id)
             .order_by(budgets.c.id)
             .with_for_update(of=budgets)
@@ -192,7 +192,7 @@ class Budgets:
 
     def charge_lost(self, lease: Lease, usage: Usage) -> None:
         """Counts a reply that was paid for but came after the lease had ended."""
-        paying = select(budgets.c.id).join(jobs, _PAYS).where(jobs.c.id == lease.job.id)
+        paying = select(budgets.c.id).join(jobs, PAYS).where(jobs.c.id == lease.job.id)
         with self._database.transaction() as connection:
             connection.execute(
                 update(budgets)
@@ -210,9 +210,6 @@ class Budgets:
                 .where(jobs.c.id == lease.job.id)
                 .values(lost_requests=jobs.c.lost_requests + usage.requests)
             )
-
-
-_PAYS = or_(budgets.c.id == jobs.c.payer, budgets.c.id == jobs.c.owner)
 
 
 def _budget(row: Any) -> Budget:

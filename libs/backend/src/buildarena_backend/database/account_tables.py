@@ -2,10 +2,26 @@
 
 from __future__ import annotations
 
-from sqlalchemy import BigInteger, Column, Computed, ForeignKey, Index, Numeric, Table, Text, text
+from typing import Final
+
+from sqlalchemy import (
+    BigInteger,
+    Column,
+    Computed,
+    ForeignKey,
+    Index,
+    Numeric,
+    Table,
+    Text,
+    and_,
+    func,
+    or_,
+    text,
+)
 from sqlalchemy.dialects.postgresql import JSONB
 
-from buildarena_backend.database.tables import count_column, metadata, time_column
+from buildarena_backend.database.tables import count_column, jobs, metadata, time_column
+from buildarena_backend.states import BUILTIN_PROVIDER
 
 MAX_USD = 99_999_999
 """Sums stop here: what a provider claims to have used must not make a column overflow."""
@@ -73,3 +89,13 @@ reservations = Table(
     Column("tokens", BigInteger, nullable=False),
     Index("ix_reservations_budget", "budget_id"),
 )
+
+NEEDS_BUDGET: Final = (
+    func.coalesce(jobs.c.model_config["provider"].as_string(), "") != BUILTIN_PROVIDER
+)
+"""Whether a job's requests count in budgets: those of built-in models cost nothing."""
+PAYS: Final = and_(
+    or_(budgets.c.id == jobs.c.payer, budgets.c.id == jobs.c.owner),
+    NEEDS_BUDGET,
+)
+"""Whether a budget pays for a job."""

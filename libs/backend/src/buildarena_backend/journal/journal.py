@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
-from typing import Any
+from typing import Any, Final
 
 from sqlalchemy import bindparam, select, text
 
@@ -16,7 +16,7 @@ from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import journal
 from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.leases.leases import Lease
-from buildarena_backend.states import JobState
+from buildarena_backend.states import BUILTIN_PROVIDER, JobState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,6 +88,12 @@ class JournalEntry:
         return self.reply.get("finish") not in {GARBAGE, OUT_OF_TIME}
 
 
+_PAYERS: Final = ", ".join(
+    f"CASE WHEN model_config->>'provider' IS DISTINCT FROM '{BUILTIN_PROVIDER}' THEN {name} END"
+    f" AS {name}"
+    for name in ("payer", "owner")
+)
+"""Sweep and key that pay for a request; nobody does for what costs nothing."""
 # One statement, because it is the one that every turn of every session waits for.
 _APPEND = text(
     f"""
@@ -101,7 +107,7 @@ _APPEND = text(
             cost_usd = LEAST(cost_usd + :cost_usd, {MAX_USD}),
             faults = CASE WHEN :answers THEN 0 ELSE faults END
         WHERE id = :job_id AND lease_token = :token AND state = '{JobState.RUNNING}'
-        RETURNING id, payer, owner
+        RETURNING id, {_PAYERS}
     ), settled AS (
         DELETE FROM reservations USING job WHERE reservations.job_id = job.id
     ), paying AS (

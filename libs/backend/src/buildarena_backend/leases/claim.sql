@@ -91,5 +91,6 @@ recorded AS (
 )
 
 -- The job, and whether a budget pays for it.
-SELECT {columns}, EXISTS (SELECT FROM budgets WHERE budgets.id IN (payer, owner)) AS budgeted
+SELECT {columns}, model_config->>'provider' IS DISTINCT FROM 'builtin'
+    AND EXISTS (SELECT FROM budgets WHERE budgets.id IN (payer, owner)) AS budgeted
 FROM taken

@@ -24,7 +24,7 @@ from sqlalchemy import (
 )
 
 from buildarena_backend import events
-from buildarena_backend.database.account_tables import budgets
+from buildarena_backend.database.account_tables import PAYS, budgets
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import value_of
 from buildarena_backend.database.tables import jobs
@@ -326,9 +326,7 @@ class Leases:
             )
 
 
-_BUDGETED = (
-    select(budgets).where(budgets.c.id.in_([jobs.c.payer, jobs.c.owner])).exists().label("budgeted")
-)
+_BUDGETED = select(budgets).where(PAYS).correlate(jobs).exists().label("budgeted")
 
 
 def _among(leases: Sequence[Lease]) -> ColumnElement[bool]:

@@ -16,6 +16,7 @@ from sqlalchemy import ColumnElement, Connection, Row, or_, select, text, update
 
 from buildarena_backend import events
 from buildarena_backend.accounts.budgets import BudgetLimits, Budgets
+from buildarena_backend.database.account_tables import NEEDS_BUDGET
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import jobs, sweep_jobs, sweeps
 from buildarena_backend.errors import NotOwnedError, TransitionError, UnknownIdError
@@ -258,6 +259,7 @@ class SweepLifecycle:
             or_(jobs.c.payer == budget_id, jobs.c.owner == budget_id),
             jobs.c.stage == Stage.CONSTRUCT,
             jobs.c.model.not_in(sorted(free_models)),
+            NEEDS_BUDGET,
         )
         claims.hand_over(*paid, connection=connection, except_owner=budget_id)
         transition(

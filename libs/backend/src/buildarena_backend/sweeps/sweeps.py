@@ -14,6 +14,7 @@ from sqlalchemy import Connection, Row, case, exists, func, literal, select
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
+from buildarena_backend.database.account_tables import NEEDS_BUDGET
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.rows import bound_texts, columns_of, value_of
 from buildarena_backend.database.tables import attempts, jobs, sweep_jobs, sweeps
@@ -205,7 +206,9 @@ class Sweeps:
         place = (sweep_jobs.c.sweep_id, jobs.c.stage, jobs.c.state, jobs.c.outcome)
         query = (
             select(
-                *place, func.count().label("jobs"), *(func.sum(jobs.c[n]).label(n) for n in _USE)
+                *place,
+                func.count().label("jobs"),
+                *(func.sum(case((NEEDS_BUDGET, jobs.c[n]), else_=0)).label(n) for n in _USE),
             )
             .join(jobs, jobs.c.id == sweep_jobs.c.job_id)
             .where(sweep_jobs.c.sweep_id == func.any(bound_texts(list(rows))))
