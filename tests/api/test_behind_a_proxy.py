@@ -17,7 +17,7 @@ from support.servers.reverse_proxy import ProxyRules, reverse_proxy
 from support.servers.stacks import wait_until
 from typer.testing import CliRunner
 
-from buildarena_api.dashboard.files import BASE_NAME, INDEX, read_pages
+from buildarena_api.dashboard import BASE_NAME, INDEX, read_pages
 from buildarena_backend.errors import StartupError
 from buildarena_backend.process.context import Context
 from buildarena_backend.settings import OWN_PATHS, Settings, load_settings

@@ -2,7 +2,7 @@
 
 from support.contract import contract
 
-from buildarena_api.http.codes import ErrorCode
+from buildarena_api.http.problems import ErrorCode
 
 CONTRACT = contract()
 SCHEMAS = CONTRACT["components"]["schemas"]

@@ -10,8 +10,7 @@ from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 from starlette.testclient import TestClient
 
-from buildarena_api.dashboard.files import read_pages
-from buildarena_api.dashboard.serving import Dashboard
+from buildarena_api.dashboard import Dashboard, read_pages
 
 INDEX = b"<!doctype html><title>index</title>" + b" " * 600
 SCRIPT = b"console.log(1);" * 100

@@ -12,7 +12,7 @@ from support.servers.live_api import live_api
 from support.stages import work
 
 from buildarena_backend.agents.turn_views import Transcripts
-from buildarena_backend.journal import transcript_search
+from buildarena_backend.journal import turns as kept_turns
 from buildarena_backend.journal.journal import Usage
 from buildarena_backend.journal.turns import TurnResult
 from buildarena_backend.leases.leases import Lease
@@ -262,5 +262,5 @@ def test_of_very_many_turns_some_are_searched_page_by_page(
     some = api.get("/v1/transcripts?text=beam&limit=4").json()
     rest = found(api, "beam", limit=4, cursor=some["next_cursor"])
     assert [match["turn"] for match in some["data"] + rest] == list(range(6))
-    monkeypatch.setattr(transcript_search, "MAX_MATCHES", 3)
+    monkeypatch.setattr(kept_turns, "MAX_MATCHES", 3)
     assert len(found(api, "beam")) == 3

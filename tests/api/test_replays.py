@@ -12,8 +12,8 @@ from support.jobs import attach
 from support.stages import work
 
 from buildarena_api.http.etags import ResponseCache
-from buildarena_api.replays.making import Replays
-from buildarena_api.routes import pictures, trials
+from buildarena_api.replays import Replays
+from buildarena_api.routes import trials
 from buildarena_backend.replays import chapters
 from buildarena_simulation import read_trajectory
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
@@ -247,7 +247,7 @@ def test_scenes_models_and_pictures_are_there_once_something_is_built(
     kept = api.get(f"{path}/artifacts/thumbnail")
     assert kept.headers["content-security-policy"] == "sandbox"
     assert kept.headers["content-type"] == "image/png"
-    monkeypatch.setattr(pictures, "still_png", None)
+    monkeypatch.setattr(trials, "still_png", None)
     api.app.state.services.pictures._cached.clear()
     assert api.get(f"{path}/thumbnail.png").content == drawn.content
     # Bytes that are no trajectory are a problem and no failure.

@@ -13,8 +13,7 @@ from buildarena_backend.catalog.specs import JobSpec, SweepSpec
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.process import job_runner
 from buildarena_backend.process.active_lease import ActiveLease, LeaseKeeper
-from buildarena_backend.process.job_runner import SLICE_S, JobRunner
-from buildarena_backend.process.owner_slots import OwnerSlots
+from buildarena_backend.process.job_runner import SLICE_S, JobRunner, OwnerSlots
 from buildarena_backend.results.results import JobScore
 
 SCORE = JobScore(outcome="unsuccessful", success=0.0, indicator=1.0)

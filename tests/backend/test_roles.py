@@ -23,7 +23,7 @@ from buildarena_backend.process.context import Context, open_context
 from buildarena_backend.process.reaper import Reaper
 from buildarena_backend.states import CONSTRUCT_QUEUE, Verdict, simulate_queue
 from buildarena_backend.submission.submission import Submissions
-from buildarena_backend.telemetry.server_figures import HIDDEN
+from buildarena_backend.telemetry.metrics import HIDDEN
 from buildarena_worker.wiring import verifier
 
 PROCESSES = ("api", "construct", "simulate")

@@ -17,7 +17,7 @@ from support.clients.tenants import ADMIN, WITH_KEYS
 from support.servers.live_api import changed, live_api
 from support.stages import work
 
-from buildarena_api.dashboard.serving import POLICY
+from buildarena_api.dashboard import POLICY
 from buildarena_cli.defaults import KEY_VARIABLE
 from buildarena_cli.site import pages as site_pages
 from buildarena_cli.site.folder import MARKER, Folder

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from buildarena_api.dashboard.files import FOLDER as PAGES
+from buildarena_api.dashboard import FOLDER as PAGES
 from buildarena_cli.local.server import free_port
 
 ROOT = Path(__file__).resolve().parents[2]

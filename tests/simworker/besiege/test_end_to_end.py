@@ -12,7 +12,7 @@ from sqlalchemy import text
 from support.game.game_rig import PROGRAMS, Rig, our_score, piloted_text, piloted_trial
 from support.stages import work
 
-from buildarena_backend.agents.machine_trials import request_trial
+from buildarena_backend.agents.submission import request_trial
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.job import Job

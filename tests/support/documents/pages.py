@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from support.marks import nightly
 
-from buildarena_api.dashboard.files import FOLDER
+from buildarena_api.dashboard import FOLDER
 
 WEB = Path(__file__).resolve().parents[3] / "clients" / "web"
 NODE = WEB.parents[1] / "mk" / "node.sh"

@@ -17,8 +17,7 @@ from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.process.context import Context
-from buildarena_backend.process.job_runner import JobRunner
-from buildarena_backend.process.owner_slots import OwnerSlots
+from buildarena_backend.process.job_runner import JobRunner, OwnerSlots
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.submission.submission import Submissions
 from buildarena_worker.providers.provider import ProviderClient

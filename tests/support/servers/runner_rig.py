@@ -12,7 +12,7 @@ from sqlalchemy import text
 from support.clients.tenants import ADMIN
 from support.machines.building import built
 
-from buildarena_backend.agents.machine_trials import request_trial
+from buildarena_backend.agents.submission import request_trial
 from buildarena_backend.catalog.specs import JobSpec
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context

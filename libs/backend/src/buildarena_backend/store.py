@@ -8,7 +8,7 @@ from sqlalchemy import Text, literal_column, or_, select
 
 from buildarena_backend.accounts.budgets import Budgets
 from buildarena_backend.accounts.keys import ApiKeys
-from buildarena_backend.catalog.stored_tasks import Tasks
+from buildarena_backend.catalog.tasks import Tasks
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import jobs
 from buildarena_backend.events import Events

@@ -7,50 +7,18 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import Any, Final
 
-from sqlalchemy import bindparam, cast, delete, func, not_, select, tuple_
+from sqlalchemy import Row, bindparam, cast, delete, func, not_, select, tuple_
 from sqlalchemy.dialects.postgresql import Insert, insert
 from sqlalchemy.types import DateTime, Double
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
-from buildarena_backend.database.rows import value_of
 from buildarena_backend.database.tables import workers
 
 FORGOTTEN_AFTER = timedelta(hours=1)
 WORST_CLOCKS: Final = 10
 ANNOUNCED: Final = ("simulation", "kind", "repeatable")
 MAX_ANNOUNCEMENTS: Final = 1000
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class WorkerInfo:
-    """A worker process.
-
-    Attributes:
-        id: ``kind@host:pid-nonce``: a process that takes another's place has a name of its own.
-        kind: ``construct`` or ``simulate``.
-        queues: Queues it serves.
-        host: Its machine.
-        pid: Its process id there.
-        versions: Versions of what it runs.
-        started_at: When it first reported.
-        seen_at: When it last reported.
-        alive: Whether it reported within the last 15 seconds, by the database's clock.
-        peak_memory_bytes: The most memory it and its children ever had, if it says so.
-        clock_ahead_s: How far its clock is ahead of the database's, if it says so.
-    """
-
-    id: str
-    kind: str
-    queues: Sequence[str]
-    host: str
-    pid: int
-    versions: Mapping[str, Any]
-    started_at: datetime
-    seen_at: datetime
-    alive: bool
-    peak_memory_bytes: int | None
-    clock_ahead_s: float | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,8 +116,11 @@ class Workers:
         with self._database.transaction() as connection:
             connection.execute(delete(workers).where(workers.c.id.in_(old)))
 
-    def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> list[WorkerInfo]:
+    def page(self, *, limit: int, after: tuple[datetime, str] | None = None) -> Sequence[Row[Any]]:
         """Known workers, the last started first: an order that reports do not change.
+
+        Rows have also whether the worker is ``alive``: whether it reported within the last 15
+        seconds, by the database's clock.
 
         Args:
             limit: How many at most.
@@ -160,7 +131,7 @@ class Workers:
         if after is not None:
             query = query.where(tuple_(workers.c.started_at, workers.c.id) < tuple_(*after))
         with self._database.transaction() as connection:
-            return [value_of(WorkerInfo, row) for row in connection.execute(query.limit(limit))]
+            return connection.execute(query.limit(limit)).all()
 
     def counts(self) -> WorkerCounts:
         """The register in a few numbers; no worker's versions are read."""

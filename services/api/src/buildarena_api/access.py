@@ -23,9 +23,8 @@ from starlette.types import Scope
 
 from buildarena_api.dependencies import Services, services_of
 from buildarena_api.http.bodies import Admit
-from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.places import Kind
-from buildarena_api.http.problems import ProblemError, database_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError, database_problem
 from buildarena_api.http.rate_limits import Count, RateLimits
 from buildarena_backend.settings import Settings
 

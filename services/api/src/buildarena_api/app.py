@@ -12,15 +12,13 @@ from fastapi.routing import APIRoute
 from fastapi_offline import FastAPIOffline
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from buildarena_api.access import admin_of, admission, caller_of, known_sender, limited
-from buildarena_api.dashboard.files import read_pages
-from buildarena_api.dashboard.serving import Dashboard, is_page
+from buildarena_api.access import admin_of, admission, caller_of, known_sender
+from buildarena_api.dashboard import Dashboard, is_page, read_pages
 from buildarena_api.dependencies import Services
-from buildarena_api.events.hub import EventHub
+from buildarena_api.events import EventHub
 from buildarena_api.http.bodies import BodyLimitMiddleware
 from buildarena_api.http.etags import ResponseCache
 from buildarena_api.http.key_checks import KeyChecks
-from buildarena_api.http.locality import LocalOnlyMiddleware
 from buildarena_api.http.log import RequestLog
 from buildarena_api.http.methods import MethodMiddleware
 from buildarena_api.http.metrics import ServiceMetrics
@@ -28,6 +26,7 @@ from buildarena_api.http.openapi import describe
 from buildarena_api.http.outer_address import (
     BasePathMiddleware,
     ForwardedHostMiddleware,
+    LocalOnlyMiddleware,
     RootPathMiddleware,
 )
 from buildarena_api.http.pages import known_parameters
@@ -36,7 +35,7 @@ from buildarena_api.http.places import OpenRequests, usual_places
 from buildarena_api.http.problems import add_problem_handlers
 from buildarena_api.http.rate_limits import RateLimits
 from buildarena_api.leaderboard.cache import BoardCache
-from buildarena_api.replays.making import Replays
+from buildarena_api.replays import Replays
 from buildarena_api.routes import (
     catalogue,
     events,
@@ -46,17 +45,14 @@ from buildarena_api.routes import (
     keys,
     leaderboard,
     machines,
-    metrics,
-    pictures,
     runner,
     sessions,
     sweeps,
     tasks,
-    transcript_search,
     trials,
     verifications,
 )
-from buildarena_api.runners.service import RunnerService
+from buildarena_api.runners.outcomes import RunnerService
 from buildarena_backend import __version__
 from buildarena_backend.agents.sessions import ExternalSessions
 from buildarena_backend.catalog.models import ModelRegistry
@@ -73,20 +69,13 @@ WATCHING: Final = 4
 """Connections for key checks, event streams and questions how the service is."""
 POOL_TIMEOUT_S: Final = 2.0
 """How long a request waits for a database connection before it is answered with 503."""
-ORDINARY = (
-    verifications,
-    sessions,
-    sweeps,
-    tasks,
-    catalogue,
-    keys,
+ROUTERS: Final = (
+    # Those before `jobs` whose artifacts have paths like theirs.
+    *(jobs.transcripts, trials.pictures, leaderboard.router, exports.router, events.router),
+    *(machines.router, trials.router, jobs.router, health.metrics, verifications.router),
+    *(sessions.router, sweeps.router, tasks.router, catalogue.router),
 )
-HEAVY = (transcript_search, pictures, leaderboard, exports)
-"""Routes whose questions take a core for as long as they last."""
-LIMITED_THEMSELVES = (events, machines, trials, jobs, metrics)
-"""Routes that say how much of what they answer goes on at once; metrics take no thread."""
-# Those before `jobs` whose artifacts have paths like theirs.
-ROUTES = (*HEAVY, *LIMITED_THEMSELVES, *ORDINARY)
+"""For any key that may read; each says how many of its questions go on at once."""
 DESCRIPTION = """Find out whether language models can engineer: submit task x model x seed jobs,
 watch machines being built and simulated, and read the leaderboard. Errors are RFC 9457 problem
 details that name the field and the valid choices."""
@@ -167,7 +156,7 @@ def _services(context: Context, registry: ModelRegistry, watching: Context) -> S
         hub=EventHub(watching),
         boards=BoardCache(context.store.results.boards, context.tasks),
         replays=Replays(context),
-        pictures=ResponseCache(pictures.MAX_CACHED_PICTURES),
+        pictures=ResponseCache(trials.MAX_CACHED_PICTURES),
         scenes=ResponseCache(trials.MAX_CACHED_SCENES),
         key_checks=KeyChecks(watching.store.keys),
         rate_limits=RateLimits(settings.required_broker_url(), settings.rate_limit),
@@ -185,11 +174,9 @@ def _services(context: Context, registry: ModelRegistry, watching: Context) -> S
 def _add_routes(app: FastAPI) -> None:
     known = Depends(known_parameters)
     app.include_router(health.router, dependencies=[known])
-    for route in ROUTES:
-        who = admin_of if route is keys else caller_of
-        own = [limited("heavy")] if route in HEAVY else []
-        own = [limited(caller=who)] if route in ORDINARY else own
-        app.include_router(route.router, dependencies=[Depends(who), known, *own])
+    for router in ROUTERS:
+        app.include_router(router, dependencies=[Depends(caller_of), known])
+    app.include_router(keys.router, dependencies=[Depends(admin_of), known])
     app.include_router(runner.router, dependencies=[known])
     describe(app)
 
@@ -198,8 +185,8 @@ def all_routes() -> list[APIRoute]:
     """Every route of the application."""
     return [
         found
-        for part in (health, runner, *ROUTES)
-        for found in part.router.routes
+        for router in (health.router, runner.router, keys.router, *ROUTERS)
+        for found in router.routes
         if isinstance(found, APIRoute)
     ]
 

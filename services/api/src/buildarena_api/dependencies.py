@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import TYPE_CHECKING, Annotated
 
-from fastapi import Depends, Query, Request
+from fastapi import Depends, Header, Query, Request
 from pydantic import AfterValidator
 
+from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_backend.catalog.models import ModelRegistry
+from buildarena_backend.ids import content_hash
 from buildarena_backend.process.context import Context
 
 if TYPE_CHECKING:
-    from buildarena_api.events.hub import EventHub
+    from buildarena_api.events import EventHub
     from buildarena_api.http.etags import ResponseCache
     from buildarena_api.http.key_checks import KeyChecks
     from buildarena_api.http.metrics import ServiceMetrics
@@ -21,10 +24,43 @@ if TYPE_CHECKING:
     from buildarena_api.http.places import Kind, Places
     from buildarena_api.http.rate_limits import RateLimits
     from buildarena_api.leaderboard.cache import BoardCache
-    from buildarena_api.replays.making import Replays
-    from buildarena_api.runners.service import RunnerService
+    from buildarena_api.replays import Replays
+    from buildarena_api.runners.outcomes import RunnerService
     from buildarena_backend.agents.sessions import ExternalSessions
     from buildarena_backend.submission.submission import Submissions
+
+
+GivenKey = Annotated[
+    str | None,
+    Header(
+        alias="Idempotency-Key",
+        min_length=1,
+        max_length=200,
+        description="A request with the same key and body creates nothing a second time; with the "
+        "same key and another body it is refused",
+    ),
+]
+
+
+async def _request_key(
+    request: Request, services: ServicesDep, given: GivenKey = None
+) -> str | None:
+    """A name for what the request creates, one caller's apart from another's; None without key.
+
+    Raises:
+        ProblemError: The key was used for another request within a day.
+    """
+    if given is None:
+        return None
+    name = content_hash([request.state.caller.key_id, request.url.path, given])
+    said = sha256(request.url.query.encode() + b"\n" + await request.body()).hexdigest()
+    if await services.rate_limits.first_said(f"idempotency:{name}", said) != said:
+        detail = "this Idempotency-Key was used for another request"
+        raise ProblemError(ErrorCode.IDEMPOTENCY_KEY_REUSED, detail)
+    return name
+
+
+RequestKey = Annotated[str | None, Depends(_request_key)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,7 @@ from typing import Annotated
 from fastapi import Depends, Query
 
 from buildarena_api.dependencies import ContextDep, IdPrefix, Track
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import invalid, unknown
+from buildarena_api.http.problems import ErrorCode, invalid, unknown
 from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.process.context import Context

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import JobState

@@ -14,8 +14,7 @@ from typing import Any, Final
 from fastapi import Request
 
 from buildarena_api.checking import Checker, CheckFailedError
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError, invalid
+from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_backend.database.text import clean
 from buildarena_besiege import (
     ImportedMachine,

@@ -10,19 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import Any
+from typing import Any, Final
 
-from sqlalchemy import bindparam, text
+from sqlalchemy import ARRAY, BindParameter, Row, Text, bindparam, text
 from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_backend.database.database import Database
+from buildarena_backend.database.tables import ANSWER_WORDS, FEEDBACK_WORDS, REPLY_WORDS
 from buildarena_backend.database.text import clean
-from buildarena_backend.journal.transcript_search import (
-    TranscriptFilter,
-    TranscriptMatch,
-    has_words,
-    search_transcripts,
-)
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.states import TURN, JobState
 
@@ -59,21 +54,6 @@ class TurnRecord:
     cost_usd: Decimal
     latency_s: float
     tries: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Prompt:
-    """What a session told a role before one of its replies.
-
-    Attributes:
-        turn: Place of the reply in the transcript; None where it is in none.
-        system: The role's system message, if it had none yet.
-        user: Further messages: the task, what is to be done, results of trials.
-    """
-
-    turn: int | None
-    system: str | None
-    user: Sequence[str]
 
 
 # The lock makes a worker that lost its lease write before the next one counts, or not at all.
@@ -138,22 +118,58 @@ class Turns:
             connection.execute(_APPEND, given)
 
     def search(
-        self, words: str, wanted: TranscriptFilter, *, limit: int, offset: int = 0
-    ) -> list[TranscriptMatch]:
-        """The turns of all jobs in which words stand, see `search_transcripts`."""
+        self,
+        words: str,
+        *,
+        tasks: Sequence[str] | None,
+        models: Sequence[str] | None,
+        sweep_ids: Sequence[str] | None,
+        limit: int,
+        offset: int = 0,
+    ) -> Sequence[Row[Any]]:
+        """The turns in which words stand, in any form of English; those of the newest jobs first.
+
+        Rows have the job, its task, model, seed and outcome, the turn's place (None where only its
+        reply is kept), ``where`` (``reply`` or ``feedback``), and an excerpt in which each match
+        stands between `BEGIN` and `END`.
+
+        Args:
+            words: As search engines take them: ``"a phrase"``, ``or``, ``-not``.
+            tasks: Only of jobs on these; None for all, as of the others.
+            models: Only of these models' jobs.
+            sweep_ids: Only of these sweeps' jobs.
+            limit: Turns at most.
+            offset: How many of the first are left out.
+        """
+        values = {
+            "words": words,
+            "tasks": tasks,
+            "models": models,
+            "sweeps": sweep_ids,
+            "most": MAX_MATCHES,
+            "limit": limit,
+            "offset": offset,
+            "options": f"StartSel={BEGIN}, StopSel={END}, MinWords=15, MaxWords=35",
+        }
         with self._database.transaction() as connection:
-            return search_transcripts(connection, words, wanted, limit=limit, offset=offset)
+            # However many turns the words are expected in, the indexes find them.
+            connection.execute(text("SET LOCAL enable_seqscan = off"))
+            return connection.execute(SEARCH, values).all()
 
     def has_words(self, words: str) -> bool:
-        """Whether there is anything to search for."""
+        """Whether there is anything to search for: "the" is nothing, and "-wheel" is nearly all."""
+        query = text("SELECT querytree(websearch_to_tsquery('english', :words))")
         with self._database.statement() as connection:
-            return has_words(connection, words)
+            return connection.execute(query, {"words": words}).scalar_one() not in {"", "T"}
 
-    def prompts(self, job_id: str) -> list[Prompt]:
-        """What a job's session told its roles, in order; empty where no journal has it."""
+    def prompts(self, job_id: str) -> Sequence[Row[Any]]:
+        """What a job's session told its roles before their replies, in order.
+
+        Rows have the turn (None for a reply in none), the role's ``system`` message if it had none
+        yet, and further messages as ``user``. Empty where no journal has it.
+        """
         with self._database.statement() as connection:
-            rows = connection.execute(_PROMPTS, {"job_id": job_id}).mappings()
-            return [Prompt(**row) for row in rows]
+            return connection.execute(_PROMPTS, {"job_id": job_id}).all()
 
     def count(self, job_id: str) -> int:
         """How many turns of a job are there."""
@@ -171,3 +187,75 @@ class Turns:
         given = {"job_id": job_id, "after": after, "until": until}
         with self._database.statement() as connection:
             return [TurnRecord(**row) for row in connection.execute(_READ, given).mappings()]
+
+
+MAX_MATCHES: Final = 5_000
+"""Turns with the words that are looked at, of each kind; of more, only some are."""
+BEGIN, END = "\x02", "\x03"
+"""What stands around a match in an excerpt; transcripts have neither."""
+
+TYPES: Final[Sequence[BindParameter[Any]]] = (
+    bindparam("words", type_=Text()),
+    *(bindparam(name, type_=ARRAY(Text)) for name in ("tasks", "models", "sweeps")),
+)
+WANTED: Final = """
+    (CAST(:tasks AS text[]) IS NULL OR jobs.task = ANY(:tasks))
+    AND (CAST(:models AS text[]) IS NULL OR jobs.model = ANY(:models))
+    AND (CAST(:sweeps AS text[]) IS NULL OR EXISTS (
+        SELECT FROM sweep_jobs WHERE sweep_id = ANY(:sweeps) AND job_id = jobs.id
+    ))
+"""
+SEARCH: Final = text(
+    f"""
+    WITH asked AS MATERIALIZED (SELECT websearch_to_tsquery('english', :words) AS words),
+    replies AS MATERIALIZED (
+        SELECT job_id, sequence, NULL::bigint AS event
+        FROM journal WHERE {REPLY_WORDS.text} @@ (SELECT words FROM asked) LIMIT :most
+    ),
+    feedback AS MATERIALIZED (
+        SELECT job_id, NULL::int AS sequence, id AS event FROM events
+        WHERE kind = '{TURN}' AND ({FEEDBACK_WORDS.text}) @@ (SELECT words FROM asked) LIMIT :most
+    ),
+    answers AS MATERIALIZED (
+        SELECT job_id, sequence, NULL::bigint AS event
+        FROM external_calls WHERE {ANSWER_WORDS.text} @@ (SELECT words FROM asked) LIMIT :most
+    ),
+    places AS (
+        SELECT *, 'reply' AS kind FROM replies
+        UNION ALL SELECT *, 'feedback' FROM feedback
+        UNION ALL SELECT *, 'answer' FROM answers
+    ),
+    shown AS (
+        SELECT places.*, jobs.task, jobs.model, jobs.seed, jobs.outcome, jobs.created_at
+        FROM places JOIN jobs ON jobs.id = places.job_id
+        WHERE {WANTED}
+        ORDER BY jobs.created_at DESC, places.job_id, places.event, places.sequence
+        LIMIT :limit OFFSET :offset
+    )
+    SELECT
+        shown.job_id, shown.task, shown.model, shown.seed, shown.outcome,
+        CASE WHEN shown.kind = 'reply' THEN 'reply' ELSE 'feedback' END AS "where",
+        CASE shown.kind WHEN 'answer' THEN shown.sequence
+            ELSE (coalesce(answered.data, taken.data) ->> 'index')::int END AS turn,
+        ts_headline('english', left(CASE shown.kind
+            WHEN 'reply' THEN said.reply ->> 'text'
+            WHEN 'answer' THEN calls.feedback
+            ELSE (
+                SELECT string_agg(answer #>> '{{}}', E'\\n')
+                FROM jsonb_path_query(answered.data, '$.results[*][2]') AS answer
+            )
+        END, 100000), (SELECT words FROM asked), :options) AS excerpt
+    FROM shown
+    LEFT JOIN journal AS said
+        ON shown.kind = 'reply' AND said.job_id = shown.job_id AND said.sequence = shown.sequence
+    LEFT JOIN external_calls AS calls
+        ON shown.kind = 'answer' AND calls.job_id = shown.job_id AND calls.sequence = shown.sequence
+    LEFT JOIN events AS answered ON answered.id = shown.event
+    LEFT JOIN LATERAL (
+        SELECT data FROM events
+        WHERE shown.kind = 'reply' AND events.job_id = shown.job_id AND events.kind = '{TURN}'
+            AND (events.data ->> 'sequence')::int = shown.sequence LIMIT 1
+    ) AS taken ON TRUE
+    ORDER BY shown.created_at DESC, shown.job_id, turn NULLS LAST, "where" DESC
+    """  # noqa: S608 - made of our own constants
+).bindparams(*TYPES)

@@ -20,8 +20,7 @@ from sqlalchemy.exc import OperationalError
 from buildarena_backend.errors import SchemaVersionError, StartupError
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.process.context import Context, open_context
-from buildarena_backend.process.job_runner import JobRunner, StageHandler
-from buildarena_backend.process.owner_slots import OwnerSlots
+from buildarena_backend.process.job_runner import JobRunner, OwnerSlots, StageHandler
 from buildarena_backend.process.reaper import Reaper
 from buildarena_backend.queue.consumer import FORKING_POOL, THREADS, Callbacks, consume
 from buildarena_backend.settings import Settings

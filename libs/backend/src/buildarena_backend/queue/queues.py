@@ -13,13 +13,14 @@ from threading import Lock
 from typing import Final
 
 import structlog
+from celery import Celery
 from kombu.exceptions import OperationalError
 from redis import Redis
 from redis.backoff import NoBackoff
 from redis.exceptions import RedisError
 from redis.retry import Retry
 
-from buildarena_backend.queue.app import celery_app
+from buildarena_backend.keepalive import tcp_options
 
 PROCESS_NEXT: Final = "buildarena.process_next"
 """Name of the one message kind; its argument is the queue's name."""
@@ -98,3 +99,39 @@ class Queues:
         self._thread.shutdown(cancel_futures=True)
         self._redis.close()
         self.app.close()
+
+
+CELERY_TIMEOUT_S: Final = 10.0
+"""How long the broker may take for an answer to Celery."""
+
+
+def celery_app(broker_url: str) -> Celery:
+    """The Celery application of every process, without a result backend.
+
+    Args:
+        broker_url: ``redis://…``.
+    """
+    app = Celery("buildarena", broker=broker_url)
+    app.conf.update(
+        task_ignore_result=True,
+        task_acks_late=False,
+        task_create_missing_queues=True,
+        worker_prefetch_multiplier=1,
+        worker_hijack_root_logger=False,
+        worker_send_task_events=False,
+        worker_enable_remote_control=False,
+        broker_connection_retry=True,
+        broker_connection_retry_on_startup=True,
+        broker_connection_max_retries=None,
+        broker_transport_options={
+            "socket_connect_timeout": 2.0,
+            "socket_timeout": CELERY_TIMEOUT_S,
+            # A consumer waits for messages for hours, by no time-out.
+            "socket_keepalive": True,
+            "socket_keepalive_options": dict(tcp_options()),
+            "max_retries": 1,
+            "interval_start": 0,
+            "interval_max": 0.2,
+        },
+    )
+    return app

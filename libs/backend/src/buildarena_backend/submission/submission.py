@@ -18,7 +18,7 @@ from buildarena_backend.ids import content_hash, new_id
 from buildarena_backend.jobs.job import Job, NewJobs, configuration_hash
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import CONSTRUCT_QUEUE
-from buildarena_backend.submission.estimates import SweepEstimate, estimate
+from buildarena_backend.submission.estimates import estimate
 from buildarena_backend.sweeps.claims import add_claim
 from buildarena_backend.sweeps.sweeps import NewSweep, Sweep
 from buildarena_backend.telemetry.tracing import current_traceparent
@@ -193,7 +193,7 @@ class Submissions:
         """The track of a sweep that names nothing but tasks and models."""
         return self._track(Variant(), on_demand=False).id
 
-    def estimate(self, spec: SweepSpec) -> SweepEstimate:
+    def estimate(self, spec: SweepSpec) -> Mapping[str, Any]:
         """What a sweep would use, without storing anything.
 
         Raises:

@@ -93,29 +93,6 @@ class SweepProgress:
         return sum(self.outcomes.values())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trouble:
-    """Attempts at a sweep's jobs that failed alike and were, or will be, made again.
-
-    Attributes:
-        model: Whose jobs.
-        stage: At which stage.
-        result: How they ended: ``fault`` or ``lost``.
-        detail: A sentence for people, if there was one.
-        attempts: How many.
-        jobs: Of how many jobs.
-        newest: When the last one ended.
-    """
-
-    model: str
-    stage: str
-    result: str
-    detail: str | None
-    attempts: int
-    jobs: int
-    newest: datetime
-
-
 class Sweeps:
     """Adds and finds sweeps."""
 
@@ -232,8 +209,11 @@ class Sweeps:
         with self._database.transaction() as connection:
             return read_forecast(connection, sweep_id, state)
 
-    def troubles(self, sweep_id: str, *, limit: int) -> list[Trouble]:
+    def troubles(self, sweep_id: str, *, limit: int) -> Sequence[Row[Any]]:
         """Attempts at the sweep's jobs that faults ended or whose worker was lost, newest first.
+
+        Those of a model, stage, result and detail are one row, with how many ``attempts`` there
+        were, of how many ``jobs``, and when the ``newest`` ended.
 
         Args:
             sweep_id: The sweep.
@@ -259,7 +239,7 @@ class Sweeps:
             .limit(limit)
         )
         with self._database.transaction() as connection:
-            return [value_of(Trouble, row) for row in connection.execute(query)]
+            return connection.execute(query).all()
 
     def size(self, sweep_id: str) -> int:
         """How many jobs the sweep has.

@@ -16,9 +16,8 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.requests import ClientDisconnect, Request
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.places import Places
-from buildarena_api.http.problems import ProblemError, send_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
 from buildarena_backend.database.text import clean
 from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import read_source

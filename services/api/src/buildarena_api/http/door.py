@@ -26,9 +26,8 @@ import structlog
 import uvicorn
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.outer_address import Networks
-from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_backend.keepalive import socket_options
 from buildarena_backend.settings import Settings
 

@@ -12,8 +12,7 @@ from collections.abc import Iterable
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError, send_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
 
 PARAMETER = re.compile(r"\{[a-z_]+\}")
 CONTROL = re.compile(r"[\x00-\x1f\x7f]")

@@ -10,8 +10,7 @@ from typing import Any, Final
 from fastapi import FastAPI
 
 from buildarena_api.http.bodies import YAML
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import PROBLEM_JSON, Problem
+from buildarena_api.http.problems import PROBLEM_JSON, ErrorCode, Problem
 
 JSON: Final = "application/json"
 REFERENCE: Final = "#/components/schemas/"

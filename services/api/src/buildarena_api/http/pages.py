@@ -15,8 +15,7 @@ from fastapi.dependencies.utils import get_flat_params
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, Field
 
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError, invalid
+from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_backend.jobs.pages import Order, SortValue
 
 T = TypeVar("T")

@@ -17,8 +17,7 @@ from weakref import WeakValueDictionary
 from anyio import CapacityLimiter
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError, send_problem
+from buildarena_api.http.problems import ErrorCode, ProblemError, send_problem
 
 WAIT_S: Final = 30.0
 """How long a request waits for its turn."""

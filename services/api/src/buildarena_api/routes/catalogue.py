@@ -11,11 +11,10 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
-from buildarena_api.access import SCOPES, CallerDep
+from buildarena_api.access import SCOPES, CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RegistryDep
-from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
-from buildarena_api.http.problems import ProblemError, invalid
+from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_api.leaderboard.views import FlagView
 from buildarena_backend import __version__
 from buildarena_backend.states import simulate_queue
@@ -28,7 +27,7 @@ from buildarena_geometry import FEEDBACK_VERSION, module_set
 from buildarena_geometry.modules.module import Face
 from buildarena_simulation import DEFAULT_ENGINE
 
-router = APIRouter(prefix="/v1")
+router = APIRouter(prefix="/v1", dependencies=[limited()])
 
 
 def _labels(faces: Iterable[Face]) -> list[str]:

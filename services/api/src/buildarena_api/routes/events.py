@@ -11,7 +11,7 @@ from sse_starlette import EventSourceResponse
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ServicesDep
-from buildarena_api.events.hub import EventHub
+from buildarena_api.events import EventHub
 
 router = APIRouter(
     prefix="/v1", tags=["events"], dependencies=[limited("streams", until="request")]

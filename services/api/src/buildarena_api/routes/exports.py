@@ -12,10 +12,11 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.board_filters import SelectionDep
+from buildarena_api.access import limited
 from buildarena_api.dependencies import ServicesDep
 from buildarena_api.http.pages import Page, PagingDep, seal
 from buildarena_api.leaderboard.views import Board, BoardRow, board_view
+from buildarena_api.routes.leaderboard import SelectionDep
 from buildarena_api.schemas import UsageView
 from buildarena_backend.states import Outcome
 from buildarena_benchmark import paper_tasks
@@ -27,7 +28,7 @@ from buildarena_benchmark.leaderboard import (
     published_rows,
 )
 
-router = APIRouter(prefix="/v1", tags=["leaderboard"])
+router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("heavy")])
 
 MEDIA_TYPES = {
     "csv": "text/csv; charset=utf-8",

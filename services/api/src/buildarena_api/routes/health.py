@@ -1,4 +1,4 @@
-"""Health: what works, what does not, and what to do about it."""
+"""Health: what works, what does not, and what to do about it; and metrics, for Prometheus."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from fastapi import APIRouter, Response
+from prometheus_client import CONTENT_TYPE_LATEST, generate_latest
 from pydantic import BaseModel, Field
 
 from buildarena_api.dependencies import ServicesDep
@@ -203,3 +204,21 @@ def _disk(context: Context) -> HealthCheck:
         detail=f"{disk.free / 1e9:.1f} GB free, {share:.0%}",
         advice=f"free some space under {existing}" if low else "",
     )
+
+
+metrics = APIRouter(prefix="/v1", tags=["health"])
+
+
+@metrics.get(
+    "/metrics",
+    response_class=Response,
+    # Where a key of the database's is used, which is then asked for it.
+    responses={200: {"content": {"text/plain": {}}}},
+)
+async def show_metrics(services: ServicesDep) -> Response:
+    """Figures for Prometheus: jobs, queues, stage times, tokens, cost, errors, requests.
+
+    Answers at once: what a part of the service does not answer is left out, and its `_up` is 0.
+    """
+    await services.parts.renew()
+    return Response(generate_latest(services.metrics.registry), media_type=CONTENT_TYPE_LATEST)

@@ -1,22 +1,22 @@
-"""Routes of jobs."""
+"""Routes of jobs, and the search through their transcripts."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections import Counter
 from collections.abc import Sequence
 from hashlib import sha256
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from buildarena_api.access import CallerDep, limited
-from buildarena_api.dependencies import ContextDep, RegistryDep, ServicesDep
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.pages import Page, PagingDep, encode
+from buildarena_api.dependencies import ContextDep, RegistryDep, RequestKey, ServicesDep
+from buildarena_api.http.pages import Page, PagingDep, encode, seal
 from buildarena_api.http.places import Kind
-from buildarena_api.http.problems import ProblemError
-from buildarena_api.idempotency import RequestKey
+from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_api.job_filters import JobFilterDep, require_known
 from buildarena_api.job_records import machine_hash, missing, require_told
 from buildarena_api.schemas import (
@@ -32,8 +32,10 @@ from buildarena_api.schemas import (
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.artifacts.kinds import MEDIA_TYPES
 from buildarena_backend.catalog.specs import JobSpec
+from buildarena_backend.jobs.filters import JobFilter
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.jobs.pages import Order, Sort, sort_value
+from buildarena_backend.journal.turns import BEGIN, END
 from buildarena_backend.process.context import Context
 from buildarena_backend.trials.scoring import drawn_for, scored_worlds
 from buildarena_benchmark.outcomes import SIMULATED, Outcome
@@ -318,3 +320,75 @@ def _turn(turn: dict[str, Any]) -> list[str]:
         lines += [f"`{action['name']}` {arguments} ({mark})", ""]
         lines += [FENCE, action["feedback"].replace(FENCE, "'''"), FENCE, ""]
     return lines
+
+
+transcripts = APIRouter(prefix="/v1/transcripts", tags=["jobs"], dependencies=[limited("heavy")])
+
+
+class ExcerptPiece(BaseModel):
+    """A piece of the text around a match."""
+
+    text: str
+    match: bool = Field(description="Whether it is one of the words")
+
+
+def _pieces(excerpt: str) -> list[ExcerptPiece]:
+    """An excerpt cut where its matches begin and end."""
+    pieces = re.split(f"({BEGIN}.*?{END})", excerpt, flags=re.DOTALL)
+    return [
+        ExcerptPiece(text=piece.strip(BEGIN + END), match=piece.startswith(BEGIN))
+        for piece in pieces
+        if piece
+    ]
+
+
+class TranscriptMatchView(BaseModel):
+    """A turn in which the words stand."""
+
+    model_config = ConfigDict(from_attributes=True)
+
+    job_id: str
+    task: str
+    model: str
+    seed: int
+    outcome: Outcome | None = Field(description="null while the job has not ended")
+    turn: int | None = Field(
+        description="Place in the transcript, from 0; null where only the reply is kept"
+    )
+    where: Literal["reply", "feedback"] = Field(
+        description="In what was said, or in what it was answered"
+    )
+    excerpt: Annotated[list[ExcerptPiece], BeforeValidator(_pieces)]
+
+
+@transcripts.get("")
+def search_transcripts(
+    context: ContextDep,
+    registry: RegistryDep,
+    *,
+    text: Annotated[
+        str,
+        Query(
+            min_length=1,
+            max_length=200,
+            description='Words in any of their forms; "a phrase", or, -not as in search engines',
+        ),
+    ],
+    paging: PagingDep,
+    task: Annotated[list[str] | None, Query(description="Only on these tasks")] = None,
+    model: Annotated[list[str] | None, Query(description="Only by these models")] = None,
+    sweep: Annotated[list[str] | None, Query(description="Only of these sweeps' jobs")] = None,
+) -> Page[TranscriptMatchView]:
+    """Searches the transcripts of all jobs for words, in what models said and were answered."""
+    if "\0" in text or not context.store.turns.has_words(text):
+        raise invalid("text", f"{text!r} has no word to search for")
+    for sweep_id in sweep or ():
+        context.store.sweeps.get(sweep_id)
+    first = paging.number or 0
+    found = context.store.turns.search(
+        text, tasks=task, models=model, sweep_ids=sweep, limit=paging.limit + 1, offset=first
+    )
+    if not found:
+        require_known(context, registry, JobFilter(equals={"task": task, "model": model}))
+    shown, following = paging.cut(found, lambda _: seal([first + paging.limit]))
+    return Page[TranscriptMatchView].model_validate({"data": shown, "next_cursor": following})

@@ -8,9 +8,9 @@ from typing import Annotated, Literal, Self
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
 
-from buildarena_api.dependencies import ContextDep, ServicesDep
+from buildarena_api.access import admin_of, limited
+from buildarena_api.dependencies import ContextDep, RequestKey, ServicesDep
 from buildarena_api.http.pages import Page, PagingDep
-from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import EXISTED, BudgetUse
 from buildarena_backend.accounts.keys import ApiKey
 from buildarena_backend.catalog.specs import Budget, Title
@@ -20,7 +20,7 @@ from buildarena_backend.settings import SimulatorName
 from buildarena_backend.states import CONSTRUCT_QUEUE
 from buildarena_backend.trials.known_simulators import simulator_issues
 
-router = APIRouter(prefix="/v1/keys", tags=["keys"])
+router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[limited(caller=admin_of)])
 
 
 class NewKey(BaseModel):

@@ -8,19 +8,18 @@ from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BaseModel, Field
 
 from buildarena_api.access import CallerDep, limited
-from buildarena_api.dependencies import ContextDep
+from buildarena_api.dependencies import ContextDep, RequestKey
 from buildarena_api.http.problems import unknown
-from buildarena_api.idempotency import RequestKey
 from buildarena_api.machine_uploads import (
     MAX_BYTES,
     read_uploaded,
     refused,
     uploaded,
 )
-from buildarena_api.replays.views import KeyPress
+from buildarena_api.replays import KeyPress
 from buildarena_api.scenes import MachineScene, Vector, machine_scene
 from buildarena_api.schemas import EXISTED, JobView
-from buildarena_backend.agents.machine_trials import request_trial
+from buildarena_backend.agents.submission import request_trial
 from buildarena_backend.catalog.specs import MAX_SEED, Name
 from buildarena_backend.process.context import Context
 from buildarena_benchmark import broken_constraint

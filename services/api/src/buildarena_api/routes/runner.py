@@ -17,8 +17,7 @@ from fastapi.concurrency import run_in_threadpool
 from buildarena_api.access import Caller, RunnerDep, RunnerRights, limited, runner_of
 from buildarena_api.dependencies import ContextDep, ServicesDep
 from buildarena_api.http.bodies import receive_file
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError, invalid
+from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_api.runners.lease_queue import MAX_NAMES, Leased, LeaseQuery
 from buildarena_api.runners.views import (
     Heartbeat,

@@ -7,10 +7,9 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.access import Caller, CallerDep
-from buildarena_api.dependencies import Services, ServicesDep
-from buildarena_api.idempotency import RequestKey
-from buildarena_api.replays.views import (
+from buildarena_api.access import Caller, CallerDep, limited
+from buildarena_api.dependencies import RequestKey, Services, ServicesDep
+from buildarena_api.replays import (
     KeyPress,
     PartView,
     Vector,
@@ -27,7 +26,7 @@ from buildarena_geometry import Block, Connector, Machine
 from buildarena_geometry.feedback.words import caption
 from buildarena_simulation import DEFAULT_ENGINE
 
-router = APIRouter(prefix="/v1/sessions", tags=["sessions"])
+router = APIRouter(prefix="/v1/sessions", tags=["sessions"], dependencies=[limited()])
 
 MachineName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 

@@ -9,10 +9,9 @@ from typing import Annotated, Final
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict
 
-from buildarena_api.access import Caller, CallerDep
-from buildarena_api.dependencies import ContextDep, IdPrefix, ServicesDep
+from buildarena_api.access import Caller, CallerDep, limited
+from buildarena_api.dependencies import ContextDep, IdPrefix, RequestKey, ServicesDep
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
-from buildarena_api.idempotency import RequestKey
 from buildarena_api.schemas import (
     EXISTED,
     BudgetUse,
@@ -28,7 +27,7 @@ from buildarena_backend.process.context import Context
 from buildarena_backend.states import CONSTRUCT_QUEUE, SweepState
 from buildarena_backend.sweeps.sweeps import Sweep, SweepProgress
 
-router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"])
+router = APIRouter(prefix="/v1/sweeps", tags=["sweeps"], dependencies=[limited()])
 MAX_TROUBLES: Final = 50
 """Kinds of trouble that one answer has."""
 Resume = Annotated[

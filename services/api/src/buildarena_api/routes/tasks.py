@@ -8,14 +8,12 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import BaseModel, Field
 
-from buildarena_api.access import CallerDep
-from buildarena_api.dependencies import ContextDep
+from buildarena_api.access import CallerDep, limited
+from buildarena_api.dependencies import ContextDep, RequestKey
 from buildarena_api.http.bodies import YAML, is_yaml, not_utf8
-from buildarena_api.http.codes import ErrorCode
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.pages import Page, PagingDep
-from buildarena_api.http.problems import ProblemError
-from buildarena_api.idempotency import RequestKey
+from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.schemas import EXISTED
 from buildarena_backend.catalog.tasks import CatalogueEntry
 from buildarena_backend.database.text import clean
@@ -24,7 +22,7 @@ from buildarena_benchmark.categories import title_of
 from buildarena_benchmark.tasks.sources import MAX_BYTES
 
 PATH = "/v1/tasks"
-router = APIRouter(prefix=PATH, tags=["tasks"])
+router = APIRouter(prefix=PATH, tags=["tasks"], dependencies=[limited()])
 
 JSON = "application/json"
 EXAMPLE = """\

@@ -9,17 +9,15 @@ from typing import Any
 from fastapi import APIRouter, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from buildarena_api.access import Caller, CallerDep
-from buildarena_api.dependencies import ContextDep
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError
-from buildarena_api.idempotency import RequestKey
+from buildarena_api.access import Caller, CallerDep, limited
+from buildarena_api.dependencies import ContextDep, RequestKey
+from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.schemas import EXISTED
 from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import MAX_OPEN, Requested
 from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
 
-router = APIRouter(prefix="/v1", tags=["verification"])
+router = APIRouter(prefix="/v1", tags=["verification"], dependencies=[limited()])
 
 RETRY_S = 5
 """When a caller may come back whose verifications found no room."""

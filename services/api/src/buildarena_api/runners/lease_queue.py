@@ -9,8 +9,7 @@ from typing import Final
 
 from fastapi.concurrency import run_in_threadpool
 
-from buildarena_api.http.codes import ErrorCode
-from buildarena_api.http.problems import ProblemError
+from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_backend.errors import PermanentError, StaleLeaseError
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.leases.runner_leases import prefix_of

@@ -1,4 +1,4 @@
-"""What runners hand over: checked, scored and written under their leases."""
+"""What runners hand over: checked, scored and written under their leases; and what serves them."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from functools import cache
 from typing import Any, Final, Literal, TypeVar
 
 import structlog
+from sqlalchemy.exc import SQLAlchemyError
 
 from buildarena_api.checking import Checker, CheckFailedError
+from buildarena_api.runners.lease_queue import LeaseQueue
 from buildarena_api.runners.views import NamedFile, TrialFault, TrialOutcome
 from buildarena_backend.artifacts.kinds import EVIDENCE
 from buildarena_backend.artifacts.trajectory_files import OutcomeRefusedError
 from buildarena_backend.artifacts.uploads import Uploads
 from buildarena_backend.database.text import clean
-from buildarena_backend.errors import StaleLeaseError, UploadError
+from buildarena_backend.errors import ArtifactStoreError, StaleLeaseError, UploadError
 from buildarena_backend.leases.leases import Lease
 from buildarena_backend.leases.runner_leases import JobToken
+from buildarena_backend.periodic import Periodic
 from buildarena_backend.process.context import Context
 from buildarena_backend.states import AttemptResult
 from buildarena_backend.telemetry.tracing import Attribute, span
@@ -271,3 +274,47 @@ def drop_dead_uploads(context: Context, uploads: Uploads) -> int:
     for named in dead:
         uploads.drop(named)
     return len(dead)
+
+
+DROP_EVERY_S: Final = 60.0
+
+
+class RunnerService:
+    """What the routes of runners use.
+
+    Args:
+        context: The process' connections.
+
+    Attributes:
+        uploads: What runners have uploaded.
+        lease_queue: Finds trials.
+        outcomes: Ends leases.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        settings = context.settings
+        self.uploads = Uploads(settings.artifacts_location, settings.artifact_options)
+        self.lease_queue = LeaseQueue(context)
+        self.outcomes = Outcomes(context, self.uploads)
+        self._cleaner = Periodic(self._clean, name="uploads", period_s=DROP_EVERY_S)
+
+    def start(self) -> None:
+        """Begins to remove uploads of dead leases every now and then."""
+        self._cleaner.start()
+
+    def close(self) -> None:
+        """Ends what was started."""
+        self._cleaner.stop()
+
+    def _clean(self) -> None:
+        try:
+            dropped = drop_dead_uploads(self._context, self.uploads)
+        except (ArtifactStoreError, SQLAlchemyError) as error:
+            log.warning("uploads_not_cleaned", error=str(error).splitlines()[0])
+        except Exception:
+            # Whatever it was, the next time may do.
+            log.exception("uploads_not_cleaned")
+        else:
+            if dropped:
+                log.info("uploads_dropped", leases=dropped)

@@ -1,1 +1,0 @@
-"""The dashboard: pages that were built beforehand, served from memory."""

@@ -1,1 +1,0 @@
-"""Events from the database to listeners."""

@@ -1,1 +1,0 @@
-"""How jobs' machines came about, as the API answers it."""
