@@ -26,8 +26,7 @@ from sqlalchemy import text
 from buildarena_backend.database.database import Database
 from buildarena_backend.store import open_store
 from buildarena_cli.local.postgres import EmbeddedPostgres
-from buildarena_cli.local.server import free_port
-from buildarena_cli.local.valkey import EmbeddedValkey
+from buildarena_cli.local.server import EmbeddedValkey, free_port
 
 BARS = {
     "board_at_rest_ms": 20.0,

@@ -26,7 +26,7 @@ from buildarena_backend.process.context import Context, open_context
 from buildarena_backend.settings import Settings
 from buildarena_backend.submission.submission import Submissions
 from buildarena_cli.local.postgres import EmbeddedPostgres
-from buildarena_cli.local.valkey import EmbeddedValkey
+from buildarena_cli.local.server import EmbeddedValkey
 
 MEBIBYTE = 1024 * 1024
 POLL_S = 0.05

@@ -17,12 +17,11 @@ from scenarios.hunt.variation.genome import Genome, grown
 from scenarios.hunt.variation.kinds import kind_of
 from scenarios.hunt.variation.mutation import crossed, mutated
 from scenarios.hunt.variation.programs import IDLE
-from support.machines.boulders import car_with_boulder
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.headroom import drafted
 
 from buildarena_benchmark import broken_constraint, builtin_tasks, score
-from buildarena_benchmark.experts.drafting import EAST, UP
+from buildarena_benchmark.experts.drafting import EAST, SOUTH, UP, WEST
 from buildarena_benchmark.tasks.courses.expert import courier
 from buildarena_geometry import Machine
 from buildarena_simulation import simulate
@@ -133,6 +132,19 @@ def test_checks_name_past_exploits_without_any_rule(name, check) -> None:
     found = tried(task, stored(name), lenient)
     assert found is not None
     assert check in found.suspicions
+
+
+def car_with_boulder() -> Machine:
+    """A car that carries its boulder north and brakes at the line."""
+    draft = KeyedDraft(modules="all")
+    start = draft.start()
+    beam = draft.row(start, SOUTH, 3)
+    for base in (start, beam[-1]):
+        for side in (EAST, WEST):
+            draft.bind(draft.wheel(base, side), "spinning_forward", "UpArrow")
+    draft.attach(draft.attach(beam[1], UP, "Bomb Holder"), UP, "Boulder")
+    draft.press("UpArrow", 1.0, 3.0)
+    return draft.machine
 
 
 def _dropped() -> Machine:

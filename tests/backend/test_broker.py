@@ -24,7 +24,7 @@ from buildarena_api.http.rate_limits import RateLimits
 from buildarena_backend.process.active_lease import LeaseKeeper
 from buildarena_backend.queue.consumer import ConsumerWatchdog, reconnect
 from buildarena_backend.queue.queues import MAX_WAITING, Queues
-from buildarena_cli.local.valkey import EmbeddedValkey
+from buildarena_cli.local.server import EmbeddedValkey
 from buildarena_worker.providers import throttle as throttle_module
 from buildarena_worker.providers.throttle import Throttle
 

@@ -9,7 +9,7 @@ from collections import Counter
 
 import pytest
 from support.servers.collector import collector
-from support.spans import recorded
+from support.statements import recorded
 
 from buildarena_backend.errors import TransientError
 from buildarena_backend.telemetry.tracing import current_traceparent, span

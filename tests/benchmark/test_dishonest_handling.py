@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.piloted import scored
 from tests.benchmark.conftest import expert, strict
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from tests.benchmark.conftest import (
     Path,
     make_trajectory,

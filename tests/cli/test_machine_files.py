@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from support.clients.commands import printed, run, run_cli
-from support.machines.experts import experts_machine
+from support.machines.building import experts_machine
 from support.stages import work
 
 from buildarena_api.routes.tasks import EXAMPLE

@@ -19,7 +19,7 @@ from support.stages import work
 
 from buildarena_api.dashboard import POLICY
 from buildarena_cli.defaults import KEY_VARIABLE
-from buildarena_cli.site import pages as site_pages
+from buildarena_cli.site import writing
 from buildarena_cli.site.folder import MARKER, Folder
 from buildarena_cli.site.scope import Scope, chosen_jobs, read_choice
 from buildarena_simulation.arrow import MEDIA_TYPE as ARROW
@@ -41,7 +41,7 @@ def pages(tmp_path, monkeypatch) -> Path:
     (folder / "index.html").write_text(PAGE)
     for name in ("scheme.js", "assets/index-1.js", "assets/index-1.js.br", ".built"):
         (folder / name).write_text("0")
-    monkeypatch.setattr(site_pages, "built_pages", lambda: folder)
+    monkeypatch.setattr(writing, "built_pages", lambda: folder)
     return folder
 
 
@@ -120,7 +120,7 @@ def test_every_answer_is_the_services(url, context, tmp_path) -> None:
 
 def test_its_policy_is_the_services() -> None:
     told = [part for part in POLICY.split("; ") if not part.startswith("frame-ancestors")]
-    assert "; ".join(told) == site_pages.POLICY
+    assert "; ".join(told) == writing.POLICY
 
 
 @pytest.mark.ci

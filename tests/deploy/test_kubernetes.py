@@ -20,7 +20,7 @@ from support.documents.manifests import (
     pods,
     rendered,
 )
-from support.documents.promtool import needs_promtool, promtool
+from support.servers.prometheus import needs_promtool, promtool
 from typer.main import get_command
 
 from buildarena_backend import __version__

@@ -3,23 +3,41 @@
 import json
 import re
 from collections.abc import Iterator
+from pathlib import Path
 
 import httpx
 import pytest
 import yaml
 from pydantic import SecretStr
 from support.clients.tenants import WITH_KEYS
-from support.documents.promtool import needs_promtool, promtool
-from support.documents.runbook import entries, entry
 from support.servers.live_api import changed, live_api
 from support.servers.prometheus import (
     MONITORING,
     needs_prometheus,
+    needs_promtool,
     prometheus,
+    promtool,
     target_says,
 )
 
 from buildarena_api.routes import health
+
+RUNBOOK = Path(__file__).resolve().parents[2] / "docs" / "runbook.md"
+PARTS = ("Means", "Look", "Do")
+
+
+def entries() -> dict[str, str]:
+    """The runbook's entries by alert."""
+    parts = re.split(r"^## (\S+)\n", RUNBOOK.read_text(), flags=re.MULTILINE)[1:]
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+def entry(alert: str) -> dict[str, str]:
+    """An entry's parts by name."""
+    parts = re.split(rf"^\*\*({'|'.join(PARTS)})\*\*: ", entries()[alert], flags=re.MULTILINE)[1:]
+    assert tuple(parts[::2]) == PARTS, alert
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
 
 BOARDS = sorted((MONITORING / "grafana" / "dashboards").glob("*.json"))
 RULES = yaml.safe_load((MONITORING / "prometheus/alerts.yml").read_text())["groups"][0]["rules"]

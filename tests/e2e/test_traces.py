@@ -12,8 +12,8 @@ from support.providers.stand_in import ProviderStandIn
 from support.servers.construct_threads import crew
 from support.servers.live_api import api_client, live_api
 from support.servers.runner_rig import slot
-from support.spans import Spans, recorded
 from support.stages import work
+from support.statements import Spans, recorded
 
 from buildarena_backend.telemetry.tracing import current_traceparent, span
 

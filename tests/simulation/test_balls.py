@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.piloted import FASTER_FIRST
 
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, WEST

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import pytest
 from benchmarks.agreement import compared
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.random_machines import TASKS
 from support.machines.references import load_machine
 from support.machines.trials import gap_terrain, trial

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.families import car, rocket
 from support.machines.trials import trial
 from support.marks import nightly

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.families import beam, car
 from support.machines.trials import gap_terrain
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.families import car, rocket
 from support.machines.references import REFERENCES, load_machine
 from support.machines.trials import press

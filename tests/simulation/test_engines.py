@@ -11,8 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from support.machines.building import BLOCK, built
-from support.machines.drafts import KeyedDraft
+from support.machines.building import BLOCK, KeyedDraft, built
 from support.machines.families import beam, rocket
 from support.machines.module_files import BASIC, like, module_file
 

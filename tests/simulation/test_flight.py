@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.marks import nightly
 
 from buildarena_benchmark.experts.drafting import DOWN, EAST, UP, WEST, Direction

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from support.machines.building import attach
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft, attach
 from support.machines.trials import press
 
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST

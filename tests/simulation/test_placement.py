@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.marks import nightly
 
 from buildarena_benchmark.experts.drafting import NORTH, UP

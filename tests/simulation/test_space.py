@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from support.machines.building import attach, built, connect
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft, attach, built, connect
 from support.marks import nightly
 
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, UP, WEST

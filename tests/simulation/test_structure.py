@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.families import beam, car, deck
 from support.machines.trials import gap_terrain
 

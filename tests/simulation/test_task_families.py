@@ -6,7 +6,7 @@ from dataclasses import replace
 from importlib import resources
 
 import pytest
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.repairs import TRICKS, faulty, faulty_side, new_car, repaired, wheels_of
 from support.machines.trials import trial
 from support.marks import nightly

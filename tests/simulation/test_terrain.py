@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.piloted import FASTER_FIRST
 from support.marks import nightly
 

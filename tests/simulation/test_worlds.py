@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.families import beam as beam_of
 
 from buildarena_benchmark.experts.drafting import EAST, NORTH, SOUTH, UP, WEST

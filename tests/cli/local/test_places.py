@@ -24,7 +24,7 @@ from pathlib import Path
 import psycopg
 from redis import Redis
 from buildarena_cli.local.postgres import EmbeddedPostgres
-from buildarena_cli.local.valkey import EmbeddedValkey
+from buildarena_cli.local.server import EmbeddedValkey
 
 def once(statement):
     postgres = EmbeddedPostgres(data / "postgres", data / "postgres.log", durable=False)

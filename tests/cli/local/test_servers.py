@@ -20,8 +20,8 @@ from support.servers.stacks import wait_until
 from buildarena_backend.errors import StartupError
 from buildarena_cli.local.postgres import EmbeddedPostgres, installed_postgres
 from buildarena_cli.local.program_copy import PREFIX, ProgramCopy
+from buildarena_cli.local.server import EmbeddedValkey
 from buildarena_cli.local.supervisor import ManagedProcess, Supervisor
-from buildarena_cli.local.valkey import EmbeddedValkey
 
 
 def python(*words: str, **more: object) -> subprocess.Popen[bytes]:
@@ -94,7 +94,7 @@ def test_what_is_started_again_while_all_is_stopped_is_stopped_too(started) -> N
 def test_children_do_not_outlive_a_killed_parent(tmp_path) -> None:
     program = (
         "import sys, time, pathlib\n"
-        "from buildarena_cli.local.valkey import EmbeddedValkey\n"
+        "from buildarena_cli.local.server import EmbeddedValkey\n"
         "folder = pathlib.Path(sys.argv[1])\n"
         "print(EmbeddedValkey(folder / 'v', folder / 'log').start().pid, flush=True)\n"
         "time.sleep(60)\n"

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from support.game.game_programs import GO, drive, piloted, program
+from support.game.game_rig import GO, drive, piloted, program
 from support.game.record_games import RUN, game_of, recorded
 from support.machines.trials import press
 

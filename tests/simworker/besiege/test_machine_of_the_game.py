@@ -8,8 +8,7 @@ from ctypes import wintypes
 from types import SimpleNamespace
 
 import pytest
-from support.game.game_rig import Rig, short_trial, trial_of
-from support.game.steam_library import MOD_XML, library
+from support.game.game_rig import MOD_XML, Rig, library, short_trial, trial_of
 
 from buildarena_backend.trials.simulator import SimulatorFaultError
 from buildarena_simworker.besiege import doctor
@@ -21,9 +20,9 @@ from buildarena_simworker.besiege.errors import (
 )
 from buildarena_simworker.besiege.game_lock import GameLock
 from buildarena_simworker.besiege.installed import installed
-from buildarena_simworker.besiege.screen import clipboard
+from buildarena_simworker.besiege.screen import input as screen_input
+from buildarena_simworker.besiege.screen.actions import shown_text
 from buildarena_simworker.besiege.screen.calibration import Calibration, PathClick, load_calibration
-from buildarena_simworker.besiege.screen.machine_list import shown_text
 from buildarena_simworker.besiege.screen.window_types import Area, Wanted
 from buildarena_simworker.besiege.screen.windows_win32 import Win32Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, _words
@@ -191,8 +190,8 @@ def test_a_clipboard_that_another_program_keeps_is_waited_for_and_then_a_fault(m
 
     system = SimpleNamespace(PyperclipException=RuntimeError, paste=paste, copy=lambda _: paste())
     monkeypatch.setitem(sys.modules, "pyperclip", system)
-    monkeypatch.setattr(clipboard, "TRY_AGAIN_S", 0.0)
-    reached = clipboard._SystemClipboard()
+    monkeypatch.setattr(screen_input, "TRY_AGAIN_S", 0.0)
+    reached = screen_input._SystemClipboard()
     assert reached.get() == "text"
     for use in (reached.get, lambda: reached.put("x")):
         busy = 1000

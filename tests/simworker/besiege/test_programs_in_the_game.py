@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.game.game_programs import AGENT, drive, piloted, program
+from support.game.game_rig import AGENT, drive, piloted, program
 from support.game.record_games import RUN, Recorded, game_of, recorded
 from support.lua_game import LuaGame
 from support.machines.families import mechanism

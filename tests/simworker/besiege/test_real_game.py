@@ -107,14 +107,14 @@ def test_a_launcher_that_ends_is_not_started_again_and_a_path_leads_to_the_level
 
 def test_a_page_about_the_game_and_another_program_are_not_taken_for_it(clean, screen) -> None:
     page = (
-        "import tkinter as tk; from support.game.stand_in_game.ownership import sign;"
+        "import tkinter as tk; from support.game.stand_in_game.window import sign;"
         "a = tk.Tk(); a.title('besiege.md - Notepad'); a.geometry('400x300');"
         "b = tk.Toplevel(a); b.title('Besiege'); b.geometry('400x300+500+400');"
         "a.after(200, lambda: (sign(a), sign(b), print('shown', flush=True))); a.mainloop()"
     )
     environment = {**os.environ, **screen, "PYTHONPATH": SUPPORT}
     look = (
-        "from buildarena_simworker.besiege.screen.windows import *;"
+        "from buildarena_simworker.besiege.screen.window_types import *;"
         "from buildarena_simworker.besiege.screen.window_types import *;"
         "w = Wanted(title='Besiege', executable='Besiege.exe');"
         "print(open_windows(w).find(), open_windows(Wanted(title='besiege')).find())"

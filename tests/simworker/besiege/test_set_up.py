@@ -8,8 +8,7 @@ import time
 from dataclasses import asdict
 
 import pytest
-from support.game.game_rig import Rig
-from support.game.steam_library import library
+from support.game.game_rig import Rig, library
 
 from buildarena_simworker.besiege.errors import NotSetUpError
 from buildarena_simworker.besiege.process import GameProcess

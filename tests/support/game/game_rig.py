@@ -8,15 +8,18 @@ from pathlib import Path
 from typing import Any
 
 import psutil
-from support.machines.building import BLOCK, built
-from support.machines.experts import experts_machine
+from support.machines.building import BLOCK, built, experts_machine
+from support.machines.families import car
 
 from buildarena_backend.trials.simulator import TrialRequest
 from buildarena_benchmark import Score, Task, builtin_tasks, parse_custom_task, score
 from buildarena_besiege import game_start
 from buildarena_geometry import Machine
 from buildarena_simulation import Scenario, simulate
+from buildarena_simulation.offered import Senses
+from buildarena_simulation.scenario import Control
 from buildarena_simworker.besiege.calibrate import TRIAL_S
+from buildarena_simworker.besiege.installed import LUA_MOD_ID
 
 HERE = Path(__file__).parent
 TESTS = HERE.parents[1]
@@ -166,3 +169,43 @@ def trial_of(task: Task, machine: Machine, *, job_id: str = "job_0001") -> Trial
         controls=None,
         require_held=lambda: None,
     )
+
+
+MOD_XML = "<Mod>\n\t<Name>{name}</Name>\n\t<Version>{version}</Version>\n<ID>{id}</ID>\n</Mod>"
+
+
+def library(tmp_path: Path, *, build: str = "25346", version: str = "1.4") -> Path:
+    """A folder of Steam with the game and its mod, two levels below the workshop's folder."""
+    steam = tmp_path / "steamapps"
+    game = steam / "common" / "Besiege"
+    mod = steam / "workshop" / "content" / "346010" / "2383785201" / "LuaScripting"
+    for folder in (game / "Besiege_Data" / "SavedMachines", mod):
+        folder.mkdir(parents=True, exist_ok=True)
+    text = MOD_XML.format(name="Scripting", version=version, id=LUA_MOD_ID.upper())
+    (mod / "Mod.xml").write_text(text, encoding="utf-8")
+    other = mod.parents[1] / "1" / "Other"
+    other.mkdir(parents=True, exist_ok=True)
+    (other / "Mod.xml").write_text(MOD_XML.format(name="Lua toys", version="9", id="1"))
+    (steam / "appmanifest_346010.acf").write_text(
+        f'"AppState"\n{{\n\t"appid"\t\t"346010"\n\t"buildid"\t\t"{build}"\n}}\n'
+    )
+    return game
+
+
+AGENT = Control(mode="agent")
+
+
+def drive(duration_s: float = 2.0, **changes) -> Scenario:
+    changes.setdefault("senses", Senses(offers=("pose", "wheels", "joints", "blocks")))
+    return Scenario(duration_s=duration_s, control=AGENT, **changes)
+
+
+def program(body: str) -> str:
+    return f"function control(t, sense)\n{body}\nend"
+
+
+GO = program("return { spinning_forward = 1 }")
+
+
+def piloted(text: str = GO, machine: Machine | None = None) -> Machine:
+    return (machine or car(bound=False, drive=())).with_controller(text)

@@ -2,6 +2,9 @@
 
 from typing import Any
 
+from support.player import Player
+
+from buildarena_benchmark.experts.drafting import Direction, Draft
 from buildarena_geometry import Machine, Outcome
 
 BLOCK = "Small Wooden Block"
@@ -27,3 +30,32 @@ def built(*parts: tuple[str, str, str], catalogue: Any = None, **start: Any) -> 
         done = attach(machine, *part)
         assert done.ok, done.text
     return machine
+
+
+class KeyedDraft(Draft):
+    """A machine under construction whose keys are bound while it is drafted."""
+
+    def placed(self, base: str, face: Direction, module: str, y_axis: Direction) -> str:
+        """A block on a face, twisted until its own y axis looks a way."""
+        made = self.attach(base, face, module)
+        self.turn_axis(made, 1, y_axis)
+        return made
+
+    def bind(self, block: str, action: str, key: str) -> None:
+        self.do("add_control_key", block_id=block, action=action, new_key=key)
+
+    def press(self, key: str, time: float, hold_for: float) -> None:
+        self.do("add_control_sequence", time=time, key=key, hold_for=hold_for)
+
+
+def experts_machine(task: str) -> Machine:
+    """What the expert builds, with its key presses."""
+    asked = Player()("builtin/expert", task=task).suspended
+    assert asked is not None
+    document = asked.machine.to_document()
+    if asked.controls is not None:
+        document["control_sequence"] = [
+            {"time_s": press.time_s, "key": press.key, "hold_for_s": press.hold_for_s}
+            for press in asked.controls
+        ]
+    return Machine.from_document(document)

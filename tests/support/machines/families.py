@@ -6,7 +6,7 @@ parameters is kept as data: see `references`.
 
 from collections.abc import Sequence
 
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 
 from buildarena_benchmark.experts.drafting import (
     DOWN,

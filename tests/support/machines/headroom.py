@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 
 from buildarena_benchmark.experts.design import Design
 from buildarena_benchmark.experts.drafting import DOWN, EAST, NORTH, SOUTH, UP, WEST

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 from support.machines.trials import press
 
 from buildarena_benchmark.experts.drafting import (

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from support.machines.drafts import KeyedDraft
+from support.machines.building import KeyedDraft
 
 from buildarena_benchmark import Task
 from buildarena_benchmark.experts import expert_designs

@@ -5,8 +5,7 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from support.machines.building import BLOCK
-from support.machines.drafts import KeyedDraft
+from support.machines.building import BLOCK, KeyedDraft
 from support.machines.module_files import like
 
 from buildarena_benchmark.experts.drafting import DOWN

@@ -14,8 +14,7 @@ from support.servers.stacks import wait_until
 
 from buildarena_backend.database.database import Database
 from buildarena_cli.local.postgres import EmbeddedPostgres
-from buildarena_cli.local.server import free_port
-from buildarena_cli.local.valkey import EmbeddedValkey
+from buildarena_cli.local.server import EmbeddedValkey, free_port
 
 
 @dataclass(frozen=True, kw_only=True)

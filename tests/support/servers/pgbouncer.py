@@ -11,7 +11,7 @@ import psycopg
 import pytest
 from support.servers.stacks import wait_until
 
-from buildarena_cli.local.accounts import run_as, unprivileged_account
+from buildarena_cli.local.program_copy import run_as, unprivileged_account
 from buildarena_cli.local.server import free_port
 
 PGBOUNCER = shutil.which("pgbouncer") or shutil.which("pgbouncer", path="/usr/sbin")

@@ -102,3 +102,19 @@ def target_says(client: httpx.Client, wanted: str) -> None:
         return any(wanted in (each["health"], *each["lastError"].split()) for each in active)
 
     wait_until(says, 60, f"the target says {wanted}")
+
+
+PROMTOOL = shutil.which("promtool")
+
+needs_promtool = pytest.mark.skipif(
+    PROMTOOL is None, reason="rules need promtool: install the Debian packages prometheus"
+)
+
+
+def promtool(*words: str) -> str:
+    """What a check printed; a failed one fails the test."""
+    done = subprocess.run(
+        [str(PROMTOOL), *words], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout + done.stderr

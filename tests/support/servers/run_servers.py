@@ -60,7 +60,7 @@ class RunServers:
     def _start(self) -> tuple[str, str]:
         from buildarena_backend.database.database import Database
         from buildarena_cli.local.postgres import EmbeddedPostgres
-        from buildarena_cli.local.valkey import EmbeddedValkey
+        from buildarena_cli.local.server import EmbeddedValkey
 
         postgres = EmbeddedPostgres(self._folder / "pg", self._folder / "pg.log", durable=False)
         self._run(postgres)

@@ -6,8 +6,7 @@ import contextlib
 from collections.abc import Coroutine, Iterator
 from typing import Any, TypeVar
 
-from buildarena_cli.errors import CommandError
-from buildarena_cli.suggestions import suggested_field
+from buildarena_cli.errors import CommandError, suggested_field
 from buildarena_client import errors, paths
 from buildarena_client.client import Client as ApiClient
 from buildarena_client.config import KEY_VARIABLE

@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Final
 
-from buildarena_cli.errors import CommandError
-from buildarena_cli.suggestions import did_you_mean
+from buildarena_cli.errors import CommandError, did_you_mean
 
 if TYPE_CHECKING:
     from buildarena_cli.client import Client

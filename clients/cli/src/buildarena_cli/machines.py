@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from buildarena_cli.errors import FAILED, CommandError
-from buildarena_cli.given_paths import to_read, to_read_or_name
-from buildarena_cli.suggestions import did_you_mean
+from buildarena_cli.errors import FAILED, CommandError, did_you_mean
+from buildarena_cli.options import to_read, to_read_or_name
 from buildarena_cli.terminal.output import warn
 
 if TYPE_CHECKING:

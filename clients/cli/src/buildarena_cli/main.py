@@ -20,7 +20,7 @@ from buildarena_cli.commands import (
     tasks,
 )
 from buildarena_cli.errors import CommandError
-from buildarena_cli.groups import new_group
+from buildarena_cli.options import new_group
 from buildarena_cli.terminal.output import is_terminal, warn
 
 UNWRAPPED = 10_000

@@ -2,12 +2,74 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import typer
 
 from buildarena_cli.defaults import DEFAULT_URL
+from buildarena_cli.errors import USAGE, CommandError
+
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+"""Words that ask for help, and columns of its texts on wide terminals."""
+
+
+def new_group(text: str, *, completed: bool = False) -> typer.Typer:
+    """An empty group of commands.
+
+    Args:
+        text: What they are for.
+        completed: Whether it has the options that install completion for a shell.
+    """
+    return typer.Typer(
+        help=text,
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        add_completion=completed,
+        pretty_exceptions_enable=False,
+        context_settings=CONTEXT,
+    )
+
+
+STANDARD_INPUT: Final = "-"
+
+
+def to_read(path: Path | None) -> Path | None:
+    """A path that is there, for the options and arguments that name what a command reads.
+
+    Args:
+        path: What was given; None where an option was left out.
+
+    Raises:
+        CommandError: There is neither a file nor a folder; a usage error.
+    """
+    if path is not None and str(path) != STANDARD_INPUT and not path.exists():
+        raise CommandError(f"{path}: No such file or directory", USAGE)
+    return path
+
+
+def to_read_or_url(place: str) -> str:
+    """The same for what is a path, or the URL of a store.
+
+    Raises:
+        CommandError: It is no URL, and nothing is there; a usage error.
+    """
+    if "://" not in place:
+        to_read(Path(place))
+    return place
+
+
+def to_read_or_name(name: str) -> str:
+    """The same for what is a name, or the path of a YAML file.
+
+    Raises:
+        CommandError: It looks like a path and nothing is there; a usage error.
+    """
+    if name.endswith((".yaml", ".yml")) or os.sep in name:
+        to_read(Path(name))
+    return name
+
 
 __all__ = ["DEFAULT_URL"]
 

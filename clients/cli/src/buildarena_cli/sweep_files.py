@@ -13,8 +13,7 @@ from buildarena_backend.catalog.specs import SweepSpec
 from buildarena_benchmark import SourceError, ValidationIssue
 from buildarena_benchmark.tasks.sources import Source, path_of, read_source
 from buildarena_cli.client import RefusedError
-from buildarena_cli.errors import CommandError
-from buildarena_cli.suggestions import suggested_field
+from buildarena_cli.errors import CommandError, suggested_field
 
 MAX_BYTES: Final = 2 * 1024 * 1024
 """Largest file: room for the 100,000 seeds that a sweep can name."""

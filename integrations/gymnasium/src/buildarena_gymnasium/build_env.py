@@ -20,8 +20,7 @@ from buildarena_benchmark.environment import (
     Snapshot,
     call_text,
 )
-from buildarena_gymnasium.pictures import Picture, checked_mode, picture_of
-from buildarena_gymnasium.scores import score_told
+from buildarena_gymnasium.pictures import Picture, checked_mode, picture_of, score_told
 from buildarena_gymnasium.spaces import ACTION_SPACE, OBSERVATION_SPACE, observed
 from buildarena_simulation import DEFAULT_ENGINE
 

@@ -22,8 +22,7 @@ from buildarena_benchmark.environment.rewards import (
 )
 from buildarena_geometry import Machine
 from buildarena_gymnasium.machines import fixed_machine, fixed_machines
-from buildarena_gymnasium.pictures import Picture, checked_mode, picture_at
-from buildarena_gymnasium.scores import score_told
+from buildarena_gymnasium.pictures import Picture, checked_mode, picture_at, score_told
 from buildarena_simulation import DEFAULT_ENGINE, Drive, SimulationError, pilot_of
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
 

@@ -1,18 +1,36 @@
-"""Pictures of what an episode has built, and of what drives."""
+"""What is told of an episode: pictures of what it built or drives, and scores of its trials."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from buildarena_benchmark.environment import Environment, NothingToSubmitError
+from buildarena_benchmark.environment import Environment, NothingToSubmitError, Trial
 from buildarena_geometry import Machine
 from buildarena_simulation import MachineNotSimulable, Scenario, Trajectory
 from buildarena_simulation.render.still import SIZE, still_png
+
+
+def score_told(trial: Trial) -> dict[str, Any]:
+    """The score in types that vector environments stack; metrics without a value are left out."""
+    metrics = {
+        name: value if isinstance(value, str) else float(value)
+        for name, value in trial.score.metrics.items()
+        if value is not None
+    }
+    return {
+        "success": trial.score.success,
+        "indicator": float(trial.score.indicator),
+        "metrics": metrics,
+        "flags": list(trial.score.flags),
+        "reason": trial.reason or "",
+    }
+
 
 Picture = NDArray[np.uint8]
 """(height, width, 3), red, green and blue."""

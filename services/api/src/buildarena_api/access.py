@@ -38,6 +38,7 @@ OPERATOR = "operator"
 """For whom the operator's open requests count."""
 READING = ("GET", "HEAD", "OPTIONS")
 _bearer = HTTPBearer(auto_error=False, description="An API key, of `buildarena admin key create`")
+GivenKey = Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,10 +117,7 @@ def check_binding(settings: Settings) -> None:
         )
 
 
-async def caller_of(
-    request: Request,
-    given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
-) -> Caller:
+async def caller_of(request: Request, given: GivenKey) -> Caller:
     """Who sent the request, as long as they may send it now.
 
     Raises:
@@ -131,10 +129,7 @@ async def caller_of(
     return caller
 
 
-async def admin_of(
-    request: Request,
-    given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
-) -> Caller:
+async def admin_of(request: Request, given: GivenKey) -> Caller:
     """As `caller_of`, for what only admins may ask.
 
     Raises:
@@ -145,10 +140,7 @@ async def admin_of(
     return caller
 
 
-async def runner_of(
-    request: Request,
-    given: Annotated[HTTPAuthorizationCredentials | None, Depends(_bearer)],
-) -> Caller:
+async def runner_of(request: Request, given: GivenKey) -> Caller:
     """As `caller_of`, for what runners ask: only runner keys may, and anybody without keys.
 
     Raises:

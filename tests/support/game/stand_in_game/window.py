@@ -16,7 +16,6 @@ from typing import Final
 from support.game.stand_in_game.faults import Fault
 from support.game.stand_in_game.game import SIZE, Game
 from support.game.stand_in_game.interface import Interface
-from support.game.stand_in_game.ownership import sign
 from support.game.stand_in_game.panels import Shape, draw, shapes
 
 TITLE: Final = "Besiege"
@@ -173,3 +172,18 @@ class Window:
             "counts": dict(game.counts),
             "faults": list(game.faults.struck),
         }
+
+
+def sign(window: tk.Tk | tk.Toplevel) -> None:
+    """Writes this process's number to a window that is shown."""
+    from Xlib import Xatom, display
+
+    screen = display.Display()
+    try:
+        inner = screen.create_resource_object("window", window.winfo_id())
+        titled = inner.query_tree().parent
+        number = screen.intern_atom("_NET_WM_PID")
+        titled.change_property(number, Xatom.CARDINAL, 32, [os.getpid()])
+        screen.sync()
+    finally:
+        screen.close()

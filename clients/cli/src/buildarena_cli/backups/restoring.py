@@ -17,8 +17,7 @@ from buildarena_backend.database.database import Database
 from buildarena_backend.database.migrating import known_schemas
 from buildarena_backend.database.tables import job_artifacts
 from buildarena_backend.errors import ArtifactDamagedError, ArtifactMissingError
-from buildarena_cli.backups.copying import AT_ONCE, copy_artifacts
-from buildarena_cli.backups.place import DUMP, LIST, BackupPlace, Manifest
+from buildarena_cli.backups.place import AT_ONCE, DUMP, LIST, BackupPlace, Manifest, copy_artifacts
 from buildarena_cli.backups.programs import run_program
 from buildarena_cli.errors import CommandError
 

@@ -17,8 +17,15 @@ from buildarena_backend.artifacts.collecting import LOCK, referenced
 from buildarena_backend.artifacts.storing import ArtifactStore
 from buildarena_backend.database.database import Database
 from buildarena_backend.database.tables import artifacts as artifacts_table
-from buildarena_cli.backups.copying import copy_artifacts
-from buildarena_cli.backups.place import DUMP, FORMAT, LIST, NAME, BackupPlace, Manifest
+from buildarena_cli.backups.place import (
+    DUMP,
+    FORMAT,
+    LIST,
+    NAME,
+    BackupPlace,
+    Manifest,
+    copy_artifacts,
+)
 from buildarena_cli.backups.programs import run_program
 from buildarena_cli.errors import CommandError
 

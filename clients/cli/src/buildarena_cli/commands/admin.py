@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
-from buildarena_cli.commands import artifacts, backups, keys, running, worker
-from buildarena_cli.groups import new_group
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from buildarena_cli.commands import backups, keys, running, worker
+from buildarena_cli.errors import CommandError
+from buildarena_cli.options import DataOption, JsonOption, new_group
+from buildarena_cli.terminal.output import print_json, say
 
 app = new_group("Keys, workers, backups and the database of a service.")
 app.command()(running.status)
@@ -14,4 +21,51 @@ app.command()(backups.backup)
 app.command()(backups.restore)
 app.command()(worker.migrate)
 app.command()(worker.roles)
-app.command("gc")(artifacts.collect)
+
+MEBIBYTE = 1024 * 1024
+
+
+@app.command("gc")
+def collect(
+    *,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only say what would be done.")
+    ] = False,
+    keep_days: Annotated[
+        float,
+        typer.Option(
+            "--grace-days",
+            help="Days an unreferenced artifact is kept before it moves to the trash, and again "
+            "before it is deleted (total: twice this value).",
+            min=1,
+        ),
+    ] = 7,
+    data: DataOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Remove artifacts that nothing refers to.
+
+    They go to the trash, and are deleted by a later call; whatever is referred to again meanwhile
+    comes back. The service may run; it is that of BUILDARENA_DATABASE_URL, or of the data folder.
+    """
+    from datetime import timedelta
+
+    from buildarena_backend.artifacts.collecting import GarbageCollector
+    from buildarena_cli.local.stores import opened_stores
+
+    with opened_stores(data) as stores:
+        stores.database.require_schema()
+        keep = timedelta(days=keep_days)
+        collector = GarbageCollector(stores.database, stores.artifacts, keep=keep)
+        done = collector.collect(dry_run=dry_run)
+    if done is None:
+        raise CommandError("a backup or another collection is under way: try again later")
+    if as_json:
+        print_json({"dry_run": dry_run, **asdict(done)})
+        return
+    would = "would be " if dry_run else ""
+    say(f"{done.kept:,} artifacts are referred to, {done.young:,} more are too new to judge")
+    say(f"{done.trashed:,} {would}moved to the trash ({done.trashed_bytes / MEBIBYTE:,.1f} MiB)")
+    say(f"{done.deleted:,} {would}deleted from it ({done.deleted_bytes / MEBIBYTE:,.1f} MiB)")
+    if done.taken_back:
+        say(f"{done.taken_back:,} {would}taken back from it: something refers to them again")

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from buildarena_cli.errors import PARTIAL, CommandError
-from buildarena_cli.given_paths import to_read_or_url
-from buildarena_cli.options import DataOption, JsonOption
+from buildarena_cli.options import DataOption, JsonOption, to_read_or_url
 from buildarena_cli.terminal.output import print_json, say
 
 if TYPE_CHECKING:

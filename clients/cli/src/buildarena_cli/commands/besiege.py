@@ -9,10 +9,8 @@ import typer
 
 from buildarena_cli.errors import CommandError
 from buildarena_cli.exec import exec_module
-from buildarena_cli.given_paths import to_read
-from buildarena_cli.groups import new_group
 from buildarena_cli.machines import chosen_task, read_machine, shown_errors
-from buildarena_cli.options import JsonOption
+from buildarena_cli.options import JsonOption, new_group, to_read
 from buildarena_cli.terminal.output import print_json, say, warn
 
 if TYPE_CHECKING:

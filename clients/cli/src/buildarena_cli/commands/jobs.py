@@ -11,11 +11,9 @@ import typer
 
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import list_jobs
-from buildarena_cli.commands.job_replay import replay
-from buildarena_cli.errors import DONE, FAILED, USAGE, CommandError
-from buildarena_cli.given_paths import to_read
-from buildarena_cli.groups import new_group
+from buildarena_cli.errors import DONE, FAILED, USAGE, CommandError, did_you_mean
 from buildarena_cli.ids import whole_id
+from buildarena_cli.machines import film, read_machine, shown_errors
 from buildarena_cli.options import (
     DEFAULT_URL,
     JobId,
@@ -25,8 +23,9 @@ from buildarena_cli.options import (
     TasksOption,
     TrackOption,
     UrlOption,
+    new_group,
+    to_read,
 )
-from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say
 
 app = new_group("Submit and look at jobs.")
@@ -91,9 +90,6 @@ def retry_job(job_id: JobId, *, url: UrlOption = DEFAULT_URL, as_json: JsonOptio
     A scored job is never run again.
     """
     _change(url, job_id, "retry", as_json=as_json)
-
-
-app.command("replay")(replay)
 
 
 def _change(url: str, job_id: str, verb: str, *, as_json: bool) -> None:
@@ -303,3 +299,37 @@ def _verifications(client: Client, accepted: dict[str, Any]) -> Iterator[str]:
     yield from accepted["verification_ids"]
     for job_id in accepted["skipped_job_ids"]:
         yield client.post(at("jobs", job_id, "verify"), {})["id"]
+
+
+@app.command("replay")
+def replay(
+    job_id: JobId,
+    *,
+    out: Annotated[Path, typer.Option(help="The film (.mp4, .gif) or pictures (.png) to write.")],
+    number: Annotated[int, typer.Option(help="Which of the job's rollouts.", min=0)] = 0,
+    url: UrlOption = DEFAULT_URL,
+) -> None:
+    """Draw a job's trial as a film."""
+    import tempfile
+
+    from buildarena_benchmark import parse_task
+    from buildarena_simulation import read_trajectory
+
+    client = Client(url)
+    whole = whole_id(client, "job", job_id)
+    job = client.get(at("jobs", whole))
+    task = client.get(at("tasks", job["task"]), version=job["task_version"])
+    recorded = client.get_bytes(at("jobs", whole, "trajectory"), number=number)
+    document = client.get_bytes(at("jobs", whole, "machine"))
+    with shown_errors(), tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "machine.json"
+        file.write_bytes(document)
+        rollout = read_trajectory(recorded)
+        film(read_machine(file), parse_task(_text(task), origin=job["task"]), rollout, out)
+    say(str(out))
+
+
+def _text(task: dict[str, Any]) -> str:
+    import yaml
+
+    return yaml.safe_dump(task["document"])

@@ -10,7 +10,6 @@ import typer
 
 from buildarena_cli.client import Client, at
 from buildarena_cli.errors import CommandError
-from buildarena_cli.groups import new_group
 from buildarena_cli.ids import whole_id
 from buildarena_cli.options import (
     DEFAULT_URL,
@@ -21,6 +20,7 @@ from buildarena_cli.options import (
     MaxTokensOption,
     UrlOption,
     budget_of,
+    new_group,
 )
 from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from buildarena_cli.client import Client
-from buildarena_cli.groups import new_group
-from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption
+from buildarena_cli.options import DEFAULT_URL, JsonOption, UrlOption, new_group
 from buildarena_cli.terminal.output import print_json, print_table
 
 app = new_group("Look at models.")

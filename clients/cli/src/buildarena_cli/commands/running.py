@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.defaults import data_folder
-from buildarena_cli.errors import FAILED, CommandError
+from buildarena_cli.errors import FAILED, CommandError, did_you_mean
 from buildarena_cli.options import DEFAULT_URL, DataOption, JsonOption, UrlOption
-from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import number, print_json, print_table, say
 
 if TYPE_CHECKING:

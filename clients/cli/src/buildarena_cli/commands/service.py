@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from buildarena_cli.errors import CommandError
+from buildarena_cli.errors import CommandError, did_you_mean
 from buildarena_cli.options import DataOption, PortOption
-from buildarena_cli.suggestions import did_you_mean
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:

@@ -44,9 +44,8 @@ def site(
     if not sweeps and track is None:
         raise CommandError("name the sweeps to publish, or a track: --track", code=USAGE)
     from buildarena_cli.site.folder import Folder
-    from buildarena_cli.site.pages import built_pages
     from buildarena_cli.site.scope import chosen_jobs, read_choice, read_scope
-    from buildarena_cli.site.writing import write_site
+    from buildarena_cli.site.writing import built_pages, write_site
 
     per_cell, folder, pages = read_choice(jobs), Folder(out), built_pages()
     client = Client(url)

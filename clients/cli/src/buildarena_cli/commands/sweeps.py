@@ -12,8 +12,6 @@ import typer
 from buildarena_cli.client import Client, RefusedError, at
 from buildarena_cli.commands.job_lists import gathered, show_cursor
 from buildarena_cli.commands.keys import spent
-from buildarena_cli.given_paths import to_read
-from buildarena_cli.groups import new_group
 from buildarena_cli.ids import whole_id
 from buildarena_cli.options import (
     DEFAULT_URL,
@@ -26,6 +24,8 @@ from buildarena_cli.options import (
     SweepId,
     UrlOption,
     budget_of,
+    new_group,
+    to_read,
 )
 from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say, warn
 from buildarena_cli.terminal.progress import (

@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.client import Client, RefusedError, at
-from buildarena_cli.errors import FAILED, CommandError
-from buildarena_cli.given_paths import to_read
-from buildarena_cli.groups import new_group
-from buildarena_cli.options import DEFAULT_URL, JsonOption, TaskName, UrlOption
-from buildarena_cli.suggestions import did_you_mean, suggested_field
+from buildarena_cli.errors import FAILED, CommandError, did_you_mean, suggested_field
+from buildarena_cli.options import DEFAULT_URL, JsonOption, TaskName, UrlOption, new_group, to_read
 from buildarena_cli.terminal.output import in_words, print_json, print_table, say, warn
 
 if TYPE_CHECKING:

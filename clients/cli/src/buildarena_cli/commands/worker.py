@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from buildarena_cli.defaults import KEY_VARIABLE
-from buildarena_cli.errors import USAGE, CommandError
+from buildarena_cli.errors import USAGE, CommandError, did_you_mean
 from buildarena_cli.exec import exec_module
-from buildarena_cli.given_paths import to_read
-from buildarena_cli.options import JsonOption
-from buildarena_cli.suggestions import did_you_mean
+from buildarena_cli.options import JsonOption, to_read
 from buildarena_cli.terminal.output import say
 
 if TYPE_CHECKING:

@@ -14,13 +14,13 @@ from pathlib import Path
 
 from buildarena_backend.errors import StartupError
 from buildarena_benchmark.environment.trials.processes import dying_with_me
-from buildarena_cli.local.accounts import (
+from buildarena_cli.local.program_copy import (
     READ_BY_SHELLS,
+    ProgramCopy,
     run_as,
     unprivileged_account,
     usable_by_path,
 )
-from buildarena_cli.local.program_copy import ProgramCopy
 from buildarena_cli.local.server import (
     LOOPBACK,
     free_port,

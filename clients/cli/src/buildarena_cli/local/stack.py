@@ -30,10 +30,9 @@ from buildarena_benchmark.environment.trials.processes import ALLOCATOR, PARENT
 from buildarena_cli.errors import CommandError
 from buildarena_cli.local.postgres import EmbeddedPostgres
 from buildarena_cli.local.programs import programs
-from buildarena_cli.local.server import EmbeddedServer
+from buildarena_cli.local.server import EmbeddedServer, EmbeddedValkey
 from buildarena_cli.local.service import LOCK, READY, RUN, log_name, unwritable
 from buildarena_cli.local.supervisor import ManagedProcess, Supervisor
-from buildarena_cli.local.valkey import EmbeddedValkey
 from buildarena_client.paths import HEALTH
 
 KEYS = ("admin_key", "previous_admin_key", "metrics_key")

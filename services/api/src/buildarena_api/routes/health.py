@@ -23,6 +23,7 @@ from buildarena_backend.workers import WorkerCounts
 
 # No turn is waited for: an answer takes neither a thread nor a connection.
 router = APIRouter(prefix="/v1", tags=["health"])
+metrics = APIRouter(prefix="/v1", tags=["health"])
 
 # Wrong is what deploy/monitoring/prometheus/alerts.yml calls wrong; a test compares them.
 LOW_DISK_BYTES: Final = 1_000_000_000
@@ -72,6 +73,11 @@ async def health(services: ServicesDep, response: Response) -> Health:
     return Health(status="ok" if all(c.ok for c in checks) else "degraded", checks=checks)
 
 
+def _check(name: str, detail: str, advice: str = "") -> HealthCheck:
+    """A check; what is not ok has an advice."""
+    return HealthCheck(name=name, ok=not advice, detail=detail, advice=advice)
+
+
 def _database(parts: Parts) -> tuple[HealthCheck, WorkerCounts | None]:
     try:
         counts = parts.database.latest()
@@ -81,8 +87,8 @@ def _database(parts: Parts) -> tuple[HealthCheck, WorkerCounts | None]:
             advice = "run `buildarena admin migrate`"
         elif error.is_silent:
             advice = "look at Postgres' log, disk and locks; it accepts connections"
-        return HealthCheck(name="database", ok=False, detail=str(error), advice=advice), None
-    return HealthCheck(name="database", ok=True, detail="reachable, schema as expected"), counts
+        return _check("database", str(error), advice), None
+    return _check("database", "reachable, schema as expected"), counts
 
 
 def _figures(parts: Parts) -> MetricValues | None:
@@ -95,28 +101,18 @@ def _broker(parts: Parts) -> HealthCheck:
     try:
         waiting = parts.broker.latest()
     except PartFailedError as error:
-        return HealthCheck(
-            name="broker",
-            ok=False,
-            detail=f"{error}; jobs are kept and wait",
-            advice="start Valkey or Redis, or correct BUILDARENA_BROKER_URL",
-        )
-    return HealthCheck(
-        name="broker", ok=True, detail=f"reachable, {waiting} messages for construct"
-    )
+        advice = "start Valkey or Redis, or correct BUILDARENA_BROKER_URL"
+        return _check("broker", f"{error}; jobs are kept and wait", advice)
+    return _check("broker", f"reachable, {waiting} messages for construct")
 
 
 def _artifacts(parts: Parts) -> HealthCheck:
     try:
         parts.artifacts.latest()
     except PartFailedError as error:
-        return HealthCheck(
-            name="artifacts",
-            ok=False,
-            detail=f"{error}; jobs wait and lose nothing",
-            advice="free space, or correct BUILDARENA_ARTIFACTS_URL and its permissions",
-        )
-    return HealthCheck(name="artifacts", ok=True, detail="can be written and read")
+        advice = "free space, or correct BUILDARENA_ARTIFACTS_URL and its permissions"
+        return _check("artifacts", f"{error}; jobs wait and lose nothing", advice)
+    return _check("artifacts", "can be written and read")
 
 
 def _workers(
@@ -129,20 +125,17 @@ def _workers(
         serving, depth = counts.serving.get(queue, 0), waiting.get(queue)
         detail = f"{serving} alive" + (f"; {depth.jobs} waiting" if depth else "")
         advice = "" if serving else f"start a worker for the queue {queue}"
-        yield HealthCheck(name=f"workers of {queue}", ok=not advice, detail=detail, advice=advice)
+        yield _check(f"workers of {queue}", detail, advice)
 
 
 def _waiting(figures: MetricValues) -> HealthCheck:
     oldest = max(figures.queues, key=lambda depth: depth.oldest_s, default=None)
     if oldest is None or oldest.oldest_s < 1:
-        return HealthCheck(name="waiting", ok=True, detail="no job")
-    long = oldest.oldest_s > LONG_WAIT_S
-    return HealthCheck(
-        name="waiting",
-        ok=not long,
-        detail=f"the oldest job for {_duration(oldest.oldest_s)}, in {oldest.queue}",
-        advice=f"start more workers for the queue {oldest.queue}" if long else "",
-    )
+        return _check("waiting", "no job")
+    is_long = oldest.oldest_s > LONG_WAIT_S
+    advice = f"start more workers for the queue {oldest.queue}" if is_long else ""
+    detail = f"the oldest job for {_duration(oldest.oldest_s)}, in {oldest.queue}"
+    return _check("waiting", detail, advice)
 
 
 def _duration(seconds: float) -> str:
@@ -153,28 +146,21 @@ def _duration(seconds: float) -> str:
 def _lost(counts: WorkerCounts) -> HealthCheck:
     many = max(counts.lost.values(), default=0) > FEW_LOST
     lost = [f"{number} of {kind}" for kind, number in sorted(counts.lost.items()) if number]
-    return HealthCheck(
-        name="silent workers",
-        ok=not many,
-        detail=f"{', '.join(lost) or 'none'} within the last hour",
-        advice="see why they ended: memory, machines, too short a time to stop" if many else "",
-    )
+    advice = "see why they ended: memory, machines, too short a time to stop" if many else ""
+    return _check("silent workers", f"{', '.join(lost) or 'none'} within the last hour", advice)
 
 
 def _audits(figures: MetricValues) -> HealthCheck:
     waiting = figures.audits.get(Audit.REQUIRED, 0)
-    return HealthCheck(name="audits", ok=True, detail=f"{waiting} jobs wait for their verification")
+    return _check("audits", f"{waiting} jobs wait for their verification")
 
 
 def _budgets(figures: MetricValues) -> HealthCheck:
     """Not wrong, but somebody waits: an alert of the least severity."""
     waiting = figures.sweeps.get(SweepState.BUDGET_EXHAUSTED, 0)
-    return HealthCheck(
-        name="budgets",
-        ok=True,
-        detail=f"{waiting} sweeps wait for a larger one",
-        advice="see `buildarena sweep list`, then resume or cancel them" if waiting else "",
-    )
+    advice = "see `buildarena sweep list`, then resume or cancel them" if waiting else ""
+    detail = f"{waiting} sweeps wait for a larger one"
+    return HealthCheck(name="budgets", ok=True, detail=detail, advice=advice)
 
 
 def _clocks(counts: WorkerCounts) -> HealthCheck:
@@ -184,12 +170,8 @@ def _clocks(counts: WorkerCounts) -> HealthCheck:
         for worker, ahead_s in counts.clocks
         if abs(ahead_s) > CLOCK_TOLERANCE_S
     ]
-    return HealthCheck(
-        name="clocks",
-        ok=not wrong,
-        detail="; ".join(wrong) or "workers and database agree",
-        advice="synchronise these machines' clocks by NTP" if wrong else "",
-    )
+    advice = "synchronise these machines' clocks by NTP" if wrong else ""
+    return _check("clocks", "; ".join(wrong) or "workers and database agree", advice)
 
 
 def _disk(context: Context) -> HealthCheck:
@@ -197,16 +179,9 @@ def _disk(context: Context) -> HealthCheck:
     existing = next(path for path in (folder, *folder.parents) if path.exists())
     disk = shutil.disk_usage(Path(existing))
     share = disk.free / disk.total
-    low = disk.free < LOW_DISK_BYTES or share < LOW_DISK_SHARE
-    return HealthCheck(
-        name="disk",
-        ok=not low,
-        detail=f"{disk.free / 1e9:.1f} GB free, {share:.0%}",
-        advice=f"free some space under {existing}" if low else "",
-    )
-
-
-metrics = APIRouter(prefix="/v1", tags=["health"])
+    is_low = disk.free < LOW_DISK_BYTES or share < LOW_DISK_SHARE
+    advice = f"free some space under {existing}" if is_low else ""
+    return _check("disk", f"{disk.free / 1e9:.1f} GB free, {share:.0%}", advice)
 
 
 @metrics.get(

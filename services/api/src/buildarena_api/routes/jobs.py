@@ -90,6 +90,7 @@ def _kind(request: Request) -> Kind:
 
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"], dependencies=[limited(_kind)])
+transcripts = APIRouter(prefix="/v1/transcripts", tags=["jobs"], dependencies=[limited("heavy")])
 
 JSON = "application/json"
 
@@ -320,9 +321,6 @@ def _turn(turn: dict[str, Any]) -> list[str]:
         lines += [f"`{action['name']}` {arguments} ({mark})", ""]
         lines += [FENCE, action["feedback"].replace(FENCE, "'''"), FENCE, ""]
     return lines
-
-
-transcripts = APIRouter(prefix="/v1/transcripts", tags=["jobs"], dependencies=[limited("heavy")])
 
 
 class ExcerptPiece(BaseModel):

@@ -26,8 +26,7 @@ from buildarena_simworker.besiege.screen.calibration import (
 )
 from buildarena_simworker.besiege.screen.input import ScreenInput
 from buildarena_simworker.besiege.screen.window_types import Area, Windows
-from buildarena_simworker.besiege.settings import BesiegeSettings
-from buildarena_simworker.besiege.time_limits import TimeLimits
+from buildarena_simworker.besiege.settings import BesiegeSettings, TimeLimits
 
 BEFORE: Final = {
     "name_box": "Open the list of machine files in the game.",

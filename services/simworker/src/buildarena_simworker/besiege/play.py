@@ -19,7 +19,7 @@ from buildarena_simworker.besiege.errors import (
     NeedsPersonError,
     StepFailedError,
 )
-from buildarena_simworker.besiege.time_limits import TimeLimits
+from buildarena_simworker.besiege.settings import TimeLimits
 
 log = structlog.get_logger(__name__)
 

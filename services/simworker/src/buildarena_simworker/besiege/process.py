@@ -14,7 +14,7 @@ import psutil
 
 from buildarena_simworker.besiege.errors import GameGoneError
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
-from buildarena_simworker.besiege.whole_files import write_whole
+from buildarena_simworker.besiege.traces import write_whole
 
 END_S: Final = 5.0
 """How long a game may take to end before it is killed."""

@@ -5,13 +5,38 @@ from __future__ import annotations
 import hashlib
 import shlex
 import sys
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
-from buildarena_simworker.besiege.time_limits import TimeLimits
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimeLimits:
+    """Limits by the wall clock, seconds.
+
+    Attributes:
+        start_s: Until a game that was started has its window, or its menu.
+        effect_s: Until a click shows its effect.
+        load_s: Until a machine is loaded.
+        begin_s: Until the first line of a run, after the start.
+        stall_s: Without anything new while a machine runs.
+    """
+
+    start_s: float = 240.0
+    effect_s: float = 6.0
+    load_s: float = 30.0
+    begin_s: float = 15.0
+    stall_s: float = 15.0
+
+    def scaled(self, factor: float) -> TimeLimits:
+        """Limits so many times as long."""
+        return TimeLimits(
+            **{field.name: factor * getattr(self, field.name) for field in fields(self)}
+        )
+
 
 LEVEL_FIELD = "{level}"
 """Placeholder in the game's command: the level file to open, or "" for the sandbox."""

@@ -5,7 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from buildarena_simworker.besiege.whole_files import write_whole
+
+def write_whole(file: Path, data: bytes) -> None:
+    """Writes a file so that readers see all of it or nothing; makes its folder."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_name(file.name + ".part")
+    part.write_bytes(data)
+    part.replace(file)
 
 
 class Traces:

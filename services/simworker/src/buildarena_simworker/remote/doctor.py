@@ -11,8 +11,13 @@ from typing import Any, Final
 from buildarena_backend.errors import StartupError
 from buildarena_backend.settings import Settings
 from buildarena_backend.trials.installed_simulators import installed_simulators
-from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
-from buildarena_simworker.remote.errors import RefusedError, RemoteError
+from buildarena_simworker.remote.api import (
+    RefusedError,
+    RemoteError,
+    RunnerApi,
+    check_url,
+    tls_context,
+)
 from buildarena_simworker.remote.process import KEY_VARIABLE, read_key
 
 RETRY_FOR_S: Final = 5.0

@@ -23,8 +23,13 @@ from buildarena_backend.telemetry.logs import set_up_logs
 from buildarena_backend.trials.simulator import Simulator
 from buildarena_benchmark.environment.trials.processes import end_with_parent, tree_memory_bytes
 from buildarena_geometry import __version__ as geometry_version
-from buildarena_simworker.remote.api import RunnerApi, check_url, tls_context
-from buildarena_simworker.remote.errors import RemoteError, UnreachableError
+from buildarena_simworker.remote.api import (
+    RemoteError,
+    RunnerApi,
+    UnreachableError,
+    check_url,
+    tls_context,
+)
 from buildarena_simworker.remote.slots import Heartbeats, Slot, hand_back
 
 KEY_VARIABLE: Final = "BUILDARENA_KEY"

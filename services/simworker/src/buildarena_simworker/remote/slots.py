@@ -19,11 +19,12 @@ from buildarena_benchmark.tasks.document import TaskDocument
 from buildarena_benchmark.tasks.task import task_of
 from buildarena_geometry import KeyPress, Machine
 from buildarena_simulation import write_trajectory
-from buildarena_simworker.remote.api import HeldLease, RunnerApi
-from buildarena_simworker.remote.errors import (
+from buildarena_simworker.remote.api import (
+    HeldLease,
     LeaseLostError,
     RefusedError,
     RemoteError,
+    RunnerApi,
     UnreachableError,
 )
 from buildarena_simworker.trials import do_trial

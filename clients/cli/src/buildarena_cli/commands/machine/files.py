@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from buildarena_cli.errors import DONE, FAILED, CommandError
-from buildarena_cli.given_paths import to_read
 from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
@@ -17,7 +16,7 @@ from buildarena_cli.machines import (
     read_machine,
     shown_errors,
 )
-from buildarena_cli.options import JsonOption
+from buildarena_cli.options import JsonOption, to_read
 from buildarena_cli.terminal.output import print_json, say
 
 if TYPE_CHECKING:

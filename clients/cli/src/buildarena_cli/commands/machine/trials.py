@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from buildarena_cli.errors import CommandError
-from buildarena_cli.given_paths import to_read
+from buildarena_cli.errors import CommandError, did_you_mean
 from buildarena_cli.machines import (
     DialectOption,
     MachineFile,
@@ -22,7 +21,7 @@ from buildarena_cli.machines import (
     read_imported,
     shown_errors,
 )
-from buildarena_cli.suggestions import did_you_mean
+from buildarena_cli.options import to_read
 from buildarena_cli.terminal.output import (
     emphasised,
     number,

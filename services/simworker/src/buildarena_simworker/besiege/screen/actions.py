@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import time
+import unicodedata
 from collections.abc import Callable
 from typing import Final
 
+import structlog
+
 from buildarena_simworker.besiege.errors import GameGoneError, StepFailedError
-from buildarena_simworker.besiege.screen.input import ScreenInput
-from buildarena_simworker.besiege.screen.steps import ATTEMPTS, take_step
+from buildarena_simworker.besiege.process import GameProcess
+from buildarena_simworker.besiege.screen.calibration import PathClick
+from buildarena_simworker.besiege.screen.input import SELECT, ScreenInput
 from buildarena_simworker.besiege.screen.view import View
 from buildarena_simworker.besiege.screen.window_types import Windows
-from buildarena_simworker.besiege.time_limits import TimeLimits
+from buildarena_simworker.besiege.settings import TimeLimits
 
 AFTER_CLICK_S: Final = 0.1
+
+ATTEMPTS: Final = 3
+POLL_S: Final = 0.1
 
 
 class ScreenActions:
@@ -110,3 +118,154 @@ class ScreenActions:
                 self.recover()
             else:
                 return
+
+
+log = structlog.get_logger(__name__)
+
+
+def take_step(
+    name: str,
+    act: Callable[[], None],
+    finding: Callable[[], str | None],
+    *,
+    timeout_s: float,
+    recover: Callable[[], None],
+    attempts: int = ATTEMPTS,
+) -> None:
+    """Acts until the effect is seen.
+
+    Args:
+        name: What the step does, for messages.
+        act: Does it; must be harmless when done twice.
+        finding: None once its effect is seen; otherwise what is seen instead.
+        timeout_s: How long the effect may take.
+        recover: Clears what may block the step, before the next attempt.
+        attempts: How often to act.
+
+    Raises:
+        StepFailedError: The effect was never seen.
+    """
+    seen: str | None = None
+    for attempt in range(attempts):
+        if attempt:
+            log.info("step_again", step=name, finding=seen)
+            recover()
+        act()
+        seen = wait_for(finding, timeout_s=timeout_s)
+        if seen is None:
+            return
+    raise StepFailedError(name, str(seen))
+
+
+def wait_for(finding: Callable[[], str | None], *, timeout_s: float) -> str | None:
+    """Waits until something is seen.
+
+    Args:
+        finding: None once it is seen; otherwise what is seen instead.
+        timeout_s: How long to wait.
+
+    Returns:
+        None when it was seen, otherwise the last finding.
+    """
+    ends = time.monotonic() + timeout_s
+    while True:
+        seen = finding()
+        if seen is None or time.monotonic() >= ends:
+            return seen
+        time.sleep(POLL_S)
+
+
+def start_game(
+    process: GameProcess, actions: ScreenActions, level: bytes | None, path: tuple[PathClick, ...]
+) -> None:
+    """Ends the game there is, and starts it anew with its level open.
+
+    A launcher that hands over and ends is waited for: the game is the process of its window.
+
+    Args:
+        process: The game.
+        actions: Over its window.
+        level: Where the command opens levels.
+        path: The clicks that lead from the title to the level.
+
+    Raises:
+        GameGoneError: It does not start; the message has its last words.
+    """
+    process.kill()
+    process.start(level)
+    limit_s = actions.limits.start_s
+    finding = wait_for(lambda: _no_window(process, actions), timeout_s=limit_s)
+    if finding is not None:
+        raise GameGoneError(
+            f"the game showed no {actions.windows.wanted} within {limit_s:.0f} s: {finding}"
+        )
+    process.adopt(actions.windows.process())
+    actions.input.wait(1.0)
+    if path:
+        actions.to_front()
+    for click in path:
+        actions.input.wait(click.wait_s)
+        actions.input.click(*actions.view.at(click.x, click.y))
+
+
+def _no_window(process: GameProcess, actions: ScreenActions) -> str | None:
+    if actions.windows.find() is not None:
+        return None
+    if not process.awaited():
+        raise GameGoneError(f"the game ended as it started: {process.last_words()}")
+    return f"what it printed is in {process.output}"
+
+
+def load_by_name(actions: ScreenActions, name: str) -> None:
+    """Opens the list of machines, types the name, loads; a failure leaves the list closed.
+
+    Raises:
+        StepFailedError: The list does not open, take the name or close.
+    """
+    actions.opened("open the list of machines", "open_folder", "name_box")
+    _type_name(actions, name)
+    panel = actions.view.patch("name_box")
+    actions.step(
+        f"load the machine {name}",
+        lambda: actions.click("open_machine"),
+        lambda: (
+            None
+            if actions.view.differs("name_box", panel)
+            else "the list of machines stayed open, so the game did not find or read its file"
+        ),
+        timeout_s=actions.limits.load_s,
+        attempts=1,
+    )
+
+
+def shown_text(text: str) -> str:
+    """A text without blanks around it and characters that nobody sees.
+
+    The game's boxes append a space without width to what is copied out of them.
+    """
+    return "".join(
+        letter for letter in text if unicodedata.category(letter) not in {"Cf", "Cc"}
+    ).strip()
+
+
+def _type_name(actions: ScreenActions, name: str) -> None:
+    screen = actions.input
+
+    def retype() -> None:
+        actions.click("name_box")
+        screen.wait(0.5)
+        screen.hotkey(SELECT, "a")
+        screen.wait(0.2)
+        screen.press("backspace")
+        screen.wait(0.2)
+        screen.write(name)
+        screen.wait(0.1 * len(name))
+
+    def read_back() -> str | None:
+        copied = screen.copy_all()
+        typed = None if copied is None else shown_text(copied)
+        if typed is not None and typed != name and typed.casefold() == name:
+            screen.press("capslock")
+        return None if typed == name else f"{typed!r} stands there instead"
+
+    actions.step(f"type the name {name}", retype, read_back, timeout_s=0.0, attempts=1)

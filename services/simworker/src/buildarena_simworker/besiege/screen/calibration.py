@@ -18,7 +18,7 @@ from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from buildarena_simworker.besiege.errors import NotSetUpError
-from buildarena_simworker.besiege.whole_files import write_whole
+from buildarena_simworker.besiege.traces import write_whole
 
 CALIBRATION_VERSION: Final = 2
 MAX_WAIT_S: Final = 600.0

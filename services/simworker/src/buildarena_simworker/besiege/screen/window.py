@@ -27,13 +27,16 @@ from buildarena_simworker.besiege.errors import (
 from buildarena_simworker.besiege.game_lock import GameLock, screen_name
 from buildarena_simworker.besiege.installed import installed
 from buildarena_simworker.besiege.process import GameProcess
-from buildarena_simworker.besiege.screen.actions import ScreenActions
+from buildarena_simworker.besiege.screen.actions import (
+    ATTEMPTS,
+    ScreenActions,
+    load_by_name,
+    start_game,
+    wait_for,
+)
 from buildarena_simworker.besiege.screen.calibration import Calibration
 from buildarena_simworker.besiege.screen.capture import difference, screenshot
-from buildarena_simworker.besiege.screen.game_start import start_game
 from buildarena_simworker.besiege.screen.input import ScreenInput
-from buildarena_simworker.besiege.screen.machine_list import load_by_name
-from buildarena_simworker.besiege.screen.steps import ATTEMPTS, wait_for
 from buildarena_simworker.besiege.screen.view import View
 from buildarena_simworker.besiege.screen.window_types import Windows
 from buildarena_simworker.besiege.settings import BesiegeSettings, level_digest
