@@ -24,7 +24,7 @@ from benchmarks.filling import TRACKS, Amount, fill
 from sqlalchemy import text
 
 from buildarena_backend.database.database import Database
-from buildarena_backend.store import open_store
+from buildarena_backend.store import Store
 from buildarena_cli.local.postgres import EmbeddedPostgres
 from buildarena_cli.local.server import EmbeddedValkey, free_port
 
@@ -182,7 +182,7 @@ def measure_lists(client: httpx.Client) -> dict[str, Any]:
 
 def measure_workers(database: Database, times: int) -> dict[str, Any]:
     """What workers and the reaper ask for."""
-    store = open_store(database, lease_s=15, max_faults=8)
+    store = Store(database, lease_s=15, max_faults=8)
     leases, waiting = store.leases, store.waiting
     last: list[str | None] = [None]
 

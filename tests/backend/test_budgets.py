@@ -221,7 +221,7 @@ def test_a_budget_is_raised_in_every_state_but_cancelled(context, sweep) -> None
     assert state() == ("budget_exhausted", {"construct on_hold": 1})
     lifecycle.set_budget(name, BudgetLimits(max_requests=4))
     assert state() == ("active", {"construct queued": 1})
-    assert context.store.budgets.get(name).limits.max_requests == 4
+    assert context.store.budgets.get(name).max_requests == 4
     lifecycle.cancel(name)
     with pytest.raises(TransitionError, match="is cancelled"):
         lifecycle.set_budget(name, BudgetLimits(max_requests=5))

@@ -98,149 +98,78 @@ class Settings(BaseSettings):
         default_factory=_artifact_credentials
     )
 
-    data: Annotated[Path, Field(description="Folder of databases, artifacts and logs")] = Path(
-        ".buildarena"
-    )
-    database_url: Annotated[
-        str | None, Field(description="Postgres to use instead of the embedded one")
-    ] = None
-    database_direct_url: Annotated[
-        str | None,
-        Field(
-            description="The same Postgres past a pooler such as PgBouncer, for migrations, "
-            "backups and collections; default BUILDARENA_DATABASE_URL"
-        ),
-    ] = None
-    database_connections: Annotated[
-        int | None,
-        Field(
-            description="Connections to Postgres that a process keeps for its work; it may open as "
-            "many again for a moment, and an API has 4 more",
-            ge=1,
-            le=100,
-        ),
-    ] = None
-    broker_url: Annotated[
-        str | None, Field(description="Redis or Valkey to use instead of the embedded one")
-    ] = None
-    artifacts_url: Annotated[
-        str | None, Field(description="Folder or bucket URL of artifacts; default DATA/artifacts")
-    ] = None
-    host: Annotated[str, Field(description="Address the API binds to")] = "127.0.0.1"
-    port: Annotated[int, Field(description="Port of the API", ge=0, le=65535)] = DEFAULT_PORT
-    require_keys: Annotated[bool, Field(description="Whether requests need an API key")] = False
-    admin_key: Annotated[
-        SecretStr | None,
-        Field(description="Secret of the operator's own key, which makes others", min_length=16),
-    ] = None
-    previous_admin_key: Annotated[
-        SecretStr | None,
-        Field(
-            description="The operator's key before this one, while both are valid", min_length=16
-        ),
-    ] = None
-    metrics_key: Annotated[
-        SecretStr | None,
-        Field(description="Secret that opens the metrics, and nothing else", min_length=16),
-    ] = None
-    worlds: Annotated[
-        int,
-        Field(
-            description="In how many varied worlds finished machines are scored where a submission "
-            "does not say",
-            ge=0,
-            le=MAX_WORLDS,
-        ),
-    ] = 4
-    rate_limit: Annotated[
-        str, Field(description="Requests a caller may send, for example 600/minute")
-    ] = "6000/minute"
-    trusted_proxies: Annotated[
-        str,
-        Field(
-            description="Addresses or networks of proxies whose X-Forwarded-For counts, "
-            "separated by commas; none by default"
-        ),
-    ] = ""
-    base_path: Annotated[
-        str,
-        Field(
-            description="Path below which a proxy shows the API and the dashboard, for example "
-            "/arena; empty at a host's root"
-        ),
-    ] = ""
-    models_file: Annotated[
-        Path | None, Field(description="YAML of further models, added to the built-in registry")
-    ] = None
-    prompt_packs: Annotated[
-        Path | None, Field(description="Folder of further prompt packs, one folder each")
-    ] = None
-    workflows: Annotated[
-        dict[str, str],
-        Field(description='Further workflows as JSON, {"name": "path/to/file.py:Class"}'),
-    ] = {}
-    lease_s: Annotated[
-        float, Field(description="Seconds that a lease is valid without a heartbeat", gt=1)
-    ] = 10.0
-    stop_grace_s: Annotated[
-        float,
-        Field(
-            description="Seconds that a worker or runner has to stop when it is asked to: in two "
-            "thirds of them open requests and trials finish, then the rest is handed back",
-            gt=0,
-        ),
-    ] = 60.0
-    max_faults: Annotated[
-        int, Field(description="Faults without progress before a job is given up", ge=1)
-    ] = 8
-    sessions_per_worker: Annotated[
-        int,
-        Field(
-            description="Construction sessions of one API key that one worker runs at once", ge=1
-        ),
-    ] = 32
-    simulations_per_worker: Annotated[
-        int, Field(description="Simulations one worker runs at once", ge=1)
-    ] = 2
-    max_sweep_jobs: Annotated[int, Field(description="Largest sweep accepted", ge=1)] = 100_000
-    besiege_game: Annotated[
-        str,
-        Field(
-            description="Version of the game Besiege that workers play, for example 1.75-23370; "
-            "jobs for the game are taken once this and BESIEGE_MOD are set",
-            pattern=VERSION,
-        ),
-    ] = ""
-    besiege_mod: Annotated[
-        str, Field(description="Version of the game's Lua Scripting Mod", pattern=VERSION)
-    ] = ""
-    further_simulators: Annotated[
-        dict[SimulatorName, SimulatorVersion],
-        Field(
-            description="Simulators of other distributions, each with its version, that jobs and "
-            'keys of runners may name before a worker has announced them; JSON: {"drake": "1"}'
-        ),
-    ] = {}
-    audited_share: Annotated[
-        float,
-        Field(
-            description="Share of the trials by runners that a worker beside the database runs "
-            "again before their jobs count, on engines that repeat exactly; 0 to 1",
-            ge=0,
-            le=1,
-        ),
-    ] = 1.0
-    alive_file: Annotated[
-        Path | None,
-        Field(
-            description="File that a worker touches at each heartbeat, for its container's "
-            "health check"
-        ),
-    ] = None
-    otlp_endpoint: Annotated[
-        str | None, Field(description="OTLP/HTTP collector of traces; none are made without")
-    ] = None
-    log_level: Annotated[str, Field(description="debug, info, warning or error")] = "info"
+    data: Path = Path(".buildarena")
+    """Folder of databases, artifacts and logs."""
+    database_url: str | None = None
+    """Postgres to use instead of the embedded one."""
+    database_direct_url: str | None = None
+    """The same Postgres past a pooler such as PgBouncer, for migrations, backups and collections;
+    default BUILDARENA_DATABASE_URL."""
+    database_connections: Annotated[int | None, Field(ge=1, le=100)] = None
+    """Connections to Postgres that a process keeps for its work; it may open as many again for a
+    moment, and an API has 4 more."""
+    broker_url: str | None = None
+    """Redis or Valkey to use instead of the embedded one."""
+    artifacts_url: str | None = None
+    """Folder or bucket URL of artifacts; default DATA/artifacts."""
+    host: str = "127.0.0.1"
+    """Address the API binds to."""
+    port: Annotated[int, Field(ge=0, le=65535)] = DEFAULT_PORT
+    """Port of the API."""
+    require_keys: bool = False
+    """Whether requests need an API key."""
+    admin_key: Annotated[SecretStr | None, Field(min_length=16)] = None
+    """Secret of the operator's own key, which makes others."""
+    previous_admin_key: Annotated[SecretStr | None, Field(min_length=16)] = None
+    """The operator's key before this one, while both are valid."""
+    metrics_key: Annotated[SecretStr | None, Field(min_length=16)] = None
+    """Secret that opens the metrics, and nothing else."""
+    worlds: Annotated[int, Field(ge=0, le=MAX_WORLDS)] = 4
+    """In how many varied worlds finished machines are scored where a submission does not say."""
+    rate_limit: str = "6000/minute"
+    """Requests a caller may send, for example 600/minute."""
+    trusted_proxies: str = ""
+    """Addresses or networks of proxies whose X-Forwarded-For counts, separated by commas; none by
+    default."""
+    base_path: str = ""
+    """Path below which a proxy shows the API and the dashboard, for example /arena; empty at a
+    host's root."""
+    models_file: Path | None = None
+    """YAML of further models, added to the built-in registry."""
+    prompt_packs: Path | None = None
+    """Folder of further prompt packs, one folder each."""
+    workflows: dict[str, str] = {}
+    """Further workflows as JSON, {"name": "path/to/file.py:Class"}."""
+    lease_s: Annotated[float, Field(gt=1)] = 10.0
+    """Seconds that a lease is valid without a heartbeat."""
+    stop_grace_s: Annotated[float, Field(gt=0)] = 60.0
+    """Seconds that a worker or runner has to stop when it is asked to: in two thirds of them open
+    requests and trials finish, then the rest is handed back."""
+    max_faults: Annotated[int, Field(ge=1)] = 8
+    """Faults without progress before a job is given up."""
+    sessions_per_worker: Annotated[int, Field(ge=1)] = 32
+    """Construction sessions of one API key that one worker runs at once."""
+    simulations_per_worker: Annotated[int, Field(ge=1)] = 2
+    """Simulations one worker runs at once."""
+    max_sweep_jobs: Annotated[int, Field(ge=1)] = 100_000
+    """Largest sweep accepted."""
+    besiege_game: Annotated[str, Field(pattern=VERSION)] = ""
+    """Version of the game Besiege that workers play, for example 1.75-23370; jobs for the game are
+    taken once this and BESIEGE_MOD are set."""
+    besiege_mod: Annotated[str, Field(pattern=VERSION)] = ""
+    """Version of the game's Lua Scripting Mod."""
+    further_simulators: dict[SimulatorName, SimulatorVersion] = {}
+    """Simulators of other distributions, each with its version, that jobs and keys of runners may
+    name before a worker has announced them; JSON: {"drake": "1"}."""
+    audited_share: Annotated[float, Field(ge=0, le=1)] = 1.0
+    """Share of the trials by runners that a worker beside the database runs again before their jobs
+    count, on engines that repeat exactly; 0 to 1."""
+    alive_file: Path | None = None
+    """File that a worker touches at each heartbeat, for its container's health check."""
+    otlp_endpoint: str | None = None
+    """OTLP/HTTP collector of traces; none are made without."""
+    log_level: str = "info"
+    """debug, info, warning or error."""
 
     @property
     def finishing_s(self) -> float:

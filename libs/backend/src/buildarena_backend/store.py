@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from sqlalchemy import Text, literal_column, or_, select
 
 from buildarena_backend.accounts.budgets import Budgets
@@ -62,58 +60,32 @@ class WaitingJobs:
             return not connection.execute(select(or_(ANY_LOST, _ANY_WAITING))).scalar()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Store:
-    """The repositories of one database; several written in one transaction change together."""
-
-    database: Database
-    jobs: Jobs
-    leases: Leases
-    waiting: WaitingJobs
-    runner_leases: RunnerLeases
-    journal: Journal
-    rollouts: Rollouts
-    results: Results
-    external_calls: ExternalCalls
-    turns: Turns
-    verifications: Verifications
-    sweeps: Sweeps
-    lifecycle: SweepLifecycle
-    keys: ApiKeys
-    budgets: Budgets
-    tasks: Tasks
-    events: Events
-    workers: Workers
-    metrics: Metrics
-
-
-def open_store(database: Database, *, lease_s: float, max_faults: int) -> Store:
-    """The repositories of a database.
+    """The repositories of one database; several written in one transaction change together.
 
     Args:
         database: The database.
         lease_s: Seconds that a lease is valid without a heartbeat.
         max_faults: Infrastructure faults without progress after which a job is given up.
     """
-    leases = Leases(database, duration_s=lease_s, max_faults=max_faults)
-    return Store(
-        database=database,
-        jobs=Jobs(database),
-        leases=leases,
-        waiting=WaitingJobs(database),
-        runner_leases=RunnerLeases(database, leases),
-        journal=Journal(database),
-        rollouts=Rollouts(database),
-        results=Results(database, leases),
-        external_calls=ExternalCalls(database),
-        turns=Turns(database),
-        verifications=Verifications(database),
-        sweeps=Sweeps(database),
-        lifecycle=SweepLifecycle(database),
-        keys=ApiKeys(database),
-        budgets=Budgets(database),
-        tasks=Tasks(database),
-        events=Events(database),
-        workers=Workers(database),
-        metrics=Metrics(database),
-    )
+
+    def __init__(self, database: Database, *, lease_s: float, max_faults: int) -> None:
+        self.database = database
+        self.jobs = Jobs(database)
+        self.leases = Leases(database, duration_s=lease_s, max_faults=max_faults)
+        self.waiting = WaitingJobs(database)
+        self.runner_leases = RunnerLeases(database, self.leases)
+        self.journal = Journal(database)
+        self.rollouts = Rollouts(database)
+        self.results = Results(database, self.leases)
+        self.external_calls = ExternalCalls(database)
+        self.turns = Turns(database)
+        self.verifications = Verifications(database)
+        self.sweeps = Sweeps(database)
+        self.lifecycle = SweepLifecycle(database)
+        self.keys = ApiKeys(database)
+        self.budgets = Budgets(database)
+        self.tasks = Tasks(database)
+        self.events = Events(database)
+        self.workers = Workers(database)
+        self.metrics = Metrics(database)

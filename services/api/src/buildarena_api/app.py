@@ -60,7 +60,7 @@ from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_backend.database.database import Database
 from buildarena_backend.process.context import Context
 from buildarena_backend.process.reaper import Reaper
-from buildarena_backend.store import open_store
+from buildarena_backend.store import Store
 from buildarena_backend.submission.submission import Submissions
 
 POOL_SIZE: Final = 10
@@ -137,7 +137,7 @@ def _watching(context: Context) -> Context:
         pool_timeout_s=POOL_TIMEOUT_S,
         name="buildarena-api watching",
     )
-    store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
+    store = Store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
     return replace(context, store=store, tasks=TaskCatalog(store.tasks))
 
 

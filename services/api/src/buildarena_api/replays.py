@@ -5,141 +5,51 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AliasPath, BeforeValidator, Field
 
 from buildarena_api.http.etags import Answer, ResponseCache
 from buildarena_api.http.problems import ErrorCode, ProblemError
 from buildarena_api.job_records import missing
+from buildarena_api.schemas import View
 from buildarena_backend.agents.turn_views import Transcripts
 from buildarena_backend.catalog.tracks import EXTERNAL_WORKFLOW
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.process.context import Context
-from buildarena_backend.replays.chapters import Chapter, Replay, ReplayStep
+from buildarena_backend.replays.chapters import Replay
 from buildarena_backend.replays.from_document import replay_of_document
 from buildarena_backend.replays.from_turns import NO_BUILDING, replay_of_turns
 from buildarena_backend.trials.scoring import drawn_for
 from buildarena_benchmark import Task
-from buildarena_geometry import AttemptedBlock, Block, Connector, DocumentError, Machine
+from buildarena_geometry import Block, Connector, DocumentError, Machine
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 
-class PlacedPart(BaseModel):
+class PlacedPart(View):
     """A block, and where it would have been."""
 
     id: str
     module: str = Field(examples=["Small Wooden Block"])
-    position: Vector = Field(description="Of its root point, world frame, units")
-    quaternion: Quaternion = Field(description="World from block, (w, x, y, z)")
+    position: Vector
+    """Of its root point, world frame, units."""
+    quaternion: Quaternion
+    """World from block, (w, x, y, z)."""
 
 
 class PartView(PlacedPart):
     """A part, and where it is after the step."""
 
-    start: Vector | None = Field(description="Of a connector: where it begins, world frame, units")
-    end: Vector | None = Field(description="Of a connector: where it ends")
-    flipped: bool = Field(description="Whether a wheel's sense of rotation is reversed")
-    bindings: dict[str, list[str]] = Field(description="Keys by action")
-
-
-class KeyPress(BaseModel):
-    """A key that is held for a while."""
-
-    model_config = ConfigDict(from_attributes=True)
-
-    time_s: float
-    key: str
-    hold_for_s: float
-
-
-class StepView(BaseModel):
-    """One action and what came of it."""
-
-    turn: int | None = Field(
-        description="Index of its turn in the transcript; null for what the session did by itself"
-    )
-    action: str = Field(examples=["attach_block_to"])
-    arguments: Any
-    accepted: bool
-    reason: str | None = Field(description="Refusal class; null if it was accepted")
-    text: str | None = Field(description="Why it was refused; null if it was accepted")
-    added: list[PartView]
-    moved: list[PartView] = Field(description="Parts in another place than before")
-    removed: list[str] = Field(description="Ids of parts that are gone")
-    rebound: list[PartView] = Field(description="Parts with other keys or sense of rotation")
-    control_sequence: list[KeyPress] | None = Field(
-        description="All key presses, if the action changed them"
-    )
-    attempted: list[PlacedPart] = Field(
-        description="Blocks where a refused action would have put them, if that is known"
-    )
-
-
-class ChapterView(BaseModel):
-    """How one machine came about."""
-
-    name: str
-    kind: Literal["machine", "sub_structure", "assembly"] = Field(
-        description="An assembly is put together from copies of the sub-structures"
-    )
-    steps: list[StepView]
-
-
-class ReplayView(BaseModel):
-    """How a job's machine came about, as the geometry library builds it again."""
-
-    chapters: list[ChapterView] = Field(
-        description="Sub-structures, then their assembly; each begins with nothing"
-    )
-    complete: bool = Field(
-        description="False where the steps are too many or too large: the last are left out"
-    )
-    exact: bool | None = Field(
-        description="Whether it ends in exactly the kept machine; null while none is kept"
-    )
-
-
-def replay_view(replay: Replay, *, exact: bool | None) -> ReplayView:
-    """A replay as it is answered."""
-    return ReplayView(
-        chapters=[_chapter(chapter) for chapter in replay.chapters],
-        complete=replay.complete,
-        exact=exact,
-    )
-
-
-def _chapter(chapter: Chapter) -> ChapterView:
-    return ChapterView(
-        name=chapter.name, kind=chapter.kind, steps=[_step(step) for step in chapter.steps]
-    )
-
-
-def _step(step: ReplayStep) -> StepView:
-    changed = step.difference
-    pressed = changed.control_sequence
-    return StepView(
-        turn=step.turn,
-        action=step.action,
-        arguments=step.arguments,
-        accepted=step.accepted,
-        reason=step.reason,
-        text=step.text,
-        added=_parts(changed.added),
-        moved=_parts(changed.moved),
-        removed=list(changed.removed),
-        rebound=_parts(changed.rebound),
-        control_sequence=None
-        if pressed is None
-        else [KeyPress.model_validate(one) for one in pressed],
-        attempted=[_attempted(block) for block in step.attempted],
-    )
-
-
-def _parts(parts: Iterable[Block | Connector]) -> list[PartView]:
-    return [block_view(part) if isinstance(part, Block) else connector_view(part) for part in parts]
+    start: Vector | None
+    """Of a connector: where it begins, world frame, units."""
+    end: Vector | None
+    """Of a connector: where it ends."""
+    flipped: bool
+    """Whether a wheel's sense of rotation is reversed."""
+    bindings: dict[str, list[str]]
+    """Keys by action."""
 
 
 def block_view(block: Block) -> PartView:
@@ -172,10 +82,69 @@ def connector_view(link: Connector) -> PartView:
     )
 
 
-def _attempted(block: AttemptedBlock) -> PlacedPart:
-    return PlacedPart(
-        id=block.id, module=block.module, position=block.position, quaternion=block.quaternion
-    )
+def _parts(parts: Iterable[Block | Connector]) -> list[PartView]:
+    return [block_view(part) if isinstance(part, Block) else connector_view(part) for part in parts]
+
+
+def _changed(what: str) -> Any:
+    """A field that a step's difference has."""
+    return Field(validation_alias=AliasPath("difference", what))
+
+
+Parts = Annotated[list[PartView], BeforeValidator(_parts)]
+
+
+class KeyPress(View):
+    """A key that is held for a while."""
+
+    time_s: float
+    key: str
+    hold_for_s: float
+
+
+class StepView(View):
+    """One action and what came of it."""
+
+    turn: int | None
+    """Index of its turn in the transcript; null for what the session did by itself."""
+    action: str = Field(examples=["attach_block_to"])
+    arguments: Any
+    accepted: bool
+    reason: str | None
+    """Refusal class; null if it was accepted."""
+    text: str | None
+    """Why it was refused; null if it was accepted."""
+    added: Parts = _changed("added")
+    moved: Parts = _changed("moved")
+    """Parts in another place than before."""
+    removed: list[str] = _changed("removed")
+    """Ids of parts that are gone."""
+    rebound: Parts = _changed("rebound")
+    """Parts with other keys or sense of rotation."""
+    control_sequence: list[KeyPress] | None = _changed("control_sequence")
+    """All key presses, if the action changed them."""
+    attempted: list[PlacedPart]
+    """Blocks where a refused action would have put them, if that is known."""
+
+
+class ChapterView(View):
+    """How one machine came about."""
+
+    name: str
+    kind: Literal["machine", "sub_structure", "assembly"]
+    """An assembly is put together from copies of the sub-structures."""
+    steps: list[StepView]
+
+
+class ReplayView(View):
+    """How a job's machine came about, as the geometry library builds it again."""
+
+    chapters: list[ChapterView]
+    """Sub-structures, then their assembly; each begins with nothing."""
+    complete: bool
+    """False where the steps are too many or too large: the last are left out."""
+    exact: bool | None
+    """Whether it ends in exactly the kept machine; null while none is kept."""
 
 
 MAX_CACHED_BYTES: Final = 64 << 20
@@ -242,4 +211,5 @@ class Replays:
 
 
 def _body(replay: Replay, *, exact: bool | None) -> bytes:
-    return replay_view(replay, exact=exact).model_dump_json().encode()
+    told = {"chapters": replay.chapters, "complete": replay.complete, "exact": exact}
+    return ReplayView.model_validate(told).model_dump_json().encode()

@@ -2,97 +2,108 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BeforeValidator, Field
 
-from buildarena_geometry import Block, Box, Connector, Cylinder, Machine, Module
+from buildarena_api.replays import Quaternion, Vector
+from buildarena_api.schemas import View
+from buildarena_geometry import Block, Box, Connector, Cylinder, Machine
+from buildarena_geometry.modules.solids import Solid
 from buildarena_simulation import Scenario
 
-Vector = tuple[float, float, float]
-Quaternion = tuple[float, float, float, float]
 
-
-class SolidView(BaseModel):
+class SolidView(View):
     """A solid of a module, in the block's frame, units."""
 
     shape: Literal["box", "cylinder", "sphere"]
     center: Vector
-    quaternion: Quaternion = Field(
-        description="Block from solid, (w, x, y, z); a cylinder's axis is its z"
-    )
-    size: Vector = Field(
-        description="Full extents; of a cylinder its diameter twice, and its length"
-    )
+    quaternion: Quaternion
+    """Block from solid, (w, x, y, z); a cylinder's axis is its z."""
+    size: Vector
+    """Full extents; of a cylinder its diameter twice, and its length."""
 
 
-class FlameView(BaseModel):
+def _solid(solid: Solid) -> SolidView:
+    if isinstance(solid, Cylinder):
+        pose, across = solid.block_from_axis, 2 * solid.radius
+        size = (across, across, solid.length)
+        return SolidView(shape="cylinder", center=pose.xyz, quaternion=pose.wxyz, size=size)
+    shape: Literal["box", "sphere"] = "box" if isinstance(solid, Box) else "sphere"
+    unturned = (1.0, 0.0, 0.0, 0.0)
+    return SolidView(shape=shape, center=solid.center, quaternion=unturned, size=solid.size)
+
+
+class FlameView(View):
     """A flame's ball, ahead of the block's shown centre in the way it points."""
 
-    along: float = Field(description="Units from the centre")
+    along: float
+    """Units from the centre."""
     radius: float
 
 
-class ModuleShape(BaseModel):
+class ModuleShape(View):
     """What blocks of a module look like."""
 
     kind: str = Field(examples=["wheel"])
-    center: Vector = Field(
-        description="Its shown centre in the block's frame: what trajectories give as its position"
-    )
-    pointing: Vector | None = Field(description="The way a cannon or torch points, block's frame")
-    bodies: list[SolidView]
+    center: Vector
+    """Its shown centre in the block's frame: what trajectories give as its position."""
+    pointing: Vector | None
+    """The way a cannon or torch points, block's frame."""
+    bodies: list[Annotated[SolidView, BeforeValidator(_solid)]] = Field(validation_alias="body")
     flames: list[FlameView]
 
 
-class BlockPlace(BaseModel):
+class BlockPlace(View):
     """A block of the machine as it was built."""
 
     id: str
     module: str
-    position: Vector = Field(description="Of its root point, machine's frame, units")
+    position: Vector
+    """Of its root point, machine's frame, units."""
     quaternion: Quaternion
 
 
-class ConnectorEnd(BaseModel):
+class ConnectorEnd(View):
     """An end of a connector."""
 
     block: str
-    point: Vector = Field(description="In that block's frame, units")
+    point: Vector
+    """In that block's frame, units."""
 
 
-class ConnectorPlace(BaseModel):
+class ConnectorPlace(View):
     """A connector of the machine."""
 
     id: str
     module: str
-    joint: str = Field(
-        description="What trajectories call it where it breaks", examples=["Brace 7"]
-    )
-    rope: bool = Field(description="Whether it pulls and never pushes")
+    joint: str = Field(examples=["Brace 7"])
+    """What trajectories call it where it breaks."""
+    rope: bool
+    """Whether it pulls and never pushes."""
     start: ConnectorEnd
     end: ConnectorEnd
 
 
-class MachineScene(BaseModel):
+class MachineScene(View):
     """The machine's parts, and the modules that they are of."""
 
     modules: dict[str, ModuleShape]
     blocks: list[BlockPlace]
     connectors: list[ConnectorPlace]
-    controller: str = Field(description="The program that acts; empty where keys are pressed")
+    controller: str
+    """The program that acts; empty where keys are pressed."""
 
 
-class SceneView(BaseModel):
+class SceneView(View):
     """All that a trial looks like but for how it goes."""
 
-    scenario: dict[str, Any] = Field(
-        description="As tasks have it: duration_s, terrain, cargo, placement, control. Terrain is "
-        "tilted by slope_deg about the east-west axis through its centre, and then turned by "
-        "heading_deg about the vertical"
-    )
-    machine: MachineScene | None = Field(description="null while nothing was built")
+    scenario: dict[str, Any]
+    """As tasks have it: duration_s, terrain, cargo, placement, control. Terrain is tilted by
+    slope_deg about the east-west axis through its centre, and then turned by heading_deg about the
+    vertical."""
+    machine: MachineScene | None
+    """null while nothing was built."""
 
 
 def scene_view(scenario: Scenario, machine: Machine | None) -> SceneView:
@@ -112,41 +123,10 @@ def machine_scene(machine: Machine) -> MachineScene:
     """A machine's parts as it was built."""
     used = {block.module.name: block.module for block in machine.blocks.values()}
     return MachineScene(
-        modules={name: _module(module) for name, module in used.items()},
+        modules={name: ModuleShape.model_validate(module) for name, module in used.items()},
         blocks=[_block(block) for block in machine.blocks.values()],
         connectors=[_connector(link, machine) for link in machine.connectors.values()],
         controller=machine.controller,
-    )
-
-
-def _module(module: Module) -> ModuleShape:
-    return ModuleShape(
-        kind=module.kind,
-        center=module.center,
-        pointing=module.pointing,
-        bodies=list(_bodies(module)),
-        flames=[FlameView(along=flame.along, radius=flame.radius) for flame in module.flames],
-    )
-
-
-def _bodies(module: Module) -> Iterable[SolidView]:
-    for solid in module.body:
-        if isinstance(solid, Cylinder):
-            yield _cylinder(solid)
-            continue
-        shape: Literal["box", "sphere"] = "box" if isinstance(solid, Box) else "sphere"
-        unturned = (1.0, 0.0, 0.0, 0.0)
-        yield SolidView(shape=shape, center=solid.center, quaternion=unturned, size=solid.size)
-
-
-def _cylinder(solid: Cylinder) -> SolidView:
-    pose = solid.block_from_axis
-    across = 2 * solid.radius
-    return SolidView(
-        shape="cylinder",
-        center=pose.xyz,
-        quaternion=pose.wxyz,
-        size=(across, across, solid.length),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from datetime import datetime
 from typing import Annotated, Any, Final
 
@@ -15,8 +14,16 @@ from buildarena_backend.sweeps.sweeps import SweepProgress
 from buildarena_benchmark.flags import is_censored
 
 
-class _Answer(BaseModel):
-    model_config = ConfigDict(from_attributes=True)
+class View(BaseModel):
+    """What an answer holds; what stands below a field describes it in the contract."""
+
+    model_config = ConfigDict(from_attributes=True, use_attribute_docstrings=True)
+
+
+class Document(BaseModel):
+    """What a request holds, and no field more."""
+
+    model_config = ConfigDict(extra="forbid", use_attribute_docstrings=True)
 
 
 EXISTED: Final[dict[int | str, dict[str, Any]]] = {
@@ -27,7 +34,7 @@ Flags = Annotated[list[str], BeforeValidator(lambda flags: flags or [])]
 Counts = Annotated[dict[str, int], BeforeValidator(lambda counts: counts or {})]
 
 
-class UsageView(_Answer):
+class UsageView(View):
     """Model requests and what they took; null where an external agent reports nothing."""
 
     requests: int | None
@@ -41,10 +48,11 @@ class UsageView(_Answer):
         return UsageView.model_validate(used if known else dict.fromkeys(UsageView.model_fields))
 
 
-class AttemptView(_Answer):
+class AttemptView(View):
     """One worker's attempt at a job's stage."""
 
-    token: int = Field(description="Fencing token: grows with every attempt")
+    token: int
+    """Fencing token: grows with every attempt."""
     stage: Stage
     worker: str
     started_at: datetime
@@ -53,40 +61,49 @@ class AttemptView(_Answer):
     detail: str | None
 
 
-class JobView(_Answer):
+class JobView(View):
     """A job: one task x model x seed on one track."""
 
     id: str = Field(examples=["job_5f2b0c8e4d1a9b7c3e60"])
     task: str = Field(examples=["support-1"])
     task_version: str
     model: str = Field(examples=["builtin/expert"])
-    configuration: str = Field(description="Hash of model, decoding and limits")
+    configuration: str
+    """Hash of model, decoding and limits."""
     track: str
     seed: int
-    key_id: str | None = Field(description="Of the API key that submitted it")
+    key_id: str | None
+    """Of the API key that submitted it."""
     state: JobState
     stage: Stage
-    outcome: Outcome | None = Field(description="How it ended; null until it has")
-    reason: str | None = Field(description="Class of the failure, if any")
+    outcome: Outcome | None
+    """How it ended; null until it has."""
+    reason: str | None
+    """Class of the failure, if any."""
     detail: str | None
-    success: float | None = Field(description="Share of its worlds that it passed, 0 to 1")
-    indicator: float | None = Field(
-        description="The task's indicator, as a mean over its worlds; 0 where it failed"
-    )
-    censored: bool = Field(description="Whether the indicator is at least what it says")
+    success: float | None
+    """Share of its worlds that it passed, 0 to 1."""
+    indicator: float | None
+    """The task's indicator, as a mean over its worlds; 0 where it failed."""
+    censored: bool
+    """Whether the indicator is at least what it says."""
     metrics: dict[str, Any]
-    flags: Flags = Field(description="Remarks on the score; the board says what of")
+    flags: Flags
+    """Remarks on the score; the board says what of."""
     usage: UsageView
     actions: int
     refused_actions: int
-    refusals: Counts = Field(description="Refused actions by class")
-    faults: int = Field(description="Infrastructure faults at the current stage")
-    by_runner: bool = Field(description="Whether a runner ran one of its trials")
-    verification_status: Audit | None = Field(
-        description="Of a score that was brought by a runner, or refuted: it counts once "
-        "it is verified, and nowhere while a verification is required or refuted it"
-    )
-    verified_at: datetime | None = Field(description="When such a score was verified")
+    refusals: Counts
+    """Refused actions by class."""
+    faults: int
+    """Infrastructure faults at the current stage."""
+    by_runner: bool
+    """Whether a runner ran one of its trials."""
+    verification_status: Audit | None
+    """Of a score that was brought by a runner, or refuted: it counts once it is verified, and
+    nowhere while a verification is required or refuted it."""
+    verified_at: datetime | None
+    """When such a score was verified."""
     created_at: datetime
     started_at: datetime | None
     finished_at: datetime | None
@@ -107,64 +124,83 @@ class JobView(_Answer):
         )
 
 
-class WorldView(BaseModel):
+class WorldView(View):
     """One trial that a job is scored by: in the exact world, or in a varied one."""
 
-    rollout: int = Field(description="Number of its trajectory and scene")
-    exact: bool = Field(description="Whether it is the world that builders know")
-    success: bool = Field(description="Whether it passed, and no flag disqualifies it")
-    indicator: float = Field(description="The task's indicator, whether it passed or not")
+    rollout: int
+    """Number of its trajectory and scene."""
+    exact: bool
+    """Whether it is the world that builders know."""
+    success: bool
+    """Whether it passed, and no flag disqualifies it."""
+    indicator: float
+    """The task's indicator, whether it passed or not."""
     flags: list[str]
-    explanation: str = Field(description="What happened and by how much it missed")
+    explanation: str
+    """What happened and by how much it missed."""
 
 
 class JobDetail(JobView):
     """A job with its manifest, attempts and artifacts."""
 
-    explanation: str | None = Field(
-        description="What happened and by how much it missed, in words; null until it has ended"
-    )
-    worlds: list[WorldView] = Field(description="What the score is the mean of; the exact first")
-    manifest: dict[str, Any] | None = Field(description="Versions of what can change the score")
+    explanation: str | None
+    """What happened and by how much it missed, in words; null until it has ended."""
+    worlds: list[WorldView]
+    """What the score is the mean of; the exact first."""
+    manifest: dict[str, Any] | None
+    """Versions of what can change the score."""
     attempts: list[AttemptView]
-    artifacts: dict[str, str] = Field(description="SHA-256 of each artifact by name")
-    cached_tokens: int | None = Field(description="Of the input, in the provider's cache")
-    reasoning_tokens: int | None = Field(description="Of the output, hidden reasoning")
+    artifacts: dict[str, str]
+    """SHA-256 of each artifact by name."""
+    cached_tokens: int | None
+    """Of the input, in the provider's cache."""
+    reasoning_tokens: int | None
+    """Of the output, hidden reasoning."""
 
 
-class ArtifactView(_Answer):
+class ArtifactView(View):
     """An artifact of a job."""
 
     name: str = Field(examples=["trajectory-0"])
     media_type: str = Field(examples=["application/vnd.apache.parquet"])
-    size: int = Field(description="Bytes")
-    sha256: str = Field(description="Of the bytes", validation_alias="hash")
+    size: int
+    """Bytes."""
+    sha256: str = Field(validation_alias="hash")
+    """Of the bytes."""
 
 
-class EndingView(_Answer):
+class EndingView(View):
     """Jobs that stand or ended alike."""
 
     state: JobState
-    outcome: Outcome | None = Field(description="null while they have not ended")
-    reason: str | None = Field(description="Class of the failure")
+    outcome: Outcome | None
+    """null while they have not ended."""
+    reason: str | None
+    """Class of the failure."""
     jobs: int
 
 
-class PromptView(_Answer):
+class PromptView(View):
     """What a role was told before a turn."""
 
-    turn: int | None = Field(description="Place in the transcript; null for a reply in no turn")
-    system: str | None = Field(description="The role's system message, before its first turn")
-    user: list[str] = Field(description="Further messages, in order")
+    turn: int | None
+    """Place in the transcript; null for a reply in no turn."""
+    system: str | None
+    """The role's system message, before its first turn."""
+    user: list[str]
+    """Further messages, in order."""
 
 
-class JobSummaryView(_Answer):
+class JobSummaryView(View):
     """What a list of jobs comes to."""
 
     jobs: int
-    all_counted: bool = Field(description="false when there are more than were counted")
-    endings: list[EndingView] = Field(description="The most frequent first")
-    flags: dict[str, int] = Field(description="Jobs with each flag, the most frequent first")
+    all_counted: bool
+    """false when there are more than were counted."""
+    endings: list[EndingView]
+    """The most frequent first."""
+    flags: dict[str, int]
+    """Jobs with each flag, the most frequent first."""
 
 
 LOST: Final = (
@@ -173,16 +209,15 @@ LOST: Final = (
 )
 
 
-class ProgressView(_Answer):
+class ProgressView(View):
     """Progress of a sweep."""
 
     total: int
     done: int
-    stages: dict[str, int] = Field(
-        description="Jobs that have not ended, by stage and state",
-        examples=[{"construct running": 2}],
-    )
-    outcomes: dict[str, int] = Field(description="Ended jobs by outcome", examples=[{"success": 4}])
+    stages: dict[str, int] = Field(examples=[{"construct running": 2}])
+    """Jobs that have not ended, by stage and state."""
+    outcomes: dict[str, int] = Field(examples=[{"success": 4}])
+    """Ended jobs by outcome."""
     usage: UsageView
     lost_requests: int = Field(description=LOST)
 
@@ -194,7 +229,7 @@ class ProgressView(_Answer):
         return ProgressView.model_validate({**known, "usage": UsageView.of(progress)})
 
 
-class BudgetUse(_Answer):
+class BudgetUse(View):
     """What may be used, what was, and what is left; null: without limit."""
 
     max_cost_usd: float | None
@@ -203,9 +238,8 @@ class BudgetUse(_Answer):
     used_cost_usd: float = Field(validation_alias="spent_cost_usd")
     used_tokens: int = Field(validation_alias="spent_tokens")
     used_requests: int = Field(validation_alias="spent_requests")
-    lost_cost_usd: float = Field(
-        description="What the lost requests cost at most, beyond what was used"
-    )
+    lost_cost_usd: float
+    """What the lost requests cost at most, beyond what was used."""
     lost_requests: int = Field(description=LOST)
 
     @computed_field
@@ -228,102 +262,105 @@ class BudgetUse(_Answer):
     @staticmethod
     def of(budget: Budget | None) -> BudgetUse | None:
         """The view of a budget, if there is one."""
-        if budget is None:
-            return None
-        return BudgetUse.model_validate(asdict(budget) | asdict(budget.limits))
+        return None if budget is None else BudgetUse.model_validate(budget)
 
 
-class SweepView(_Answer):
+class SweepView(View):
     """A sweep with its progress."""
 
     id: str = Field(examples=["sweep_0a1b2c3d4e5f60718293"])
     name: str
-    state: SweepState = Field(
-        description="budget_exhausted when a budget is used up; done when every job has ended"
-    )
-    key_id: str | None = Field(description="Of the API key that submitted it")
+    state: SweepState
+    """budget_exhausted when a budget is used up; done when every job has ended."""
+    key_id: str | None
+    """Of the API key that submitted it."""
     created_at: datetime
-    spec: dict[str, Any] = Field(title="Specification", description="What was submitted")
+    spec: dict[str, Any] = Field(title="Specification")
+    """What was submitted."""
     budget: BudgetUse | None
     progress: ProgressView
-    last_event: int = Field(
-        description="What later requests answer holds every event up to this one: whoever has "
-        "read the jobs gives it as `Last-Event-ID` and hears only what happened since"
-    )
+    last_event: int
+    """What later requests answer holds every event up to this one: whoever has read the jobs gives
+    it as `Last-Event-ID` and hears only what happened since."""
 
 
-class ForecastView(_Answer):
+class ForecastView(View):
     """What is to come of a sweep, from what ran so far."""
 
-    remaining_jobs: int = Field(description="Jobs that have not ended")
-    jobs_per_minute: float | None = Field(
-        description="How fast jobs are scored, over the last hundred; null until five were, and "
-        "unless the sweep is active"
-    )
-    finish_at: datetime | None = Field(description="When the last one ends at that rate")
-    remaining_cost_usd: float = Field(
-        description="What the jobs left come to cost yet, by the mean cost of the same model on "
-        "the same task, or on other tasks"
-    )
-    total_cost_usd: float = Field(description="The same with what was used")
-    lacking_budget_usd: float | None = Field(
-        description="How many dollars the budget lacks for that; null when it has no limit in "
-        "dollars, 0 when it is enough"
-    )
-    unknown_models: list[str] = Field(
-        description="Models of which no job has been scored yet: the costs leave them out"
-    )
+    remaining_jobs: int
+    """Jobs that have not ended."""
+    jobs_per_minute: float | None
+    """How fast jobs are scored, over the last hundred; null until five were, and unless the sweep
+    is active."""
+    finish_at: datetime | None
+    """When the last one ends at that rate."""
+    remaining_cost_usd: float
+    """What the jobs left come to cost yet, by the mean cost of the same model on the same task, or
+    on other tasks."""
+    total_cost_usd: float
+    """The same with what was used."""
+    lacking_budget_usd: float | None
+    """How many dollars the budget lacks for that; null when it has no limit in dollars, 0 when it
+    is enough."""
+    unknown_models: list[str]
+    """Models of which no job has been scored yet: the costs leave them out."""
 
 
-class TroubleView(_Answer):
+class TroubleView(View):
     """Attempts at a sweep's jobs that failed alike; faults never count as failures of a model."""
 
     model: str
     stage: Stage
     result: AttemptResult
-    detail: str | None = Field(description="A sentence for people")
+    detail: str | None
+    """A sentence for people."""
     attempts: int
-    jobs: int = Field(description="Of how many jobs")
-    last_at: datetime = Field(description="When the last one ended", validation_alias="newest")
+    jobs: int
+    """Of how many jobs."""
+    last_at: datetime = Field(validation_alias="newest")
+    """When the last one ended."""
 
 
-class SweepAccepted(_Answer):
+class SweepAccepted(View):
     """A sweep that was accepted."""
 
     id: str
-    jobs: int = Field(description="Jobs it consists of")
-    added: int = Field(description="Jobs that are new; the others had been submitted before")
-    resumed: bool = Field(
-        default=False, description="Whether an earlier submission of the same jobs was resumed"
-    )
+    jobs: int
+    """Jobs it consists of."""
+    added: int
+    """Jobs that are new; the others had been submitted before."""
+    resumed: bool = False
+    """Whether an earlier submission of the same jobs was resumed."""
 
 
-class ModelEstimate(_Answer):
+class ModelEstimate(View):
     """What one model's part of a sweep would use."""
 
     model: str
     jobs: int
-    usage: UsageView = Field(description="cost_usd is null when no price is known")
+    usage: UsageView
+    """cost_usd is null when no price is known."""
 
 
-class BoardPower(_Answer):
+class BoardPower(View):
     """What a sweep's board could show, where the weaker model succeeds in half of its trials."""
 
-    trials: int = Field(description="Trials of each model on each task")
-    on_a_task: float | None = Field(
-        description="The smallest rise of the success rate, 0 to 1, that four of five such boards "
-        "claim on one task; null when they claim none"
-    )
-    overall: float | None = Field(description="The same rise on every task, over all of them")
-    trials_for_ten_points: int = Field(
-        description="Trials of each model on each task that show a rise of 0.1 over all tasks"
-    )
+    trials: int
+    """Trials of each model on each task."""
+    on_a_task: float | None
+    """The smallest rise of the success rate, 0 to 1, that four of five such boards claim on one
+    task; null when they claim none."""
+    overall: float | None
+    """The same rise on every task, over all of them."""
+    trials_for_ten_points: int
+    """Trials of each model on each task that show a rise of 0.1 over all tasks."""
 
 
-class SweepEstimate(_Answer):
+class SweepEstimate(View):
     """What a sweep would consist of, from the mean figures that the paper reports per task."""
 
     jobs: int
     models: list[ModelEstimate]
-    cost_usd: float = Field(description="Sum over the models with a known price")
+    cost_usd: float
+    """Sum over the models with a known price."""
     power: BoardPower

@@ -18,6 +18,7 @@ from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend.database.account_tables import MAX_USD, PAYS, budgets, reservations
 from buildarena_backend.database.database import Database
+from buildarena_backend.database.rows import value_of
 from buildarena_backend.database.tables import jobs, journal, sweep_jobs
 from buildarena_backend.errors import StaleLeaseError
 from buildarena_backend.journal.journal import Usage
@@ -41,12 +42,11 @@ class BudgetLimits:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Budget:
+class Budget(BudgetLimits):
     """A budget and what was spent of it.
 
     Attributes:
         id: Id of the sweep or key whose budget it is.
-        limits: The most that may be spent.
         spent_cost_usd: US dollars spent.
         spent_tokens: Input and output tokens used.
         spent_requests: Model requests answered.
@@ -57,7 +57,6 @@ class Budget:
     """
 
     id: str
-    limits: BudgetLimits
     spent_cost_usd: Decimal
     spent_tokens: int
     spent_requests: int
@@ -129,7 +128,7 @@ class Budgets:
         """The budget of a sweep or key; None when it has none."""
         with self._database.statement() as connection:
             row = connection.execute(select(budgets).where(budgets.c.id == budget_id)).first()
-        return None if row is None else _budget(row)
+        return None if row is None else value_of(Budget, row)
 
     def reserve(self, lease: Lease, need: Need) -> Shortage | None:
         """Reserves what the job's next request may cost, in all its budgets or in none.
@@ -162,7 +161,7 @@ class Budgets:
         with self._database.transaction() as connection:
             if connection.execute(held).first() is None:
                 raise StaleLeaseError(job_id, lease.token)
-            found = [_budget(row) for row in connection.execute(locked)]
+            found = [value_of(Budget, row) for row in connection.execute(locked)]
             for budget in found:
                 shortage = _shortage(budget, _reserved(budget.id, job_id, connection), need)
                 if shortage is not None:
@@ -212,21 +211,6 @@ class Budgets:
             )
 
 
-def _budget(row: Any) -> Budget:
-    limits = BudgetLimits(
-        max_cost_usd=row.max_cost_usd, max_tokens=row.max_tokens, max_requests=row.max_requests
-    )
-    return Budget(
-        id=row.id,
-        limits=limits,
-        spent_cost_usd=row.spent_cost_usd,
-        spent_tokens=row.spent_tokens,
-        spent_requests=row.spent_requests,
-        lost_cost_usd=row.lost_cost_usd,
-        lost_requests=row.lost_requests,
-    )
-
-
 def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Decimal, int, int]:
     """Dollars, tokens and requests reserved for the budget's other jobs."""
     row = connection.execute(
@@ -240,11 +224,10 @@ def _reserved(budget_id: str, job_id: str, connection: Connection) -> tuple[Deci
 
 
 def _shortage(budget: Budget, reserved: tuple[Decimal, int, int], need: Need) -> Shortage | None:
-    limits = budget.limits
     rows: tuple[tuple[str, Any, Any, Any, Any], ...] = (
-        ("max_cost_usd", limits.max_cost_usd, budget.spent_cost_usd, reserved[0], need.cost_usd),
-        ("max_tokens", limits.max_tokens, budget.spent_tokens, reserved[1], need.tokens),
-        ("max_requests", limits.max_requests, budget.spent_requests, reserved[2], 1),
+        ("max_cost_usd", budget.max_cost_usd, budget.spent_cost_usd, reserved[0], need.cost_usd),
+        ("max_tokens", budget.max_tokens, budget.spent_tokens, reserved[1], need.tokens),
+        ("max_requests", budget.max_requests, budget.spent_requests, reserved[2], 1),
     )
     for name, limit, spent, reserved_now, wanted in rows:
         # What needs nothing lacks nothing, even of a budget that was overspent a little.

@@ -40,8 +40,10 @@ class Price(BaseModel):
 
     input: Annotated[float, Field(ge=0)]
     output: Annotated[float, Field(ge=0)]
-    cached: Annotated[float | None, Field(ge=0, description="Default: as input")] = None
-    source: Annotated[str, Field(description="Where the figures are from")] = ""
+    cached: Annotated[float | None, Field(ge=0)] = None
+    """Default: as input."""
+    source: str = ""
+    """Where the figures are from."""
 
 
 class ProviderEntry(BaseModel):
@@ -50,16 +52,14 @@ class ProviderEntry(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     protocol: Annotated[
-        str,
-        Field(
-            pattern=r"^[a-z0-9-]+$",
-            description="What the provider speaks: openai, anthropic, google, or a worker's own",
-            validation_alias=AliasChoices("protocol", "wire"),  # its former name
-        ),
+        str, Field(pattern=r"^[a-z0-9-]+$", validation_alias=AliasChoices("protocol", "wire"))
     ]
+    """What the provider speaks: openai, anthropic, google, or a worker's own."""
     base_url: str | None = None
-    key: Annotated[str | None, Field(description="Environment variable of the API key")] = None
-    timeout_s: Annotated[float, Field(gt=0, le=7200, description="For one sending")] = 600.0
+    key: str | None = None
+    """Environment variable of the API key."""
+    timeout_s: Annotated[float, Field(gt=0, le=7200)] = 600.0
+    """For one sending."""
     headers: Annotated[
         dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{1,100}$")], str],
         Field(description="Sent with every request, beside those of the protocol"),
@@ -73,15 +73,13 @@ class ModelEntry(BaseModel):
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_.-]+/[A-Za-z0-9_.:-]+$")]
     provider: str
-    model: Annotated[str, Field(description="The provider's own name of the snapshot")]
+    model: str
+    """The provider's own name of the snapshot."""
     baseline: bool = False
-    sampling: Annotated[
-        bool,
-        Field(description="Takes temperature and top_p, which OpenAI's reasoning models refuse"),
-    ] = True
-    max_tokens: Annotated[
-        int | None, Field(gt=0, description="Of a reply, where the job's decoding names none")
-    ] = None
+    sampling: bool = True
+    """Takes temperature and top_p, which OpenAI's reasoning models refuse."""
+    max_tokens: Annotated[int | None, Field(gt=0)] = None
+    """Of a reply, where the job's decoding names none."""
     extra_body: Annotated[
         dict[str, Any],
         Field(description="Further fields of a request's body, as endpoints of vLLM take them"),

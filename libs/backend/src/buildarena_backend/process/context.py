@@ -9,7 +9,7 @@ from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_backend.database.database import Database
 from buildarena_backend.queue.queues import Queues
 from buildarena_backend.settings import Settings
-from buildarena_backend.store import Store, open_store
+from buildarena_backend.store import Store
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ def open_context(
         overflow=overflow,
         name=name,
     )
-    store = open_store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
+    store = Store(database, lease_s=settings.lease_s, max_faults=settings.max_faults)
     return Context(
         settings=settings,
         store=store,

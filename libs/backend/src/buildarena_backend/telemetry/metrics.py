@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
-from sqlalchemy import ARRAY, ColumnElement, Connection, Double, case, cast, func, select, text
+from sqlalchemy import ARRAY, ColumnElement, Connection, Double, Row, case, cast, func, select, text
 
 from buildarena_backend import events
 from buildarena_backend.database.database import Database
@@ -119,15 +119,6 @@ class JobCount:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class QueueDepth:
-    """What waits in a queue, and for how long the oldest has."""
-
-    queue: str
-    jobs: int
-    oldest_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ModelUse:
     """What a model's sessions used so far."""
 
@@ -166,7 +157,7 @@ class MetricValues:
 
     Attributes:
         jobs: Jobs by where they are.
-        queues: What waits.
+        queues: How many ``jobs`` wait in each ``queue``, and for how long the oldest has.
         models: What sessions used.
         stages: How long attempts took.
         sweeps: Sweeps by state.
@@ -177,7 +168,7 @@ class MetricValues:
     """
 
     jobs: Sequence[JobCount]
-    queues: Sequence[QueueDepth]
+    queues: Sequence[Row[Any]]
     models: Sequence[ModelUse]
     stages: Sequence[StageTimes]
     sweeps: dict[str, int]
@@ -259,22 +250,19 @@ def _count_jobs(
     )
 
 
-def _queues(connection: Connection) -> list[QueueDepth]:
+def _queues(connection: Connection) -> Sequence[Row[Any]]:
     waited = func.extract("epoch", events.now - func.min(jobs.c.available_at))
     query = (
         select(
             jobs.c.queue,
             func.count().label("jobs"),
-            func.greatest(waited, 0).label("oldest_s"),
+            cast(func.greatest(waited, 0), Double).label("oldest_s"),
         )
         .where(jobs.c.state == JobState.QUEUED)
         .group_by(jobs.c.queue)
         .order_by(jobs.c.queue)
     )
-    return [
-        QueueDepth(queue=row.queue, jobs=row.jobs, oldest_s=float(row.oldest_s))
-        for row in connection.execute(query)
-    ]
+    return connection.execute(query).all()
 
 
 def _stages(connection: Connection) -> list[StageTimes]:

@@ -56,6 +56,11 @@ def _completed(plain: dict[str, Any]) -> dict[str, Any]:
         for name, schema in schemas.items()
         if name not in {"HTTPValidationError", "ValidationError"}
     }
+    for schema in named.values():
+        for field in schema.get("properties", {}).values():
+            # Docstrings of fields, in one line and without the last full stop.
+            if "description" in field:
+                field["description"] = " ".join(field["description"].split()).removesuffix(".")
     if len(named) != len(schemas) - 2:
         raise ValueError("two schemas have one name")
     plain["components"]["schemas"] = dict(sorted(named.items()))

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from decimal import Decimal
 from typing import Annotated, Any, Final, Generic, TypeVar
 
 from fastapi import Depends, Query, Request, params
 from fastapi.dependencies.utils import get_flat_params
 from fastapi.routing import APIRoute
-from pydantic import BaseModel, Field
+from pydantic import AwareDatetime, BaseModel, Field, StrictFloat, TypeAdapter, ValidationError
+from pydantic_core import to_jsonable_python
 
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
-from buildarena_backend.jobs.pages import Order, SortValue
+from buildarena_backend.jobs.pages import Order, Sort, SortValue
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -103,11 +103,18 @@ def _paging(
 PagingDep = Annotated[Paging, Depends(_paging)]
 
 
+_VALUES: Final[Mapping[Sort, TypeAdapter[Any]]] = {
+    "created": TypeAdapter(AwareDatetime),
+    "finished": TypeAdapter(AwareDatetime | None),
+    "indicator": TypeAdapter(StrictFloat | None),
+    "cost": TypeAdapter(Decimal | None),
+}
+"""What rows are sorted by, as the database compares it."""
+
+
 def encode(order: Order, value: SortValue, id_: str) -> str:
     """The cursor behind a row in some order."""
-    plain = value.isoformat() if isinstance(value, datetime) else value
-    plain = str(plain) if isinstance(plain, Decimal) else plain
-    return seal([order.by, order.descending, plain, id_])
+    return seal([order.by, order.descending, to_jsonable_python(value), id_])
 
 
 def decode(cursor: str, order: Order) -> tuple[SortValue, str]:
@@ -122,32 +129,9 @@ def decode(cursor: str, order: Order) -> tuple[SortValue, str]:
     if (by, descending) != (order.by, order.descending):
         raise _bad("belongs to a list in another order; leave it out to start at the first page")
     try:
-        return _value(order, plain), id_
-    except (ValueError, TypeError, ArithmeticError) as error:
+        return _VALUES[order.by].validate_json(json.dumps(plain), strict=True), id_
+    except ValidationError as error:
         raise _bad() from error
-
-
-def _value(order: Order, plain: Any) -> SortValue:
-    """A cursor's value as the database compares it.
-
-    Raises:
-        ValueError: It is of another kind.
-    """
-    if plain is None and order.by != "created":
-        return None
-    if order.by in {"created", "finished"}:
-        when = datetime.fromisoformat(plain)
-        if when.tzinfo is None:
-            raise ValueError("a time without zone")
-        return when
-    if order.by == "cost":
-        cost = Decimal(plain)
-        if not cost.is_finite():
-            raise ValueError("no amount")
-        return cost
-    if isinstance(plain, float):
-        return plain
-    raise ValueError("a value of another kind")
 
 
 def seal(parts: Sequence[Any]) -> str:

@@ -9,13 +9,14 @@ from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator, Field
 
 from buildarena_api.access import SCOPES, CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RegistryDep
 from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_api.leaderboard.views import FlagView
+from buildarena_api.schemas import View
 from buildarena_backend import __version__
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
@@ -34,20 +35,17 @@ def _labels(faces: Iterable[Face]) -> list[str]:
     return [face.label for face in faces]
 
 
-class _View(BaseModel):
-    model_config = ConfigDict(from_attributes=True)
-
-
-class ModelView(_View):
+class ModelView(View):
     """A model that jobs can name."""
 
     name: str = Field(examples=["openai/gpt-5"])
     provider: str
-    model: str = Field(description="The provider's own name of the snapshot")
+    model: str
+    """The provider's own name of the snapshot."""
     baseline: bool
 
 
-class ModuleView(_View):
+class ModuleView(View):
     """A module that machines are made of."""
 
     name: str
@@ -55,25 +53,26 @@ class ModuleView(_View):
     mass: float
     cost: float
     description: str
-    size: tuple[float, float, float] | None = Field(
-        description="Extents along its own x, y and z, units; null for connectors"
-    )
-    faces: Annotated[list[str], BeforeValidator(_labels)] = Field(
-        description="Labels of the faces that take a block"
-    )
-    actions: list[str] = Field(description="What keys can be bound to")
-    categories: list[str] = Field(description="Groups it is looked up in; none for basic modules")
-    simulated: bool = Field(description="Whether both engines have its physics")
+    size: tuple[float, float, float] | None
+    """Extents along its own x, y and z, units; null for connectors."""
+    faces: Annotated[list[str], BeforeValidator(_labels)]
+    """Labels of the faces that take a block."""
+    actions: list[str]
+    """What keys can be bound to."""
+    categories: list[str]
+    """Groups it is looked up in; none for basic modules."""
+    simulated: bool
+    """Whether both engines have its physics."""
 
 
-class ScorerView(_View):
+class ScorerView(View):
     """A scorer that task files can name."""
 
     name: str = Field(examples=["support"])
-    description: str = Field(description="What its indicator is")
-    parameters: Annotated[dict[str, Any], BeforeValidator(lambda m: m.model_json_schema())] = Field(
-        description="JSON schema of what a task file says under `scoring`"
-    )
+    description: str
+    """What its indicator is."""
+    parameters: Annotated[dict[str, Any], BeforeValidator(lambda m: m.model_json_schema())]
+    """JSON schema of what a task file says under `scoring`."""
     flags: list[FlagView]
 
 
@@ -117,21 +116,22 @@ def _contradictory(field: str, message: str) -> ProblemError:
     return invalid(field, message, code=ErrorCode.CONTRADICTORY_PARAMETERS)
 
 
-class SimulatorView(BaseModel):
+class SimulatorView(View):
     """A simulator that jobs can name."""
 
     name: str = Field(examples=["pybullet"])
-    version: str = Field(
-        description="As tracks have it in their names: trials of two versions are never compared",
-        examples=["3"],
-    )
-    kind: SimulatorKind = Field(
-        description="engine: physics simulation; game: Besiege in its window"
-    )
-    repeatable: bool = Field(description="Whether the same machine has the same trial again")
-    default: bool = Field(description="Whether jobs that name none are run by it")
-    workers: int = Field(description="Workers that reported within the last 15 seconds")
-    served: bool = Field(description="Whether there is such a worker, so that jobs don't wait")
+    version: str = Field(examples=["3"])
+    """As tracks have it in their names: trials of two versions are never compared."""
+    kind: SimulatorKind
+    """engine: physics simulation; game: Besiege in its window."""
+    repeatable: bool
+    """Whether the same machine has the same trial again."""
+    default: bool
+    """Whether jobs that name none are run by it."""
+    workers: int
+    """Workers that reported within the last 15 seconds."""
+    served: bool
+    """Whether there is such a worker, so that jobs don't wait."""
 
 
 @router.get("/simulators", tags=["simulators"])
@@ -150,26 +150,27 @@ def list_simulators(context: ContextDep, paging: PagingDep) -> Page[SimulatorVie
     return Page[SimulatorView](**paging.of(views))
 
 
-class SimulatorVersion(BaseModel):
+class SimulatorVersion(View):
     """A simulator and its version, as tracks have them in their names."""
 
     name: str
     version: str
 
 
-class VersionsView(BaseModel):
+class VersionsView(View):
     """What a result depends on besides model and task: results of other versions never mix."""
 
-    buildarena: str = Field(description="Of the service")
-    feedback: str = Field(description="Of what builders are answered")
-    scorers: int = Field(description="Of how trials are judged; part of each task's version")
+    buildarena: str
+    """Of the service."""
+    feedback: str
+    """Of what builders are answered."""
+    scorers: int
+    """Of how trials are judged; part of each task's version."""
     simulators: list[SimulatorVersion]
-    family_wise_error_rate: float = Field(
-        description="Chance that a board makes any false claim, at most"
-    )
-    min_successes: int = Field(
-        description="Successes below which a mean indicator has no interval, as none would hold"
-    )
+    family_wise_error_rate: float
+    """Chance that a board makes any false claim, at most."""
+    min_successes: int
+    """Successes below which a mean indicator has no interval, as none would hold."""
 
 
 @router.get("/versions", tags=["catalogue"])
@@ -188,14 +189,13 @@ def show_versions(context: ContextDep) -> VersionsView:
     )
 
 
-class WorkerView(_View):
+class WorkerView(View):
     """A process that works on jobs."""
 
     id: str = Field(
-        description="KIND@HOST:PID beside the database, runner@KEY/NAME where it reaches only the "
-        "API",
-        examples=["simulate@lab3:4711-9f2c41", "runner@key_0a1b2c3d4e5f60718293/lab4-4711"],
+        examples=["simulate@lab3:4711-9f2c41", "runner@key_0a1b2c3d4e5f60718293/lab4-4711"]
     )
+    """KIND@HOST:PID beside the database, runner@KEY/NAME where it reaches only the API."""
     kind: str = Field(examples=["simulate"])
     queues: list[str] = Field(examples=[["simulate.mujoco"]])
     host: str
@@ -203,9 +203,11 @@ class WorkerView(_View):
     versions: dict[str, Any]
     started_at: datetime
     seen_at: datetime
-    alive: bool = Field(description="Whether it reported within the last 15 seconds")
+    alive: bool
+    """Whether it reported within the last 15 seconds."""
     peak_memory_bytes: int | None
-    clock_ahead_s: float | None = Field(description="How far its clock is ahead of the database's")
+    clock_ahead_s: float | None
+    """How far its clock is ahead of the database's."""
 
 
 @router.get("/workers", tags=["workers"])
@@ -216,16 +218,15 @@ def list_workers(context: ContextDep, paging: PagingDep) -> Page[WorkerView]:
     return Page[WorkerView].model_validate({"data": shown, "next_cursor": following})
 
 
-class CallerView(BaseModel):
+class CallerView(View):
     """Who asks, and what they may do."""
 
-    key_id: str | None = Field(
-        description="Of the API key; null for the operator, and where no keys are asked for"
-    )
-    scopes: list[Literal["read", "submit", "admin"]] = Field(
-        description="What the key may do: each includes those before it"
-    )
-    keys_required: bool = Field(description="Whether requests need an API key")
+    key_id: str | None
+    """Of the API key; null for the operator, and where no keys are asked for."""
+    scopes: list[Literal["read", "submit", "admin"]]
+    """What the key may do: each includes those before it."""
+    keys_required: bool
+    """Whether requests need an API key."""
 
 
 @router.get("/caller", tags=["keys"])

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict
 from sse_starlette import EventSourceResponse
 
 from buildarena_api.access import CallerDep, limited
@@ -21,14 +21,15 @@ router = APIRouter(
 class StreamEvent(BaseModel):
     """What the data of an event is; its `event` is the job's or sweep's new state, or `turn`."""
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(extra="allow", use_attribute_docstrings=True)
 
-    job_id: str | None = Field(description="Of the job it happened to, if it is about one")
-    sweep_id: str | None = Field(description="Of the sweep it is about, if it is about one")
+    job_id: str | None
+    """Of the job it happened to, if it is about one."""
+    sweep_id: str | None
+    """Of the sweep it is about, if it is about one."""
     at: datetime
-    turn: dict[str, Any] | None = Field(
-        default=None, description="Of `turn`: as in the transcript; `shortened` if it is long"
-    )
+    turn: dict[str, Any] | None = None
+    """Of `turn`: as in the transcript; `shortened` if it is long."""
 
 
 STREAM: dict[int | str, dict[str, Any]] = {

@@ -5,19 +5,19 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from buildarena_api.access import limited
 from buildarena_api.dependencies import ServicesDep
 from buildarena_api.http.pages import Page, PagingDep, seal
-from buildarena_api.leaderboard.views import Board, BoardRow, board_view
-from buildarena_api.routes.leaderboard import SelectionDep
-from buildarena_api.schemas import UsageView
+from buildarena_api.leaderboard.views import Board, BoardRow
+from buildarena_api.routes.leaderboard import SelectionDep, viewed
+from buildarena_api.schemas import UsageView, View
 from buildarena_backend.states import Outcome
 from buildarena_benchmark import paper_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
@@ -39,19 +39,18 @@ PLACES = ("jobs",)
 """Fields of a row that are paths of this API: of no use in a file."""
 
 
-class RoundView(BaseModel):
+class RoundView(View):
     """One simulated machine of a job."""
 
-    model_config = ConfigDict(from_attributes=True)
-
-    machine_sha256: str = Field(description="Of its document", validation_alias="machine")
+    machine_sha256: str = Field(validation_alias="machine")
+    """Of its document."""
     success: bool
     indicator: float
     parts: int | None
     flags: list[str]
 
 
-class JobResult(BaseModel):
+class JobResult(View):
     """One ended job, with all that reports are made of."""
 
     job_id: str
@@ -64,19 +63,22 @@ class JobResult(BaseModel):
     seed: int
     outcome: Outcome
     reason: str | None
-    success: float = Field(description="Share of its worlds that its machine passed, 0 to 1")
-    indicator: float = Field(description="Mean over its worlds, 0 where it failed")
+    success: float
+    """Share of its worlds that its machine passed, 0 to 1."""
+    indicator: float
+    """Mean over its worlds, 0 where it failed."""
     parts: int | None
     flags: list[str]
     refusals: dict[str, int]
     usage: UsageView
     actions: int
     refused_actions: int
-    by_runner: bool = Field(description="A runner ran one of its trials")
-    unverified: bool = Field(
-        description="It waits for its verification, or was refuted: it counts nowhere"
-    )
-    rounds: list[RoundView] = Field(description="In order; more than one in a closed loop")
+    by_runner: bool
+    """A runner ran one of its trials."""
+    unverified: bool
+    """It waits for its verification, or was refuted: it counts nowhere."""
+    rounds: list[RoundView]
+    """In order; more than one in a closed loop."""
 
 
 _PLAIN = sorted({*JobResult.model_fields} - {"usage", "rounds"})
@@ -96,25 +98,17 @@ def export(
     format: Annotated[Literal["csv", "parquet", "latex"], Query()] = "csv",  # noqa: A002 - its name in the URL
 ) -> Response:
     """The leaderboard as a file; the LaTeX one has the paper's tables beside ours."""
-    track, tracks = selection.track, selection.tracks
 
-    def render(board: RankedBoard) -> bytes:
-        return _rendered(
-            format,
-            board,
-            lambda ranked: board_view(
-                ranked,
-                track=track or "",
-                tracks=tracks,
-                registry=services.registry,
-                catalogue=services.context.tasks,
-            ),
-        )
+    def render(ranked: RankedBoard) -> bytes:
+        board = viewed(services, selection, ranked)
+        if format == "latex":
+            return _latex(ranked, board.track).encode()
+        return _csv(_flat(board)) if format == "csv" else _parquet(_flat(board))
 
-    if track is None:
+    if selection.track is None:
         body = render(RankedBoard(tasks=(), overall=()))
     else:
-        kind = f"{format} {' '.join(tracks)}"
+        kind = f"{format} {' '.join(selection.tracks)}"
         body = services.boards.answer(
             selection.question, kind, lambda shown: render(shown.board())
         ).body
@@ -143,13 +137,6 @@ def list_results(sweep_id: str, services: ServicesDep, paging: PagingDep) -> Res
     ]
     page = Page[JobResult](data=results, next_cursor=following)
     return Response(page.model_dump_json(), media_type="application/json")
-
-
-def _rendered(kind: str, ranked: RankedBoard, as_view: Callable[[RankedBoard], Board]) -> bytes:
-    if kind == "latex":
-        return _latex(ranked, as_view(ranked).track).encode()
-    rows = _flat(as_view(ranked))
-    return _csv(rows) if kind == "csv" else _parquet(rows)
 
 
 def _columns() -> list[str]:

@@ -10,7 +10,7 @@ from hashlib import sha256
 from typing import Annotated, Any, Final, Literal
 
 from fastapi import APIRouter, Query, Request, Response
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BeforeValidator
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RegistryDep, RequestKey, ServicesDep
@@ -27,6 +27,7 @@ from buildarena_api.schemas import (
     JobSummaryView,
     JobView,
     PromptView,
+    View,
     WorldView,
 )
 from buildarena_backend.agents.turn_views import Transcripts
@@ -323,11 +324,12 @@ def _turn(turn: dict[str, Any]) -> list[str]:
     return lines
 
 
-class ExcerptPiece(BaseModel):
+class ExcerptPiece(View):
     """A piece of the text around a match."""
 
     text: str
-    match: bool = Field(description="Whether it is one of the words")
+    match: bool
+    """Whether it is one of the words."""
 
 
 def _pieces(excerpt: str) -> list[ExcerptPiece]:
@@ -340,22 +342,19 @@ def _pieces(excerpt: str) -> list[ExcerptPiece]:
     ]
 
 
-class TranscriptMatchView(BaseModel):
+class TranscriptMatchView(View):
     """A turn in which the words stand."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     job_id: str
     task: str
     model: str
     seed: int
-    outcome: Outcome | None = Field(description="null while the job has not ended")
-    turn: int | None = Field(
-        description="Place in the transcript, from 0; null where only the reply is kept"
-    )
-    where: Literal["reply", "feedback"] = Field(
-        description="In what was said, or in what it was answered"
-    )
+    outcome: Outcome | None
+    """null while the job has not ended."""
+    turn: int | None
+    """Place in the transcript, from 0; null where only the reply is kept."""
+    where: Literal["reply", "feedback"]
+    """In what was said, or in what it was answered."""
     excerpt: Annotated[list[ExcerptPiece], BeforeValidator(_pieces)]
 
 

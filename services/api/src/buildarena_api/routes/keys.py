@@ -6,12 +6,12 @@ from datetime import datetime, timedelta
 from typing import Annotated, Literal, Self
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, ConfigDict, Field, StrictInt, model_validator
+from pydantic import Field, StrictInt, model_validator
 
 from buildarena_api.access import admin_of, limited
 from buildarena_api.dependencies import ContextDep, RequestKey, ServicesDep
 from buildarena_api.http.pages import Page, PagingDep
-from buildarena_api.schemas import EXISTED, BudgetUse
+from buildarena_api.schemas import EXISTED, BudgetUse, Document, View
 from buildarena_backend.accounts.keys import ApiKey
 from buildarena_backend.catalog.specs import Budget, Title
 from buildarena_backend.errors import SubmissionError
@@ -23,40 +23,25 @@ from buildarena_backend.trials.known_simulators import simulator_issues
 router = APIRouter(prefix="/v1/keys", tags=["keys"], dependencies=[limited(caller=admin_of)])
 
 
-class NewKey(BaseModel):
+class NewKey(Document):
     """A request for a key."""
 
-    model_config = ConfigDict(extra="forbid")
-
-    name: Annotated[Title, Field(description="Who holds it", examples=["ada"])]
+    name: Annotated[Title, Field(examples=["ada"])]
+    """Who holds it."""
     scopes: Annotated[
-        list[Literal["read", "submit", "admin", "runner"]],
-        Field(
-            min_length=1,
-            max_length=3,
-            description="read, submit and admin: each includes those before it; or runner alone, "
-            "which may lease trials and nothing else",
-        ),
+        list[Literal["read", "submit", "admin", "runner"]], Field(min_length=1, max_length=3)
     ]
-    simulators: Annotated[
-        list[SimulatorName] | None,
-        Field(
-            min_length=1,
-            max_length=10,
-            description="Of a runner key: the simulators whose jobs its runners may lease",
-        ),
-    ] = None
+    """read, submit and admin: each includes those before it; or runner alone, which may lease
+    trials and nothing else."""
+    simulators: Annotated[list[SimulatorName] | None, Field(min_length=1, max_length=10)] = None
+    """Of a runner key: the simulators whose jobs its runners may lease."""
     job_owners: Annotated[
         list[Annotated[str, Field(pattern=r"^key_[0-9a-f]{1,40}$")]] | None,
-        Field(
-            min_length=1,
-            max_length=100,
-            description="Of a runner key: ids of the keys whose jobs may be leased; null for all",
-        ),
+        Field(min_length=1, max_length=100),
     ] = None
-    expires_in_days: Annotated[
-        StrictInt | None, Field(ge=1, le=3650, description="Days until it expires; null for never")
-    ] = None
+    """Of a runner key: ids of the keys whose jobs may be leased; null for all."""
+    expires_in_days: Annotated[StrictInt | None, Field(ge=1, le=3650)] = None
+    """Days until it expires; null for never."""
     budget: Budget | None = None
 
     @model_validator(mode="after")
@@ -73,56 +58,43 @@ class NewKey(BaseModel):
         return self
 
 
-class Rotation(BaseModel):
+class Rotation(Document):
     """A request for another secret of a key."""
 
-    model_config = ConfigDict(extra="forbid")
-
-    overlap_hours: Annotated[
-        float,
-        Field(
-            ge=0,
-            le=24 * 90,
-            allow_inf_nan=False,
-            description="Hours that the present secret stays good; 0 ends it at once",
-        ),
-    ] = 24.0
+    overlap_hours: Annotated[float, Field(ge=0, le=24 * 90, allow_inf_nan=False)] = 24.0
+    """Hours that the present secret stays good; 0 ends it at once."""
 
 
-class KeyView(BaseModel):
+class KeyView(View):
     """A key without its secret."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     id: str = Field(examples=["key_0a1b2c3d4e5f60718293"])
     name: str
     scopes: list[str]
-    simulators: list[str] | None = Field(description="Of a runner key: what it may lease jobs of")
-    job_owners: list[str] | None = Field(description="Of a runner key: whose; null for everybody's")
+    simulators: list[str] | None
+    """Of a runner key: what it may lease jobs of."""
+    job_owners: list[str] | None
+    """Of a runner key: whose; null for everybody's."""
     created_at: datetime
     expires_at: datetime | None
     revoked_at: datetime | None
-    used_at: datetime | None = Field(description="When it was last used, to the minute")
-    suspended_at: datetime | None = Field(
-        description="Of a runner key: since when its runners may do nothing"
-    )
-    suspended_for: str | None = Field(
-        description="The verification that refuted a trial of its runners"
-    )
-    previous_expires_at: datetime | None = Field(
-        description="Until when the secret before the present one is good; null without one",
-        validation_alias="previous_until",
-    )
+    used_at: datetime | None
+    """When it was last used, to the minute."""
+    suspended_at: datetime | None
+    """Of a runner key: since when its runners may do nothing."""
+    suspended_for: str | None
+    """The verification that refuted a trial of its runners."""
+    previous_expires_at: datetime | None = Field(validation_alias="previous_until")
+    """Until when the secret before the present one is good; null without one."""
     budget: BudgetUse | None = None
 
 
 class KeyCreated(KeyView):
     """A key that was just made."""
 
-    secret: str | None = Field(
-        description="What requests carry; it can't be read again. null if the key was there "
-        "already, under the same Idempotency-Key"
-    )
+    secret: str | None
+    """What requests carry; it can't be read again. null if the key was there already, under the
+    same Idempotency-Key."""
 
 
 @router.post("", status_code=201, responses=EXISTED)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, Services, ServicesDep, Track
@@ -18,10 +18,12 @@ from buildarena_api.http.problems import ErrorCode, invalid, unknown
 from buildarena_api.leaderboard.cache import Question
 from buildarena_api.leaderboard.views import Board, board_view
 from buildarena_api.routes.verifications import request_verifications
+from buildarena_api.schemas import Document, View
 from buildarena_backend.boards.tallying import CellRecord
 from buildarena_backend.boards.trials import CellId
 from buildarena_backend.catalog.tracks import default_track
 from buildarena_benchmark import builtin_tasks, paper_tasks
+from buildarena_benchmark.leaderboard import Board as RankedBoard
 from buildarena_benchmark.leaderboard import BoardQuery, TaskComparison, compare_models
 
 DEFAULT_TRACK = (
@@ -39,13 +41,11 @@ class Selection:
     Attributes:
         track: The track.
         tracks: All that could have been asked for.
-        query: Which tasks and models.
-        question: The same with the track and the sweeps.
+        question: The track with tasks, models and sweeps.
     """
 
     track: str | None
     tracks: list[str]
-    query: BoardQuery
     question: Question
 
 
@@ -100,13 +100,8 @@ def select_board(
         models=boards.known_models(model) if model else None,
         overall=_ranked_over(task, category),
     )
-    question = Question(
-        track=track or "",
-        query=query,
-        sweeps=sweeps,
-        members=members,
-    )
-    return Selection(track=track, tracks=[*ended], query=query, question=question)
+    question = Question(track=track or "", query=query, sweeps=sweeps, members=members)
+    return Selection(track=track, tracks=[*ended], question=question)
 
 
 def track_or_default(services: Services, asked: str | None, ended: Mapping[str, int]) -> str | None:
@@ -146,10 +141,8 @@ SelectionDep = Annotated[Selection, Depends(select_board)]
 router = APIRouter(prefix="/v1", tags=["leaderboard"], dependencies=[limited("heavy")])
 
 
-class PairedTest(BaseModel):
+class PairedTest(View):
     """A paired test on shared seeds."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     method: Literal["exact McNemar", "Wilcoxon signed-rank"]
     pairs: int
@@ -157,28 +150,25 @@ class PairedTest(BaseModel):
     p_value: float
 
 
-class TaskComparisonView(BaseModel):
+class TaskComparisonView(View):
     """Two models on one task; tests only where they share seeds."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     task: str
     successes: tuple[float, float]
     counted_jobs: tuple[int, int] = Field(validation_alias="trials")
-    difference: float = Field(description="Success rate of the first minus that of the second")
-    ci_low: float = Field(
-        description="Lower end of its 95 % interval, unpaired", validation_alias="low"
-    )
+    difference: float
+    """Success rate of the first minus that of the second."""
+    ci_low: float = Field(validation_alias="low")
+    """Lower end of its 95 % interval, unpaired."""
     ci_high: float = Field(validation_alias="high")
     success: PairedTest | None
     indicator: PairedTest | None
-    success_p: float | None = Field(
-        description="Adjusted over the tests of both figures on all tasks (Holm)"
-    )
+    success_p: float | None
+    """Adjusted over the tests of both figures on all tasks (Holm)."""
     indicator_p: float | None
 
 
-class Comparison(BaseModel):
+class Comparison(View):
     """Two models on all tasks that both played."""
 
     track: str | None
@@ -187,53 +177,50 @@ class Comparison(BaseModel):
     tasks: list[TaskComparisonView]
 
 
-class VerifyRequest(BaseModel):
+class VerifyRequest(Document):
     """Which results to verify."""
-
-    model_config = ConfigDict(extra="forbid")
 
     track: Annotated[str | None, Field(description=DEFAULT_TRACK)] = None
     model: str
     tasks: list[str] | None = None
-    sample: Annotated[int | None, Field(ge=1, le=10_000, description="Default: all")] = None
-    seed: Annotated[int, Field(description="Seed of the random sample")] = 0
+    sample: Annotated[int | None, Field(ge=1, le=10_000)] = None
+    """Default: all."""
+    seed: int = 0
+    """Seed of the random sample."""
 
 
-class VerifyAccepted(BaseModel):
+class VerifyAccepted(View):
     """Verifications that were requested."""
 
-    scored: int = Field(description="Scored jobs of the model")
-    verification_ids: list[str] = Field(description="See /v1/verifications/{verification_id}")
-    skipped_job_ids: list[str] = Field(
-        description="Jobs that were not queued, as the key has as many open verifications as it "
-        "may: request them again when some have ended"
+    scored: int
+    """Scored jobs of the model."""
+    verification_ids: list[str]
+    """See /v1/verifications/{verification_id}."""
+    skipped_job_ids: list[str]
+    """Jobs that were not queued, as the key has as many open verifications as it may: request them
+    again when some have ended."""
+
+
+def viewed(services: Services, selection: Selection, ranked: RankedBoard) -> Board:
+    """A ranked board as it is answered."""
+    return board_view(
+        ranked,
+        track=selection.track or "",
+        tracks=selection.tracks,
+        registry=services.registry,
+        catalogue=services.context.tasks,
     )
 
 
 @router.get("/leaderboard", response_model=Board)
-def leaderboard(
-    services: ServicesDep,
-    selection: SelectionDep,
-    request: Request,
-) -> Any:
+def leaderboard(services: ServicesDep, selection: SelectionDep, request: Request) -> Any:
     """Ranks the models of one track, on each task and overall; tracks are never mixed."""
-    track, tracks = selection.track, selection.tracks
-    if track is None:
+    if selection.track is None:
         return Board(track=None, tracks=[], tasks=[])
     answer = services.boards.answer(
         selection.question,
-        "json " + " ".join(tracks),
-        lambda shown: (
-            board_view(
-                shown.board(),
-                track=track,
-                tracks=tracks,
-                registry=services.registry,
-                catalogue=services.context.tasks,
-            )
-            .model_dump_json()
-            .encode()
-        ),
+        "json " + " ".join(selection.tracks),
+        lambda shown: viewed(services, selection, shown.board()).model_dump_json().encode(),
     )
     return conditional(request, answer, "application/json")
 

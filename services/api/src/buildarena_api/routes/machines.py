@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated, Any, Final
 
 from fastapi import APIRouter, Depends, Query, Response
-from pydantic import BaseModel, Field
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RequestKey
@@ -16,9 +15,9 @@ from buildarena_api.machine_uploads import (
     refused,
     uploaded,
 )
-from buildarena_api.replays import KeyPress
-from buildarena_api.scenes import MachineScene, Vector, machine_scene
-from buildarena_api.schemas import EXISTED, JobView
+from buildarena_api.replays import KeyPress, Vector
+from buildarena_api.scenes import MachineScene, machine_scene
+from buildarena_api.schemas import EXISTED, JobView, View
 from buildarena_backend.agents.submission import request_trial
 from buildarena_backend.catalog.specs import MAX_SEED, Name
 from buildarena_backend.process.context import Context
@@ -47,19 +46,25 @@ FileDep = Annotated[bytes, Depends(uploaded)]
 TaskName = Annotated[Name | None, Query(description="Also hold it against this task's rules")]
 
 
-class MachineCheckView(BaseModel):
+class MachineCheckView(View):
     """What a file holds, and what is wrong with it."""
 
-    name: str = Field(description='What the file calls the machine; "" if it does not')
-    faults: list[str] = Field(description="Why it cannot be put through a trial")
-    broken_rule: str | None = Field(description="The rule of the task that it breaks, if any")
-    remarks: list[str] = Field(description="What of the file is left out or not known")
-    detached: list[str] = Field(description="Blocks without a path to the starting block")
-    parts: int = Field(description="Blocks and connectors")
-    mass: float = Field(description="Mass units")
-    bounds: tuple[Vector, Vector] | None = Field(
-        description="Smallest and largest coordinates, units; null without blocks"
-    )
+    name: str
+    """What the file calls the machine; "" if it does not."""
+    faults: list[str]
+    """Why it cannot be put through a trial."""
+    broken_rule: str | None
+    """The rule of the task that it breaks, if any."""
+    remarks: list[str]
+    """What of the file is left out or not known."""
+    detached: list[str]
+    """Blocks without a path to the starting block."""
+    parts: int
+    """Blocks and connectors."""
+    mass: float
+    """Mass units."""
+    bounds: tuple[Vector, Vector] | None
+    """Smallest and largest coordinates, units; null without blocks."""
     control_sequence: list[KeyPress]
     scene: MachineScene
 

@@ -68,7 +68,13 @@ def _named(
     return job_id, token
 
 
+async def _prefix(caller: RunnerDep) -> str:
+    return runner_prefix(caller.key_id)
+
+
 NamedDep = Annotated[JobToken, Depends(_named)]
+PrefixDep = Annotated[str, Depends(_prefix)]
+"""What the names of the key's runners begin with."""
 
 
 @router.get("", dependencies=[_ORDINARY])
@@ -154,11 +160,10 @@ def send_heartbeat(body: Heartbeat, caller: RunnerDep, context: ContextDep) -> L
 
 
 @router.post("/goodbye", dependencies=[_ORDINARY])
-def leave(body: RunnerReport, caller: RunnerDep, context: ContextDep) -> LeaseStates:
+def leave(body: RunnerReport, prefix: PrefixDep, context: ContextDep) -> LeaseStates:
     """Takes a runner that shuts down off the list of workers; leases that it still has go back."""
-    runner = runner_prefix(caller.key_id) + body.name
-    context.store.runner_leases.hand_back(runner)
-    context.store.workers.leave(runner)
+    context.store.runner_leases.hand_back(prefix + body.name)
+    context.store.workers.leave(prefix + body.name)
     return LeaseStates(live=[], lost=[])
 
 
@@ -166,9 +171,9 @@ def leave(body: RunnerReport, caller: RunnerDep, context: ContextDep) -> LeaseSt
     "/leases/{job_id}/{token}",
     dependencies=[_ORDINARY],
 )
-def get_leased_trial(named: NamedDep, caller: RunnerDep, context: ContextDep) -> LeasedTrial:
+def get_leased_trial(named: NamedDep, prefix: PrefixDep, context: ContextDep) -> LeasedTrial:
     """The trial of a live lease, as the lease's own answer had it."""
-    lease = context.store.runner_leases.live(*named, runner_prefix(caller.key_id))
+    lease = context.store.runner_leases.live(*named, prefix)
     try:
         due = TrialRepository(context).due(lease.job)
     except PermanentError as error:
@@ -191,12 +196,11 @@ async def upload_file(
     named: NamedDep,
     sha256: Annotated[str, Path(pattern=r"^[0-9a-f]{64}$", description="Of the whole file")],
     request: Request,
-    caller: RunnerDep,
+    prefix: PrefixDep,
     services: ServicesDep,
 ) -> None:
     """Takes a whole file; one that was received before changes nothing."""
-    leases, prefix = services.context.store.runner_leases, runner_prefix(caller.key_id)
-    await run_in_threadpool(leases.live, *named, prefix)
+    await run_in_threadpool(services.context.store.runner_leases.live, *named, prefix)
     with TemporaryFile() as file:
         if await receive_file(request, file, max_bytes=MAX_FILE_BYTES) != sha256:
             raise UploadError("the file's SHA-256 is not the one in the path: send it again")
@@ -208,10 +212,9 @@ async def upload_file(
     dependencies=[limited("runner_outcomes", caller=runner_of)],
 )
 def complete_trial(
-    named: NamedDep, body: TrialOutcome, caller: RunnerDep, services: ServicesDep
+    named: NamedDep, body: TrialOutcome, prefix: PrefixDep, services: ServicesDep
 ) -> LeaseEnd:
     """Hands over what came of a trial, which is checked and scored here; ends the lease."""
-    prefix = runner_prefix(caller.key_id)
     return LeaseEnd(status=services.runners.outcomes.complete(named, prefix, body))
 
 
@@ -220,10 +223,9 @@ def complete_trial(
     dependencies=[limited("runner_outcomes", caller=runner_of)],
 )
 def report_fault(
-    named: NamedDep, body: TrialFault, caller: RunnerDep, services: ServicesDep
+    named: NamedDep, body: TrialFault, prefix: PrefixDep, services: ServicesDep
 ) -> LeaseEnd:
     """Reports that the runner or its simulator failed; ends the lease."""
-    prefix = runner_prefix(caller.key_id)
     return LeaseEnd(status=services.runners.outcomes.fault(named, prefix, body))
 
 
@@ -231,9 +233,9 @@ def report_fault(
     "/leases/{job_id}/{token}/hand-back",
     dependencies=[_ORDINARY],
 )
-def hand_back(named: NamedDep, caller: RunnerDep, services: ServicesDep) -> LeaseEnd:
+def hand_back(named: NamedDep, prefix: PrefixDep, services: ServicesDep) -> LeaseEnd:
     """Gives a trial back without fault, as at shutdown; ends the lease."""
-    return LeaseEnd(status=services.runners.outcomes.hand_back(named, runner_prefix(caller.key_id)))
+    return LeaseEnd(status=services.runners.outcomes.hand_back(named, prefix))
 
 
 def _rights(caller: Caller) -> RunnerRights:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import RequestKey, Services, ServicesDep
@@ -16,7 +16,7 @@ from buildarena_api.replays import (
     block_view,
     connector_view,
 )
-from buildarena_api.schemas import EXISTED, JobView
+from buildarena_api.schemas import EXISTED, Document, JobView, View
 from buildarena_backend.agents.briefing import LIMITS
 from buildarena_backend.agents.sessions import SessionState
 from buildarena_backend.catalog.specs import Name, Seed, Worlds
@@ -31,157 +31,158 @@ router = APIRouter(prefix="/v1/sessions", tags=["sessions"], dependencies=[limit
 MachineName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
 
 
-class OpenSession(BaseModel):
+class OpenSession(Document):
     """A request to build."""
 
-    model_config = ConfigDict(extra="forbid")
-
     task: Name
-    agent: Annotated[
-        str,
-        Field(
-            description="Its name on the leaderboard, which belongs to the key that first uses it",
-            max_length=80,
-        ),
-    ]
+    agent: Annotated[str, Field(max_length=80)]
+    """Its name on the leaderboard, which belongs to the key that first uses it."""
     seed: Seed = 0
     simulator: Name = DEFAULT_ENGINE
-    kind: Annotated[
-        Literal["agent", "human"],
-        Field(
-            description="Who builds: a program, on leaderboards `agent/NAME`, or a person, "
-            "`human/NAME`. No name is of both kinds"
-        ),
-    ] = "agent"
-    data_sheets: bool = Field(
-        default=True,
-        description="Tell each module's data and the world's; sessions with and without are "
-        "ranked apart",
-    )
+    kind: Literal["agent", "human"] = "agent"
+    """Who builds: a program, on leaderboards `agent/NAME`, or a person, `human/NAME`. No name is of
+    both kinds."""
+    data_sheets: bool = True
+    """Tell each module's data and the world's; sessions with and without are ranked apart."""
     worlds: Worlds = None
 
 
-class ToolView(BaseModel):
+class ToolView(View):
     """A tool that the agent may call."""
 
     name: str
     description: str
-    parameters: dict[str, Any] = Field(description="JSON schema of its arguments")
+    parameters: dict[str, Any]
+    """JSON schema of its arguments."""
 
 
-class SessionLimits(BaseModel):
+class SessionLimits(View):
     """How much a session may do."""
 
-    model_config = ConfigDict(from_attributes=True)
+    calls: int
+    """Calls it may make."""
+    session_bytes: int
+    """Bytes of all arguments and answers."""
+    call_bytes: int
+    """Bytes of one call's arguments."""
+    idle_s: int
+    """Seconds without a call after which it is cancelled."""
 
-    calls: int = Field(description="Calls it may make")
-    session_bytes: int = Field(description="Bytes of all arguments and answers")
-    call_bytes: int = Field(description="Bytes of one call's arguments")
-    idle_s: int = Field(description="Seconds without a call after which it is cancelled")
 
-
-class FaceView(BaseModel):
+class FaceView(View):
     """A face of a block under construction."""
 
     label: str = Field(examples=["A"])
-    side: str = Field(description="Where it looks, as feedback says it", examples=["East"])
-    center: Vector = Field(description="World frame, units")
-    normal: Vector = Field(description="Outwards, world frame, unit length")
-    taken_by: str | None = Field(
-        description="The block that it touches by an attachment; null if it takes a block"
-    )
+    side: str = Field(examples=["East"])
+    """Where it looks, as feedback says it."""
+    center: Vector
+    """World frame, units."""
+    normal: Vector
+    """Outwards, world frame, unit length."""
+    taken_by: str | None
+    """The block that it touches by an attachment; null if it takes a block."""
 
 
 class WorkbenchPart(PartView):
     """A part of a machine under construction."""
 
-    sits_on: tuple[str, str] | None = Field(
-        description="Block and face that it is attached to; null for starting blocks, connectors "
-        "and blocks whose base was removed"
-    )
-    ends: list[tuple[str, str]] = Field(description="Block and face of a connector's two ends")
-    faces: list[FaceView] = Field(description="Of a block: what can be built on")
-    actions: list[str] = Field(description="What keys can be bound to")
-    spins: bool = Field(description="Whether its spin can be flipped")
+    sits_on: tuple[str, str] | None
+    """Block and face that it is attached to; null for starting blocks, connectors and blocks whose
+    base was removed."""
+    ends: list[tuple[str, str]]
+    """Block and face of a connector's two ends."""
+    faces: list[FaceView]
+    """Of a block: what can be built on."""
+    actions: list[str]
+    """What keys can be bound to."""
+    spins: bool
+    """Whether its spin can be flipped."""
 
 
-class SubStructureView(BaseModel):
+class SubStructureView(View):
     """A copy of a machine in an assembly."""
 
-    model_config = ConfigDict(from_attributes=True)
-
     letter: str
-    source: str = Field(description="The machine that it is a copy of")
+    source: str
+    """The machine that it is a copy of."""
 
 
-class WorkbenchMachine(BaseModel):
+class WorkbenchMachine(View):
     """A machine under construction."""
 
     name: str
     parts: list[WorkbenchPart]
     control_sequence: list[KeyPress]
-    controller: str = Field(description="The program that acts in place of it, Lua; empty for none")
-    sub_structures: list[SubStructureView] = Field(description="Of an assembly")
-    available: list[str] = Field(description="Machines that an assembly can be put together from")
-    mass: float = Field(description="Mass units")
-    detached: list[str] = Field(description="Blocks without a path to the starting block")
+    controller: str
+    """The program that acts in place of it, Lua; empty for none."""
+    sub_structures: list[SubStructureView]
+    """Of an assembly."""
+    available: list[str]
+    """Machines that an assembly can be put together from."""
+    mass: float
+    """Mass units."""
+    detached: list[str]
+    """Blocks without a path to the starting block."""
 
 
-class TestTrialView(BaseModel):
+class TestTrialView(View):
     """A test trial: what was measured is told, and counts for nothing."""
 
-    model_config = ConfigDict(from_attributes=True)
+    number: int
+    """Which one it is, from 1."""
+    result: str | None
+    """What was measured, in words; null while it is tried."""
+    trace: list[list[float]]
+    """Where what counts was, each second: time (s), and x, y, z (units)."""
 
-    number: int = Field(description="Which one it is, from 1")
-    result: str | None = Field(description="What was measured, in words; null while it is tried")
-    trace: list[list[float]] = Field(
-        description="Where what counts was, each second: time (s), and x, y, z (units)"
-    )
 
-
-class SessionView(BaseModel):
+class SessionView(View):
     """A session and what stands on its workbench."""
 
-    id: str = Field(description="Also the id of the job that will hold the score")
+    id: str
+    """Also the id of the job that will hold the score."""
     job: JobView
-    briefing: str = Field(
-        description="All that an agent must know, as Markdown: how it plays, the statement, the "
-        "frame, the rules, the modules with their data, and the world"
-    )
-    statement: str = Field(description="What to build; part of the briefing")
-    open: bool = Field(description="Whether it takes calls")
-    machines: list[WorkbenchMachine] = Field(
-        description="What was built so far; the one that is simulated is the assembly, or the only"
-    )
+    briefing: str
+    """All that an agent must know, as Markdown: how it plays, the statement, the frame, the rules,
+    the modules with their data, and the world."""
+    statement: str
+    """What to build; part of the briefing."""
+    open: bool
+    """Whether it takes calls."""
+    machines: list[WorkbenchMachine]
+    """What was built so far; the one that is simulated is the assembly, or the only."""
     tools: list[ToolView]
     limits: SessionLimits
-    calls: int = Field(description="Calls made so far")
-    bytes: int = Field(description="Bytes of all arguments and answers so far")
-    tests: list[TestTrialView] = Field(description="Its test trials so far, in order")
-    max_tests: int = Field(description="Test trials that it may have; 0 for most tasks")
+    calls: int
+    """Calls made so far."""
+    bytes: int
+    """Bytes of all arguments and answers so far."""
+    tests: list[TestTrialView]
+    """Its test trials so far, in order."""
+    max_tests: int
+    """Test trials that it may have; 0 for most tasks."""
 
 
-class ToolCall(BaseModel):
+class ToolCall(Document):
     """One action."""
 
-    model_config = ConfigDict(extra="forbid")
-
     tool: Annotated[str, Field(max_length=100)]
-    arguments: Any = Field(default={}, description="What the tool's parameters ask for")
+    arguments: Any = Field(default={})
+    """What the tool's parameters ask for."""
     machine: MachineName = Field(
         default=MAIN,
         description=f"Sub-structure it is meant for; {ASSEMBLY!r} is put together from the others",
     )
 
 
-class ToolOutcome(BaseModel):
+class ToolOutcome(View):
     """What came of an action."""
 
-    model_config = ConfigDict(from_attributes=True)
-
     ok: bool
-    reason: str | None = Field(description="Refusal class, if it was refused")
-    feedback: str = Field(description="The state in words, or what would have been allowed")
+    reason: str | None
+    """Refusal class, if it was refused."""
+    feedback: str
+    """The state in words, or what would have been allowed."""
 
 
 @router.post("", status_code=201, responses=EXISTED)

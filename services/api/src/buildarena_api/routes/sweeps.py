@@ -7,7 +7,6 @@ from decimal import Decimal
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Query, Response
-from pydantic import BaseModel, ConfigDict
 
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import ContextDep, IdPrefix, RequestKey, ServicesDep
@@ -15,6 +14,7 @@ from buildarena_api.http.pages import NEWEST_FIRST, Page, PagingDep, encode
 from buildarena_api.schemas import (
     EXISTED,
     BudgetUse,
+    Document,
     ForecastView,
     ProgressView,
     SweepAccepted,
@@ -39,10 +39,8 @@ Resume = Annotated[
 ]
 
 
-class Resumption(BaseModel):
+class Resumption(Document):
     """How to resume a sweep."""
-
-    model_config = ConfigDict(extra="forbid")
 
     budget: Budget | None = None
 
@@ -176,7 +174,7 @@ def forecast_sweep(sweep_id: str, context: ContextDep) -> ForecastView:
     """Forecasts when a sweep ends and what it comes to cost, from what ran so far."""
     store = context.store
     ahead, budget = store.sweeps.forecast(sweep_id), store.budgets.get(sweep_id)
-    most = None if budget is None else budget.limits.max_cost_usd
+    most = None if budget is None else budget.max_cost_usd
     short = None
     if budget is not None and most is not None:
         short = float(max(Decimal(), budget.spent_cost_usd + ahead.own_cost_usd_left - most))

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RequestKey
@@ -14,7 +14,7 @@ from buildarena_api.http.bodies import YAML, is_yaml, not_utf8
 from buildarena_api.http.etags import Answer, conditional
 from buildarena_api.http.pages import Page, PagingDep
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.schemas import EXISTED
+from buildarena_api.schemas import EXISTED, View
 from buildarena_backend.catalog.tasks import CatalogueEntry
 from buildarena_backend.database.text import clean
 from buildarena_benchmark import parse_custom_task
@@ -43,32 +43,38 @@ indicator: {name: load, unit: mass units}
 """
 
 
-class TaskView(BaseModel):
+class TaskView(View):
     """A task that jobs can name."""
 
     name: str = Field(examples=["support-1"])
-    version: str = Field(description="Content hash of all that can change a score")
+    version: str
+    """Content hash of all that can change a score."""
     title: str
     category: str
-    category_title: str = Field(description="What people call it", examples=["Bridges"])
+    category_title: str = Field(examples=["Bridges"])
+    """What people call it."""
     level: int
-    statement: str = Field(description="What the model reads")
-    indicator: str = Field(description="Name of the figure it is ranked by", examples=["load"])
-    unit: str = Field(description='The figure\'s unit; "1" for a ratio', examples=["mass units"])
-    ceiling: float | None = Field(
-        description="The greatest indicator there is; null where only what can be built bounds it"
-    )
-    custom: bool = Field(description="Whether somebody uploaded it")
-    created_at: datetime | None = Field(description="When this version was; null for built-in ones")
+    statement: str
+    """What the model reads."""
+    indicator: str = Field(examples=["load"])
+    """Name of the figure it is ranked by."""
+    unit: str = Field(examples=["mass units"])
+    """The figure's unit; "1" for a ratio."""
+    ceiling: float | None
+    """The greatest indicator there is; null where only what can be built bounds it."""
+    custom: bool
+    """Whether somebody uploaded it."""
+    created_at: datetime | None
+    """When this version was; null for built-in ones."""
 
 
 class TaskDetail(TaskView):
     """A version of a task with its whole document."""
 
-    current: bool = Field(description="Whether new submissions get this version")
-    document: dict[str, Any] = Field(
-        description="The whole document, defaults included; JSON is YAML, so it can be uploaded"
-    )
+    current: bool
+    """Whether new submissions get this version."""
+    document: dict[str, Any]
+    """The whole document, defaults included; JSON is YAML, so it can be uploaded."""
 
 
 async def _text(request: Request) -> str:

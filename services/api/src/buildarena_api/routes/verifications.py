@@ -7,12 +7,11 @@ from datetime import datetime
 from typing import Any
 
 from fastapi import APIRouter, Response
-from pydantic import BaseModel, ConfigDict, Field
 
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RequestKey
 from buildarena_api.http.problems import ErrorCode, ProblemError
-from buildarena_api.schemas import EXISTED
+from buildarena_api.schemas import EXISTED, View
 from buildarena_backend.process.context import Context
 from buildarena_backend.results.verifications import MAX_OPEN, Requested
 from buildarena_backend.states import VERIFY_QUEUE, Verdict, VerificationState
@@ -23,21 +22,17 @@ RETRY_S = 5
 """When a caller may come back whose verifications found no room."""
 
 
-class VerificationView(BaseModel):
+class VerificationView(View):
     """A check of one job."""
-
-    model_config = ConfigDict(from_attributes=True)
 
     id: str
     job_id: str
     state: VerificationState
-    verdict: Verdict | None = Field(
-        description="null until it is done; a refuted job counts nowhere, and nothing follows from "
-        "an inconclusive verification"
-    )
-    report: dict[str, Any] | None = Field(
-        description="ok, verdict, and checks with name, ok, kept and found; null until it is done"
-    )
+    verdict: Verdict | None
+    """null until it is done; a refuted job counts nowhere, and nothing follows from an inconclusive
+    verification."""
+    report: dict[str, Any] | None
+    """ok, verdict, and checks with name, ok, kept and found; null until it is done."""
     created_at: datetime
     finished_at: datetime | None
 

@@ -168,13 +168,10 @@ class LeaseQueue:
         except StaleLeaseError:
             return None
         except PermanentError as error:
-            self._give_up(lease, error)
+            self._context.store.leases.give_up(lease, str(error), reason=error.reason)
             return None
         except Exception:
             # Whoever asked gets an error: the job must not wait for this lease's end.
             self._context.store.leases.hand_back(lease)
             raise
         return Leased(lease, due)
-
-    def _give_up(self, lease: Lease, error: PermanentError) -> None:
-        self._context.store.leases.give_up(lease, str(error), reason=error.reason)

@@ -6,8 +6,9 @@ import json
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
+from buildarena_api.schemas import Document, View
 from buildarena_backend.artifacts.kinds import EVIDENCE_NAME
 from buildarena_backend.artifacts.uploads import MAX_LEASE_FILES
 from buildarena_backend.settings import SimulatorName
@@ -49,79 +50,71 @@ Version = Annotated[str, Field(pattern=r"^[A-Za-z0-9._-]{1,80}$")]
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", description="64 hex digits")]
 
 
-class _Document(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class RunnerReport(_Document):
+class RunnerReport(Document):
     """What a runner says of itself."""
 
     name: Annotated[
-        str,
-        Field(
-            pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,59}$",
-            description="Unique among the key's runners: it has one lease at a time",
-            examples=["lab3-4711-0"],
-        ),
+        str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,59}$", examples=["lab3-4711-0"])
     ]
+    """Unique among the key's runners: it has one lease at a time."""
     simulators: Annotated[
-        dict[SimulatorName, Version],
-        Field(
-            min_length=1,
-            max_length=8,
-            description="The simulators that it has, each with its version: only jobs that were "
-            "submitted for this version are leased to it",
-            examples=[{"mujoco": "3"}],
-        ),
+        dict[SimulatorName, Version], Field(min_length=1, max_length=8, examples=[{"mujoco": "3"}])
     ]
-    versions: Facts = {}
+    """The simulators that it has, each with its version: only jobs that were submitted for this
+    version are leased to it."""
+    versions: Facts = Field(default={})
     pid: Annotated[int, Field(ge=0, le=2**31 - 1)] = 0
     peak_memory_bytes: Annotated[int, Field(ge=0, le=2**50)] | None = None
-    own_time: datetime | None = Field(
-        default=None, description="Its clock, for the check of clocks in /v1/health"
-    )
+    own_time: datetime | None = None
+    """Its clock, for the check of clocks in /v1/health."""
 
 
 class LeaseRequest(RunnerReport):
     """A request for a trial."""
 
-    wait_s: Annotated[
-        float, Field(ge=0, le=LONGEST_WAIT_S, description="How long to wait until there is one")
-    ] = 0.0
+    wait_s: Annotated[float, Field(ge=0, le=LONGEST_WAIT_S)] = 0.0
+    """How long to wait until there is one."""
 
 
-class RunnerTerms(BaseModel):
+class RunnerTerms(View):
     """What a runner should know before it begins."""
 
-    simulators: list[str] = Field(description="Whose jobs the key may lease")
-    versions: dict[str, str] = Field(
-        description="The versions for which the service takes jobs, by simulator"
-    )
-    lease_s: float = Field(description="A lease ends so long after its last heartbeat")
-    max_file_bytes: int = Field(description="Largest file that can be uploaded")
-    max_lease_bytes: int = Field(description="Most bytes that are uploaded under one lease")
+    simulators: list[str]
+    """Whose jobs the key may lease."""
+    versions: dict[str, str]
+    """The versions for which the service takes jobs, by simulator."""
+    lease_s: float
+    """A lease ends so long after its last heartbeat."""
+    max_file_bytes: int
+    """Largest file that can be uploaded."""
+    max_lease_bytes: int
+    """Most bytes that are uploaded under one lease."""
 
 
-class LeasedTrial(BaseModel):
+class LeasedTrial(View):
     """A trial that was leased: all that is needed to run it."""
 
     job_id: str
-    token: int = Field(description="The fencing token, which names the lease with the job")
-    lease_s: float = Field(description="It ends so long after its last heartbeat")
+    token: int
+    """The fencing token, which names the lease with the job."""
+    lease_s: float
+    """It ends so long after its last heartbeat."""
     simulator: str
-    version: str = Field(description="The simulator's version that the job was submitted for")
-    number: int = Field(description="Which of the job's rollouts it is")
-    task: dict[str, Any] = Field(description="The task's document, with its scenario")
-    machine: dict[str, Any] = Field(description="The machine document")
-    controls: list[dict[str, Any]] | None = Field(
-        description="Key presses of this trial; null for the machine's own"
-    )
-    seed: int | None = Field(
-        description="Of the varied world in which it is run; null for the exact one"
-    )
+    version: str
+    """The simulator's version that the job was submitted for."""
+    number: int
+    """Which of the job's rollouts it is."""
+    task: dict[str, Any]
+    """The task's document, with its scenario."""
+    machine: dict[str, Any]
+    """The machine document."""
+    controls: list[dict[str, Any]] | None
+    """Key presses of this trial; null for the machine's own."""
+    seed: int | None
+    """Of the varied world in which it is run; null for the exact one."""
 
 
-class HeldLease(_Document):
+class HeldLease(Document):
     """A lease that a runner believes it has."""
 
     job_id: Annotated[str, Field(pattern=r"^job_[0-9a-f]{1,40}$")]
@@ -131,36 +124,29 @@ class HeldLease(_Document):
 class Heartbeat(RunnerReport):
     """A runner's sign of life, for itself and for its leases."""
 
-    leases: Annotated[list[HeldLease], Field(max_length=128)] = []
+    leases: Annotated[list[HeldLease], Field(max_length=128)] = Field(default=[])
 
 
-class LeaseStates(BaseModel):
+class LeaseStates(View):
     """Which leases live on; work under the others must stop, nothing of it will be taken."""
 
     live: list[HeldLease]
     lost: list[HeldLease]
 
 
-class NamedFile(_Document):
+class NamedFile(Document):
     """An uploaded file to be kept with the job."""
 
     sha256: Sha256
-    name: Annotated[
-        str,
-        Field(
-            pattern=f"^{EVIDENCE_NAME}$",
-            max_length=80,
-            description="KIND-NUMBER.ENDING, with the rollout's number",
-            examples=["log-0.txt"],
-        ),
-    ]
+    name: Annotated[str, Field(pattern=f"^{EVIDENCE_NAME}$", max_length=80, examples=["log-0.txt"])]
+    """KIND-NUMBER.ENDING, with the rollout's number."""
 
 
 Files = Annotated[list[NamedFile], Field(max_length=MAX_LEASE_FILES - 1)]
 Seconds = Annotated[float, Field(ge=0, le=86_400, allow_inf_nan=False)]
 
 
-class Annotation(_Document):
+class Annotation(Document):
     """What an engine of ours says of a machine that the game tried."""
 
     success: bool
@@ -173,38 +159,36 @@ class Annotation(_Document):
 EngineName = Annotated[str, AfterValidator(lambda name: _one_of(name, ALL_ENGINES))]
 
 
-class TrialOutcome(_Document):
+class TrialOutcome(Document):
     """What came of a trial; its score is found here."""
 
-    trajectory: Sha256 | None = Field(
-        description="SHA-256 of the uploaded Parquet file; null when the simulator refused the "
-        "machine, or its program failed: `versions.refused` says why"
-    )
+    trajectory: Sha256 | None
+    """SHA-256 of the uploaded Parquet file; null when the simulator refused the machine, or its
+    program failed: `versions.refused` says why."""
     versions: Facts = Field(description="Everything about the simulator that can change it")
-    wall_s: Seconds = Field(description="How long the trial took")
-    files: Files = []
+    wall_s: Seconds
+    """How long the trial took."""
+    files: Files = Field(default=[])
     annotations: Annotated[dict[EngineName, Annotation], Field(max_length=8)] | None = None
 
 
-class TrialFault(_Document):
+class TrialFault(Document):
     """A failure of the runner or its simulator: the trial is not scored."""
 
     reason: FaultReason
-    detail: Annotated[str, Field(min_length=1, max_length=4000, description="For people")]
-    permanent: bool = Field(
-        default=False,
-        description="Whether no attempt of this key's runners can mend it: they get the job no "
-        "more, and it ends when a runner of another key says the same",
-    )
-    files: Files = []
+    detail: Annotated[str, Field(min_length=1, max_length=4000)]
+    """For people."""
+    permanent: bool = False
+    """Whether no attempt of this key's runners can mend it: they get the job no more, and it ends
+    when a runner of another key says the same."""
+    files: Files = Field(default=[])
 
 
-class LeaseEnd(BaseModel):
+class LeaseEnd(View):
     """The end of a lease."""
 
-    status: Literal["done", "already_done"] = Field(
-        description="already_done: the same was asked before, and its answer was lost"
-    )
+    status: Literal["done", "already_done"]
+    """already_done: the same was asked before, and its answer was lost."""
 
 
 def _one_of(name: str, names: tuple[str, ...]) -> str:

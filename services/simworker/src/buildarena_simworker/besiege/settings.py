@@ -47,55 +47,36 @@ class BesiegeSettings(BaseSettings):
 
     model_config = SettingsConfigDict(env_prefix="BUILDARENA_BESIEGE_", extra="ignore")
 
-    game: Annotated[str, Field(description="Version of the game, for example 1.75-23370")] = ""
-    mod: Annotated[str, Field(description="Version of its Lua Scripting Mod")] = ""
-    folder: Annotated[Path | None, Field(description="Folder of the game")] = None
-    machines: Annotated[
-        Path | None, Field(description="Folder of machine files; default FOLDER/SavedMachines")
-    ] = None
-    command: Annotated[
-        str,
-        Field(
-            description="Command that starts the game, so that the runner can restart it; "
-            "{level} in it is replaced by the level file to open"
-        ),
-    ] = ""
-    level: Annotated[
-        str,
-        Field(
-            description="Task whose level is open, for example support-1, where the command "
-            "cannot open levels; default: the flat sandbox"
-        ),
-    ] = ""
-    title: Annotated[str, Field(description="Title of the game's window, whatever its case")] = (
-        "Besiege"
-    )
-    executable: Annotated[
-        str,
-        Field(
-            description="Name of the game's program, with or without its ending; with an empty one "
-            "a window's title is enough"
-        ),
-    ] = "Besiege"
-    calibration: Annotated[
-        Path | None, Field(description="Calibration file; default STATE/calibration.json")
-    ] = None
-    log_file: Annotated[
-        Path | None,
-        Field(description="File to which the game writes its log; default: the log window"),
-    ] = None
-    state: Annotated[
-        Path, Field(description="Folder of the runner's own files: calibration, pid, screenshots")
-    ] = Path.home() / ".buildarena" / "besiege"
-    pace: Annotated[
-        float,
-        Field(description="How much shorter than usual the waits between clicks are", gt=0, le=20),
-    ] = 1.0
+    game: str = ""
+    """Version of the game, for example 1.75-23370."""
+    mod: str = ""
+    """Version of its Lua Scripting Mod."""
+    folder: Path | None = None
+    """Folder of the game."""
+    machines: Path | None = None
+    """Folder of machine files; default FOLDER/SavedMachines."""
+    command: str = ""
+    """Command that starts the game, so that the runner can restart it; {level} in it is replaced by
+    the level file to open."""
+    level: str = ""
+    """Task whose level is open, for example support-1, where the command cannot open levels;
+    default: the flat sandbox."""
+    title: str = "Besiege"
+    """Title of the game's window, whatever its case."""
+    executable: str = "Besiege"
+    """Name of the game's program, with or without its ending; with an empty one a window's title is
+    enough."""
+    calibration: Path | None = None
+    """Calibration file; default STATE/calibration.json."""
+    log_file: Path | None = None
+    """File to which the game writes its log; default: the log window."""
+    state: Path = Path.home() / ".buildarena" / "besiege"
+    """Folder of the runner's own files: calibration, pid, screenshots."""
+    pace: Annotated[float, Field(gt=0, le=20)] = 1.0
+    """How much shorter than usual the waits between clicks are."""
 
-    patience: Annotated[
-        float,
-        Field(description="How many times as long as usual the game may take", gt=0, le=100),
-    ] = 1.0
+    patience: Annotated[float, Field(gt=0, le=100)] = 1.0
+    """How many times as long as usual the game may take."""
 
     @property
     def time_limits(self) -> TimeLimits:
