@@ -1,7 +1,7 @@
-"""Of the site of documents: pages and pictures that are made of the code, and links to them.
+"""Of the site of documents: pages and pictures that are made of the code, and links.
 
 None of them is a file of the repository. Documents name them in words that read well without the
-site, and here become links and pictures.
+site, and here become links and pictures. Links to files outside the site become the files' names.
 """
 
 from __future__ import annotations
@@ -12,13 +12,16 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from buildarena_api.http.openapi import api_page
 from docs_modules import module_guide
-from docs_pictures import PICTURES, pictures
 from mkdocs.structure.files import File
 
+from buildarena_api.http.openapi import api_page
+from buildarena_geometry import Machine
+from buildarena_geometry.export import View, machine_svg
+
 LOG = logging.getLogger("mkdocs.hooks.generated")
-TESTS = str(Path(__file__).parents[1] / "tests")
+ROOT = Path(__file__).parents[1]
+TESTS = str(ROOT / "tests")
 PAGES = {
     "the module guide": "modules.md",
     "what a model sees": "what-a-model-sees.md",
@@ -27,6 +30,14 @@ PAGES = {
 """Pages by how documents call them, followed by (`make docs`)."""
 CALLED = re.compile(rf"({'|'.join(PAGES)}) \(`make docs`\)", re.IGNORECASE)
 PICTURE = re.compile(r"^\*Picture \(`make docs`\): (.+)\.\*$", re.MULTILINE)
+OUTSIDE = re.compile(r"\[([^\]\n]+)\]\(((?:\.\./)+[^)\s]+)\)")
+PICTURES = {
+    "World and block frames": "geometry/frames.svg",
+    "Free faces of three blocks": "geometry/faces.svg",
+    "A cannon on the east face and a torch on the south face": "geometry/pointing.svg",
+    "A car with four wheels": "geometry/first-machine.svg",
+}
+"""The pictures' paths among the documents, by what they show."""
 
 
 def on_files(files: Any, *, config: Any) -> Any:
@@ -55,5 +66,49 @@ def on_page_markdown(markdown: str, *, page: Any, **_: object) -> str:
             LOG.warning("%s shows %r, which is not drawn", page.file.src_uri, words[1])
         return f"![{words[1]}]({PICTURES.get(words[1], '')})"
 
+    def named(link: re.Match[str]) -> str:
+        target = (folder / link[2].partition("#")[0]).resolve()
+        if target.is_relative_to(ROOT / "docs"):
+            return link[0]
+        if not target.exists():
+            LOG.warning("%s links to %s, which does not exist", page.file.src_uri, link[2])
+        return f"{link[1]} (`{target.relative_to(ROOT)}`)"
+
+    folder = (ROOT / "docs" / page.file.src_uri).parent
     linked = CALLED.sub(lambda found: f"[{found[1]}]({PAGES[found[1].lower()]})", markdown)
-    return PICTURE.sub(shown, linked)
+    return OUTSIDE.sub(named, PICTURE.sub(shown, linked))
+
+
+def build(*parts: tuple[str, str, str]) -> Machine:
+    """A machine of a starting block and (base, face, module) parts."""
+    machine = Machine()
+    machine.act("start")
+    for base, face, module in parts:
+        arguments = {"base_block": base, "face": face, "new_block": module}
+        outcome = machine.act("attach_block_to", arguments)
+        if not outcome.ok:
+            raise SystemExit(outcome.text)
+    return machine
+
+
+def pictures() -> dict[str, str]:
+    """The guide's pictures by their paths among the documents."""
+    block, wheel = "Small Wooden Block", "Powered Wheel"
+    car = build(
+        ("1", "E", block),
+        ("2", "E", block),
+        ("1", "A", wheel),
+        ("1", "B", wheel),
+        ("3", "A", wheel),
+        ("3", "B", wheel),
+    )
+    spread = build(("1", "A", block), ("2", "E", wheel))
+    engine = build(("1", "A", "Water Cannon"), ("1", "F", "Torch"))
+    return {
+        "geometry/frames.svg": machine_svg(
+            build(("1", "A", block)), View(scale=110, frames=("1", "2"), compass=True)
+        ),
+        "geometry/faces.svg": machine_svg(spread, View(scale=110, face_labels=("1", "2", "3"))),
+        "geometry/pointing.svg": machine_svg(engine, View(scale=80, ids=True)),
+        "geometry/first-machine.svg": machine_svg(car, View(ids=True)),
+    }
