@@ -108,58 +108,15 @@ STAGE_SECONDS = (0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600, 180
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JobCount:
-    """How many jobs are, or once were, in one place; fields are a job's, empty where null."""
-
-    state: str
-    stage: str
-    outcome: str
-    reason: str
-    jobs: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ModelUse:
-    """What a model's sessions used so far."""
-
-    model: str
-    requests: int
-    input_tokens: int
-    output_tokens: int
-    cost_usd: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StageTimes:
-    """How long attempts at jobs took.
-
-    Attributes:
-        stage: ``construct`` or ``simulate``.
-        result: How they ended.
-        counts: Attempts in each class of STAGE_SECONDS, and in the last those above all.
-        total_s: Sum of their durations.
-    """
-
-    stage: str
-    result: str
-    counts: Sequence[int]
-    total_s: float
-
-    @classmethod
-    def none(cls, stage: str, result: str) -> StageTimes:
-        """No attempt of this stage that ended so."""
-        return cls(stage=stage, result=result, counts=[0] * (len(STAGE_SECONDS) + 1), total_s=0.0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class MetricValues:
     """All of them, from one moment.
 
     Attributes:
-        jobs: Jobs by where they are.
+        jobs: Jobs by state, stage, outcome and reason of their error; empty where there is none.
         queues: How many ``jobs`` wait in each ``queue``, and for how long the oldest has.
-        models: What sessions used.
-        stages: How long attempts took.
+        models: What the sessions of each model used: requests, tokens and dollars.
+        stages: How long attempts took, by stage and result: how many are in each class of
+            STAGE_SECONDS, and in the last those above all, and the sum of their seconds.
         sweeps: Sweeps by state.
         running: Jobs that are worked on, by queue.
         verifications: Ended verifications by verdict.
@@ -167,10 +124,10 @@ class MetricValues:
         server: The Postgres server's own.
     """
 
-    jobs: Sequence[JobCount]
+    jobs: Mapping[tuple[str, str, str, str], int]
     queues: Sequence[Row[Any]]
-    models: Sequence[ModelUse]
-    stages: Sequence[StageTimes]
+    models: Mapping[str, Mapping[str, Any]]
+    stages: Mapping[tuple[str, str], tuple[Sequence[int], float]]
     sweeps: dict[str, int]
     running: dict[str, int]
     verifications: dict[str, int]
@@ -208,7 +165,7 @@ class Metrics:
 
 def _count_jobs(
     connection: Connection,
-) -> tuple[list[JobCount], list[ModelUse], dict[str, int]]:
+) -> tuple[Counter[tuple[str, str, str, str]], dict[str, Counter[str]], Counter[str]]:
     """Jobs by where they are, what models used, and jobs by audit: all by one look at the jobs."""
     place = (
         jobs.c.state,
@@ -231,23 +188,7 @@ def _count_jobs(
         used.setdefault(row.model, Counter()).update({c.name: getattr(row, c.name) for c in use})
         if row.audit is not None:
             audits[row.audit] += row.jobs
-    return (
-        [
-            JobCount(state=state, stage=stage, outcome=outcome, reason=reason, jobs=number)
-            for (state, stage, outcome, reason), number in places.items()
-        ],
-        [
-            ModelUse(
-                model=model,
-                requests=int(one["requests"]),
-                input_tokens=int(one["input_tokens"]),
-                output_tokens=int(one["output_tokens"]),
-                cost_usd=float(one["cost_usd"]),
-            )
-            for model, one in sorted(used.items())
-        ],
-        dict(audits),
-    )
+    return places, used, audits
 
 
 def _queues(connection: Connection) -> Sequence[Row[Any]]:
@@ -265,7 +206,7 @@ def _queues(connection: Connection) -> Sequence[Row[Any]]:
     return connection.execute(query).all()
 
 
-def _stages(connection: Connection) -> list[StageTimes]:
+def _stages(connection: Connection) -> dict[tuple[str, str], tuple[list[int], float]]:
     seconds = func.extract("epoch", attempts.c.ended_at - attempts.c.started_at)
     columns = (
         attempts.c.stage,
@@ -284,10 +225,7 @@ def _stages(connection: Connection) -> list[StageTimes]:
         counts, total = found.get((row.stage, row.result), ([0] * (len(STAGE_SECONDS) + 1), 0.0))
         counts[row.bucket] += row.attempts
         found[row.stage, row.result] = (counts, total + float(row.seconds))
-    return [
-        StageTimes(stage=stage, result=result, counts=counts, total_s=total)
-        for (stage, result), (counts, total) in sorted(found.items())
-    ]
+    return found
 
 
 def _counted(

@@ -8,8 +8,8 @@ from __future__ import annotations
 import platform
 import shutil
 from collections import Counter as Counts
-from collections.abc import Collection, Iterable, Mapping
-from itertools import accumulate
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import accumulate, product
 from typing import Any, Final
 
 from prometheus_client import CollectorRegistry, Counter, Histogram, Info
@@ -39,7 +39,6 @@ from buildarena_backend.telemetry.metrics import (
     STAGE_SECONDS,
     MetricValues,
     ServerFigures,
-    StageTimes,
 )
 from buildarena_backend.trials.known_simulators import configured_simulators
 from buildarena_backend.workers import WorkerCounts
@@ -184,10 +183,10 @@ def _of_workers(counts: WorkerCounts, known: Collection[str]) -> Iterable[Metric
 
 def _of_jobs(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
     places, reasons = Counts(dict.fromkeys(PLACES, 0)), Counts[str]()
-    for count in figures.jobs:
-        places[count.state, count.stage, count.outcome] += count.jobs
-        if count.outcome == Outcome.ERRORED:
-            reasons[count.reason] += count.jobs
+    for (state, stage, outcome, reason), number in figures.jobs.items():
+        places[state, stage, outcome] += number
+        if outcome == Outcome.ERRORED:
+            reasons[reason] += number
     what = "Jobs by state, stage and outcome."
     yield _gauges("jobs", what, places, "state", "stage", "outcome")
     yield _gauges("errored_jobs", "Jobs that ended as errored, by class.", reasons, "reason")
@@ -208,14 +207,13 @@ def _of_jobs(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
 
 def _of_models(figures: MetricValues, known: Collection[str]) -> Iterable[Metric]:
     none = dict.fromkeys(known, 0.0)
-    requests = none | {use.model: use.requests for use in figures.models}
+    requests = none | {model: use["requests"] for model, use in figures.models.items()}
     yield _counters("model_requests", "Model requests answered.", requests, "model")
     tokens = {(name, direction): 0 for name in known for direction in ("input", "output")}
-    for use in figures.models:
-        tokens[use.model, "input"] = use.input_tokens
-        tokens[use.model, "output"] = use.output_tokens
+    for model, use in figures.models.items():
+        tokens[model, "input"], tokens[model, "output"] = use["input_tokens"], use["output_tokens"]
     yield _counters("model_tokens", "Tokens, by direction.", tokens, "model", "direction")
-    cost = none | {use.model: use.cost_usd for use in figures.models}
+    cost = none | {model: use["cost_usd"] for model, use in figures.models.items()}
     yield _counters("model_cost_usd", "US dollars spent on model requests.", cost, "model")
 
 
@@ -225,16 +223,12 @@ def _of_stages(figures: MetricValues) -> Metric:
         "How long attempts took, by stage and how they ended.",
         labels=["stage", "result"],
     )
-    known = {
-        (stage, result): StageTimes.none(stage, result)
-        for stage in Stage
-        for result in AttemptResult
-    } | {(times.stage, times.result): times for times in figures.stages}
     bounds = [*(str(float(bound)) for bound in STAGE_SECONDS), "+Inf"]
-    for times in known.values():
-        sums = accumulate(map(float, times.counts))
-        buckets = list(zip(bounds, sums, strict=True))
-        stages.add_metric([times.stage, times.result], buckets, sum_value=times.total_s)
+    none: tuple[Sequence[int], float] = [0] * len(bounds), 0.0
+    for stage, result in product(Stage, AttemptResult):
+        counts, total_s = figures.stages.get((stage, result), none)
+        buckets = list(zip(bounds, accumulate(map(float, counts)), strict=True))
+        stages.add_metric([stage, result], buckets, sum_value=total_s)
     return stages
 
 
