@@ -9,12 +9,7 @@ from typing import Any
 
 from scenarios.attack import floods
 from scenarios.attack.arena import HOSTILE, Arena, Tried
-from scenarios.attack.outages import (
-    flushed_broker,
-    full_disk,
-    killed_supervisor,
-    stopped_broker,
-)
+from scenarios.attack.outages import flushed_broker, full_disk, killed_supervisor, stopped_broker
 from scenarios.attack.runners import (
     forged_trials,
     harmful_runner,

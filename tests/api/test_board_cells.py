@@ -17,9 +17,7 @@ from buildarena_backend.boards.trials import TrialFilter
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.database.tables import jobs, sweep_jobs, sweeps
 from buildarena_benchmark import builtin_tasks
-from buildarena_benchmark.leaderboard import (
-    BoardQuery,
-)
+from buildarena_benchmark.leaderboard import BoardQuery
 
 TRACKS = ("first/track-1", "second/track-1")
 START = datetime(2026, 1, 1, tzinfo=UTC)

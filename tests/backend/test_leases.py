@@ -10,15 +10,7 @@ from decimal import Decimal
 import pytest
 from sqlalchemy import text
 from sqlalchemy.exc import IntegrityError
-from support.jobs import (
-    cancel,
-    claim,
-    execute,
-    expire_leases,
-    finish,
-    journal_entry,
-    set_budget,
-)
+from support.jobs import cancel, claim, execute, expire_leases, finish, journal_entry, set_budget
 
 from buildarena_backend.database.account_tables import MAX_USD
 from buildarena_backend.database.tables import jobs

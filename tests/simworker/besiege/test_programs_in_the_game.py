@@ -23,21 +23,10 @@ from buildarena_besiege.check_sums import check_sum
 from buildarena_besiege.keys import channel_keys
 from buildarena_besiege.run import prepared_machine
 from buildarena_geometry import Machine
-from buildarena_simulation import (
-    ControllerFailed,
-    Scenario,
-    Trajectory,
-)
+from buildarena_simulation import ControllerFailed, Scenario, Trajectory
 from buildarena_simulation.constants import GRAVITY
 from buildarena_simulation.offered import Senses
-from buildarena_simulation.scenario import (
-    Cargo,
-    Gate,
-    GroundPlacement,
-    Gusts,
-    Line,
-    TerrainBox,
-)
+from buildarena_simulation.scenario import Cargo, Gate, GroundPlacement, Gusts, Line, TerrainBox
 
 pytestmark = pytest.mark.nightly
 

@@ -16,11 +16,7 @@ from fastapi import Request
 from buildarena_api.checking import Checker, CheckFailedError
 from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_backend.database.text import clean
-from buildarena_besiege import (
-    ImportedMachine,
-    MachineFileError,
-    read_machine_file,
-)
+from buildarena_besiege import ImportedMachine, MachineFileError, read_machine_file
 from buildarena_geometry import DocumentError, Machine
 from buildarena_geometry.json_texts import TooDeepError, read_json
 from buildarena_simulation.constants import MAX_PARTS

@@ -10,13 +10,7 @@ import typer
 from buildarena_cli.client import Client
 from buildarena_cli.errors import USAGE, CommandError
 from buildarena_cli.ids import whole_id
-from buildarena_cli.options import (
-    DEFAULT_URL,
-    ModelsOption,
-    TasksOption,
-    TrackOption,
-    UrlOption,
-)
+from buildarena_cli.options import DEFAULT_URL, ModelsOption, TasksOption, TrackOption, UrlOption
 from buildarena_cli.terminal.output import say, warn
 
 FORMATS: Final = {".csv": "csv", ".parquet": "parquet", ".tex": "latex"}

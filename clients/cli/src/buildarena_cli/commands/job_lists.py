@@ -8,13 +8,7 @@ import typer
 
 from buildarena_cli.client import Client
 from buildarena_cli.ids import whole_id
-from buildarena_cli.options import (
-    DEFAULT_URL,
-    AfterOption,
-    AllOption,
-    JsonOption,
-    UrlOption,
-)
+from buildarena_cli.options import DEFAULT_URL, AfterOption, AllOption, JsonOption, UrlOption
 from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, warn
 
 MAX_LIMIT = 200

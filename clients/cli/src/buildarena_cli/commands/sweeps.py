@@ -28,12 +28,7 @@ from buildarena_cli.options import (
     to_read,
 )
 from buildarena_cli.terminal.output import minute_of, number, print_json, print_table, say, warn
-from buildarena_cli.terminal.progress import (
-    exit_code,
-    forecast_lines,
-    in_plain_words,
-    watch_sweep,
-)
+from buildarena_cli.terminal.progress import exit_code, forecast_lines, in_plain_words, watch_sweep
 
 if TYPE_CHECKING:
     from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate

@@ -6,14 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from buildarena_cli.terminal.output import (
-    NOTHING,
-    emphasised,
-    in_words,
-    number,
-    print_table,
-    say,
-)
+from buildarena_cli.terminal.output import NOTHING, emphasised, in_words, number, print_table, say
 
 ROW: dict[str, Callable[[Mapping[str, Any]], str]] = {
     "#": lambda row: _rank(row["rank"]),

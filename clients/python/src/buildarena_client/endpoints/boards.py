@@ -7,12 +7,7 @@ from typing import TYPE_CHECKING, Literal, Unpack, cast
 from buildarena_client.endpoints.sending import Sender
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import (
-        Board,
-        BoardFilters,
-        Comparison,
-        VerifyAccepted,
-    )
+    from buildarena_client.schemas import Board, BoardFilters, Comparison, VerifyAccepted
 
 
 class Boards(Sender):

@@ -10,12 +10,7 @@ from buildarena_client.endpoints.sending import Sender
 from buildarena_client.paths import at
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import (
-        Job,
-        MachineCheck,
-        Session,
-        ToolOutcome,
-    )
+    from buildarena_client.schemas import Job, MachineCheck, Session, ToolOutcome
 
 MACHINE_FILE: Final = "application/octet-stream"
 

@@ -14,14 +14,7 @@ from typing import Annotated, Any, Final
 
 import structlog
 import yaml
-from pydantic import (
-    AliasChoices,
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationError,
-    field_validator,
-)
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from buildarena_backend.errors import StartupError
 

@@ -12,16 +12,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any, Final
 
-from sqlalchemy import (
-    ColumnElement,
-    Connection,
-    Update,
-    and_,
-    delete,
-    select,
-    tuple_,
-    update,
-)
+from sqlalchemy import ColumnElement, Connection, Update, and_, delete, select, tuple_, update
 
 from buildarena_backend import events
 from buildarena_backend.database.account_tables import PAYS, budgets

@@ -40,12 +40,7 @@ from buildarena_simulation.control import (
 )
 from buildarena_simulation.controllers.pilot import CONTROLLER, controller_digest
 from buildarena_simulation.machine import bindings_of, structure_of
-from buildarena_simulation.parquet import (
-    PILOTED_SCHEMA,
-    SCHEMA_VERSION,
-    read_trajectory,
-    schema_of,
-)
+from buildarena_simulation.parquet import PILOTED_SCHEMA, SCHEMA_VERSION, read_trajectory, schema_of
 from buildarena_simulation.placement import start_of
 
 if TYPE_CHECKING:

@@ -35,11 +35,7 @@ from buildarena_backend.states import (
     Stage,
     simulate_queue,
 )
-from buildarena_backend.telemetry.metrics import (
-    STAGE_SECONDS,
-    MetricValues,
-    ServerFigures,
-)
+from buildarena_backend.telemetry.metrics import STAGE_SECONDS, MetricValues, ServerFigures
 from buildarena_backend.trials.known_simulators import configured_simulators
 from buildarena_backend.workers import WorkerCounts
 

@@ -15,10 +15,7 @@ from buildarena_backend.catalog.models import ModelRegistry
 from buildarena_backend.catalog.tasks import TaskCatalog
 from buildarena_benchmark import Task, builtin_tasks
 from buildarena_benchmark.leaderboard import Board as RankedBoard
-from buildarena_benchmark.leaderboard import (
-    Cell,
-    verdict_of,
-)
+from buildarena_benchmark.leaderboard import Cell, verdict_of
 from buildarena_benchmark.scoring.registry import known_flags
 from buildarena_benchmark.statistics import MIN_SUCCESSES
 

@@ -9,12 +9,7 @@ from fastapi import APIRouter, Depends, Query, Response
 from buildarena_api.access import CallerDep, limited
 from buildarena_api.dependencies import ContextDep, RequestKey
 from buildarena_api.http.problems import unknown
-from buildarena_api.machine_uploads import (
-    MAX_BYTES,
-    read_uploaded,
-    refused,
-    uploaded,
-)
+from buildarena_api.machine_uploads import MAX_BYTES, read_uploaded, refused, uploaded
 from buildarena_api.replays import KeyPress, Vector
 from buildarena_api.scenes import MachineScene, machine_scene
 from buildarena_api.schemas import EXISTED, JobView, View

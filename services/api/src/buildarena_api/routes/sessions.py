@@ -9,13 +9,7 @@ from pydantic import Field
 
 from buildarena_api.access import Caller, CallerDep, limited
 from buildarena_api.dependencies import RequestKey, Services, ServicesDep
-from buildarena_api.replays import (
-    KeyPress,
-    PartView,
-    Vector,
-    block_view,
-    connector_view,
-)
+from buildarena_api.replays import KeyPress, PartView, Vector, block_view, connector_view
 from buildarena_api.schemas import EXISTED, Document, JobView, View
 from buildarena_backend.agents.briefing import LIMITS
 from buildarena_backend.agents.sessions import SessionState

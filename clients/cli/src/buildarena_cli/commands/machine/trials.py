@@ -22,13 +22,7 @@ from buildarena_cli.machines import (
     shown_errors,
 )
 from buildarena_cli.options import to_read
-from buildarena_cli.terminal.output import (
-    emphasised,
-    number,
-    print_json,
-    print_table,
-    warn,
-)
+from buildarena_cli.terminal.output import emphasised, number, print_json, print_table, warn
 
 if TYPE_CHECKING:
     import numpy as np
@@ -170,12 +164,7 @@ def simulate(  # noqa: PLR0917 - the command line passes options by name
 ) -> None:
     """Simulate a machine in a task's trial and score it."""
     from buildarena_benchmark import broken_constraint, failed_score, score
-    from buildarena_simulation import (
-        DEFAULT_ENGINE,
-        ENGINES,
-        UnknownEngineError,
-        require_engine,
-    )
+    from buildarena_simulation import DEFAULT_ENGINE, ENGINES, UnknownEngineError, require_engine
 
     with shown_errors():
         engine = engine or DEFAULT_ENGINE
