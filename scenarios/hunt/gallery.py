@@ -8,8 +8,7 @@ from typing import Any, Final
 
 from scenarios.hunt.confirming import Confirmed
 from scenarios.hunt.trial import Finding, worth
-from scenarios.hunt.variation.genome import Genome
-from scenarios.hunt.variation.kinds import KINDS, kind_of
+from scenarios.hunt.variation.genome import KINDS, Genome, kind_of
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_simulation import SIMULATION_VERSION

@@ -16,7 +16,7 @@ from scenarios.hunt.gallery import Gallery, best_of, line_of, ranked
 from scenarios.hunt.search import Crew, TaskSearch, hunted
 from scenarios.hunt.seeds import seeds_of
 from scenarios.hunt.trial import Finding
-from scenarios.hunt.variation.kinds import kind_of
+from scenarios.hunt.variation.genome import kind_of
 
 from buildarena_benchmark import builtin_tasks
 

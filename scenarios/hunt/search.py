@@ -1,16 +1,42 @@
 """The search: per task an archive that keeps the best of every kind of machine (MAP-Elites)."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Final, Self, TypeVar
 
 import numpy as np
 from ribs.archives import GridArchive
-from scenarios.hunt.breeding import Child, made
-from scenarios.hunt.trial import CELLS, RANGES, Finding, Scorer
-from scenarios.hunt.variation.genome import Genome
+from scenarios.hunt.trial import CELLS, RANGES, Finding, Scorer, tried
+from scenarios.hunt.variation.genome import Genome, kind_of
+from scenarios.hunt.variation.mutation import crossed, mutated
+from threadpoolctl import threadpool_limits
 
 from buildarena_benchmark import builtin_tasks, score
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Child:
+    """A genome to make and try, as a worker process gets it."""
+
+    task: str
+    parents: tuple[Genome, ...]
+    seed: tuple[int, ...]
+    scorer: Scorer
+    changed: bool = True
+
+
+def made(child: Child) -> Finding | None:
+    """Makes a child and tries it; equal children give equal findings in every process."""
+    draw = np.random.default_rng(child.seed)
+    genome = child.parents[0]
+    if len(child.parents) > 1:
+        genome = crossed(genome, child.parents[1], draw)
+    if child.changed:
+        genome = mutated(genome, kind_of(child.task), draw)
+    with threadpool_limits(limits=1):
+        return tried(child.task, genome, child.scorer)
+
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from scenarios.hunt.variation.genome import Genome, grown
-from scenarios.hunt.variation.kinds import ALIKE, kind_of
+from scenarios.hunt.variation.genome import ALIKE, Genome, grown, kind_of
 
 from buildarena_benchmark import builtin_tasks
 from buildarena_benchmark.environment.expert_calls import control_of

@@ -13,10 +13,8 @@ from scenarios.hunt.search import Crew, TaskSearch
 from scenarios.hunt.seeds import expert_genome, exploits, seeds_of
 from scenarios.hunt.suspicion import suspicions
 from scenarios.hunt.trial import tried
-from scenarios.hunt.variation.genome import Genome, grown
-from scenarios.hunt.variation.kinds import kind_of
+from scenarios.hunt.variation.genome import IDLE, Genome, grown, kind_of
 from scenarios.hunt.variation.mutation import crossed, mutated
-from scenarios.hunt.variation.programs import IDLE
 from support.machines.building import KeyedDraft
 from support.machines.headroom import drafted
 

@@ -7,8 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scenarios.hunt.variation.genome import Actions, Genome, act, grown, replayed
-from scenarios.hunt.variation.programs import changed
+from scenarios.hunt.variation.genome import Actions, Genome, act, changed, grown, replayed
 
 from buildarena_geometry import Block, Machine
 
