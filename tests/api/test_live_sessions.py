@@ -151,7 +151,7 @@ def test_a_turn_that_was_journalled_and_not_told_is_told_when_the_session_resume
     monkeypatch.undo()
     execute(context, "UPDATE jobs SET available_at = now() - interval '1 hour'")
     work(context, steps=1)
-    indices = [record.index for record in context.store.turns.read(job)]
+    indices = [record["index"] for record in context.store.turns.read(job)]
     assert indices == list(range(len(indices)))
     assert len(indices) > 6
 

@@ -6,17 +6,24 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any, Final
 
+from sqlalchemy import RowMapping
+
 from buildarena_backend.artifacts.storing import ArtifactStore
 from buildarena_backend.events import Event
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.external_calls import ExternalCall
 from buildarena_backend.journal.transcript import ActionResult, ModelTurn, Transcript, Turn
-from buildarena_backend.journal.turns import TurnRecord
 from buildarena_backend.states import EXTERNAL_PROVIDER, JobState, Outcome
 from buildarena_backend.store import Store
 
 UNSCORED: Final = frozenset({Outcome.ERRORED, Outcome.CANCELLED})
 """Jobs that ended without a transcript of their own, or with one of an earlier suspension."""
+
+_KEPT: Final = (
+    *("index", "stage", "sub_structure", "role"),
+    *("input_tokens", "output_tokens", "latency_s", "tries"),
+)
+"""What a turn has as the journal has it."""
 
 
 class Transcripts:
@@ -75,27 +82,19 @@ class Transcripts:
         return [turn_of_call(index, call) for index, call in enumerate(calls)]
 
 
-def turn_of_record(record: TurnRecord) -> ModelTurn:
+def turn_of_record(record: RowMapping) -> ModelTurn:
     """A model's turn from its reply in the journal and what came of it."""
-    calls = record.reply["calls"]
+    reply = record["reply"]
+    done = zip(reply["calls"], record["results"], strict=True)
     return ModelTurn(
-        index=record.index,
-        stage=record.stage,
-        sub_structure=record.sub_structure,
-        role=record.role,
-        text=record.reply["text"],
+        **{name: record[name] for name in _KEPT},
+        text=reply["text"],
+        finish=reply["finish"],
+        cost_usd=f"{record['cost_usd']:.6f}",
         actions=tuple(
             ActionResult(name=name, arguments=arguments, ok=ok, reason=reason, feedback=feedback)
-            for (_, name, arguments), (ok, reason, feedback) in zip(
-                calls, record.results, strict=True
-            )
+            for (_, name, arguments), (ok, reason, feedback) in done
         ),
-        finish=record.reply["finish"],
-        input_tokens=record.input_tokens,
-        output_tokens=record.output_tokens,
-        cost_usd=f"{record.cost_usd:.6f}",
-        latency_s=record.latency_s,
-        tries=record.tries,
     )
 
 

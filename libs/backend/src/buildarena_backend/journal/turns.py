@@ -7,12 +7,11 @@ the journal holds is written twice.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 from typing import Any, Final
 
-from sqlalchemy import ARRAY, BindParameter, Row, Text, bindparam, text
+from sqlalchemy import ARRAY, BindParameter, Row, RowMapping, Text, bindparam, text
 from sqlalchemy.dialects.postgresql import JSONB
 
 from buildarena_backend.database.database import Database
@@ -37,23 +36,6 @@ class TurnResult:
     sequence: int
     sub_structure: str | None
     results: Sequence[tuple[bool, str | None, str]]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TurnRecord:
-    """A model's turn: its reply in the journal, and what came of it; see `JournalEntry`."""
-
-    index: int
-    sub_structure: str | None
-    results: Sequence[Sequence[Any]]
-    stage: str
-    role: str
-    reply: Mapping[str, Any]
-    input_tokens: int
-    output_tokens: int
-    cost_usd: Decimal
-    latency_s: float
-    tries: int
 
 
 # The lock makes a worker that lost its lease write before the next one counts, or not at all.
@@ -176,8 +158,8 @@ class Turns:
         with self._database.statement() as connection:
             return int(connection.execute(_COUNT, {"job_id": job_id}).scalar_one())
 
-    def read(self, job_id: str, *, after: int = 0, until: int = LAST_ID) -> list[TurnRecord]:
-        """A model's turns in their order.
+    def read(self, job_id: str, *, after: int = 0, until: int = LAST_ID) -> Sequence[RowMapping]:
+        """A model's turns in their order: the replies in the journal, and what came of them.
 
         Args:
             job_id: The job.
@@ -186,7 +168,7 @@ class Turns:
         """
         given = {"job_id": job_id, "after": after, "until": until}
         with self._database.statement() as connection:
-            return [TurnRecord(**row) for row in connection.execute(_READ, given).mappings()]
+            return connection.execute(_READ, given).mappings().all()
 
 
 MAX_MATCHES: Final = 5_000
