@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -94,32 +94,18 @@ def _trajectory(
     return trajectory_of(log, machine, task.scenario, game="unknown", mod="unknown")
 
 
-@app.command("calibrate")
-def calibrate(
-    *,
-    defaults: Annotated[
-        bool,
-        typer.Option("--defaults", help="Take the published runner's positions, ask nothing."),
-    ] = False,
-    only_try: Annotated[
-        bool, typer.Option("--try", help="Only try the calibration that is there.")
-    ] = False,
-    path: Annotated[
-        bool,
-        typer.Option("--path", help="Record the clicks from the game's title to its level."),
-    ] = False,
-) -> None:
+RUNNER: Final = "buildarena_simworker.besiege"
+"""The program that knows this machine's game, and its own options."""
+PASSED_ON: Final = {"allow_extra_args": True, "ignore_unknown_options": True}
+
+
+@app.command("calibrate", context_settings=PASSED_ON, add_help_option=False)
+def calibrate(context: typer.Context) -> None:
     """Find out where to click in this machine's game, and try it."""
-    chosen = {"--defaults": defaults, "--try": only_try, "--path": path}
-    options = [option for option, wanted in chosen.items() if wanted]
-    exec_module([*RUNNER, "calibrate", *options])
+    exec_module([RUNNER, "calibrate", *context.args])
 
 
-@app.command("doctor")
-def doctor(*, as_json: JsonOption = False) -> None:
+@app.command("doctor", context_settings=PASSED_ON, add_help_option=False)
+def doctor(context: typer.Context) -> None:
     """Show what this machine lacks to play the game; the exit code is 1 when anything does."""
-    exec_module([*RUNNER, "doctor", *(["--json"] if as_json else [])])
-
-
-RUNNER = ("buildarena_simworker.besiege",)
-"""The program that knows this machine's game."""
+    exec_module([RUNNER, "doctor", *context.args])
