@@ -66,13 +66,11 @@ class UnknownIdError(StoreError):
 
     Attributes:
         kind: What was looked for, for example ``job``.
-        id: The id that nobody has.
     """
 
     def __init__(self, kind: str, id_: str) -> None:
         super().__init__(f"there is no {kind} {id_!r}")
         self.kind = kind
-        self.id = id_
 
 
 class EndedKeyError(StoreError):
@@ -83,21 +81,10 @@ class EndedKeyError(StoreError):
 
 
 class TransitionError(StoreError):
-    """A sweep or job is in a state that it may not leave for the one that was asked for.
-
-    Attributes:
-        kind: ``sweep`` or ``job``.
-        id: Which one.
-        state: The state it is in.
-        to: What it was to become.
-    """
+    """A sweep or job is in a state that it may not leave for the one that was asked for."""
 
     def __init__(self, kind: str, id_: str, state: str, to: str) -> None:
         super().__init__(f"{kind} {id_} is {state}; it can't become {to}")
-        self.kind = kind
-        self.id = id_
-        self.state = state
-        self.to = to
 
 
 class NotOwnedError(StoreError):
@@ -144,16 +131,10 @@ class TooManyFilesError(StoreError):
 
 
 class TooManyLeasesError(StoreError):
-    """A key's runners have as many leases as they may.
-
-    Attributes:
-        number: How many they have.
-        most: How many they may have.
-    """
+    """A key's runners have as many leases as they may."""
 
     def __init__(self, number: int, most: int) -> None:
         super().__init__(f"the key's runners have {number} leases, of {most} that they may have")
-        self.number, self.most = number, most
 
 
 class StaleLeaseError(StoreError):
@@ -161,8 +142,6 @@ class StaleLeaseError(StoreError):
 
     def __init__(self, job_id: str, token: int) -> None:
         super().__init__(f"lease {token} on job {job_id} is over; its write was refused")
-        self.job_id = job_id
-        self.token = token
 
 
 class ArtifactMissingError(StoreError):

@@ -10,32 +10,10 @@ from enum import StrEnum
 from types import MappingProxyType
 from typing import Final
 
-from buildarena_benchmark.outcomes import Outcome
+from buildarena_benchmark import outcomes
 
-__all__ = [
-    "BUILTIN_PROVIDER",
-    "CONSTRUCT_QUEUE",
-    "EXTERNAL_PROVIDER",
-    "EXTERNAL_QUEUE",
-    "FILE_PROVIDER",
-    "JOB_TRANSITIONS",
-    "SWEEP_TRANSITIONS",
-    "TURN",
-    "VERIFY_QUEUE",
-    "AttemptResult",
-    "Audit",
-    "JobState",
-    "Outcome",
-    "Stage",
-    "SweepState",
-    "Verdict",
-    "VerificationState",
-    "require_legal",
-    "simulate_queue",
-    "sweep_states_before",
-]
-
-
+Outcome = outcomes.Outcome
+"""How a job ended."""
 CONSTRUCT_QUEUE: Final = "construct"
 VERIFY_QUEUE: Final = "verify"
 BUILTIN_PROVIDER: Final = "builtin"
