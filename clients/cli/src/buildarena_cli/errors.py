@@ -1,4 +1,4 @@
-"""Errors of the command line, and its exit codes."""
+"""Errors of the command line, its exit codes, and what a wrong word may have meant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that many commands share."""
+"""What many commands share: options, arguments, and how groups of commands are made."""
 
 from __future__ import annotations
 

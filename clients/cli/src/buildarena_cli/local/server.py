@@ -1,4 +1,4 @@
-"""What embedded servers have in common."""
+"""Embedded servers: what they have in common, and Valkey."""
 
 from __future__ import annotations
 
