@@ -14,7 +14,7 @@ import buildarena_gymnasium
 from buildarena_benchmark import builtin_tasks, score
 from buildarena_benchmark.environment import UnknownChoiceError
 from buildarena_gymnasium import DriveEnv
-from buildarena_gymnasium.machines import fixed_machine, fixed_machines
+from buildarena_gymnasium.drive_env import fixed_machine, fixed_machines
 from buildarena_simulation import SimulationError, simulate, write_trajectory
 from buildarena_simulation.controllers.program import Program
 from buildarena_simulation.trial import Trial

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
 from typing import Any, Final
 
 import gymnasium
@@ -21,10 +25,29 @@ from buildarena_benchmark.environment.rewards import (
     weighed,
 )
 from buildarena_geometry import Machine
-from buildarena_gymnasium.machines import fixed_machine, fixed_machines
 from buildarena_gymnasium.pictures import Picture, checked_mode, picture_at, score_told
 from buildarena_simulation import DEFAULT_ENGINE, Drive, SimulationError, pilot_of
 from buildarena_simulation.constants import SAMPLE_RATE_HZ
+
+
+@cache
+def fixed_machines() -> Mapping[str, Any]:
+    """Documents of the machines by task, in the order of the tasks."""
+    text = files(__package__).joinpath("machines.json").read_text(encoding="utf-8")
+    return MappingProxyType(json.loads(text)["machines"])
+
+
+def fixed_machine(task: str) -> Machine:
+    """The machine for a task.
+
+    Raises:
+        UnknownChoiceError: There is none.
+    """
+    documents = fixed_machines()
+    if task not in documents:
+        raise UnknownChoiceError("machine to be driven in task", task, documents)
+    return Machine.from_document(documents[task])
+
 
 Figures = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gymnasium
 
 from buildarena_benchmark import builtin_tasks
-from buildarena_gymnasium.machines import fixed_machines
+from buildarena_gymnasium.drive_env import fixed_machines
 
 NAMESPACE = "BuildArena"
 _BUILDS = "buildarena_gymnasium.build_env:BuildEnv"
