@@ -29,7 +29,7 @@ BUILTIN_PROTOCOL: Final = "builtin"
 class Price(BaseModel):
     """US dollars per million tokens."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     input: Annotated[float, Field(ge=0)]
     output: Annotated[float, Field(ge=0)]
@@ -42,7 +42,7 @@ class Price(BaseModel):
 class ProviderEntry(BaseModel):
     """How a provider is reached."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     protocol: Annotated[
         str, Field(pattern=r"^[a-z0-9-]+$", validation_alias=AliasChoices("protocol", "wire"))
@@ -62,7 +62,7 @@ class ProviderEntry(BaseModel):
 class ModelEntry(BaseModel):
     """A model that jobs can name."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_.-]+/[A-Za-z0-9_.:-]+$")]
     provider: str
