@@ -9,7 +9,7 @@ from alembic import op
 from buildarena_backend.database.migrating import TRIGGERS
 from buildarena_backend.database.tables import metadata
 
-revision = "0001_0ce16fdf"
+revision = "0001_018fa32f"
 down_revision = None
 branch_labels = None
 depends_on = None

@@ -10,6 +10,7 @@ import pytest
 from support.jobs import claim, execute, finish
 from support.servers.live_api import live_api
 
+from buildarena_backend.journal.journal import JournalEntry, Usage
 from buildarena_backend.states import AttemptResult, JobState
 
 JOB = {"task": "support-1", "model": "builtin/idle", "seed": 3}
@@ -196,6 +197,42 @@ def test_troubles_of_a_sweep_are_counted_by_what_they_are(api, context, submitte
     counted = {(one["result"], one["detail"]): one["attempts"] for one in found}
     assert counted == {("fault", "provider answered 503"): 2, ("lost", None): 1}
     assert all(one["jobs"] <= one["attempts"] and one["model"] == "builtin/idle" for one in found)
+
+
+def test_requests_that_hang_or_are_sent_again_are_reported(api, context, submitted) -> None:
+    lease = claim(context)
+    failures = ["HTTP 503: busy", "HTTP 503: busy", "HTTP 429: slow down"]
+    entry = JournalEntry(
+        sequence=0,
+        stage="plan",
+        role="planner",
+        request_hash="0",
+        reply={"text": "", "calls": [], "finish": "stop"},
+        usage=Usage(requests=1),
+        latency_s=1.0,
+        tries=4,
+        failures=failures,
+    )
+    context.store.journal.append(lease, entry)
+    path = f"/v1/sweeps/{submitted}/troubles"
+    assert "waiting" not in {one["result"] for one in api.get(path).json()["data"]}
+    with context.store.database.transaction() as connection:
+        for column, table in (
+            ("started_at", "jobs"),
+            ("started_at", "attempts"),
+            ("created_at", "journal"),
+        ):
+            ago = f"UPDATE {table} SET {column} = now() - interval '8 minutes'"
+            connection.exec_driver_sql(ago)
+    found = [one for one in api.get(path).json()["data"] if one["result"] != "fault"]
+    counted = {(one["result"], one["detail"]): (one["attempts"], one["jobs"]) for one in found}
+    assert counted == {
+        ("waiting", None): (1, 1),
+        ("retried", "HTTP 503: busy"): (2, 1),
+        ("retried", "HTTP 429: slow down"): (1, 1),
+    }
+    job = api.get(f"/v1/jobs/{lease.job.id}").json()
+    assert job["retries"] == {"HTTP 503: busy": 2, "HTTP 429: slow down": 1}
 
 
 @pytest.fixture

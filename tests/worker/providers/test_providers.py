@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import random
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -16,13 +17,20 @@ import pytest
 from pydantic import ValidationError
 from support.providers.stand_in import ProviderStandIn
 
-from buildarena_backend.catalog.models import ModelEntry, ProviderEntry, load_registry
+from buildarena_backend.catalog.models import (
+    ModelEntry,
+    ModelRegistry,
+    Price,
+    ProviderEntry,
+    load_registry,
+)
 from buildarena_backend.errors import PermanentError, TransientError
 from buildarena_backend.journal.journal import Usage
 from buildarena_geometry import ToolDefinition
+from buildarena_worker.providers.checking import check_model
 from buildarena_worker.providers.keys import key_report
 from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
-from buildarena_worker.session.messages import Completion, Message, Request
+from buildarena_worker.session.messages import Completion, Message, Request, ToolCall
 from buildarena_worker.session.results import Failed
 
 PROTOCOLS = ["openai", "anthropic", "google"]
@@ -77,6 +85,7 @@ def test_passing_faults_are_retried(client, subtests) -> None:
                 answer = client(standin, protocol).complete(ask())
             assert answer.text == "TERMINATE"
             assert answer.attempts == 3
+            assert len(answer.failures) == 2
             assert answer.usage.requests == 1
 
 
@@ -127,6 +136,57 @@ def test_refusals_that_stay_are_not_retried(client, subtests) -> None:
             assert standin.counts.requests == 1
             assert caught.value.reason in {reason, "request_refused"}
             assert "secret" not in str(caught.value)
+
+
+def test_secrets_that_a_provider_repeats_are_blotted_out(client, subtests) -> None:
+    said = {"k": ["Bearer secret", 1], "secret": {"deep": "x-token-1"}}
+    reply = Completion(
+        text="You sent Authorization: Bearer secret and x-token-1.",
+        calls=[ToolCall(id="1", name="secret", arguments=said)],
+        finish="tool_call",
+    )
+    for protocol in PROTOCOLS:
+        with subtests.test(protocol=protocol), ProviderStandIn(respond=lambda _: reply) as standin:
+            headers = {"X-Token": "x-token-1"}
+            answer = client(standin, protocol, headers=headers).complete(ask())
+            kept = json.dumps(answer.to_json())
+            assert "You sent Authorization: Bearer *** and ***." in kept
+            assert not {"secret", "x-token-1"} & set(re.findall(r"[a-z0-9-]+", kept))
+
+
+def test_a_model_is_checked_with_one_request(monkeypatch, subtests) -> None:
+    monkeypatch.setenv("STANDIN_KEY", "secret")
+    call = ToolCall(id="1", name="add", arguments={"a": 2, "b": 3})
+    usage = Usage(requests=1, input_tokens=50, output_tokens=7)
+
+    def findings(url: str, price: Price | None = None) -> list[tuple[bool, str]]:
+        provider = ProviderEntry(protocol="openai", base_url=f"{url}/v1", key="STANDIN_KEY")
+        entry = ModelEntry(name="x/y", provider="x", model="y", price=price)
+        registry = ModelRegistry(models={"x/y": entry}, providers={"x": provider})
+        return list(check_model(registry, "x/y"))
+
+    for name, reply, price, fault in [
+        ("fine", Completion(text="", calls=[call], usage=usage), Price(input=2, output=8), None),
+        ("said 'It is 5.'", Completion(text="It is 5.", usage=usage), None, None),
+        ("price is unknown", Completion(text="", calls=[call], usage=usage), None, None),
+        ("no answer: x/y", Completion(text=""), None, "401"),
+        (
+            "instead of a = 2",
+            Completion(text="", calls=[replace(call, arguments={"a": 9})]),
+            None,
+            None,
+        ),
+    ]:
+        with (
+            subtests.test(name=name),
+            ProviderStandIn(respond=lambda _, r=reply: r, fault=lambda _, f=fault: f) as standin,
+        ):
+            found = findings(standin.url, price)
+            assert standin.counts.requests == 1
+            faults = [text for is_fine, text in found if not is_fine]
+            assert (not faults) == (name == "fine")
+            assert name == "fine" or any(name in text for text in faults), found
+    assert findings("http://127.0.0.1:9")[0][0] is False
 
 
 def test_a_missing_key_is_named() -> None:

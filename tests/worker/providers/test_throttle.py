@@ -20,19 +20,22 @@ from buildarena_worker.providers.throttle import Throttle
 pytestmark = pytest.mark.usefixtures("context")
 
 
-def test_no_more_than_the_limit_is_open_at_once_over_all_workers(broker_url) -> None:
+@pytest.mark.parametrize("limits", [{"start": 3}, {"most": 3}])
+def test_no_more_than_the_limit_is_open_at_once_over_all_workers(broker_url, limits) -> None:
     open_now, most = 0, 0
 
     async def request(throttle: Throttle) -> None:
         nonlocal open_now, most
-        async with throttle.slot():
+        async with throttle.slot() as slot:
             open_now += 1
             most = max(most, open_now)
             await asyncio.sleep(0.02)
             open_now -= 1
+            if "most" in limits:
+                slot.succeeded()
 
     async def main() -> None:
-        workers = [Throttle(broker_url, "p", start=3) for _ in range(2)]
+        workers = [Throttle(broker_url, "p", **limits) for _ in range(2)]
         await asyncio.gather(*(request(workers[n % 2]) for n in range(20)))
         for worker in workers:
             await worker.close()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, computed_field
 
@@ -150,6 +150,8 @@ class JobDetail(JobView):
     manifest: dict[str, Any] | None
     """Versions of what can change the score."""
     attempts: list[AttemptView]
+    retries: dict[str, int]
+    """Requests that were sent again, by what failed."""
     artifacts: dict[str, str]
     """SHA-256 of each artifact by name."""
     cached_tokens: int | None
@@ -307,18 +309,21 @@ class ForecastView(View):
 
 
 class TroubleView(View):
-    """Attempts at a sweep's jobs that failed alike; faults never count as failures of a model."""
+    """Attempts or requests that failed alike, or hang; they never count against a model."""
 
     model: str
     stage: Stage
-    result: AttemptResult
+    result: Literal["fault", "lost", "retried", "waiting"]
+    """How attempts ended; `retried`: requests that were sent again; `waiting`: requests that have
+    had no answer for a minute."""
     detail: str | None
     """A sentence for people."""
     attempts: int
+    """Attempts, or requests."""
     jobs: int
     """Of how many jobs."""
     last_at: datetime = Field(validation_alias="newest")
-    """When the last one ended."""
+    """When the last one ended; since when requests wait."""
 
 
 class SweepAccepted(View):

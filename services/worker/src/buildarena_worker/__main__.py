@@ -30,11 +30,14 @@ def main() -> None:
         metavar="MODEL",
         help="only see whether providers' keys are there, and those of these models in any case",
     )
+    parser.add_argument("--ask", metavar="MODEL", help="only send one request to this model")
     options = parser.parse_args()
     try:
         settings = load_settings()
         registry = WatchedRegistry(settings.models_file)
         require_known_protocols(registry)
+        if options.ask is not None:
+            sys.exit(_ask(registry, options.ask))
         if options.check is not None:
             sys.exit(_check(registry, options.check))
 
@@ -58,6 +61,19 @@ def main() -> None:
         )
     except StartupError as error:
         sys.exit(f"construct worker: {error}")
+
+
+def _ask(registry: ModelRegistry, name: str) -> int:
+    """Prints whether sessions can work with a model; 1 where they can't."""
+    from buildarena_worker.providers.checking import check_model
+
+    if name not in registry.models:
+        raise StartupError(f"unknown model {name!r}; valid models: {', '.join(registry.models)}")
+    code = 0
+    for is_fine, text in check_model(registry, name):
+        sys.stdout.write(f"{'ok  ' if is_fine else 'FAIL'}  {text}\n")
+        code |= not is_fine
+    return code
 
 
 def _check(registry: ModelRegistry, models: Sequence[str]) -> int:

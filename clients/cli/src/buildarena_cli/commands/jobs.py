@@ -139,6 +139,8 @@ def _show(job: dict[str, Any], *, as_json: bool) -> None:
             f"attempt   {attempt['token']} {attempt['stage']} on {attempt['worker']}: "
             f"{attempt['result'] or 'running'}"
         )
+    for failure, times in job.get("retries", {}).items():
+        say(f"retried   {times} x {failure}")
     for name, digest in sorted(job.get("artifacts", {}).items()):
         say(f"file      {name}  {digest}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,7 +32,7 @@ from buildarena_cli.terminal.output import minute_of, number, print_json, print_
 from buildarena_cli.terminal.progress import exit_code, forecast_lines, in_plain_words, watch_sweep
 
 if TYPE_CHECKING:
-    from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate
+    from buildarena_client.schemas import BoardPower, Sweep, SweepEstimate, Trouble
 
 app = new_group("Submit and watch sweeps.")
 AGAIN_S = 3
@@ -146,9 +147,25 @@ def show_sweep(
     whole = whole_id(client, "sweep", sweep_id)
     sweep = client.sweep(whole)
     _show(sweep, as_json=as_json)
-    if not as_json and sweep["progress"]["done"] < sweep["progress"]["total"]:
+    if as_json:
+        return
+    for trouble in client.sweep_troubles(whole):
+        say(_trouble(trouble))
+    if sweep["progress"]["done"] < sweep["progress"]["total"]:
         for line in forecast_lines(client.sweep_forecast(whole)):
             say(line)
+
+
+def _trouble(trouble: Trouble) -> str:
+    """Return a line on requests that hang or were sent again, or on attempts that failed."""
+    model, jobs = trouble["model"], f"in {trouble['jobs']:,} jobs"
+    if trouble["result"] == "waiting":
+        since = datetime.fromisoformat(trouble["last_at"])
+        minutes = (datetime.now(UTC) - since).total_seconds() / 60
+        return f"waiting {minutes:.0f} min for {model} {jobs}"
+    kind = "asked again" if trouble["result"] == "retried" else in_plain_words(trouble["result"])
+    detail = f": {trouble['detail']}" if trouble["detail"] else ""
+    return f"{kind} {trouble['attempts']:,} x {model} {jobs}{detail}"
 
 
 @app.command("pause")

@@ -36,5 +36,5 @@ export function Troubles({ sweep }: { sweep: Sweep }) {
   );
 }
 
-const causeOf = ({ detail, result }: Trouble): string =>
-  detail ?? (result === "lost" ? "its worker was lost" : "a fault");
+const CAUSES = { lost: "its worker was lost", waiting: "no answer yet", retried: "asked again", fault: "a fault" };
+const causeOf = ({ detail, result }: Trouble): string => detail ?? CAUSES[result];

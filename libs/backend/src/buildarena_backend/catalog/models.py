@@ -53,6 +53,8 @@ class ProviderEntry(BaseModel):
     """Environment variable of the API key."""
     timeout_s: Annotated[float, Field(gt=0, le=7200)] = 600.0
     """For one sending."""
+    concurrency: Annotated[int | None, Field(ge=1, le=2048)] = None
+    """Requests open at once, over all workers."""
     headers: Annotated[
         dict[Annotated[str, Field(pattern=r"^[A-Za-z0-9-]{1,100}$")], str],
         Field(description="Sent with every request, beside those of the protocol"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelEntry, ModelRegistry
+from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelEntry, ModelRegistry, Price
 
 PER_MILLION = Decimal(1_000_000)
 CENT_FRACTION = Decimal("0.000001")
@@ -40,6 +40,21 @@ def price_usd(
     except LookupError:
         return Decimal()
     return Decimal(price.total_price).quantize(CENT_FRACTION)
+
+
+def listed_price(entry: ModelEntry) -> Price | None:
+    """Return the model's price, the file's own or the published one; None if none is known."""
+    if entry.price is not None:
+        return entry.price
+    million = int(PER_MILLION)
+    sent = price_usd(entry, input_tokens=million, output_tokens=0, cached_tokens=0)
+    cached = price_usd(entry, input_tokens=million, output_tokens=0, cached_tokens=million)
+    received = price_usd(entry, input_tokens=0, output_tokens=million, cached_tokens=0)
+    if not sent and not received:
+        return None
+    return Price(
+        input=float(sent), output=float(received), cached=float(cached), source="genai-prices"
+    )
 
 
 def free_models(registry: ModelRegistry) -> list[str]:

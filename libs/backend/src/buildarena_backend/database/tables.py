@@ -223,6 +223,9 @@ journal = Table(
     Column("latency_s", Double, nullable=False),
     Column("tries", Integer, nullable=False, server_default=text("1")),
     Column("provider_request_id", Text),
+    Column("system_fingerprint", Text),
+    # Why earlier sendings of the request failed, a text each.
+    Column("failures", JSONB(none_as_null=True)),
     # Who paid for it: a job may be handed over to another sweep later.
     Column("payer", Text),
     Column("owner", Text),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from decimal import Decimal
 from typing import Any, Final
 
-from sqlalchemy import bindparam, select, text
+from sqlalchemy import bindparam, func, select, text
 
 from buildarena_backend.database.account_tables import MAX_USD
 from buildarena_backend.database.database import Database
@@ -65,6 +65,8 @@ class JournalEntry:
         latency_s: Seconds from sending to having the reply, waits for retries included.
         tries: Sendings, 1 when the first was answered.
         provider_request_id: The provider's own id, if it gave one.
+        system_fingerprint: The provider's name of its configuration, if it gave one.
+        failures: Why earlier sendings failed, a text each.
         created_at: When it was written; None before.
         told: What the session told the role since its last reply: ``system``, its system message
             where it had none yet, and ``user``, texts. What others said meanwhile is not in it.
@@ -79,6 +81,8 @@ class JournalEntry:
     latency_s: float
     tries: int = 1
     provider_request_id: str | None = None
+    system_fingerprint: str | None = None
+    failures: Sequence[str] = ()
     created_at: datetime | None = None
     told: Mapping[str, Any] | None = None
 
@@ -123,12 +127,13 @@ _APPEND = text(
     INSERT INTO journal (
         job_id, sequence, token, stage, role, request_hash, reply, input_tokens, output_tokens,
         cached_tokens, reasoning_tokens, cost_usd, latency_s, tries, provider_request_id,
-        payer, owner, told
+        system_fingerprint, failures, payer, owner, told
     )
     SELECT
         id, :sequence, :token, :stage, :role, :request_hash, CAST(:reply AS json), :input_tokens,
         :output_tokens, :cached_tokens, :reasoning_tokens, :cost_usd, :latency_s, :tries,
-        CAST(:provider_request_id AS text), payer, owner, CAST(:told AS json)
+        CAST(:provider_request_id AS text), CAST(:system_fingerprint AS text),
+        CAST(:failures AS jsonb), payer, owner, CAST(:told AS json)
     FROM job
     """  # noqa: S608 - the state is our own constant
 )
@@ -140,7 +145,7 @@ _OF_JOB = (
 
 _KEPT = (
     *("sequence", "stage", "role", "request_hash", "latency_s", "tries"),
-    "provider_request_id",
+    *("provider_request_id", "system_fingerprint"),
 )
 """Fields of an entry that are columns as they are."""
 
@@ -170,11 +175,21 @@ class Journal:
                     **{name: getattr(entry, name) for name in _KEPT},
                     **{name: getattr(entry.usage, name) for name in _USED},
                     "reply": json.dumps(entry.reply),
+                    "failures": json.dumps(entry.failures) if entry.failures else None,
                     "told": None if entry.told is None else json.dumps(entry.told),
                 },
             )
             if written.rowcount != 1:
                 raise StaleLeaseError(lease.job.id, lease.token)
+
+    def retries(self, job_id: str) -> dict[str, int]:
+        """Return how many requests were sent again, by what had failed."""
+        failure = func.jsonb_array_elements_text(journal.c.failures).label("failure")
+        failed = select(failure).where(journal.c.job_id == job_id).subquery()
+        times = func.count().label("times")
+        query = select(failed.c.failure, times).group_by(failed.c.failure)
+        with self._database.statement() as connection:
+            return {row.failure: row.times for row in connection.execute(query)}
 
     def read(self, job_id: str) -> list[JournalEntry]:
         """All entries of a job in their order."""
@@ -184,6 +199,7 @@ class Journal:
                     **{name: getattr(row, name) for name in _KEPT},
                     usage=Usage(requests=1, **{name: getattr(row, name) for name in _USED[1:]}),
                     reply=row.reply,
+                    failures=row.failures or (),
                     created_at=row.created_at,
                     told=row.told,
                 )

@@ -10,7 +10,7 @@ from decimal import Decimal
 from typing import Any, Final
 
 from cachetools import TTLCache
-from sqlalchemy import Connection, Row, case, exists, func, literal, select
+from sqlalchemy import Connection, Row, case, exists, func, literal, select, text
 from sqlalchemy.dialects.postgresql import insert
 
 from buildarena_backend import events
@@ -238,8 +238,9 @@ class Sweeps:
             .order_by(newest.desc(), *alike)
             .limit(limit)
         )
+        values = {"sweep": sweep_id, "limit": limit}
         with self._database.transaction() as connection:
-            return connection.execute(query).all()
+            return [*connection.execute(query), *connection.execute(_REQUESTS, values)]
 
     def size(self, sweep_id: str) -> int:
         """How many jobs the sweep has.
@@ -261,6 +262,28 @@ class Sweeps:
             return [row.job_id for row in connection.execute(query)]
 
 
+_REQUESTS: Final = text(
+    """
+    WITH members AS (
+        SELECT jobs.* FROM sweep_jobs JOIN jobs ON jobs.id = job_id WHERE sweep_id = :sweep
+    )
+    (SELECT model, 'construct' AS stage, 'waiting' AS result, NULL AS detail,
+        count(*) AS attempts, count(*) AS jobs, min(since) AS newest
+    FROM members, LATERAL (
+        SELECT greatest(max(journal.created_at), members.started_at, max(attempts.started_at))
+        FROM attempts LEFT JOIN journal USING (job_id) WHERE attempts.job_id = members.id
+    ) AS last (since)
+    WHERE state = 'running' AND stage = 'construct' AND since < now() - interval '1 minute'
+    GROUP BY model)
+    UNION ALL
+    (SELECT model, 'construct', 'retried', failure, count(*), count(DISTINCT members.id),
+        max(journal.created_at)
+    FROM members JOIN journal ON journal.job_id = members.id,
+        LATERAL jsonb_array_elements_text(journal.failures) AS failure
+    GROUP BY model, failure ORDER BY count(*) DESC LIMIT :limit)
+    """
+)
+"""Requests that have had no answer for a minute, and those that were sent again, alike ones."""
 _OPEN: Final = exists().where(
     sweep_jobs.c.sweep_id == sweeps.c.id,
     jobs.c.id == sweep_jobs.c.job_id,

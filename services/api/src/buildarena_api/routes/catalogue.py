@@ -18,6 +18,8 @@ from buildarena_api.http.problems import ErrorCode, ProblemError, invalid
 from buildarena_api.leaderboard.views import FlagView
 from buildarena_api.schemas import View
 from buildarena_backend import __version__
+from buildarena_backend.catalog.models import Price
+from buildarena_backend.catalog.prices import listed_price
 from buildarena_backend.states import simulate_queue
 from buildarena_backend.trials.known_simulators import known_simulators
 from buildarena_backend.trials.simulator import SimulatorKind
@@ -43,6 +45,7 @@ class ModelView(View):
     model: str
     """The provider's own name of the snapshot."""
     baseline: bool
+    price: Price | None = Field(description="US dollars per million tokens; null if unknown")
 
 
 class ModuleView(View):
@@ -79,7 +82,14 @@ class ScorerView(View):
 @router.get("/models", tags=["catalogue"])
 def list_models(registry: RegistryDep, paging: PagingDep) -> Page[ModelView]:
     """Lists the models of the registry."""
-    return Page[ModelView].model_validate(paging.of(list(registry.models.values())))
+    models = [
+        ModelView(
+            **entry.model_dump(include={"name", "provider", "model", "baseline"}),
+            price=listed_price(entry),
+        )
+        for entry in registry.models.values()
+    ]
+    return Page[ModelView].model_validate(paging.of(models))
 
 
 @router.get("/modules", tags=["catalogue"])

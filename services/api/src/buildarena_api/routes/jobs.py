@@ -166,6 +166,7 @@ def show_job(job_id: str, context: ContextDep) -> JobDetail:
         worlds=worlds,
         manifest=None if job.manifest is None else dict(job.manifest),
         attempts=[AttemptView.model_validate(a) for a in context.store.jobs.attempts(job_id)],
+        retries=context.store.journal.retries(job_id),
         artifacts=context.store.jobs.artifacts(job_id),
         cached_tokens=job.cached_tokens if known else None,
         reasoning_tokens=job.reasoning_tokens if known else None,

@@ -67,14 +67,18 @@ def bounded(completion: Completion) -> Completion:
     )
     text = _text(completion.text, MAX_TEXT)
     finish = completion.finish if text == completion.text else "length"
-    named = completion.provider_request_id
     return replace(
         completion,
         text=text,
         calls=calls,
         finish=finish,
-        provider_request_id=None if named is None else str(named)[:MAX_NAME],
+        provider_request_id=_name(completion.provider_request_id),
+        system_fingerprint=_name(completion.system_fingerprint),
     )
+
+
+def _name(value: Any) -> str | None:
+    return None if value is None else str(value)[:MAX_NAME]
 
 
 def arguments_of(raw: Any) -> Any:

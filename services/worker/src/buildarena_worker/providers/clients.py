@@ -58,5 +58,5 @@ class ModelClients:
         from buildarena_worker.providers.provider import ProviderClient
         from buildarena_worker.providers.throttle import Throttle
 
-        throttle = Throttle(self._throttle_url, entry.provider)
+        throttle = Throttle(self._throttle_url, entry.provider, most=provider.concurrency)
         return ProviderClient(entry, provider, throttle=throttle)

@@ -12,7 +12,7 @@ import os
 import random
 import threading
 import time
-from collections.abc import Coroutine, Mapping
+from collections.abc import Coroutine, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -147,8 +147,9 @@ class ProviderClient:
         self._throttle = throttle or Throttle(None, entry.provider)
         self._entry = entry
         self._policy = policy or RetryPolicy(timeout_s=provider.timeout_s)
-        self._key = _key_of(entry, provider)
-        self._sender = sender_for(entry, provider, self._key)
+        key = _key_of(entry, provider)
+        self._secrets = tuple(filter(None, (provider.key and key, *provider.headers.values())))
+        self._sender = sender_for(entry, provider, key)
         self._rng = random.Random()  # noqa: S311 - spreads retries, guards nothing
 
     def complete(self, request: Request, options: RequestOptions = UNBOUNDED) -> Completion:
@@ -184,13 +185,13 @@ class ProviderClient:
             return _empty(OUT_OF_TIME, detail, time.monotonic() - started, 1)
 
     async def _complete(self, request: Request, options: RequestOptions) -> Completion:
-        started = time.monotonic()
+        started, failures = time.monotonic(), list[str]()
         for attempts in range(1, self._policy.attempts + 1):
             try:
                 completion = await self._send(request, options)
             except (ProviderError, TimeoutError) as error:
                 failure = error.failure if isinstance(error, ProviderError) else Failure.OUTAGE
-                detail = _first_line(error, self._key)
+                detail = without_secrets(_first_line(error), self._secrets)
                 latency_s = time.monotonic() - started
                 if failure in OWN_FAILURES:
                     return _empty(failure.value, "", latency_s, attempts, detail=detail)
@@ -212,10 +213,21 @@ class ProviderClient:
                     raise asyncio.CancelledError from error  # it would be sent after the stop
                 note("retry", {ERROR_TYPE: failure.value, "buildarena.wait_s": wait_s})
                 log.info("model_retry", model=self._entry.name, attempts=attempts, wait_s=wait_s)
+                failures.append(detail)
                 await asyncio.sleep(wait_s)
             else:
                 return replace(
                     completion,
+                    text=without_secrets(completion.text, self._secrets),
+                    calls=[
+                        replace(
+                            call,
+                            name=without_secrets(call.name, self._secrets),
+                            arguments=without_secrets(call.arguments, self._secrets),
+                        )
+                        for call in completion.calls
+                    ],
+                    failures=failures,
                     usage=self._priced(completion.usage),
                     latency_s=time.monotonic() - started,
                     attempts=attempts,
@@ -289,7 +301,21 @@ def _empty(
     return Completion(text=text, finish=finish, usage=usage, latency_s=latency_s, attempts=attempts)
 
 
-def _first_line(error: Exception, key: str) -> str:
-    """What an error says, without the API key, which some providers repeat."""
-    line = (str(error).splitlines() or [type(error).__name__])[0]
-    return line.replace(key, "***")[:500]
+def _first_line(error: Exception) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0][:500]
+
+
+def without_secrets(value: Any, secrets: Sequence[str]) -> Any:
+    """Return a JSON value in which no text has a secret, which some providers repeat."""
+    if isinstance(value, str):
+        for secret in secrets:
+            value = value.replace(secret, "***")
+        return value
+    if isinstance(value, dict):
+        return {
+            without_secrets(name, secrets): without_secrets(inner, secrets)
+            for name, inner in value.items()
+        }
+    if isinstance(value, list | tuple):
+        return [without_secrets(inner, secrets) for inner in value]
+    return value

@@ -51,7 +51,7 @@ _TAKE = f"""
 local now = tonumber(redis.call('TIME')[1])
 redis.call('ZREMRANGEBYSCORE', KEYS[1], '-inf', now)
 redis.call('ZREMRANGEBYSCORE', KEYS[6], '-inf', now)
-local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[3])
+local limit = math.min(tonumber(redis.call('GET', KEYS[2]) or ARGV[3]), tonumber(ARGV[5]))
 if redis.call('ZCARD', KEYS[1]) >= math.floor(limit) then
   if redis.call('ZCARD', KEYS[6]) > 0 then
     redis.call('SET', KEYS[5], 1, 'PX', {REFUSED_MS})
@@ -69,7 +69,7 @@ for _, open in ipairs({{KEYS[1], KEYS[6]}}) do redis.call('ZREM', open, ARGV[1])
 local limit = tonumber(redis.call('GET', KEYS[2]) or ARGV[2])
 if ARGV[3] == 'grow' then
   local step = redis.call('EXISTS', KEYS[4]) == 1 and 1 / limit or 1
-  limit = math.min({MAX_LIMIT}, limit + step)
+  limit = math.min(tonumber(ARGV[4]), limit + step)
 elseif ARGV[3] == 'shrink' and redis.call('SET', KEYS[3], 1, 'NX', 'EX', {CALM_S}) then
   limit = math.max({MIN_LIMIT}, limit / 2)
   redis.call('SET', KEYS[4], 1, 'EX', {LIMIT_STORED_S})
@@ -92,9 +92,18 @@ class Throttle:
         url: ``redis://…`` of the key-value store, or None to never wait.
         provider: The provider's name.
         start: The limit to begin with.
+        most: The limit that it never grows beyond.
     """
 
-    def __init__(self, url: str | None, provider: str, *, start: float = START) -> None:
+    def __init__(
+        self,
+        url: str | None,
+        provider: str,
+        *,
+        start: float = START,
+        most: float | None = None,
+    ) -> None:
+        self._most = most or MAX_LIMIT
         self._store: Any = (
             None
             if url is None
@@ -127,7 +136,7 @@ class Throttle:
             yield slot
         finally:  # one that was cancelled while it waited may have its slot all the same
             self._open.pop(id_, None)
-            await self._ask(_GIVE, owner, id_, self._start, slot.verdict)
+            await self._ask(_GIVE, owner, id_, self._start, slot.verdict, self._most)
 
     async def close(self) -> None:
         """Gives all slots back and closes the connection."""
@@ -135,14 +144,15 @@ class Throttle:
             self._renewing.cancel()
             await asyncio.gather(self._renewing, return_exceptions=True)
         for id_, owner in list(self._open.items()):
-            await self._ask(_GIVE, owner, id_, self._start, "keep")
+            await self._ask(_GIVE, owner, id_, self._start, "keep", self._most)
         if self._store is not None:
             await self._store.aclose()
 
     async def _take(self, id_: str, owner: str) -> None:
         """Waits until the store gives a slot, or fails: without it requests go on."""
         standing = "new"
-        while await self._ask(_TAKE, owner, id_, SLOT_TTL_S, self._start, standing) == 0:
+        asked = owner, id_, SLOT_TTL_S, self._start
+        while await self._ask(_TAKE, *asked, standing, self._most) == 0:
             standing = "waiting"
             await asyncio.sleep(random.uniform(*RETRY_S))  # noqa: S311 - spreads waits
         self._open[id_] = owner

@@ -109,6 +109,8 @@ class Completion:
         latency_s: Time until it was there, retries included.
         attempts: Requests that it took.
         provider_request_id: The provider's own id of it, if it gave one.
+        system_fingerprint: The provider's name of its configuration, if it gave one.
+        failures: Why earlier sendings failed, a text each.
         sequence: Its place in the session's journal, from 0; known to the session's host.
     """
 
@@ -119,6 +121,8 @@ class Completion:
     latency_s: float = 0.0
     attempts: int = 1
     provider_request_id: str | None = None
+    system_fingerprint: str | None = None
+    failures: Sequence[str] = ()
     sequence: int = 0
 
     def to_json(self) -> dict[str, Any]:

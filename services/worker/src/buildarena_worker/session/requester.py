@@ -76,6 +76,8 @@ class Requester:
                 latency_s=latency_s,
                 tries=completion.attempts,
                 provider_request_id=clean(completion.provider_request_id),
+                system_fingerprint=clean(completion.system_fingerprint),
+                failures=clean(list(completion.failures)),
                 told=clean(_told(request)),
             )
             try:

@@ -92,8 +92,13 @@ class AnswerReader:
     def _completion(self, answer: Any) -> Completion:
         if "model" not in answer:
             raise KeyError("model")
-        id_, reply = answer["id"], _reply(answer["choices"][0])
-        return bounded(replace(reply, usage=self._usage_in(answer), provider_request_id=id_))
+        reply = replace(
+            _reply(answer["choices"][0]),
+            usage=self._usage_in(answer),
+            provider_request_id=answer["id"],
+            system_fingerprint=answer.get("system_fingerprint"),
+        )
+        return bounded(reply)
 
     def _usage_in(self, answer: Any) -> Usage:
         usage = answer.get("usage") if isinstance(answer, dict) else None

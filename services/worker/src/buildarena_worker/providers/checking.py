@@ -1,0 +1,80 @@
+"""One request to a model, to find out whether sessions can work with it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import closing
+from typing import Final
+
+from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
+from buildarena_backend.catalog.prices import listed_price
+from buildarena_backend.errors import PipelineError
+from buildarena_geometry import ToolDefinition
+from buildarena_worker.providers.provider import ProviderClient, RetryPolicy
+from buildarena_worker.session.messages import Completion, Message, Request
+
+PATIENCE_S: Final = 60.0
+_TOOL: Final = ToolDefinition(
+    name="add",
+    description="Add two whole numbers.",
+    parameters={
+        "type": "object",
+        "properties": {"a": {"type": "integer"}, "b": {"type": "integer"}},
+        "required": ["a", "b"],
+        "additionalProperties": False,
+    },
+)
+_PROMPT: Final = "Call the tool `add` with a = 2 and b = 3. Say nothing else."
+
+
+def check_model(registry: ModelRegistry, name: str) -> Iterator[tuple[bool, str]]:
+    """Send one request, and yield findings: whether all is well, and a sentence.
+
+    Args:
+        registry: Has the model.
+        name: Name of the model.
+    """
+    entry = registry.models[name]
+    provider = registry.provider_of(entry)
+    if provider.protocol == BUILTIN_PROTOCOL:
+        yield True, f"{name} is built in: there is no endpoint to ask"
+        return
+    policy = RetryPolicy(attempts=1, timeout_s=min(PATIENCE_S, provider.timeout_s))
+    config = {"name": name, "provider": entry.provider, "model": entry.model, "decoding": {}}
+    request = Request(
+        model_config={**config, "sampling": entry.sampling},
+        messages=[Message(role="user", text=_PROMPT)],
+        tools=[_TOOL],
+    )
+    try:
+        with closing(ProviderClient(entry, provider, policy)) as client:
+            completion = client.complete(request)
+    except PipelineError as error:
+        yield False, f"no answer: {error}"
+        return
+    yield True, f"it answered in {completion.latency_s:.1f} s"
+    yield _judge_call(completion)
+    used = completion.usage
+    if used.input_tokens and used.output_tokens:
+        yield True, f"it counts tokens: {used.input_tokens} in, {used.output_tokens} out"
+    else:
+        yield False, "it reports no tokens: budgets in tokens and dollars cannot count its requests"
+    price = listed_price(entry)
+    if price is None:
+        yield False, "its price is unknown and counts as $0: give `price` in the models file"
+    else:
+        yield True, f"$ {price.input:g} in and {price.output:g} out per million tokens"
+
+
+def _judge_call(completion: Completion) -> tuple[bool, str]:
+    if not completion.calls:
+        said = " ".join(completion.text.split())[:80]
+        return False, f"it called no tool, and said {said!r} (it stopped by {completion.finish})"
+    (call, *_others) = completion.calls
+    if call.name != _TOOL.name or not isinstance(call.arguments, dict):
+        return False, f"it called {call.name!r} with {str(call.arguments)[:80]!r}: no JSON object"
+    given = {name: call.arguments.get(name, math.nan) for name in ("a", "b")}
+    if given != {"a": 2, "b": 3}:
+        return False, f"it called `add` with {given} instead of a = 2 and b = 3"
+    return True, "it called the tool as it should"
