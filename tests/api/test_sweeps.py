@@ -131,6 +131,11 @@ def test_an_estimate_stores_nothing(api, sweep) -> None:
     assert paid["usage"]["cost_usd"] == pytest.approx(
         4 * (629911.1 * 2.5 + 27311.1 * 10) / 1e6, rel=1e-3
     )
+    ceilings = [
+        api.post("/v1/sweeps/estimate", json=payload | more).json()["max_cost_usd"]
+        for more in ({}, {"limits": {"max_cost_usd": 0.5}}, {"budget": {"max_cost_usd": 7}})
+    ]
+    assert ceilings == [40, 2, 7]
     assert api.get("/v1/sweeps").json()["data"] == []
     # Two models on one task are one claim.
     power = estimate["power"]

@@ -368,4 +368,6 @@ class SweepEstimate(View):
     models: list[ModelEstimate]
     cost_usd: float
     """Sum over the models with a known price."""
+    max_cost_usd: float
+    """What the jobs' limits and the sweep's budget leave at most; built-in models cost nothing."""
     power: BoardPower

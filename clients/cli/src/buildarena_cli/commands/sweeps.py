@@ -94,12 +94,13 @@ def run_sweep(
         if dry_run:
             _show_estimate(client.estimate_sweep(sweep.content), as_json=as_json)
             return
+        estimate = client.estimate_sweep(sweep.content)
         accepted = client.submit_sweep(sweep.content, resume=True)
     except RefusedError as error:
         raise sweep.refused(error) from error
     if not as_json:
         news = "resumed" if accepted["resumed"] else f"{accepted['added']} of them new"
-        say(f"{accepted['id']}: {accepted['jobs']} jobs, {news}")
+        say(f"{accepted['id']}: {accepted['jobs']} jobs, {news}; {_cost(estimate)}")
     if detach:
         if as_json:
             print_json(accepted)
@@ -290,12 +291,16 @@ def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
             for model in estimate["models"]
         ],
         numeric=ESTIMATE[1:],
-        title=f"{estimate['jobs']:,} jobs, about ${estimate['cost_usd']:,.2f}",
+        title=f"{estimate['jobs']:,} jobs, {_cost(estimate)}",
         notes=[
             "From the mean figures that the paper reports; models without a known price: -",
             *_power(estimate["power"]),
         ],
     )
+
+
+def _cost(estimate: SweepEstimate) -> str:
+    return f"about ${estimate['cost_usd']:,.2f}, at most ${estimate['max_cost_usd']:,.2f}"
 
 
 def _power(power: BoardPower) -> list[str]:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from buildarena_backend.catalog.models import BUILTIN_PROTOCOL, ModelRegistry
 from buildarena_backend.catalog.prices import price_usd
+from buildarena_backend.catalog.tracks import session_limits
 from buildarena_backend.jobs.job import NewJobs
 from buildarena_benchmark.statistics import board_power
 
@@ -24,8 +25,9 @@ def estimate(jobs: Sequence[NewJobs], registry: ModelRegistry) -> Mapping[str, A
     for a task of one's own.
 
     Returns:
-        The ``jobs``, the ``models`` with the use of each, its cost None when no price is known, the
-        whole ``cost_usd``, and the ``power``: what the figures could show.
+        The ``jobs``; the ``models`` with the use of each, its cost None when no price is known; the
+        whole ``cost_usd``; ``max_cost_usd``, which the jobs' limits leave; and ``power``, what the
+        figures could show.
     """
     by_model: dict[str, list[NewJobs]] = {}
     for some in jobs:
@@ -35,6 +37,11 @@ def estimate(jobs: Sequence[NewJobs], registry: ModelRegistry) -> Mapping[str, A
         "jobs": sum(model["jobs"] for model in models),
         "models": models,
         "cost_usd": round(sum(model["usage"]["cost_usd"] or 0.0 for model in models), 2),
+        "max_cost_usd": sum(
+            len(some.seeds) * float(session_limits(some.limits)["max_cost_usd"])
+            for some in jobs
+            if registry.provider_of(registry.models[some.model]).protocol != BUILTIN_PROTOCOL
+        ),
         "power": board_power(
             models=len(by_model),
             tasks=len({some.task for some in jobs}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -199,7 +200,9 @@ class Submissions:
         Raises:
             SubmissionError: Something of it is unknown, or it is too large.
         """
-        return estimate(self.plan(spec), self._registry)
+        found = estimate(self.plan(spec), self._registry)
+        most = math.inf if spec.budget is None else spec.budget.max_cost_usd or math.inf
+        return {**found, "max_cost_usd": min(found["max_cost_usd"], most)}
 
     def plan(self, spec: SweepSpec) -> list[NewJobs]:
         """The jobs that a sweep consists of, without storing anything.
