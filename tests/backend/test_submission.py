@@ -7,12 +7,14 @@ from datetime import UTC, datetime
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 from support.servers.live_api import changed
 
 from buildarena_backend.agents.turn_views import turn_of_call
 from buildarena_backend.agents.workbench import MAX_BYTES, MAX_DEPTH, check_arguments
 from buildarena_backend.catalog.models import load_registry
 from buildarena_backend.catalog.specs import JobSpec, SweepSpec
+from buildarena_backend.catalog.tracks import is_paper, session_limits, worlds_of
 from buildarena_backend.errors import SubmissionError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.external_calls import ExternalCall
@@ -162,6 +164,23 @@ def test_a_jobs_score_is_the_mean_over_its_worlds_of_which_the_exact_one_is_one(
             found = rollout_score(job, task, [test, *made])
             assert (found.outcome, found.success) == (outcome, success)
             assert found.indicator == pytest.approx(indicator)
+            paper = rollout_score(replace(job, track_config={"paper": True}), task, made)
+            assert (paper.outcome == "excluded") == (worlds[0][2] == flagged)
+
+
+def test_the_papers_protocol_is_a_track_of_its_own_with_the_exact_world_alone(submissions) -> None:
+    (plain,), (paper,) = (
+        submissions.plan(spec(models=["openai/gpt-4o"], paper=paper)) for paper in (False, True)
+    )
+    assert plain.track != paper.track
+    assert (worlds_of(paper.track_config), is_paper(paper.track_config)) == (0, True)
+    assert session_limits(paper.track_config, {}) == {}
+    assert session_limits(plain.track_config, {})["max_requests"] == 1500
+    assert submissions.estimate(spec(models=["openai/gpt-4o"], paper=True))["max_cost_usd"] is None
+    with pytest.raises(SubmissionError, match=r"paper's task.*support-4"):
+        submissions.plan(spec(tasks=["support-4"], paper=True))
+    with pytest.raises(ValidationError, match="leave `worlds` out"):
+        spec(worlds=4, paper=True)
 
 
 REFUSED = {"arguments": {"n": [1, "ü"]}, "ok": False, "reason": "block_presence", "feedback": "No."}

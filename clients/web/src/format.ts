@@ -94,6 +94,7 @@ const STATES: Readonly<Record<string, string>> = {
   unsuccessful: "failed its trial",
   construction_failed: "didn’t finish building",
   limit: "hit a limit",
+  excluded: "left out by the paper's protocol",
   errored: "hit an error (not counted)",
 };
 

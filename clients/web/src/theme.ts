@@ -20,6 +20,7 @@ export const OUTCOME_COLOURS: Readonly<Record<string, string>> = {
   unsuccessful: "orange",
   construction_failed: "red",
   limit: "grape",
+  excluded: "gray",
   errored: "pink",
   cancelled: "gray",
   running: "blue",

@@ -18,6 +18,7 @@ const ICONS: Readonly<Record<string, Icon>> = {
   unsuccessful: IconX,
   construction_failed: IconX,
   limit: IconHourglass,
+  excluded: IconBan,
   errored: IconPlugX,
   cancelled: IconBan,
   running: IconLoader2,

@@ -12,6 +12,7 @@ class Outcome(StrEnum):
         UNSUCCESSFUL: It was simulated and did not.
         CONSTRUCTION_FAILED: The session ended without a machine that may be simulated.
         LIMIT: The session reached a limit that its owner set below the protocol's: never scored.
+        EXCLUDED: The paper's protocol leaves its trial out as hacked: never scored.
         ERRORED: Infrastructure failed: never scored.
         CANCELLED: Somebody ended it: never scored.
     """
@@ -20,6 +21,7 @@ class Outcome(StrEnum):
     UNSUCCESSFUL = "unsuccessful"
     CONSTRUCTION_FAILED = "construction_failed"
     LIMIT = "limit"
+    EXCLUDED = "excluded"
     ERRORED = "errored"
     CANCELLED = "cancelled"
 

@@ -368,6 +368,7 @@ class SweepEstimate(View):
     models: list[ModelEstimate]
     cost_usd: float
     """Sum over the models with a known price."""
-    max_cost_usd: float
-    """What the jobs' limits and the sweep's budget leave at most; built-in models cost nothing."""
+    max_cost_usd: float | None
+    """What the jobs' limits and the sweep's budget leave at most, built-in models free; null where
+    nothing limits it."""
     power: BoardPower

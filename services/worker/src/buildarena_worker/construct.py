@@ -112,7 +112,7 @@ class ConstructHandler:
         return JournalHost(
             entries=[] if lease.first else self.store.journal.read(job.id),
             rollouts=[] if lease.first else self.store.rollouts.read(job.id),
-            limits=session_limits(job.limits),
+            limits=session_limits(job.track_config, job.limits),
             load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
             requester=Requester(
                 client=self.clients.for_config(job.model_config),

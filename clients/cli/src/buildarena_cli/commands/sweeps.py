@@ -300,7 +300,9 @@ def _show_estimate(estimate: SweepEstimate, *, as_json: bool) -> None:
 
 
 def _cost(estimate: SweepEstimate) -> str:
-    return f"about ${estimate['cost_usd']:,.2f}, at most ${estimate['max_cost_usd']:,.2f}"
+    most = estimate["max_cost_usd"]
+    limit = "without a limit" if most is None else f"at most ${most:,.2f}"
+    return f"about ${estimate['cost_usd']:,.2f}, {limit}"
 
 
 def _power(power: BoardPower) -> list[str]:

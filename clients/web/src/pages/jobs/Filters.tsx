@@ -6,7 +6,7 @@ import { jobSummary, models, tasks } from "../../api/queries";
 import { stateWords, titled, words } from "../../format";
 
 const LONGEST = 34;
-const OUTCOMES = ["success", "unsuccessful", "construction_failed", "limit", "errored", "cancelled"];
+const OUTCOMES = ["success", "unsuccessful", "construction_failed", "limit", "excluded", "errored", "cancelled"];
 /** What only links set: each can be taken away. */
 const LINKED = ["category", "sweep", "state", "flag", "track", "task_version", "configuration"] as const;
 

@@ -115,10 +115,24 @@ class Variant(BaseModel):
         ),
     ] = True
     worlds: Worlds = None
+    paper: Annotated[
+        bool,
+        Field(
+            description="The paper's protocol: its nine tasks in the exact world alone, without "
+            "test trials and limits; trials that the paper calls hacked are left out"
+        ),
+    ] = False
     one_shot: Annotated[bool, Field(description="Show an example construction")] = False
     closed_loop: ClosedLoop | None = None
     decoding: Decoding = Decoding()
     limits: Limits = Limits()
+
+    @field_validator("paper")
+    @classmethod
+    def _has_no_worlds(cls, paper: bool, info: ValidationInfo) -> bool:
+        if paper and info.data.get("worlds"):
+            raise ValueError("the paper's protocol has no varied worlds: leave `worlds` out")
+        return paper
 
 
 class JobSpec(Variant):

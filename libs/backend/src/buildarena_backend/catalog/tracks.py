@@ -39,6 +39,7 @@ class Track:
         on_demand: Whether roles look modules up instead of being told them.
         data_sheets: Whether roles are told the numbers of modules and world.
         worlds: How many varied worlds a finished machine is scored in besides the exact one.
+        paper: Whether it follows the paper's protocol, see `is_paper`.
     """
 
     workflow: str
@@ -54,6 +55,7 @@ class Track:
     on_demand: bool = False
     data_sheets: bool = False
     worlds: int = 0
+    paper: bool = False
 
     @property
     def id(self) -> str:
@@ -71,6 +73,8 @@ class Track:
             workflow += f"+{self.rounds}-rounds" + ("-analyst" if self.analyst else "")
         if self.worlds:
             workflow += f"+{self.worlds}-worlds"
+        if self.paper:
+            workflow += "+paper"
         return (
             f"{workflow}/{self.simulator}-{self.simulation_version}/"
             f"{self.prompts}-{self.prompts_digest[:8]}-{self.feedback_version}"
@@ -85,6 +89,7 @@ class Track:
             "data_sheets": parts.pop("data_sheets"),
             "looked_up": parts.pop("on_demand"),
             "worlds": parts.pop("worlds"),
+            "paper": parts.pop("paper"),
         }
         return {**parts, **{name: value for name, value in further.items() if value}}
 
@@ -107,12 +112,27 @@ def worlds_of(config: Mapping[str, Any]) -> int:
     return int(config.get("worlds", 0))
 
 
-def session_limits(own: Mapping[str, Any]) -> Mapping[str, Any]:
+def is_paper(config: Mapping[str, Any]) -> bool:
+    """Return whether a track follows the paper's protocol.
+
+    It has the paper's nine tasks in the exact world alone, without test trials and with the limits
+    of the workflow's turns alone; trials that the paper calls hacked are left out.
+
+    Args:
+        config: What `Track.as_config` gave.
+    """
+    return bool(config.get("paper"))
+
+
+def session_limits(config: Mapping[str, Any], own: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return all limits of a job's session, by name.
 
     Args:
+        config: The track's, as `Track.as_config` gave it.
         own: Those that its owner set, below those of the protocol.
     """
+    if is_paper(config):
+        return own
     standard = {"max_requests": STANDARD_MAX_REQUESTS, "max_cost_usd": STANDARD_MAX_COST_USD}
     return {**standard, **own}
 
@@ -189,6 +209,7 @@ def make_track(
     on_demand: bool = False,
     data_sheets: bool = True,
     worlds: int = 0,
+    paper: bool = False,
 ) -> Track:
     """The track of a submission, with the prompts and feedback that are installed now.
 
@@ -202,6 +223,7 @@ def make_track(
         on_demand: Whether the task's modules are looked up instead of told.
         data_sheets: Whether the numbers of modules and world are told.
         worlds: How many varied worlds machines are scored in.
+        paper: Whether it follows the paper's protocol.
     """
     return Track(
         workflow=workflow.name,
@@ -217,4 +239,5 @@ def make_track(
         on_demand=on_demand,
         data_sheets=data_sheets,
         worlds=worlds,
+        paper=paper,
     )

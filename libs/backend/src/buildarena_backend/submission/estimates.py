@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib import resources
@@ -38,7 +39,8 @@ def estimate(jobs: Sequence[NewJobs], registry: ModelRegistry) -> Mapping[str, A
         "models": models,
         "cost_usd": round(sum(model["usage"]["cost_usd"] or 0.0 for model in models), 2),
         "max_cost_usd": sum(
-            len(some.seeds) * float(session_limits(some.limits)["max_cost_usd"])
+            len(some.seeds)
+            * float(session_limits(some.track_config, some.limits).get("max_cost_usd", math.inf))
             for some in jobs
             if registry.provider_of(registry.models[some.model]).protocol != BUILTIN_PROTOCOL
         ),

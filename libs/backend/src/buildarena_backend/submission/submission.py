@@ -30,7 +30,7 @@ from buildarena_backend.trials.known_simulators import (
     worlds_here,
     worlds_issues,
 )
-from buildarena_benchmark import Task, ValidationIssue
+from buildarena_benchmark import Task, ValidationIssue, paper_tasks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,7 +202,8 @@ class Submissions:
         """
         found = estimate(self.plan(spec), self._registry)
         most = math.inf if spec.budget is None else spec.budget.max_cost_usd or math.inf
-        return {**found, "max_cost_usd": min(found["max_cost_usd"], most)}
+        most = min(found["max_cost_usd"], most)
+        return {**found, "max_cost_usd": most if math.isfinite(most) else None}
 
     def plan(self, spec: SweepSpec) -> list[NewJobs]:
         """The jobs that a sweep consists of, without storing anything.
@@ -258,7 +259,10 @@ class Submissions:
             closed_loop=variant.closed_loop,
             on_demand=on_demand,
             data_sheets=variant.data_sheets,
-            worlds=worlds_here(self._context, variant.simulator, variant.worlds),
+            worlds=0
+            if variant.paper
+            else worlds_here(self._context, variant.simulator, variant.worlds),
+            paper=variant.paper,
         )
 
     def _require_known(
@@ -277,6 +281,7 @@ class Submissions:
             *_unknown("workflow", {"workflow": variant.workflow}, self._workflows),
             *simulator_issues(self._context, variant.simulator),
             *worlds_issues(self._context, variant.simulator, variant.worlds),
+            *(_unknown("paper's task", tasks, paper_tasks()) if variant.paper else ()),
             *_unknown("prompt pack", {"prompts": variant.prompts}, self._packs.names),
         ]
         issues = issues or [

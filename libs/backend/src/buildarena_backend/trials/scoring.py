@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from buildarena_backend import __version__
 from buildarena_backend.catalog.tasks import TaskCatalog
+from buildarena_backend.catalog.tracks import is_paper
 from buildarena_backend.errors import PermanentError
 from buildarena_backend.jobs.job import Job
 from buildarena_backend.journal.rollouts import RolloutRecord
@@ -21,6 +22,8 @@ from buildarena_benchmark.scoring.registry import known_scorers
 from buildarena_geometry import DOCUMENT_VERSION, Machine
 from buildarena_geometry import __version__ as geometry_version
 
+EXCLUDED_BY_PAPER: Final = frozenset({"no_wheels", "start_too_high", "twr_below_one", "never_fell"})
+"""Flags of trials that the published evaluation leaves out."""
 PASSED_FROM: Final = 0.5
 """Share of its worlds that a machine passes, at least, if its job is a success."""
 
@@ -104,8 +107,11 @@ def rollout_score(job: Job, task: Task, records: Sequence[RolloutRecord]) -> Job
     gained = [world.score.indicator for world in worlds if world.counts]
     share = len(gained) / len(worlds)
     passed = {} if len(worlds) == 1 else {"worlds": len(worlds), "worlds_passed": len(gained)}
+    outcome = Outcome.SUCCESS if share >= PASSED_FROM else Outcome.UNSUCCESSFUL
+    if is_paper(job.track_config) and not EXCLUDED_BY_PAPER.isdisjoint(best.flags or ()):
+        outcome = Outcome.EXCLUDED
     return JobScore(
-        outcome=Outcome.SUCCESS if share >= PASSED_FROM else Outcome.UNSUCCESSFUL,
+        outcome=outcome,
         success=share,
         indicator=math.fsum(gained) / len(worlds),
         metrics={**(best.metrics or {}), **passed},

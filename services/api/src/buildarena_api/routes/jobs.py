@@ -45,6 +45,7 @@ from buildarena_benchmark.scores import explain
 _ENDED: Final = {
     Outcome.CONSTRUCTION_FAILED: "The machine was not finished",
     Outcome.LIMIT: "The session reached a limit that its owner set, so the job counts nowhere",
+    Outcome.EXCLUDED: "The paper's protocol leaves it out",
     Outcome.ERRORED: "The service failed, so the job counts nowhere",
     Outcome.CANCELLED: "The job was cancelled",
 }
@@ -55,6 +56,8 @@ def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
     if job.outcome is None:
         return None
     outcome = Outcome(job.outcome)
+    if outcome == Outcome.EXCLUDED and worlds:
+        return f"{_ENDED[outcome]} as hacked. {worlds[0].explanation}"
     if outcome not in SIMULATED:
         why = job.detail or (job.reason or "").replace("_", " ")
         return f"{_ENDED[outcome]}{': ' if why else ''}{why.rstrip('.')}."
@@ -68,7 +71,7 @@ def explain_job(job: Job, worlds: Sequence[WorldView]) -> str | None:
 
 def _worlds(job: Job, context: Context) -> list[WorldView]:
     task = context.tasks.exact(job.task, job.task_version)
-    if task is None or job.outcome not in SIMULATED:
+    if task is None or job.outcome not in {*SIMULATED, Outcome.EXCLUDED}:
         return []
     drawn = drawn_for(job, task)
     return [

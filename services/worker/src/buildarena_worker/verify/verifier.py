@@ -147,7 +147,7 @@ class Verifier:
         host = JournalHost(
             entries=self.store.journal.read(job.id),
             rollouts=stored.records,
-            limits=session_limits(job.limits),
+            limits=session_limits(job.track_config, job.limits),
             load_trajectory=lambda digest: read_trajectory(self.artifacts.get(digest)),
         )
         session = self.sessions.begin(job, host)
